@@ -1,0 +1,213 @@
+//! The plain CAN frame that the core works on.
+//!
+//! A driver's own frame type is copied into a [`CanFrame`] at the door ([`CanFrame::copy_of`]) and built
+//! from one on the way out ([`CanFrame::convert`]); in between, the crate knows no driver.
+//!
+//! ```text
+//! CanFrame = header (29-bit id, extended flag, remote flag) + length 0..=8 + data, zero beyond the length
+//! ```
+//!
+//! ```
+//! use drivetrain::frame::CanFrame;
+//! use embedded_can::{Frame, StandardId};
+//!
+//! let id = StandardId::new(0x200).ok_or("not an 11-bit id")?;
+//! let frame = CanFrame::new(id, &[0x03, 0xE8]).ok_or("more than 8 bytes")?;
+//! assert_eq!(frame.data(), [0x03, 0xE8]);
+//! # Ok::<(), &str>(())
+//! ```
+//!
+//! Classic CAN only: a CAN FD frame of more than 8 bytes has no `CanFrame`.
+
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+
+const EXTENDED: u32 = 1 << 31;
+const REMOTE: u32 = 1 << 30;
+const ID_MASK: u32 = 0x1FFF_FFFF;
+
+/// A classic CAN data or remote frame.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CanFrame {
+    header: u32,
+    data: [u8; 8],
+    length: u8,
+}
+
+impl CanFrame {
+    /// Builds a standard data frame of 8 bytes; `None` for an id above `0x7FF`.
+    #[must_use]
+    pub const fn standard(id: u16, data: [u8; 8]) -> Option<Self> {
+        if id <= 0x7FF { Some(Self { header: id as u32, data, length: 8 }) } else { None }
+    }
+
+    /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
+    #[must_use]
+    pub fn copy_of(frame: &impl Frame) -> Option<Self> {
+        if frame.is_remote_frame() {
+            Self::new_remote(frame.id(), frame.dlc())
+        } else {
+            Self::new(frame.id(), frame.data())
+        }
+    }
+
+    /// Builds a driver's frame with the same content; `None` when the driver's type cannot hold it.
+    #[must_use]
+    pub fn convert<F: Frame>(&self) -> Option<F> {
+        if self.is_remote_frame() {
+            F::new_remote(self.id(), self.dlc())
+        } else {
+            F::new(self.id(), self.data())
+        }
+    }
+
+    /// Returns the id, extended flag and remote flag as one word.
+    ///
+    /// For a standard data frame, and only for that, it is at most `0x7FF`: one comparison tells all three.
+    #[must_use]
+    pub const fn header(&self) -> u32 {
+        self.header
+    }
+
+    /// Returns all 8 data bytes; those beyond the length are zero.
+    #[must_use]
+    pub const fn bytes(&self) -> &[u8; 8] {
+        &self.data
+    }
+
+    /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
+    #[must_use]
+    pub const fn length(&self) -> u8 {
+        self.length
+    }
+
+    fn with_header(header: u32, data: &[u8]) -> Option<Self> {
+        let mut frame = Self { header, data: [0; 8], length: u8::try_from(data.len()).ok()? };
+        frame.data.get_mut(..data.len())?.copy_from_slice(data);
+        Some(frame)
+    }
+}
+
+fn header_of(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => u32::from(id.as_raw()),
+        Id::Extended(id) => id.as_raw() | EXTENDED,
+    }
+}
+
+impl Frame for CanFrame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        Self::with_header(header_of(id.into()), data)
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
+        let length = u8::try_from(dlc).ok().filter(|length| *length <= 8)?;
+        Some(Self { header: header_of(id.into()) | REMOTE, data: [0; 8], length })
+    }
+
+    fn is_extended(&self) -> bool {
+        self.header & EXTENDED != 0
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.header & REMOTE != 0
+    }
+
+    fn id(&self) -> Id {
+        let raw = self.header & ID_MASK;
+        let standard = u16::try_from(raw).ok().and_then(StandardId::new);
+        match standard {
+            Some(id) if !self.is_extended() => Id::Standard(id),
+            _ => Id::Extended(ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO)),
+        }
+    }
+
+    fn dlc(&self) -> usize {
+        usize::from(self.length)
+    }
+
+    fn data(&self) -> &[u8] {
+        let length = if self.is_remote_frame() { 0 } else { self.dlc() };
+        self.data.get(..length).unwrap_or(&[])
+    }
+}
+
+/// Writes the form of candump: `201 [8] 0E 16 00 00 FF FD 21 00`.
+impl core::fmt::Debug for CanFrame {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.id() {
+            Id::Standard(id) => write!(f, "{:03X} [{}]", id.as_raw(), self.length)?,
+            Id::Extended(id) => write!(f, "{:08X} [{}]", id.as_raw(), self.length)?,
+        }
+        if self.is_remote_frame() {
+            return f.write_str(" remote request");
+        }
+        self.data().iter().try_for_each(|byte| write!(f, " {byte:02X}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::format;
+
+    fn standard(raw: u16) -> StandardId {
+        StandardId::new(raw).unwrap()
+    }
+
+    #[test]
+    fn every_length_up_to_eight_is_kept_and_nine_is_refused() {
+        let bytes = [1, 2, 3, 4, 5, 6, 7, 8, 9];
+        for length in 0..=8 {
+            let frame = CanFrame::new(standard(0x201), &bytes[..length]).unwrap();
+            assert_eq!((frame.dlc(), frame.data()), (length, &bytes[..length]));
+            assert!(frame.bytes()[length..].iter().all(|byte| *byte == 0));
+            let remote = CanFrame::new_remote(standard(0x201), length).unwrap();
+            assert_eq!((remote.dlc(), remote.data()), (length, &[][..]));
+        }
+        assert_eq!(CanFrame::new(standard(0x201), &bytes), None);
+        assert_eq!(CanFrame::new_remote(standard(0x201), 9), None);
+        assert_eq!(CanFrame::new_remote(standard(0x201), usize::MAX), None);
+    }
+
+    #[test]
+    fn one_number_in_two_id_spaces_is_two_ids() {
+        let standard = CanFrame::new(standard(0x201), &[]).unwrap();
+        let extended = CanFrame::new(ExtendedId::new(0x201).unwrap(), &[]).unwrap();
+        assert_ne!(standard.id(), extended.id());
+        assert!(standard.header() <= 0x7FF);
+        assert!(extended.header() > 0x7FF);
+        assert!(CanFrame::new_remote(standard.id(), 8).unwrap().header() > 0x7FF);
+    }
+
+    #[test]
+    fn ids_survive_at_both_ends_of_their_range() {
+        for raw in [0, 1, 0x7FF] {
+            let id = Id::Standard(StandardId::new(raw).unwrap());
+            assert_eq!(CanFrame::new(id, &[]).unwrap().id(), id);
+        }
+        for raw in [0, 1, 0x7FF, 0x800, 0x1FFF_FFFF] {
+            let id = Id::Extended(ExtendedId::new(raw).unwrap());
+            assert_eq!(CanFrame::new(id, &[]).unwrap().id(), id);
+        }
+        assert_eq!(CanFrame::standard(0x800, [0; 8]), None);
+    }
+
+    #[test]
+    fn copies_and_conversions_are_equal() {
+        let data = CanFrame::standard(0x1FF, [1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+        let remote = CanFrame::new_remote(ExtendedId::MAX, 3).unwrap();
+        for frame in [data, remote] {
+            assert_eq!(CanFrame::copy_of(&frame), Some(frame));
+            assert_eq!(frame.convert::<CanFrame>(), Some(frame));
+        }
+    }
+
+    #[test]
+    fn debug_is_the_form_of_candump() {
+        let frame = CanFrame::new(standard(0x201), &[0x0E, 0x16]).unwrap();
+        assert_eq!(format!("{frame:?}"), "201 [2] 0E 16");
+        let remote = CanFrame::new_remote(ExtendedId::new(0x12).unwrap(), 1).unwrap();
+        assert_eq!(format!("{remote:?}"), "00000012 [1] remote request");
+    }
+}

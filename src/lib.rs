@@ -1,0 +1,30 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_auto_cfg))]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+// F0: vocabulary
+pub mod frame;
+pub mod math;
+pub mod time;
+pub mod units;
+
+// F1: pure algorithms
+pub mod control;
+pub mod encoder;
+pub mod geometry;
+
+// F2: what every motor and every chassis has in common; byte protocols
+pub mod chassis;
+pub mod motor;
+pub mod wire;
+
+// F3: device families and their simulation
+pub mod dji;
+#[cfg(feature = "sim")]
+pub mod sim;
+
+// F4: the only part that does I/O
+pub mod runner;

@@ -1,0 +1,65 @@
+use crate::units::AngularVelocity;
+
+/// An owner of motors whose output shafts follow a velocity.
+///
+/// `H` is the owner's handle type. A chassis needs no more than this from its wheels.
+pub trait VelocityDrive<H: Copy> {
+    /// Returns the measured velocity of the output shaft; `None` when there is no fresh feedback.
+    fn velocity(&self, motor: H) -> Option<AngularVelocity>;
+
+    /// Sets the velocity that the output shaft is to follow.
+    ///
+    /// # Errors
+    /// Says why the motor cannot take the target now. The value is then not kept for later.
+    fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError>;
+}
+
+impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
+    fn velocity(&self, motor: H) -> Option<AngularVelocity> {
+        (**self).velocity(motor)
+    }
+
+    fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError> {
+        (**self).set_velocity(motor, target)
+    }
+}
+
+/// Why a motor does not take a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum TargetError {
+    /// The handle's motor was detached.
+    Detached,
+    /// The target is NaN or infinite. The motor goes to its safe output at once.
+    NotFinite,
+    /// The device is not armed.
+    Disarmed,
+    /// There is no fresh feedback from the motor.
+    NoFeedback,
+    /// The motor was relaxed by a fault and waits to be armed again.
+    Relaxed,
+    /// The motor was attached without the control loop that this kind of target needs.
+    NoLoop,
+    /// The position of a geared output shaft is relative to power-on until it is zeroed.
+    NotHomed,
+    /// This motor does not offer this kind of target.
+    Unsupported,
+}
+
+impl core::fmt::Display for TargetError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Detached => "the motor was detached",
+            Self::NotFinite => "the target is NaN or infinite",
+            Self::Disarmed => "the device is not armed",
+            Self::NoFeedback => "no fresh feedback from the motor",
+            Self::Relaxed => "the motor was relaxed by a fault: arm it again",
+            Self::NoLoop => "the motor was attached without the loop for this target",
+            Self::NotHomed => "the output angle is unknown until the position is zeroed",
+            Self::Unsupported => "the motor does not offer this kind of target",
+        })
+    }
+}
+
+impl core::error::Error for TargetError {}

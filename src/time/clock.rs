@@ -1,0 +1,113 @@
+use super::{Duration, Instant};
+use core::cell::Cell;
+
+/// A source of time for the runner.
+///
+/// An implementation must never go back and must not stand still while the loop runs; a step of one
+/// microsecond is the resolution that the crate uses. A reading that goes back counts as no time passed.
+///
+/// Any closure `FnMut() -> Instant` is a clock.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Clock, Instant};
+///
+/// let mut reading = 0;
+/// let mut clock = || {
+///     reading += 10;
+///     Instant::from_micros(reading)
+/// };
+/// assert_eq!(clock.now(), Instant::from_micros(10));
+/// assert_eq!(clock.now(), Instant::from_micros(20));
+/// ```
+pub trait Clock {
+    /// Reads the time.
+    fn now(&mut self) -> Instant;
+}
+
+impl<F: FnMut() -> Instant> Clock for F {
+    fn now(&mut self) -> Instant {
+        self()
+    }
+}
+
+/// A clock that stands until it is moved: share it by reference between a test and what is tested.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Clock, Duration, Instant, ManualClock};
+///
+/// let clock = ManualClock::new(Instant::START);
+/// let mut shared = &clock;
+/// clock.advance(Duration::from_millis(3));
+/// assert_eq!(shared.now(), Instant::from_micros(3_000));
+/// ```
+#[derive(Debug, Default)]
+pub struct ManualClock(Cell<Instant>);
+
+impl ManualClock {
+    /// Starts at `now`.
+    #[must_use]
+    pub const fn new(now: Instant) -> Self {
+        Self(Cell::new(now))
+    }
+
+    /// Reads the time.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.0.get()
+    }
+
+    /// Moves the time forward.
+    pub fn advance(&self, duration: Duration) {
+        self.set(self.now() + duration);
+    }
+
+    /// Sets the time, also backward: that is a fault to test.
+    pub fn set(&self, now: Instant) {
+        self.0.set(now);
+    }
+}
+
+impl Clock for &ManualClock {
+    fn now(&mut self) -> Instant {
+        ManualClock::now(self)
+    }
+}
+
+/// The time since its creation, from the operating system's monotonic clock.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Clock, Instant, StdClock};
+///
+/// let mut clock = StdClock::new();
+/// let first = clock.now();
+/// assert!(clock.now() >= first);
+/// ```
+#[cfg(feature = "std")]
+#[derive(Debug, Clone, Copy)]
+pub struct StdClock(std::time::Instant);
+
+#[cfg(feature = "std")]
+impl StdClock {
+    /// Starts at zero, now.
+    #[must_use]
+    pub fn new() -> Self {
+        Self(std::time::Instant::now())
+    }
+}
+
+#[cfg(feature = "std")]
+impl Default for StdClock {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(feature = "std")]
+impl Clock for StdClock {
+    fn now(&mut self) -> Instant {
+        Instant::START + Duration::from(self.0.elapsed())
+    }
+}

@@ -1,0 +1,162 @@
+use super::{Duration, Instant};
+
+/// One step of the control loop: when it takes place, and the time since the one before.
+///
+/// Made by a [`Ticker`], or by hand in tests and in loops that a hardware timer starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tick {
+    now: Instant,
+    dt_s: f32,
+}
+
+impl Tick {
+    /// Takes the time of this step and the seconds since the one before.
+    ///
+    /// Any `dt_s` is accepted: what a controller does with zero, negative, NaN or very long is in its docs.
+    #[must_use]
+    pub const fn new(now: Instant, dt_s: f32) -> Self {
+        Self { now, dt_s }
+    }
+
+    /// Returns the time of this step.
+    #[must_use]
+    pub const fn now(self) -> Instant {
+        self.now
+    }
+
+    /// Returns the seconds since the step before.
+    #[must_use]
+    pub const fn dt_s(self) -> f32 {
+        self.dt_s
+    }
+}
+
+/// Keeps the cadence of the control loop: no drift, and every period that was missed is counted.
+///
+/// Call [`due`](Self::due) as often as you like. Steps stay on the grid `first call + n * period`; a step
+/// that comes late does not move the later ones. Periods that passed without a call are skipped, not made
+/// up for: the step after them carries the real `dt_s`, and [`overruns`](Self::overruns) grows by their number.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Duration, Instant, Ticker};
+///
+/// let at = Instant::from_micros;
+/// let mut ticker = Ticker::new(Duration::from_millis(1));
+/// ticker.due(at(0)).ok_or("starts")?;
+/// let late = ticker.due(at(3_200)).ok_or("due at 1000")?;
+/// assert_eq!((late.dt_s(), ticker.overruns()), (0.0032, 2)); // 2000 and 3000 were skipped
+/// assert!(ticker.due(at(3_999)).is_none());
+/// assert!(ticker.due(at(4_000)).is_some()); // still on the grid
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Ticker {
+    period_us: u32,
+    next: Option<Instant>,
+    last: Instant,
+    overruns: u32,
+}
+
+impl Ticker {
+    /// Takes the period: at least 1 µs and at most 71 minutes, otherwise the nearest of these.
+    #[must_use]
+    pub const fn new(period: Duration) -> Self {
+        let period_us = match period.micros_u32() {
+            Some(0) => 1,
+            Some(micros) => micros,
+            None => u32::MAX,
+        };
+        Self { period_us, next: None, last: Instant::START, overruns: 0 }
+    }
+
+    /// Returns the step that is due at `now`, or `None` when the next one lies ahead.
+    ///
+    /// The first call starts the cadence and carries one nominal period as `dt_s`.
+    pub fn due(&mut self, now: Instant) -> Option<Tick> {
+        let Some(next) = self.next else {
+            self.last = now;
+            self.next = Some(now + self.period());
+            return Some(Tick::new(now, self.period().as_secs_f32()));
+        };
+        if now < next {
+            return None;
+        }
+        match now.since(next).micros_u32() {
+            Some(late_us) => {
+                let skipped = late_us / self.period_us;
+                self.overruns = self.overruns.saturating_add(skipped);
+                let steps = u64::from(skipped) + 1;
+                self.next = Some(next + Duration::from_micros(steps * u64::from(self.period_us)));
+            }
+            None => {
+                self.overruns = u32::MAX;
+                self.next = Some(now + self.period());
+            }
+        }
+        let tick = Tick::new(now, now.since(self.last).as_secs_f32());
+        self.last = now;
+        Some(tick)
+    }
+
+    /// Returns the number of periods that were skipped; `u32::MAX` after a single pause of over 71 minutes.
+    #[must_use]
+    pub const fn overruns(&self) -> u32 {
+        self.overruns
+    }
+
+    /// Returns the period.
+    #[must_use]
+    pub const fn period(&self) -> Duration {
+        Duration::from_micros(self.period_us as u64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(micros: u64) -> Instant {
+        Instant::from_micros(micros)
+    }
+
+    #[test]
+    fn an_hour_at_one_kilohertz_does_not_drift() {
+        let mut ticker = Ticker::new(Duration::from_millis(1));
+        let (mut now, mut steps) = (0_u64, 0_u64);
+        while now < 3_600_000_000 {
+            steps += u64::from(ticker.due(at(now)).is_some());
+            now += 137; // polled off the grid
+        }
+        assert_eq!((steps, ticker.overruns()), (3_600_000, 0));
+    }
+
+    #[test]
+    fn time_that_goes_back_makes_no_step_and_no_overrun() {
+        let mut ticker = Ticker::new(Duration::from_millis(1));
+        assert!(ticker.due(at(10_000)).is_some());
+        assert_eq!(ticker.due(at(2_000)), None);
+        assert_eq!(ticker.overruns(), 0);
+        assert_eq!(ticker.due(at(11_000)).map(Tick::dt_s), Some(0.001));
+    }
+
+    #[test]
+    fn a_pause_of_days_is_one_step_and_a_saturated_count() {
+        let mut ticker = Ticker::new(Duration::from_millis(1));
+        assert!(ticker.due(at(0)).is_some());
+        let after = at(10 * 86_400 * 1_000_000);
+        assert!(ticker.due(after).is_some_and(|tick| tick.dt_s() > 863_999.0));
+        assert_eq!(ticker.overruns(), u32::MAX);
+        assert_eq!(ticker.due(after), None);
+        assert!(ticker.due(after + Duration::from_millis(1)).is_some());
+    }
+
+    #[test]
+    fn a_period_of_zero_is_one_microsecond() {
+        let mut ticker = Ticker::new(Duration::ZERO);
+        assert!(ticker.due(at(0)).is_some());
+        assert_eq!(ticker.due(at(0)), None);
+        assert!(ticker.due(at(1)).is_some());
+    }
+}

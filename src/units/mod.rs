@@ -1,0 +1,91 @@
+//! Newtypes for the quantities that this field writes in more than one unit.
+//!
+//! | type | stored as | also read and written as |
+//! |---|---|---|
+//! | [`Angle`] | rad | degrees, turns, encoder counts |
+//! | [`AngularVelocity`] | rad/s | rpm, degrees/s |
+//! | [`Current`] | A | mA |
+//! | [`Voltage`] | V | mV |
+//!
+//! Everything else in this crate is a plain SI `f32` with the unit in its name (`radius_m`, `dt_s`).
+//! A newtype accepts any `f32`, NaN included: what cannot be used is refused where it would be used.
+//!
+//! ```
+//! use drivetrain::units::{Angle, AngularVelocity};
+//!
+//! assert_eq!(Angle::from_degrees(180.0), Angle::from_turns(0.5));
+//! assert!((AngularVelocity::from_rpm(60.0).as_rad_per_s() - core::f32::consts::TAU).abs() < 1e-6);
+//! ```
+
+mod angle;
+mod angular_velocity;
+mod electrical;
+
+pub use angle::Angle;
+pub use angular_velocity::AngularVelocity;
+pub use electrical::{Current, Voltage};
+
+/// Gives a quantity that is a newtype over `f32` its linear arithmetic.
+macro_rules! linear {
+    ($quantity:ident) => {
+        impl $quantity {
+            /// Zero.
+            pub const ZERO: Self = Self(0.0);
+
+            /// Returns the absolute value.
+            #[must_use]
+            pub const fn abs(self) -> Self {
+                Self(self.0.abs())
+            }
+
+            /// Tells whether the value is neither NaN nor infinite.
+            #[must_use]
+            pub const fn is_finite(self) -> bool {
+                self.0.is_finite()
+            }
+        }
+
+        impl core::ops::Neg for $quantity {
+            type Output = Self;
+            fn neg(self) -> Self {
+                Self(-self.0)
+            }
+        }
+
+        impl core::ops::Add for $quantity {
+            type Output = Self;
+            fn add(self, other: Self) -> Self {
+                Self(self.0 + other.0)
+            }
+        }
+
+        impl core::ops::Sub for $quantity {
+            type Output = Self;
+            fn sub(self, other: Self) -> Self {
+                Self(self.0 - other.0)
+            }
+        }
+
+        impl core::ops::Mul<f32> for $quantity {
+            type Output = Self;
+            fn mul(self, factor: f32) -> Self {
+                Self(self.0 * factor)
+            }
+        }
+
+        impl core::ops::Div<f32> for $quantity {
+            type Output = Self;
+            fn div(self, divisor: f32) -> Self {
+                Self(self.0 / divisor)
+            }
+        }
+
+        impl core::ops::Div for $quantity {
+            type Output = f32;
+            fn div(self, divisor: Self) -> f32 {
+                self.0 / divisor.0
+            }
+        }
+    };
+}
+use linear;
