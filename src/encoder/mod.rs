@@ -1,1 +1,48 @@
-//! (being written)
+//! From a single-turn rotor angle to an exact multi-turn position of the output shaft.
+//!
+//! ```text
+//! 13-bit angle ──shortest / resolve──> rotor counts moved ──Shaft──> turns: i64 + phase of the output shaft
+//! ```
+//!
+//! | item | what it does |
+//! |---|---|
+//! | [`shortest`] | the way from one angle to the next, when less than half a rotor turn passed |
+//! | [`Gap::resolve`] | the same across lost frames, with the reported speeds; says when it cannot know |
+//! | [`GearRatio`] | an exact fraction, 3591:187 say |
+//! | [`Shaft`] | turns and phase of the output shaft, in integers, for any number of turns |
+//! | [`Position`] | a multi-turn position as users write it |
+//! | [`Homing`] | what is known of the output shaft's absolute angle |
+//!
+//! All positions are exact: the phase of the output shaft is counted in rotor counts divided by the gear's
+//! denominator, so neither a float nor a 64-bit division takes part, and an `f32` is made only of the
+//! difference between two positions. An angle is counter-clockwise positive.
+
+mod gap;
+mod gear;
+mod position;
+mod shaft;
+
+pub use gap::Gap;
+pub use gear::{GearError, GearRatio};
+pub use position::{Homing, Position};
+pub use shaft::Shaft;
+
+/// Counts in one rotor turn of a 13-bit encoder.
+pub const COUNTS_PER_TURN: u16 = 8192;
+
+/// Returns the shortest way from one 13-bit angle to the next, in counts: -4096 to 4095.
+///
+/// Half a turn is undecidable and is taken as -4096.
+///
+/// # Examples
+/// ```
+/// use drivetrain::encoder::shortest;
+///
+/// assert_eq!(shortest(8190, 1), 3); // over the top
+/// assert_eq!(shortest(1, 8190), -3); // and back
+/// ```
+#[must_use]
+pub const fn shortest(previous: u16, next: u16) -> i32 {
+    const UNUSED_BITS: u32 = 32 - COUNTS_PER_TURN.trailing_zeros();
+    ((next as i32 - previous as i32) << UNUSED_BITS) >> UNUSED_BITS
+}

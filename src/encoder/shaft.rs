@@ -1,0 +1,323 @@
+use super::{COUNTS_PER_TURN, GearRatio, Position};
+use crate::units::Angle;
+use core::f32::consts::TAU;
+
+/// Turns and phase of an output shaft, advanced by rotor counts.
+///
+/// The phase is counted in *fine counts*: rotor counts divided by the gear's output turns. For 3591:187 a rotor
+/// count is 187 fine counts and an output turn is 8192 * 3591 of them, so nothing is ever rounded.
+///
+/// # Examples
+/// ```
+/// use drivetrain::encoder::{GearRatio, Shaft};
+///
+/// let mut shaft = Shaft::new(GearRatio::new(36, 1)?, false);
+/// shaft.seed(8000);
+/// assert_eq!(shaft.rotor_counts(), 8000); // the first frame: absolute angle, no turn
+/// for _ in 0..36 {
+///     shaft.advance(4095);
+///     shaft.advance(4095);
+///     shaft.advance(2);
+/// }
+/// assert_eq!(shaft.rotor_counts(), 8000 + 36 * 8192);
+/// assert_eq!(shaft.position().turns(), 1); // 36 rotor turns are one output turn, exactly
+/// # Ok::<(), drivetrain::encoder::GearError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shaft {
+    turns: i64,
+    phase: i32,
+    fine_per_turn: i32,
+    fine_per_count: i32,
+    radians_per_fine: f32,
+}
+
+impl Shaft {
+    /// Takes the gear, and whether the rotor's positive direction is the shaft's negative one.
+    #[must_use]
+    pub const fn new(gear: GearRatio, reversed: bool) -> Self {
+        let fine_per_turn = COUNTS_PER_TURN as i32 * gear.rotor() as i32;
+        let fine_per_count = gear.output() as i32;
+        Self {
+            turns: 0,
+            phase: 0,
+            fine_per_turn,
+            fine_per_count: if reversed { -fine_per_count } else { fine_per_count },
+            radians_per_fine: TAU / fine_per_turn as f32,
+        }
+    }
+
+    /// Starts from the first angle of the rotor: within the first turn, no turn counted.
+    ///
+    /// A reversed shaft sees the angle `8192 - rotor_angle`.
+    pub const fn seed(&mut self, rotor_angle: u16) {
+        self.set_zero();
+        let angle = rotor_angle as i32 % COUNTS_PER_TURN as i32;
+        let reversed = self.fine_per_count < 0 && angle != 0;
+        self.advance_far(if reversed { angle - COUNTS_PER_TURN as i32 } else { angle });
+        self.turns = 0;
+    }
+
+    /// Makes the present position zero.
+    pub const fn set_zero(&mut self) {
+        self.turns = 0;
+        self.phase = 0;
+    }
+
+    /// Calls the present position `position`. A NaN or infinite angle counts as zero.
+    pub const fn set_position(&mut self, position: Position) {
+        (self.turns, self.phase) = self.locate(position);
+    }
+
+    /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`](super::shortest) gives.
+    #[inline]
+    pub const fn advance(&mut self, counts: i32) {
+        let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count));
+        if next < 0 {
+            self.phase = next.wrapping_add(self.fine_per_turn);
+            self.turns = self.turns.wrapping_sub(1);
+        } else if next >= self.fine_per_turn {
+            self.phase = next.wrapping_sub(self.fine_per_turn);
+            self.turns = self.turns.wrapping_add(1);
+        } else {
+            self.phase = next;
+        }
+    }
+
+    /// Moves by any number of rotor counts: across a gap of many turns.
+    pub const fn advance_far(&mut self, counts: i32) {
+        const STEP: i32 = COUNTS_PER_TURN as i32 / 2;
+        let mut rest = counts;
+        while rest > STEP {
+            self.advance(STEP);
+            rest -= STEP;
+        }
+        while rest < -STEP {
+            self.advance(-STEP);
+            rest += STEP;
+        }
+        self.advance(rest);
+    }
+
+    /// Returns the position as turns and angle; the angle is rounded to `f32`.
+    #[must_use]
+    pub const fn position(&self) -> Position {
+        Position::new(self.turns, self.angle())
+    }
+
+    /// Returns the angle within the turn: 0 up to, but not including, one turn.
+    #[must_use]
+    pub const fn angle(&self) -> Angle {
+        const BELOW_ONE_TURN: f32 = TAU.next_down();
+        let radians = self.phase as f32 * self.radians_per_fine;
+        Angle::from_radians(if radians < TAU { radians } else { BELOW_ONE_TURN })
+    }
+
+    /// Returns the rotor's counts in the direction of the shaft, since the seed (which counts its angle) or
+    /// since zero was set; exact. After a position other than zero was set, rounded to whole counts.
+    #[must_use]
+    pub const fn rotor_counts(&self) -> i64 {
+        let fine =
+            self.turns.wrapping_mul(self.fine_per_turn as i64).wrapping_add(self.phase as i64);
+        let counts = divide(fine.unsigned_abs(), self.fine_per_count.unsigned_abs()).cast_signed();
+        if fine < 0 { counts.wrapping_neg() } else { counts }
+    }
+
+    /// Returns turns and phase of a position in this shaft's counts.
+    #[must_use]
+    pub(crate) const fn locate(&self, position: Position) -> (i64, i32) {
+        #[expect(clippy::cast_possible_truncation, reason = "0 to one turn; NaN is 0")]
+        let phase = (position.angle().as_radians() / self.radians_per_fine + 0.5) as i32;
+        if phase < self.fine_per_turn {
+            (position.turns(), phase)
+        } else {
+            (position.turns().saturating_add(1), 0)
+        }
+    }
+
+    /// Returns the way to a located position in radians: exact near zero, saturated at 63 turns.
+    #[must_use]
+    #[inline]
+    pub(crate) const fn way_to(&self, turns: i64, phase: i32) -> f32 {
+        let whole = turns.wrapping_sub(self.turns);
+        #[expect(clippy::cast_possible_truncation, reason = "limited to 63")]
+        let whole = if whole > 63 {
+            63
+        } else if whole < -63 {
+            -63
+        } else {
+            whole as i32
+        };
+        let fine =
+            whole.wrapping_mul(self.fine_per_turn).wrapping_add(phase.wrapping_sub(self.phase));
+        fine as f32 * self.radians_per_fine
+    }
+
+    /// Returns the shortest way to a phase in radians: half a turn at most.
+    #[must_use]
+    #[inline]
+    pub(crate) const fn shortest_way_to(&self, phase: i32) -> f32 {
+        let turn = self.fine_per_turn;
+        let way = phase.wrapping_sub(self.phase);
+        let way = if way >= turn / 2 {
+            way.wrapping_sub(turn)
+        } else if way < -(turn / 2) {
+            way.wrapping_add(turn)
+        } else {
+            way
+        };
+        way as f32 * self.radians_per_fine
+    }
+}
+
+/// Divides by a number of at most 16 bits with 32-bit divisions only; exact.
+const fn divide(dividend: u64, divisor: u32) -> u64 {
+    let (mut quotient, mut rest, mut shift) = (0_u64, 0_u32, 64);
+    while shift > 0 {
+        shift -= 16;
+        let digit = rest << 16 | ((dividend >> shift) & 0xFFFF) as u32;
+        quotient = quotient << 16 | (digit / divisor) as u64;
+        rest = digit % divisor;
+    }
+    quotient
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shortest;
+    use super::*;
+    use proptest::prelude::*;
+
+    const M3508: (u16, u16) = (3591, 187);
+    const M2006: (u16, u16) = (36, 1);
+
+    fn shaft(gear: (u16, u16), reversed: bool) -> Shaft {
+        Shaft::new(GearRatio::new(gear.0, gear.1).unwrap(), reversed)
+    }
+
+    #[test]
+    fn the_first_angle_is_absolute_with_no_turn() {
+        for angle in [8000, 5000, 4097, 0, 8191] {
+            for gear in [M3508, M2006, (1, 1)] {
+                let mut shaft = shaft(gear, false);
+                shaft.seed(angle);
+                assert_eq!((shaft.position().turns(), shaft.rotor_counts()), (0, i64::from(angle)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_reversed_shaft_sees_the_complement_and_turns_the_other_way() {
+        let mut shaft = shaft((1, 1), true);
+        shaft.seed(2048);
+        assert!((shaft.angle().as_degrees() - 270.0).abs() < 1e-4);
+        shaft.advance(-1024); // the rotor turns clockwise, the shaft counter-clockwise
+        assert!((shaft.angle().as_degrees() - 315.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn three_hundred_thousand_turns_lose_no_count() {
+        for gear in [M3508, M2006, (1, 1)] {
+            for reversed in [false, true] {
+                let mut shaft = shaft(gear, reversed);
+                shaft.seed(0);
+                let (mut angle, mut expected) = (0_u16, 0_i64);
+                while expected < 300_000 * 8192 {
+                    let next = (angle + 4001) % 8192;
+                    shaft.advance(shortest(angle, next));
+                    (angle, expected) = (next, expected + 4001);
+                }
+                assert_eq!(shaft.rotor_counts(), if reversed { -expected } else { expected });
+                assert!(expected > 1_000_000_000);
+            }
+        }
+    }
+
+    #[test]
+    fn zeroing_then_the_next_frame_is_no_turn() {
+        let mut shaft = shaft(M3508, false);
+        shaft.seed(8190);
+        shaft.set_zero();
+        shaft.advance(shortest(8190, 3));
+        assert_eq!((shaft.position().turns(), shaft.rotor_counts()), (0, 5));
+    }
+
+    #[test]
+    fn a_set_position_is_read_back() {
+        let mut shaft = shaft(M3508, false);
+        for (turns, degrees) in [(0, 0.0), (-3, 359.9), (1_000_000_000_000, 123.4)] {
+            let position = Position::new(turns, Angle::from_degrees(degrees));
+            shaft.set_position(position);
+            assert!((shaft.position() - position).as_degrees().abs() < 1e-4);
+        }
+        shaft.set_position(Position::from_angle(Angle::from_radians(f32::NAN)));
+        assert_eq!(shaft.position(), Position::ZERO);
+    }
+
+    #[test]
+    fn the_angle_never_reaches_a_whole_turn() {
+        let mut shaft = shaft((4096, 1), false);
+        shaft.seed(0);
+        shaft.advance(-1);
+        assert!(shaft.angle().as_radians() < TAU);
+        assert_eq!(shaft.position().turns(), -1);
+    }
+
+    #[test]
+    fn the_way_to_a_target_is_exact_however_far_the_shaft_has_gone() {
+        let mut shaft = shaft(M3508, false);
+        for turns in [0, 1_000_000, 1_000_000_000_000] {
+            shaft.set_position(Position::from_turns(turns));
+            let (turns, phase) = shaft.locate(Position::new(turns, Angle::from_degrees(-1.0)));
+            assert!((shaft.way_to(turns, phase).to_degrees() + 1.0).abs() < 1e-4);
+            assert!((shaft.way_to(turns - 500, phase) + 63.0 * TAU).abs() < 0.1);
+            assert!((shaft.way_to(i64::MAX, phase).abs() - 63.0 * TAU).abs() < 0.1);
+        }
+    }
+
+    #[test]
+    fn the_shortest_way_crosses_zero() {
+        let mut shaft = shaft((1, 1), false);
+        let degrees = |degrees| Position::from_angle(Angle::from_degrees(degrees));
+        for (from, to, way) in [(350.0, 10.0, 20.0_f32), (10.0, 350.0, -20.0), (0.0, 180.0, -180.0)]
+        {
+            shaft.set_position(degrees(from));
+            let (_, phase) = shaft.locate(degrees(to));
+            assert!((shaft.shortest_way_to(phase).to_degrees() - way).abs() < 0.05);
+        }
+    }
+
+    proptest! {
+        /// Law: turns and phase are the exact quotient and remainder of all counts moved.
+        #[test]
+        fn unwrapping_is_exact_integer_arithmetic(
+            gear in prop::sample::select(&[M3508, M2006, (1, 1), (27, 2), (1, 2)][..]),
+            first in 0_u16..8192,
+            steps in prop::collection::vec(-4096_i32..4096, 0..300),
+            far in -200_000_i32..200_000,
+        ) {
+            let mut shaft = shaft(gear, false);
+            shaft.seed(first);
+            let start = shaft.rotor_counts();
+            let mut angle = i64::from(first);
+            for step in &steps {
+                #[expect(clippy::cast_possible_truncation, reason = "0..8192")]
+                let (before, after) = (angle.rem_euclid(8192) as u16, (angle + i64::from(*step)).rem_euclid(8192) as u16);
+                shaft.advance(shortest(before, after));
+                angle += i64::from(*step);
+            }
+            shaft.advance_far(far);
+            let moved: i64 = steps.iter().copied().map(i64::from).sum::<i64>() + i64::from(far);
+            prop_assert_eq!(shaft.rotor_counts() - start, moved);
+            let fine = (start + moved) * i64::from(gear.1);
+            let turn = 8192 * i64::from(gear.0);
+            prop_assert_eq!((shaft.turns, i64::from(shaft.phase)), (fine.div_euclid(turn), fine.rem_euclid(turn)));
+        }
+
+        /// Law: division by 16-bit digits is division.
+        #[test]
+        fn divide_is_division(dividend: u64, divisor in 1_u32..=8192) {
+            prop_assert_eq!(divide(dividend, divisor), dividend / u64::from(divisor));
+        }
+    }
+}
