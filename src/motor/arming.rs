@@ -1,0 +1,93 @@
+use super::{Claim, MotorName};
+
+/// The motors whose feedback is missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Missing {
+    names: [Option<MotorName>; Self::CAPACITY],
+    total: u16,
+}
+
+impl Missing {
+    /// How many names are kept; the others are only counted.
+    pub const CAPACITY: usize = 12;
+
+    /// Collects names; `None` when there are none.
+    pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
+        let mut missing = Self { names: [None; Self::CAPACITY], total: 0 };
+        for name in names {
+            if let Some(place) = missing.names.get_mut(usize::from(missing.total)) {
+                *place = Some(name);
+            }
+            missing.total = missing.total.saturating_add(1);
+        }
+        (missing.total > 0).then_some(missing)
+    }
+
+    /// Iterates over the names that were kept.
+    pub fn names(&self) -> impl Iterator<Item = MotorName> + '_ {
+        self.names.iter().flatten().copied()
+    }
+
+    /// Returns how many motors are missing.
+    #[must_use]
+    pub const fn total(&self) -> u16 {
+        self.total
+    }
+}
+
+impl core::fmt::Display for Missing {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        for (index, name) in self.names().enumerate() {
+            write!(f, "{}{name}", if index == 0 { "" } else { ", " })?;
+        }
+        match usize::from(self.total).saturating_sub(Self::CAPACITY) {
+            0 => Ok(()),
+            more => write!(f, " and {more} more"),
+        }
+    }
+}
+
+/// Why a device was not armed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "no heap, and arming is rare")]
+pub enum ArmError {
+    /// These motors send no fresh feedback.
+    Missing(Missing),
+    /// Two motors of different owners use one CAN id.
+    Clash(Claim, Claim),
+    /// The emergency stop is still set: clear it first.
+    Stopped,
+    /// There is no motor to arm.
+    NoMotors,
+}
+
+impl core::fmt::Display for ArmError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Missing(missing) => write!(f, "no feedback from {missing}"),
+            Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
+            Self::Stopped => f.write_str("the emergency stop is set"),
+            Self::NoMotors => f.write_str("no motor is attached"),
+        }
+    }
+}
+
+impl core::error::Error for ArmError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn the_missing_are_named_up_to_the_capacity_and_counted_beyond() {
+        let names = |count| (1..=count).map(|id| MotorName::new("M3508", id));
+        assert_eq!(Missing::collect(names(0)), None);
+        let two = Missing::collect(names(2)).unwrap();
+        assert_eq!(ArmError::Missing(two).to_string(), "no feedback from M3508 #1, M3508 #2");
+        let many = Missing::collect(names(15)).unwrap();
+        assert_eq!((many.names().count(), many.total()), (12, 15));
+        assert!(many.to_string().ends_with("M3508 #12 and 3 more"));
+    }
+}

@@ -1,0 +1,91 @@
+use super::MotorName;
+use embedded_can::Id;
+
+/// Who sends the frames of a claimed id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Role {
+    /// The controller sends it.
+    Command,
+    /// The motor sends it.
+    Feedback,
+}
+
+/// A CAN id, or a block of ids under a mask, that belongs to one motor.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Claim, MotorName, Role};
+/// use embedded_can::StandardId;
+///
+/// let id = |raw| StandardId::new(raw).unwrap_or(StandardId::ZERO);
+/// let dji = Claim::new(id(0x201), Role::Feedback, MotorName::new("M3508", 1));
+/// let damiao = Claim::new(id(0x201), Role::Command, MotorName::new("DM4310 (velocity)", 1));
+/// let odrive = Claim::new(id(0x200), Role::Command, MotorName::new("ODrive", 0x10)).with_mask(0x7E0);
+/// assert!(dji.clashes_with(&damiao));
+/// assert!(dji.clashes_with(&odrive)); // node 0x10 owns 0x200 to 0x21F
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Claim {
+    id: Id,
+    mask: u32,
+    role: Role,
+    motor: MotorName,
+}
+
+impl Claim {
+    /// Claims one id.
+    #[must_use]
+    pub fn new(id: impl Into<Id>, role: Role, motor: MotorName) -> Self {
+        Self { id: id.into(), mask: u32::MAX, role, motor }
+    }
+
+    /// Claims every id that is equal under `mask`.
+    #[must_use]
+    pub const fn with_mask(self, mask: u32) -> Self {
+        Self { mask, ..self }
+    }
+
+    /// Tells whether some id belongs to both claims.
+    #[must_use]
+    pub fn clashes_with(&self, other: &Self) -> bool {
+        let (extended, raw) = raw(self.id);
+        let (other_extended, other_raw) = self::raw(other.id);
+        extended == other_extended && (raw ^ other_raw) & self.mask & other.mask == 0
+    }
+
+    /// Returns the id.
+    #[must_use]
+    pub const fn id(&self) -> Id {
+        self.id
+    }
+
+    /// Returns who sends it.
+    #[must_use]
+    pub const fn role(&self) -> Role {
+        self.role
+    }
+
+    /// Returns the motor that it belongs to.
+    #[must_use]
+    pub const fn motor(&self) -> MotorName {
+        self.motor
+    }
+}
+
+fn raw(id: Id) -> (bool, u32) {
+    match id {
+        Id::Standard(id) => (false, u32::from(id.as_raw())),
+        Id::Extended(id) => (true, id.as_raw()),
+    }
+}
+
+impl core::fmt::Display for Claim {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let role = match self.role {
+            Role::Command => "command",
+            Role::Feedback => "feedback",
+        };
+        write!(f, "{} of {} on 0x{:X}", role, self.motor, raw(self.id).1)
+    }
+}
