@@ -91,6 +91,7 @@ const fn positive(wrapped: f32, period: f32) -> f32 {
 
 /// The half turn itself, what rounding left on the wrong side of it, and arguments too large to hold a remainder.
 #[cold]
+#[inline(never)]
 const fn at_the_edge(rest: f32, x: f32, period: f32) -> f32 {
     let half = 0.5 * period;
     if !(half > 0.0 && period < f32::INFINITY && x.is_finite()) {
