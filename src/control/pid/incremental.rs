@@ -1,0 +1,410 @@
+use crate::control::differentiator::LinearDifferentiator;
+use crate::control::error::{ConfigError, check, not_negative, ordered, positive};
+use crate::control::number::{finite, limited};
+use crate::control::step::TimeStep;
+
+/// Marks a stored error or measurement as unknown.
+const UNKNOWN: f32 = f32::INFINITY;
+
+/// What an [`IncrementalPid`] is made from. Units of the gains as for [`PidConfig`](super::PidConfig).
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{IncrementalPid, IncrementalPidConfig};
+///
+/// let config = IncrementalPidConfig::new(0.1, 0.5, 0.0)
+///     .with_output_limit(20.0)
+///     .with_max_step(0.005)
+///     .with_tracking(200.0);
+/// assert!(IncrementalPid::new(config).is_ok());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct IncrementalPidConfig {
+    kp: f32,
+    ki: f32,
+    kd: f32,
+    output_lower: f32,
+    output_upper: f32,
+    tracking_r: Option<f32>,
+    max_step_s: f32,
+}
+
+impl IncrementalPidConfig {
+    /// Takes the gains: proportional, integral (1/s times the unit of `kp`) and derivative (s times the unit of `kp`).
+    ///
+    /// Each must be finite and zero or more.
+    #[must_use]
+    pub const fn new(kp: f32, ki: f32, kd: f32) -> Self {
+        Self {
+            kp,
+            ki,
+            kd,
+            output_lower: -f32::MAX,
+            output_upper: f32::MAX,
+            tracking_r: None,
+            max_step_s: super::PidConfig::MAX_STEP_S,
+        }
+    }
+
+    /// Keeps the output in ±`limit`, more than zero. Off by default.
+    #[must_use]
+    pub const fn with_output_limit(self, limit: f32) -> Self {
+        self.with_output_range(-limit, limit)
+    }
+
+    /// Keeps the output in `lower..=upper`, `lower` below `upper`. Off by default.
+    #[must_use]
+    pub const fn with_output_range(self, lower: f32, upper: f32) -> Self {
+        Self { output_lower: lower, output_upper: upper, ..self }
+    }
+
+    /// Leads the setpoint through a [`LinearDifferentiator`] of speed `r` in 1/s. Off by default.
+    ///
+    /// It starts from the first measurement. `r` times the longest step must be at most 1.
+    #[must_use]
+    pub const fn with_tracking(self, r: f32) -> Self {
+        Self { tracking_r: Some(r), ..self }
+    }
+
+    /// Sets the longest step in seconds that is believed, more than zero; the default is 0.1, and 0.001 would go with a
+    /// tracking of up to `r` = 1000.
+    #[must_use]
+    pub const fn with_max_step(self, max_step_s: f32) -> Self {
+        Self { max_step_s, ..self }
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, reversed, or too fast for the step.
+    pub const fn validate(&self) -> Result<(), ConfigError> {
+        check!(not_negative("kp", self.kp));
+        check!(not_negative("ki", self.ki));
+        check!(not_negative("kd", self.kd));
+        check!(ordered("output_range", self.output_lower, self.output_upper));
+        check!(positive("max_step", self.max_step_s));
+        if let Some(r) = self.tracking_r {
+            check!(LinearDifferentiator::new(r, self.max_step_s));
+        }
+        Ok(())
+    }
+}
+
+/// An incremental (velocity-form) PID controller: every step adds to the last output.
+///
+/// ```text
+/// output += kp (e - e1) + ki dt (e + e1) / 2 - kd (rate - rate1),   rate = (measurement - measurement1) / dt
+/// ```
+/// D is the second difference of the measurement. The only memory of the past is the output, and that is limited: the controller
+/// cannot wind up. Without limits it gives what [`Pid`](super::Pid) gives, to rounding.
+///
+/// # Edge behaviour
+/// * The first call gives P only, or after [`reset_to`](Self::reset_to) the given output.
+/// * `dt_s` zero, negative, NaN or infinite, and NaN or infinity in an input: nothing changes, the last output is returned, and
+///   [`rejected`](Self::rejected) grows. The next good sample works as if the bad one had not been.
+/// * `dt_s` above the maximum of the [`TimeStep`]: only the change of P is added.
+/// * `ki` zero: nothing brings the output back after it was limited; what the limit cut off stays off.
+/// * Overflow of `f32`: the output is the limit, never NaN.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{IncrementalPid, IncrementalPidConfig};
+///
+/// let mut pid = IncrementalPid::new(IncrementalPidConfig::new(2.0, 10.0, 0.0))?;
+/// assert_eq!(pid.update(1.0, 0.0, 0.01), 2.0); // P
+/// assert_eq!(pid.update(1.0, 0.0, 0.01), 2.1); // and 10/s for 10 ms
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct IncrementalPid {
+    config: IncrementalPidConfig,
+    tracking: Option<LinearDifferentiator>,
+    error: f32,
+    measurement: f32,
+    rate: f32,
+    output: f32,
+    rejected: u16,
+    track_output: bool,
+}
+
+impl IncrementalPid {
+    /// Takes and checks the configuration.
+    ///
+    /// # Errors
+    /// Names the parameter as [`IncrementalPidConfig::validate`] does.
+    pub const fn new(config: IncrementalPidConfig) -> Result<Self, ConfigError> {
+        check!(config.validate());
+        let tracking = match config.tracking_r {
+            Some(r) => match LinearDifferentiator::new(r, config.max_step_s) {
+                Ok(tracking) => Some(tracking),
+                Err(error) => return Err(error),
+            },
+            None => None,
+        };
+        Ok(Self {
+            config,
+            tracking,
+            error: UNKNOWN,
+            measurement: UNKNOWN,
+            rate: 0.0,
+            output: 0.0,
+            rejected: 0,
+            track_output: false,
+        })
+    }
+
+    /// Steps by `dt_s` seconds and returns the output.
+    pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
+        self.step(setpoint, measurement, &TimeStep::new(dt_s, self.config.max_step_s))
+    }
+
+    /// Steps by a time that was validated before, and returns the output.
+    pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
+            self.rejected = self.rejected.saturating_add(1);
+            return self.output;
+        }
+        let config = &self.config;
+        let first = self.measurement == UNKNOWN;
+        let target = match &mut self.tracking {
+            Some(tracking) => {
+                if first {
+                    tracking.reset_to(measurement);
+                }
+                tracking.step(setpoint, step)
+            }
+            None => setpoint,
+        };
+        let error = finite(target - measurement);
+        let change = if first {
+            if self.track_output { 0.0 } else { config.kp * error }
+        } else if step.is_frozen() {
+            config.kp * (error - self.error)
+        } else {
+            let rate = finite((measurement - self.measurement) * step.per_dt);
+            let damping = config.kd * (rate - self.rate);
+            self.rate = rate;
+            let proportional = finite(config.kp * (error - self.error));
+            let integral = finite(config.ki * step.half_dt_s * (error + self.error));
+            proportional + integral - finite(damping)
+        };
+        self.track_output = false;
+        self.error = error;
+        self.measurement = measurement;
+        let wanted = self.output + finite(change);
+        self.output = limited(wanted, config.output_lower, config.output_upper);
+        self.output
+    }
+
+    /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
+    pub const fn reset(&mut self) {
+        self.error = UNKNOWN;
+        self.measurement = UNKNOWN;
+        self.rate = 0.0;
+        self.output = 0.0;
+        self.track_output = false;
+    }
+
+    /// Resets, and lets the first call return `output`, within the limits, whatever its error.
+    ///
+    /// NaN and infinity count as zero.
+    pub const fn reset_to(&mut self, output: f32) {
+        self.reset();
+        self.output = limited(
+            if output.is_finite() { output } else { 0.0 },
+            self.config.output_lower,
+            self.config.output_upper,
+        );
+        self.track_output = true;
+    }
+
+    /// Changes the gains; the output does not jump, because it is the memory.
+    ///
+    /// # Errors
+    /// Names the gain that is NaN, infinite or negative; then nothing changes.
+    pub const fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
+        check!(not_negative("kp", kp));
+        check!(not_negative("ki", ki));
+        check!(not_negative("kd", kd));
+        self.config.kp = kp;
+        self.config.ki = ki;
+        self.config.kd = kd;
+        Ok(())
+    }
+
+    /// Returns the last output; before the first call zero, or what was given to [`reset_to`](Self::reset_to).
+    #[must_use]
+    pub const fn output(&self) -> f32 {
+        self.output
+    }
+
+    /// Returns the configuration.
+    #[must_use]
+    pub const fn config(&self) -> &IncrementalPidConfig {
+        &self.config
+    }
+
+    /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+    use crate::control::{ConfigFault, Pid, PidConfig};
+    use proptest::prelude::*;
+
+    const DT_S: f32 = 0.001;
+    const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+    fn pid(config: IncrementalPidConfig) -> IncrementalPid {
+        IncrementalPid::new(config).unwrap()
+    }
+
+    #[test]
+    fn first_call_after_a_long_time_is_proportional_only() {
+        for dt_s in [DT_S, 10.0] {
+            assert_eq!(
+                pid(IncrementalPidConfig::new(2.0, 100.0, 100.0)).update(3.0, 1.0, dt_s),
+                4.0
+            );
+        }
+    }
+
+    #[test]
+    fn bad_time_and_bad_samples_hold_the_output_and_leave_no_trace() {
+        let config =
+            IncrementalPidConfig::new(2.0, 10.0, 0.1).with_max_step(0.01).with_tracking(50.0);
+        let (mut clean, mut hit) = (pid(config), pid(config));
+        for sample in 0..20_u8 {
+            let measurement = f32::from(sample) * 0.01;
+            let expected = clean.update(1.0, measurement, DT_S);
+            let held = hit.output();
+            for bad in BAD {
+                assert_eq!(hit.update(1.0, bad, DT_S), held);
+                assert_eq!(hit.update(bad, measurement, DT_S), held);
+                assert_eq!(hit.update(1.0, measurement, bad), held);
+            }
+            assert_eq!(hit.update(1.0, measurement, 0.0), held);
+            assert_eq!(hit.update(1.0, measurement, -DT_S), held);
+            assert_eq!(hit.update(1.0, measurement, DT_S), expected);
+        }
+        assert_eq!((hit.rejected(), IncrementalPid { rejected: 0, ..hit }), (220, clean));
+    }
+
+    #[test]
+    fn a_dt_above_the_maximum_adds_the_change_of_p_only() {
+        let mut pid = pid(IncrementalPidConfig::new(2.0, 10.0, 0.1));
+        pid.update(1.0, 0.0, DT_S);
+        let before = pid.update(1.0, 0.0, DT_S);
+        assert_eq!(pid.update(3.0, 0.5, 10.0), before + 3.0);
+    }
+
+    #[test]
+    fn a_limit_that_is_zero_or_reversed_is_named() {
+        let new = IncrementalPidConfig::new(1.0, 1.0, 1.0);
+        for (config, parameter, fault) in [
+            (IncrementalPidConfig::new(f32::NAN, 0.0, 0.0), "kp", ConfigFault::Negative),
+            (IncrementalPidConfig::new(0.0, -1.0, 0.0), "ki", ConfigFault::Negative),
+            (IncrementalPidConfig::new(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
+            (new.with_output_limit(0.0), "output_range", ConfigFault::Reversed),
+            (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
+            (new.with_max_step(-0.1), "max_step", ConfigFault::NotPositive),
+            (new.with_tracking(0.0), "r", ConfigFault::NotPositive),
+            (new.with_tracking(20.0), "r", ConfigFault::Unstable),
+        ] {
+            assert_eq!(IncrementalPid::new(config), Err(ConfigError::new(parameter, fault)));
+        }
+    }
+
+    #[test]
+    fn it_leaves_the_limit_at_once() {
+        let mut pid = pid(IncrementalPidConfig::new(0.0, 100.0, 0.0).with_output_limit(10.0));
+        for _ in 0..10_000 {
+            pid.update(9.0, 0.0, DT_S);
+        }
+        assert_eq!(pid.output(), 10.0);
+        pid.update(-1.0, 0.0, DT_S);
+        assert!(pid.update(-1.0, 0.0, DT_S) < 10.0);
+    }
+
+    #[test]
+    fn huge_gains_end_at_the_limit_and_never_in_nan() {
+        let mut pid = pid(IncrementalPidConfig::new(1e30, 1e30, 1e30));
+        for measurement in [0.0, 1e30, f32::MIN, f32::MAX, 1.0] {
+            assert!(pid.update(f32::MAX, measurement, 1e-6).is_finite());
+        }
+    }
+
+    #[test]
+    fn tracking_smooths_a_step_of_the_setpoint_from_the_first_measurement() {
+        let config = IncrementalPidConfig::new(1.0, 0.0, 0.0).with_max_step(0.01);
+        let mut smooth = pid(config.with_tracking(50.0));
+        assert_eq!(smooth.update(11.0, 10.0, DT_S), 0.0);
+        let mut last = 0.0;
+        for _ in 0..300 {
+            let output = smooth.update(11.0, 10.0, DT_S);
+            assert!(output >= last && output - last < 0.05);
+            last = output;
+        }
+        assert!((last - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn reset_to_takes_over_without_a_jump() {
+        let mut pid = pid(IncrementalPidConfig::new(2.0, 10.0, 0.5).with_output_limit(10.0));
+        pid.reset_to(7.0);
+        assert_eq!(pid.update(100.0, 99.0, DT_S), 7.0);
+        assert!((pid.update(100.0, 99.0, DT_S) - 7.01).abs() < 1e-5);
+        pid.reset();
+        assert_eq!(pid.update(1.0, 0.0, DT_S), 2.0);
+    }
+
+    #[test]
+    fn new_gains_do_not_move_the_output() {
+        let mut pid = pid(IncrementalPidConfig::new(2.0, 10.0, 0.0));
+        pid.update(1.0, 0.0, DT_S);
+        let before = pid.update(1.0, 0.0, DT_S);
+        pid.set_gains(20.0, 5.0, 1.0).unwrap();
+        assert!((pid.update(1.0, 0.0, DT_S) - before).abs() < 0.01);
+        assert!(pid.set_gains(1.0, f32::NAN, 0.0).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn without_limits_it_equals_the_positional_form(
+            kp in 0.0_f32..10.0, ki in 0.0_f32..10.0, kd in 0.0_f32..0.1,
+            samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0, 1_u8..10), 1..50),
+        ) {
+            let mut positional = Pid::new(PidConfig::new(kp, ki, kd)).unwrap();
+            let mut incremental = pid(IncrementalPidConfig::new(kp, ki, kd));
+            let mut largest = 1.0_f32;
+            for (setpoint, measurement, millis) in samples {
+                let dt_s = f32::from(millis) * DT_S;
+                let expected = positional.update(setpoint, measurement, dt_s);
+                let output = incremental.update(setpoint, measurement, dt_s);
+                largest = largest.max(expected.abs());
+                prop_assert!((output - expected).abs() <= 2e-5 * largest, "{} {}", output, expected);
+            }
+        }
+
+        #[test]
+        fn output_is_within_limits_for_any_finite_input(
+            gains in (0.0_f32..1e6, 0.0_f32..1e6, 0.0_f32..1e6), limit in 0.001_f32..1e6,
+            samples in prop::collection::vec((-f32::MAX..f32::MAX, -f32::MAX..f32::MAX, 0.0_f32..0.2), 1..50),
+        ) {
+            let config = IncrementalPidConfig::new(gains.0, gains.1, gains.2).with_output_limit(limit);
+            let mut pid = pid(config);
+            for (setpoint, measurement, dt_s) in samples {
+                prop_assert!(pid.update(setpoint, measurement, dt_s).abs() <= limit);
+            }
+        }
+    }
+}

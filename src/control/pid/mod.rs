@@ -1,0 +1,9 @@
+//! The positional and the incremental PID controller.
+
+mod config;
+mod incremental;
+mod positional;
+
+pub use config::PidConfig;
+pub use incremental::{IncrementalPid, IncrementalPidConfig};
+pub use positional::{Pid, Terms};

@@ -1,0 +1,902 @@
+use super::PidConfig;
+use crate::control::error::{ConfigError, not_negative};
+use crate::control::number::{finite, limited, sign};
+use crate::control::step::TimeStep;
+use crate::math;
+
+/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
+const UNKNOWN: f32 = f32::INFINITY;
+
+/// A positional PID controller.
+///
+/// ```text
+/// e = setpoint - measurement
+/// output = kp e + ki integral(e dt) - kd d(measurement)/dt + kS sign(setpoint) + kV setpoint
+/// ```
+/// The integral is trapezoidal. Options are in [`PidConfig`]; they apply in this order: circle, dead band, derivative
+/// filter, integral weights, integral limit, sum, slew limit, output limits, anti-windup.
+///
+/// # Edge behaviour
+/// * The first call gives P and feed-forward only: there is no interval yet to integrate or to differentiate over.
+///   It does not matter how long ago the controller was made.
+/// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
+/// * `dt_s` above the maximum of the [`TimeStep`]: the integral and D stay for this step, P and feed-forward follow.
+/// * NaN or infinity in any input: as for `dt_s` zero. The next good sample works as if the bad one had not been.
+/// * `ki` zero: the integral is zero and stays zero.
+/// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
+///   what is stored stays finite.
+///
+/// # Examples
+/// The gains are those of continuous time: one second of a constant error of 1 integrates to `ki` at any rate, and a
+/// measurement that grows by 1 a second gives a D of `-kd`.
+/// ```
+/// use drivetrain::control::{Pid, PidConfig};
+///
+/// for rate_hz in [100_u16, 1000] {
+///     let dt_s = 1.0 / f32::from(rate_hz);
+///     let mut pid = Pid::new(PidConfig::new(0.0, 3.0, 0.0))?;
+///     for _ in 0..=rate_hz {
+///         pid.update(1.0, 0.0, dt_s);
+///     }
+///     assert!((pid.output() - 3.0).abs() < 1e-4); // ki times 1 s
+///
+///     let mut pid = Pid::new(PidConfig::new(0.0, 0.0, 0.2))?;
+///     pid.update(0.0, 0.0, dt_s);
+///     assert!((pid.update(0.0, dt_s, dt_s) + 0.2).abs() < 1e-6); // kd times 1/s
+/// }
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pid {
+    config: PidConfig,
+    integral_gate: u32,
+    output_gate: u32,
+    integral: f32,
+    error: f32,
+    measurement: f32,
+    rate: f32,
+    output: f32,
+    setpoint: f32,
+    rejected: u16,
+    track_output: bool,
+}
+
+/// The parts of an output, in its unit. Their sum is the output before limits.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Terms {
+    /// Proportional: `kp` times the error.
+    pub p: f32,
+    /// Integral.
+    pub i: f32,
+    /// Derivative: `-kd` times the rate of the measurement.
+    pub d: f32,
+    /// Feed-forward: `kS sign(setpoint) + kV setpoint`.
+    pub feed_forward: f32,
+}
+
+impl Pid {
+    /// Takes and checks the configuration.
+    ///
+    /// # Errors
+    /// Names the parameter that is NaN, infinite, negative, zero where it must not be, or reversed.
+    pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
+        if let Err(error) = config.validate() {
+            return Err(error);
+        }
+        Ok(Self {
+            config,
+            integral_gate: gate(config.integral_limit),
+            output_gate: if config.is_plain() { gate(config.output_upper) } else { CLOSED },
+            integral: 0.0,
+            error: UNKNOWN,
+            measurement: UNKNOWN,
+            rate: 0.0,
+            output: 0.0,
+            setpoint: 0.0,
+            rejected: 0,
+            track_output: false,
+        })
+    }
+
+    /// Steps by `dt_s` seconds and returns the output.
+    pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
+        self.step(setpoint, measurement, &TimeStep::new(dt_s, self.config.max_step_s))
+    }
+
+    /// Steps by a time that was validated before, and returns the output.
+    ///
+    /// The same as [`update`](Self::update) for several loops that share a tick.
+    #[inline]
+    pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let error = setpoint - measurement;
+        let rate = (measurement - self.measurement) * step.per_dt;
+        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let output = self.config.kp * error + integral - self.config.kd * rate;
+        // Options, limits, a step that is not normal, NaN and overflow: none of them passes both gates.
+        if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
+            self.integral = integral;
+            self.error = error;
+            self.measurement = measurement;
+            self.rate = rate;
+            self.output = output;
+            return output;
+        }
+        self.step_carefully(setpoint, measurement, step)
+    }
+
+    /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
+    ///
+    /// D is `-kd * rate`, so a positive `kd` damps; there is no feed-forward. Options on the circle and on the
+    /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
+    #[inline]
+    pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let output = self.config.kp * error + integral - self.config.kd * rate;
+        if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
+            self.integral = integral;
+            self.error = error;
+            self.measurement = UNKNOWN;
+            self.rate = rate;
+            self.output = output;
+            return output;
+        }
+        self.step_error_carefully(error, rate, step)
+    }
+
+    /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
+    pub const fn reset(&mut self) {
+        self.integral = 0.0;
+        self.error = UNKNOWN;
+        self.measurement = UNKNOWN;
+        self.rate = 0.0;
+        self.output = 0.0;
+        self.setpoint = 0.0;
+        self.track_output = false;
+    }
+
+    /// Resets, and lets the first call return `output`, within the limits, whatever its error: for taking over from
+    /// another controller without a jump.
+    ///
+    /// The integral carries the difference to P, as far as its limit reaches. Without an integral (`ki` zero) nothing can carry
+    /// it, and `output` is only where a slew limit starts from. NaN and infinity count as zero.
+    pub fn reset_to(&mut self, output: f32) {
+        self.reset();
+        self.output = limited(
+            if output.is_finite() { output } else { 0.0 },
+            self.config.output_lower,
+            self.config.output_upper,
+        );
+        self.track_output = true;
+    }
+
+    /// Changes the gains without a jump of the output: the integral takes up the difference.
+    ///
+    /// With `ki` zero the integral is dropped, since nothing would ever drain it; then the output moves to P and D.
+    ///
+    /// # Errors
+    /// Names the gain that is NaN, infinite or negative; then nothing changes.
+    pub fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
+        not_negative("kp", kp)?;
+        not_negative("ki", ki)?;
+        not_negative("kd", kd)?;
+        self.change(self.config.with_gains(kp, ki, kd));
+        Ok(())
+    }
+
+    /// Changes the configuration without a jump of the output, as [`set_gains`](Self::set_gains) does; new limits hold
+    /// from the next step on.
+    ///
+    /// # Errors
+    /// Names the parameter as [`new`](Self::new) does; then nothing changes.
+    pub fn set_config(&mut self, config: PidConfig) -> Result<(), ConfigError> {
+        config.validate()?;
+        self.change(config);
+        Ok(())
+    }
+
+    /// Returns the parts of the last output.
+    #[must_use]
+    pub fn terms(&self) -> Terms {
+        let config = &self.config;
+        let error = if self.error == UNKNOWN || self.error.abs() < config.dead_band {
+            0.0
+        } else {
+            self.error
+        };
+        Terms {
+            p: config.kp * error,
+            i: self.integral,
+            d: -(config.kd * self.rate),
+            feed_forward: self.feed_forward(),
+        }
+    }
+
+    /// Returns the last output; before the first call zero, or what was given to [`reset_to`](Self::reset_to).
+    #[must_use]
+    pub const fn output(&self) -> f32 {
+        self.output
+    }
+
+    /// Returns the configuration.
+    #[must_use]
+    pub const fn config(&self) -> &PidConfig {
+        &self.config
+    }
+
+    /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+
+    fn change(&mut self, config: PidConfig) {
+        if self.output_gate != CLOSED {
+            // The plain path does not store its setpoint.
+            let known = self.measurement != UNKNOWN;
+            self.setpoint = if known { self.error + self.measurement } else { 0.0 };
+        }
+        let before = self.terms();
+        self.config = config;
+        self.integral_gate = gate(config.integral_limit);
+        self.output_gate = if config.is_plain() { gate(config.output_upper) } else { CLOSED };
+        let after = self.terms();
+        let carried = before.i
+            + (before.p - after.p)
+            + (before.d - after.d)
+            + (before.feed_forward - after.feed_forward);
+        self.integral = if config.ki > 0.0 {
+            limited(finite(carried), -config.integral_limit, config.integral_limit)
+        } else {
+            0.0
+        };
+    }
+
+    fn feed_forward(&self) -> f32 {
+        self.config.static_gain * sign(self.setpoint) + self.config.velocity_gain * self.setpoint
+    }
+
+    #[inline(never)]
+    fn step_carefully(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
+            return self.reject();
+        }
+        let mut error = setpoint - measurement;
+        let mut travel = measurement - self.measurement;
+        if self.config.derivative_on_error {
+            travel = self.error - error;
+        }
+        if self.config.period > 0.0 {
+            error = math::wrap(error, self.config.period);
+            travel = math::wrap(travel, self.config.period);
+        }
+        if self.measurement == UNKNOWN {
+            travel = 0.0;
+        }
+        self.measurement = measurement;
+        self.setpoint = setpoint;
+        self.advance(finite(error), finite(travel * step.per_dt), step)
+    }
+
+    #[inline(never)]
+    fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !error.is_finite() || !rate.is_finite() {
+            return self.reject();
+        }
+        self.measurement = UNKNOWN;
+        self.setpoint = 0.0;
+        self.advance(error, rate, step)
+    }
+
+    const fn reject(&mut self) -> f32 {
+        self.rejected = self.rejected.saturating_add(1);
+        self.output
+    }
+
+    /// The whole controller, for finite arguments and a step that is normal or frozen.
+    fn advance(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let config = &self.config;
+        let first = self.error == UNKNOWN;
+        let in_band = error.abs() < config.dead_band;
+        let proportional = if in_band { 0.0 } else { finite(config.kp * error) };
+        let mut growth = 0.0;
+        if !step.is_frozen() {
+            self.rate = if config.derivative_time_s > 0.0 {
+                let gain = step.dt_s / (step.dt_s + config.derivative_time_s);
+                finite(self.rate + gain * (rate - self.rate))
+            } else {
+                rate
+            };
+        }
+        if !first && !step.is_frozen() {
+            growth = finite(config.ki * step.half_dt_s * (error + self.error) * self.weight(error));
+            if in_band && growth * self.integral >= 0.0 {
+                growth = 0.0;
+            }
+        }
+        let others = finite(proportional - finite(config.kd * self.rate) + self.feed_forward());
+        if self.track_output {
+            self.track_output = false;
+            if config.ki > 0.0 {
+                self.integral = finite(self.output - others);
+            }
+        }
+        let limit = config.integral_limit;
+        let integral = limited(finite(self.integral + growth), -limit, limit);
+        let wanted = others + integral;
+        let slewed = if config.slew_per_s < f32::MAX {
+            let slew = config.slew_per_s * step.dt_s;
+            limited(wanted, self.output - slew, self.output + slew)
+        } else {
+            wanted
+        };
+        let output = limited(slewed, config.output_lower, config.output_upper);
+        let excess = finite(wanted - output);
+        self.integral = if config.tracking_time_s > 0.0 {
+            let drained = excess * (step.dt_s / config.tracking_time_s).min(1.0);
+            limited(integral - drained, -limit, limit)
+        } else if excess * growth > 0.0 && !config.wind_up {
+            self.integral
+        } else {
+            integral
+        };
+        self.error = error;
+        self.output = output;
+        output
+    }
+
+    /// The part of its rate at which the integral works at this error.
+    fn weight(&self, error: f32) -> f32 {
+        let config = &self.config;
+        let size = error.abs();
+        if size > config.integral_separation || size >= config.no_rate_above {
+            0.0
+        } else if size > config.full_rate_below {
+            (config.no_rate_above - size) / (config.no_rate_above - config.full_rate_below)
+        } else {
+            1.0
+        }
+    }
+}
+
+/// A gate that nothing passes.
+const CLOSED: u32 = 0;
+
+/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
+const fn gate(limit: f32) -> u32 {
+    (limit.to_bits() << 1) + 1
+}
+
+#[inline]
+const fn passes(value: f32, gate: u32) -> bool {
+    value.to_bits() << 1 < gate
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+    use crate::control::ConfigFault;
+    use proptest::prelude::*;
+
+    const DT_S: f32 = 0.001;
+    const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+    fn pid(config: PidConfig) -> Pid {
+        Pid::new(config).unwrap()
+    }
+
+    fn every_option() -> PidConfig {
+        PidConfig::new(2.0, 10.0, 0.05)
+            .with_output_range(-8.0, 10.0)
+            .with_integral_limit(4.0)
+            .with_integral_separation(100.0)
+            .with_variable_integral(20.0, 80.0)
+            .with_dead_band(0.01)
+            .with_feed_forward(0.5, 0.01)
+            .with_slew_limit(4000.0)
+            .with_period(360.0)
+            .with_derivative_filter(100.0)
+            .with_back_calculation(0.05)
+    }
+
+    #[test]
+    fn two_loops_of_a_motor_fit_its_slot() {
+        assert!(size_of::<Pid>() <= 112, "{}", size_of::<Pid>());
+    }
+
+    #[test]
+    fn first_call_after_a_long_time_is_proportional_only() {
+        for dt_s in [DT_S, 0.09, 10.0] {
+            let mut pid = pid(PidConfig::new(2.0, 100.0, 100.0));
+            assert_eq!(pid.update(3.0, 1.0, dt_s), 4.0);
+            assert_eq!(pid.terms(), Terms { p: 4.0, ..Terms::default() });
+        }
+    }
+
+    #[test]
+    fn a_dt_that_is_no_time_holds_the_output_and_is_counted() {
+        for config in [PidConfig::new(2.0, 10.0, 0.1), every_option()] {
+            let mut pid = pid(config);
+            pid.update(3.0, 1.0, DT_S);
+            pid.update(3.0, 1.1, DT_S);
+            let before = pid;
+            for (refused, dt_s) in
+                [0.0, -0.0, -DT_S, BAD[0], BAD[1], BAD[2]].into_iter().enumerate()
+            {
+                assert_eq!(pid.update(9.0, 2.0, dt_s), before.output());
+                assert_eq!(usize::from(pid.rejected()), refused + 1);
+                assert_eq!(Pid { rejected: 0, ..pid }, before);
+            }
+        }
+    }
+
+    #[test]
+    fn a_dt_above_the_maximum_freezes_integral_and_derivative() {
+        let mut pid = pid(PidConfig::new(2.0, 10.0, 0.01).with_max_step(0.02));
+        pid.update(1.0, 0.0, DT_S);
+        pid.update(1.0, 0.001, DT_S);
+        let before = pid.terms();
+        assert_eq!(pid.update(5.0, 0.0, 10.0), 10.0 + before.i + before.d);
+        assert_eq!(pid.terms(), Terms { p: 10.0, ..before });
+        assert_eq!(pid.rejected(), 0);
+        // The step after it works with its own interval only.
+        pid.update(5.0, 0.0, DT_S);
+        assert_eq!(pid.terms().d, 0.0);
+        assert!((pid.terms().i - before.i - 10.0 * 5.0 * DT_S).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_bad_sample_holds_the_output_and_leaves_no_trace() {
+        for config in
+            [PidConfig::new(2.0, 10.0, 0.1), PidConfig::new(0.0, 0.0, 0.0), every_option()]
+        {
+            for bad in BAD {
+                let (mut clean, mut hit) = (pid(config), pid(config));
+                for sample in 0..20_u8 {
+                    let measurement = f32::from(sample) * 0.01;
+                    let expected = clean.update(1.0, measurement, DT_S);
+                    let held = hit.output();
+                    assert_eq!(hit.update(1.0, bad, DT_S), held);
+                    assert_eq!(hit.update(bad, measurement, DT_S), held);
+                    assert_eq!(hit.update(1.0, measurement, DT_S), expected);
+                }
+                assert_eq!(hit.rejected(), 40);
+                assert_eq!(Pid { rejected: 0, ..hit }, clean);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_error_or_rate_holds_the_output_and_leaves_no_trace() {
+        let step = TimeStep::new(DT_S, 0.1);
+        let mut pid = pid(PidConfig::new(2.0, 10.0, 0.1));
+        pid.step_error(1.0, 0.5, &step);
+        let before = pid;
+        for bad in BAD {
+            assert_eq!(pid.step_error(bad, 0.0, &step), before.output());
+            assert_eq!(pid.step_error(1.0, bad, &step), before.output());
+        }
+        assert_eq!(pid.step_error(1.0, 0.5, &TimeStep::new(0.0, 0.1)), before.output());
+        assert_eq!((pid.rejected(), Pid { rejected: 0, ..pid }), (7, before));
+    }
+
+    #[test]
+    fn a_limit_that_is_zero_or_reversed_is_named() {
+        let new = PidConfig::new(1.0, 1.0, 1.0);
+        let cases = [
+            (PidConfig::new(-1.0, 0.0, 0.0), "kp", ConfigFault::Negative),
+            (PidConfig::new(0.0, f32::NAN, 0.0), "ki", ConfigFault::Negative),
+            (PidConfig::new(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
+            (new.with_output_limit(0.0), "output_range", ConfigFault::Reversed),
+            (new.with_output_limit(-1.0), "output_range", ConfigFault::Reversed),
+            (new.with_output_range(1.0, f32::NAN), "output_range", ConfigFault::Reversed),
+            (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
+            (new.with_integral_limit(0.0), "integral_limit", ConfigFault::NotPositive),
+            (new.with_integral_separation(-1.0), "integral_separation", ConfigFault::NotPositive),
+            (new.with_variable_integral(2.0, 1.0), "variable_integral", ConfigFault::Reversed),
+            (new.with_variable_integral(-1.0, 1.0), "variable_integral", ConfigFault::Negative),
+            (new.with_variable_integral(1.0, f32::NAN), "variable_integral", ConfigFault::Reversed),
+            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::Negative),
+            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::Negative),
+            (new.with_dead_band(-1.0), "dead_band", ConfigFault::Negative),
+            (new.with_feed_forward(-1.0, 0.0), "static_gain", ConfigFault::Negative),
+            (new.with_feed_forward(0.0, f32::NAN), "velocity_gain", ConfigFault::Negative),
+            (new.with_slew_limit(0.0), "slew_limit", ConfigFault::NotPositive),
+            (new.with_period(0.0), "period", ConfigFault::Negative),
+            (new.with_period(-360.0), "period", ConfigFault::Negative),
+            (new.with_period(f32::INFINITY), "period", ConfigFault::Negative),
+            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::Negative),
+            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::Negative),
+            (new.with_max_step(0.0), "max_step", ConfigFault::NotPositive),
+        ];
+        for (config, parameter, fault) in cases {
+            assert_eq!(Pid::new(config), Err(ConfigError::new(parameter, fault)));
+            let mut running = pid(new);
+            assert!(running.set_config(config).is_err());
+            assert_eq!(running, pid(new));
+        }
+        assert!(Pid::new(every_option()).is_ok());
+    }
+
+    #[test]
+    fn without_ki_the_integral_is_zero_and_stays_zero() {
+        let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_output_limit(5.0));
+        for _ in 0..1000 {
+            pid.update(100.0, 0.0, DT_S);
+        }
+        assert_eq!((pid.terms().i, pid.update(0.0, 0.0, DT_S)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn huge_gains_end_at_the_limit_and_never_in_nan() {
+        let huge = PidConfig::new(1e30, 1e30, 1e30);
+        for config in [
+            huge.with_output_limit(20.0),
+            huge,
+            huge.with_period(1e30),
+            huge.with_derivative_filter(1.0),
+        ] {
+            let mut pid = pid(config);
+            for measurement in [0.0, 1e30, -1e30, f32::MAX, f32::MIN, 3.0, f32::MIN_POSITIVE] {
+                for setpoint in [1.0, f32::MAX, f32::MIN] {
+                    let output = pid.update(setpoint, measurement, 1e-6);
+                    assert!(output.abs() <= config.output_upper && pid.integral.is_finite());
+                    assert!(pid.rate.is_finite() && pid.error.is_finite());
+                }
+            }
+            assert_eq!(pid.rejected(), 0);
+        }
+    }
+
+    #[test]
+    fn positive_kd_damps_in_every_entry_point() {
+        for config in [
+            PidConfig::new(0.0, 0.0, 0.5),
+            PidConfig::new(0.0, 0.0, 0.5).with_derivative_on_error(),
+        ] {
+            for direction in [1.0, -1.0] {
+                let mut pid = pid(config);
+                let step = TimeStep::new(DT_S, 0.1);
+                pid.update(0.0, 0.0, DT_S);
+                assert!(pid.update(0.0, direction * 0.1, DT_S) * direction < 0.0);
+                assert!(pid.step(0.0, direction * 0.2, &step) * direction < 0.0);
+                assert!(pid.step_error(0.0, direction * 3.0, &step) * direction < 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn derivative_on_measurement_ignores_the_setpoint_and_on_error_answers_it() {
+        let config = PidConfig::new(0.0, 0.0, 1.0);
+        let (mut quiet, mut kicked) = (pid(config), pid(config.with_derivative_on_error()));
+        quiet.update(0.0, 0.0, DT_S);
+        kicked.update(0.0, 0.0, DT_S);
+        assert_eq!(quiet.update(1.0, 0.0, DT_S), 0.0);
+        assert!((kicked.update(1.0, 0.0, DT_S) - 1000.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn integral_separation_off_means_integral_on() {
+        let mut pid = pid(PidConfig::new(0.0, 10.0, 0.0));
+        pid.update(1000.0, 0.0, DT_S);
+        pid.update(1000.0, 0.0, DT_S);
+        assert!((pid.terms().i - 10.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn integral_separation_rests_beyond_the_threshold_in_both_directions() {
+        let mut pid = pid(PidConfig::new(0.0, 10.0, 0.0).with_integral_separation(5.0));
+        for far in [6.0, -6.0] {
+            pid.update(far, 0.0, DT_S);
+            pid.update(far, 0.0, DT_S);
+            assert_eq!(pid.terms().i, 0.0);
+        }
+        pid.update(5.0, 0.0, DT_S);
+        pid.update(5.0, 0.0, DT_S);
+        assert!(pid.terms().i > 0.0);
+    }
+
+    #[test]
+    fn variable_integral_works_at_half_rate_half_way() {
+        for (error, part) in [(10.0, 1.0), (15.0, 0.5), (-15.0, 0.5), (20.0, 0.0), (30.0, 0.0)] {
+            let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0).with_variable_integral(10.0, 20.0));
+            pid.update(error, 0.0, DT_S);
+            pid.update(error, 0.0, DT_S);
+            assert!((pid.terms().i - part * error * DT_S).abs() < 1e-8, "{error}");
+        }
+    }
+
+    #[test]
+    fn dead_band_does_not_freeze_a_wound_up_integral() {
+        for direction in [1.0, -1.0] {
+            let mut pid = pid(PidConfig::new(0.0, 100.0, 0.0).with_dead_band(1.0));
+            for _ in 0..100 {
+                pid.update(direction * 5.0, 0.0, DT_S);
+            }
+            let wound_up = pid.terms().i.abs();
+            // Past the target but inside the band: the integral goes back ...
+            for _ in 0..100 {
+                pid.update(direction * -0.9, 0.0, DT_S);
+            }
+            assert!(pid.terms().i.abs() < wound_up - 5.0);
+            // ... and short of it, inside the band, it does not grow.
+            let before = pid.terms().i;
+            pid.update(direction * 0.9, 0.0, DT_S);
+            pid.update(direction * 0.9, 0.0, DT_S);
+            assert_eq!(pid.terms().i, before);
+        }
+    }
+
+    #[test]
+    fn dead_band_takes_p_to_zero() {
+        let mut pid = pid(PidConfig::new(10.0, 0.0, 0.0).with_dead_band(1.0));
+        assert_eq!(pid.update(0.99, 0.0, DT_S), 0.0);
+        assert_eq!(pid.terms().p, 0.0);
+        assert_eq!(pid.update(-1.5, 0.0, DT_S), -15.0);
+    }
+
+    #[test]
+    fn circular_goes_the_short_way_in_both_directions() {
+        let circle = PidConfig::new(1.0, 0.0, 0.0).with_period(360.0);
+        assert_eq!(pid(circle).update(10.0, 350.0, DT_S), 20.0);
+        assert_eq!(pid(circle).update(350.0, 10.0, DT_S), -20.0);
+    }
+
+    #[test]
+    fn circular_derivative_has_no_spike_at_the_wrap() {
+        let damper = PidConfig::new(0.0, 0.0, 1.0).with_period(360.0);
+        for config in [damper, damper.with_derivative_on_error()] {
+            let mut pid = pid(config);
+            pid.update(0.0, 359.5, DT_S);
+            assert!((pid.update(0.0, 0.5, DT_S) + 1000.0).abs() < 0.1);
+            assert!((pid.update(0.0, 359.5, DT_S) - 1000.0).abs() < 0.1);
+        }
+    }
+
+    #[test]
+    fn feed_forward_is_static_and_proportional_to_the_setpoint() {
+        let config = PidConfig::new(0.0, 0.0, 0.0).with_feed_forward(0.5, 0.1);
+        assert_eq!(pid(config).update(10.0, 3.0, DT_S), 1.5);
+        assert_eq!(pid(config).update(-10.0, 3.0, DT_S), -1.5);
+        assert_eq!(pid(config).update(0.0, 3.0, DT_S), 0.0);
+    }
+
+    #[test]
+    fn slew_limit_holds_up_and_down_and_from_the_start() {
+        let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_slew_limit(1000.0));
+        assert_eq!(pid.update(5.0, 0.0, DT_S), 1.0);
+        assert_eq!(pid.update(5.0, 0.0, DT_S), 2.0);
+        assert_eq!(pid.update(-5.0, 0.0, DT_S), 1.0);
+    }
+
+    #[test]
+    fn derivative_filter_reaches_63_percent_after_its_time_constant() {
+        let cutoff_hz = 1.0 / (core::f32::consts::TAU * 0.1); // 0.1 s
+        let mut pid = pid(PidConfig::new(0.0, 0.0, 1.0).with_derivative_filter(cutoff_hz));
+        for sample in 0..=100_u8 {
+            pid.update(0.0, f32::from(sample) * DT_S, DT_S);
+        }
+        assert!((pid.output() + 0.632).abs() < 0.005, "{}", pid.output());
+    }
+
+    #[test]
+    fn conditional_integration_leaves_the_limit_at_once() {
+        let config = PidConfig::new(1.0, 100.0, 0.0).with_output_limit(10.0);
+        let (mut guarded, mut winding) = (pid(config), pid(config.without_anti_windup()));
+        for _ in 0..1000 {
+            guarded.update(9.0, 0.0, DT_S);
+            winding.update(9.0, 0.0, DT_S);
+        }
+        assert_eq!((guarded.output(), winding.output()), (10.0, 10.0));
+        assert!(guarded.terms().i <= 2.0 && winding.terms().i > 500.0);
+        assert!(guarded.update(-1.0, 0.0, DT_S) < 1.0);
+    }
+
+    #[test]
+    fn back_calculation_drains_what_the_limit_cuts_off() {
+        let config =
+            PidConfig::new(1.0, 100.0, 0.0).with_output_limit(10.0).with_back_calculation(0.01);
+        let mut pid = pid(config);
+        for _ in 0..1000 {
+            pid.update(9.0, 0.0, DT_S);
+        }
+        // In balance, the inflow ki e equals the outflow excess / Tt: excess = 100 * 9 * 0.01 = 9.
+        assert!((pid.terms().p + pid.terms().i - 10.0 - 9.0).abs() < 1.5, "{:?}", pid.terms());
+    }
+
+    #[test]
+    fn reset_forgets_all_but_the_configuration() {
+        let mut pid = pid(every_option());
+        for sample in 0..10_u8 {
+            pid.update(50.0, f32::from(sample), DT_S);
+        }
+        pid.reset();
+        assert_eq!(pid, Pid::new(every_option()).unwrap());
+    }
+
+    #[test]
+    fn reset_to_takes_over_without_a_jump() {
+        let config = PidConfig::new(2.0, 10.0, 0.5).with_output_limit(10.0);
+        let mut pid = pid(config);
+        pid.reset_to(7.0);
+        assert_eq!(pid.output(), 7.0);
+        assert!((pid.update(100.0, 99.0, DT_S) - 7.0).abs() < 1e-5);
+        assert!((pid.update(100.0, 99.0, DT_S) - 7.01).abs() < 1e-4);
+        pid.reset_to(70.0);
+        assert_eq!(pid.update(0.0, 0.0, DT_S), 10.0);
+        pid.reset_to(f32::NAN);
+        assert_eq!(pid.output(), 0.0);
+    }
+
+    #[test]
+    fn new_gains_do_not_move_the_output() {
+        for config in [PidConfig::new(2.0, 10.0, 0.02), every_option().with_slew_limit(1e9)] {
+            let mut pid = pid(config);
+            for sample in 0..10_u8 {
+                pid.update(1.0, f32::from(sample) * 0.001, DT_S);
+            }
+            let (before, terms) = (pid.output(), pid.terms());
+            pid.set_gains(3.0, 5.0, 0.04).unwrap();
+            let now = pid.terms();
+            assert!(
+                (now.p + now.i + now.d + now.feed_forward - before).abs() < 1e-4,
+                "{terms:?} {now:?}"
+            );
+            assert!((pid.update(1.0, 0.010, DT_S) - before).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn a_new_configuration_does_not_move_the_output_even_from_the_plain_path() {
+        let config = PidConfig::new(2.0, 10.0, 0.02).with_output_limit(10.0);
+        let mut pid = pid(config);
+        pid.update(1.0, 0.1, DT_S);
+        let before = pid.update(1.0, 0.1, DT_S);
+        pid.set_config(config.with_feed_forward(0.5, 0.2)).unwrap();
+        assert!((pid.update(1.0, 0.1, DT_S) - before).abs() < 0.02);
+    }
+
+    #[test]
+    fn dropping_the_integral_gain_drops_the_integral() {
+        let mut pid = pid(PidConfig::new(1.0, 10.0, 0.0));
+        pid.update(1.0, 0.0, DT_S);
+        pid.update(1.0, 0.0, DT_S);
+        pid.set_gains(1.0, 0.0, 0.0).unwrap();
+        assert_eq!(pid.update(1.0, 0.0, DT_S), 1.0);
+        assert!(pid.set_gains(1.0, -1.0, 0.0).is_err_and(|error| error.parameter() == "ki"));
+    }
+
+    fn any_value() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            -100.0_f32..100.0,
+            any::<f32>().prop_filter("finite", |value| value.is_finite())
+        ]
+    }
+
+    fn any_config() -> impl Strategy<Value = PidConfig> {
+        let gains = (0.0_f32..1e3, 0.0_f32..1e3, 0.0_f32..10.0);
+        let limits = (-50.0_f32..0.0, 0.1_f32..50.0, 0.1_f32..50.0);
+        (gains, limits, 0_u16..1024).prop_map(
+            |((kp, ki, kd), (lower, upper, integral), options)| {
+                let mut config = PidConfig::new(kp, ki, kd)
+                    .with_output_range(lower, upper)
+                    .with_integral_limit(integral);
+                let on = |bit: u16| options >> bit & 1 == 1;
+                if on(0) {
+                    config = config.with_output_limit(upper);
+                }
+                if on(1) {
+                    config = config.with_integral_separation(30.0);
+                }
+                if on(2) {
+                    config = config.with_variable_integral(10.0, 40.0);
+                }
+                if on(3) {
+                    config = config.with_dead_band(1.0);
+                }
+                if on(4) {
+                    config = config.with_feed_forward(1.0, 0.1);
+                }
+                if on(5) {
+                    config = config.with_slew_limit(500.0);
+                }
+                if on(6) {
+                    config = config.with_period(360.0);
+                }
+                if on(7) {
+                    config = config.with_derivative_filter(50.0);
+                }
+                if on(8) {
+                    config = config.with_back_calculation(0.01);
+                }
+                if on(9) {
+                    config = config.with_derivative_on_error();
+                }
+                config
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn output_and_integral_are_within_limits_for_any_finite_input(
+            config in any_config(),
+            samples in prop::collection::vec((any_value(), any_value(), 0.0_f32..0.2), 1..40),
+        ) {
+            let mut pid = pid(config);
+            for (setpoint, measurement, dt_s) in samples {
+                let output = pid.update(setpoint, measurement, dt_s);
+                // Before the first good sample the output is zero.
+                prop_assert!(output == 0.0 || (config.output_lower..=config.output_upper).contains(&output));
+                prop_assert!(pid.terms().i.abs() <= config.integral_limit);
+            }
+        }
+
+        #[test]
+        fn damping_never_feeds_energy_in(kd in 0.001_f32..10.0, path in prop::collection::vec(-100.0_f32..100.0, 2..50)) {
+            let mut pid = pid(PidConfig::new(1.0, 1.0, kd));
+            let (mut work, mut last) = (0.0_f64, None);
+            for measurement in path {
+                pid.update(0.0, measurement, DT_S);
+                if let Some(last) = last {
+                    work += f64::from(pid.terms().d) * f64::from(measurement - last);
+                }
+                last = Some(measurement);
+            }
+            prop_assert!(work <= 0.0);
+        }
+
+        #[test]
+        fn whole_periods_change_nothing(
+            config in any_config(),
+            samples in prop::collection::vec((0_u16..5760, 0_u16..5760, -50_i8..50, -50_i8..50), 1..30),
+        ) {
+            // Without feed-forward, which sees the setpoint itself. Sixteenths of a degree are exact in f32.
+            let config = config.with_period(360.0).with_feed_forward(0.0, 0.0);
+            let (mut here, mut turned) = (pid(config), pid(config));
+            for (setpoint, measurement, turns, others) in samples {
+                let (setpoint, measurement) = (f32::from(setpoint) / 16.0, f32::from(measurement) / 16.0);
+                let expected = here.update(setpoint, measurement, DT_S);
+                let shifted = turned.update(
+                    setpoint + 360.0 * f32::from(turns),
+                    measurement + 360.0 * f32::from(others),
+                    DT_S,
+                );
+                prop_assert_eq!(shifted, expected);
+            }
+        }
+
+        #[test]
+        fn the_plain_path_and_the_careful_one_agree(
+            config in any_config(),
+            samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0), 1..30),
+        ) {
+            let plain = PidConfig::new(config.kp, config.ki, config.kd).with_output_limit(1e6);
+            let (mut fast, mut slow) = (pid(plain), pid(plain.with_output_range(-1e6, 1.1e6)));
+            for (setpoint, measurement) in samples {
+                let (fast, slow) = (fast.update(setpoint, measurement, DT_S), slow.update(setpoint, measurement, DT_S));
+                prop_assert!((fast - slow).abs() <= 1e-5 * fast.abs().max(1e3) || fast.abs() >= 1e6);
+            }
+        }
+
+        #[test]
+        fn an_error_formed_elsewhere_gives_the_same(
+            config in any_config(),
+            samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0), 2..30),
+        ) {
+            let plain = PidConfig::new(config.kp, config.ki, config.kd).with_output_limit(config.output_upper);
+            let (mut whole, mut parts) = (pid(plain), pid(plain));
+            let step = TimeStep::new(DT_S, 0.1);
+            let mut last = samples[0].1;
+            for (setpoint, measurement) in samples {
+                let expected = whole.step(setpoint, measurement, &step);
+                let rate = (measurement - last) * step.per_dt;
+                prop_assert_eq!(parts.step_error(setpoint - measurement, rate, &step), expected);
+                last = measurement;
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+/// The time since the step before, validated once for all loops of a tick.
+///
+/// | `dt_s` | kind | what a controller does with it |
+/// |---|---|---|
+/// | above 0, up to `dt_max_s` | normal | its work |
+/// | above `dt_max_s` | [frozen](Self::is_frozen) | integral and derivative stay for this step, the rest follows |
+/// | zero, negative, NaN, infinite | [hold](Self::is_hold) | nothing changes, the last output is returned, the step is counted |
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::TimeStep;
+///
+/// assert_eq!(TimeStep::new(0.001, 0.1).dt_s(), 0.001);
+/// assert!(TimeStep::new(0.0, 0.1).is_hold());
+/// assert!(TimeStep::new(10.0, 0.1).is_frozen()); // back from a breakpoint
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TimeStep {
+    pub(super) dt_s: f32,
+    /// Infinite unless the step is normal, so that no plain arithmetic can take it for one.
+    pub(super) half_dt_s: f32,
+    pub(super) per_dt: f32,
+}
+
+impl TimeStep {
+    /// Takes the seconds since the step before and the longest step that is still believed.
+    ///
+    /// A `dt_max_s` that is NaN counts as infinite; with one of zero or less every step holds.
+    #[must_use]
+    #[inline]
+    pub const fn new(dt_s: f32, dt_max_s: f32) -> Self {
+        let per_dt = 1.0 / dt_s;
+        if dt_s > 0.0 && dt_s <= f32::MAX && per_dt <= f32::MAX {
+            if dt_s > dt_max_s {
+                return Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
+            }
+            return Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt };
+        }
+        Self { dt_s: 0.0, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY }
+    }
+
+    /// Returns the seconds to count with: `dt_max_s` when frozen, 0 when on hold.
+    #[must_use]
+    pub const fn dt_s(&self) -> f32 {
+        self.dt_s
+    }
+
+    /// Tells whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
+    #[must_use]
+    pub const fn is_hold(&self) -> bool {
+        self.dt_s <= 0.0
+    }
+
+    /// Tells whether integral and derivative stay for this step: `dt_s` was above the maximum.
+    #[must_use]
+    pub const fn is_frozen(&self) -> bool {
+        self.dt_s > 0.0 && self.per_dt > f32::MAX
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_dt_is_of_one_kind() {
+        for dt_s in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40] {
+            let step = TimeStep::new(dt_s, 0.1);
+            assert!(step.is_hold() && !step.is_frozen(), "{dt_s}");
+        }
+        for dt_s in [0.100_001, 10.0, f32::MAX] {
+            let step = TimeStep::new(dt_s, 0.1);
+            assert!(step.is_frozen() && !step.is_hold() && step.dt_s() == 0.1, "{dt_s}");
+        }
+        for dt_s in [1e-6, 0.001, 0.1] {
+            let step = TimeStep::new(dt_s, 0.1);
+            assert!(!step.is_frozen() && !step.is_hold() && step.dt_s() == dt_s, "{dt_s}");
+        }
+    }
+}
