@@ -1,1 +1,85 @@
-//! (being written)
+//! DJI C610/M2006, C620/M3508 and GM6020: four motors to a command frame, one feedback frame a motor.
+//!
+//! # The protocol on one page
+//! Classic CAN at 1 Mbit/s, standard data frames of 8 bytes, all numbers big-endian.
+//!
+//! | model | ids | command id, slots 0..=3 | feedback id | command, full scale | gear |
+//! |---|---|---|---|---|---|
+//! | [`M2006`] on C610 | 1..=8 | 0x200 for 1..=4, 0x1FF for 5..=8 | 0x200 + id | 10000 = 10 A | 36:1 |
+//! | [`M3508`] on C620 | 1..=8 | 0x200 for 1..=4, 0x1FF for 5..=8 | 0x200 + id | 16384 = 20 A | 3591:187 |
+//! | [`Gm6020Voltage`] | 1..=7 | 0x1FF for 1..=4, 0x2FF for 5..=7 | 0x204 + id | 25000 = 24 V nominal | 1:1 |
+//! | [`Gm6020Current`] (a) | 1..=7 | 0x1FE for 1..=4, 0x2FE for 5..=7 | 0x204 + id | 16384 = 3 A | 1:1 |
+//!
+//! (a) Only when current control was switched on in the motor with RoboMaster Assistant, on ESC firmware that
+//! offers it. In the other mode the motor ignores the frame: the two models are not interchangeable.
+//!
+//! Command frame: four `i16`, one a slot; a slot without a motor is sent as 0. Feedback frame, 1 kHz by default:
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 0..=1 | rotor angle, 0..=8191 for one turn |
+//! | 2..=3 | rotor speed, `i16`, rpm |
+//! | 4..=5 | torque current, `i16`, in the scale of the current command |
+//! | 6 | motor temperature in °C; nothing on C610 |
+//! | 7 | error code ([`ErrorCode`]); 0 on old firmware |
+//!
+//! Positive is counter-clockwise looking at the shaft, for angle, speed, current and command alike.
+//!
+//! # What collides on one bus
+//! A frame id and a slot have one owner each, so [`Bus::attach`] refuses:
+//! * the same feedback id: C6x0 #5..=8 with GM6020 #1..=4 *in either mode* (0x205..=0x208);
+//! * the same command slot: C6x0 #5..=8 with GM6020 (voltage) #1..=4 on 0x1FF;
+//! * one physical id in two modes or models: C610 #n with C620 #n, GM6020 #n as voltage and as current.
+//!
+//! `attach` is a `const fn`: in a `const` the same refusal is a compile error, in words.
+//!
+//! ```compile_fail
+//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//!
+//! const BUS: Bus = {
+//!     let mut bus = Bus::new();
+//!     match bus.attach(Config::<M3508>::new(5)) {
+//!         Ok(_) => {}
+//!         Err(error) => panic!("{}", error.message().as_str()),
+//!     }
+//!     match bus.attach(Config::<Gm6020Current>::new(1)) {
+//!         Ok(_) => {}
+//!         // error[E0080]: evaluation panicked: GM6020 (current) #1 collides with M3508 #5 on 0x205
+//!         Err(error) => panic!("{}", error.message().as_str()),
+//!     }
+//!     bus
+//! };
+//! let bus = BUS;
+//! ```
+//!
+//! # Sources
+//! DJI C610 user guide V1.0 (2019.03) pages 8 and 9 for layout, ids, scale and rate of C610; for C620 and GM6020,
+//! whose manuals were not at hand, what independent public drivers agree on (taproot, librm, HNU's framework, IFR). They differ on the GM6020 voltage limit: 25000 is today's, 30000 that of old motors
+//! ([`Config::with_legacy_full_scale`]). The volts behind it are nominal: sources say 24 V or 25.2 V.
+
+mod bus;
+mod command;
+mod config;
+mod device;
+mod error;
+mod feedback;
+mod handle;
+mod model;
+mod slot;
+mod state;
+mod targets;
+#[cfg(test)]
+mod tests;
+
+pub use bus::{Bus, Counters};
+pub use command::CommandFrame;
+pub use config::Config;
+pub use error::{AttachError, Collision, Message};
+pub use feedback::{ErrorCode, Feedback, FeedbackError};
+pub use handle::{AnyHandle, Handle};
+pub use model::{
+    CurrentControlled, Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model, Unit,
+    VoltageControlled,
+};
+pub use state::State;
+pub use targets::LoopError;

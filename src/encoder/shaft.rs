@@ -25,26 +25,56 @@ use core::f32::consts::TAU;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shaft {
-    turns: i64,
+    turns: Turns,
     phase: i32,
-    fine_per_turn: i32,
-    fine_per_count: i32,
     radians_per_fine: f32,
+    /// 8192 of these are the fine counts of a turn.
+    rotor: u16,
+    /// Fine counts of a rotor count, negative for a reversed shaft.
+    fine_per_count: i16,
+}
+
+/// Whole turns in 64 bits, in two halves: a struct that holds it needs no alignment to 8 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Turns {
+    high: i32,
+    low: u32,
+}
+
+impl Turns {
+    #[expect(clippy::cast_possible_truncation, reason = "splits")]
+    pub(crate) const fn new(turns: i64) -> Self {
+        Self { high: (turns >> 32) as i32, low: turns.cast_unsigned() as u32 }
+    }
+
+    pub(crate) const fn get(self) -> i64 {
+        (self.high as i64) << 32 | self.low as i64
+    }
+
+    #[inline]
+    const fn add(self, more: i64) -> Self {
+        Self::new(self.get().wrapping_add(more))
+    }
 }
 
 impl Shaft {
     /// Takes the gear, and whether the rotor's positive direction is the shaft's negative one.
     #[must_use]
     pub const fn new(gear: GearRatio, reversed: bool) -> Self {
-        let fine_per_turn = COUNTS_PER_TURN as i32 * gear.rotor() as i32;
-        let fine_per_count = gear.output() as i32;
+        #[expect(clippy::cast_possible_wrap, reason = "a gear ratio has at most 8192 output turns")]
+        let output = gear.output() as i16;
         Self {
-            turns: 0,
+            turns: Turns::new(0),
             phase: 0,
-            fine_per_turn,
-            fine_per_count: if reversed { -fine_per_count } else { fine_per_count },
-            radians_per_fine: TAU / fine_per_turn as f32,
+            radians_per_fine: TAU / (COUNTS_PER_TURN as f32 * gear.rotor() as f32),
+            rotor: gear.rotor(),
+            fine_per_count: if reversed { -output } else { output },
         }
+    }
+
+    #[inline]
+    const fn fine_per_turn(&self) -> i32 {
+        self.rotor as i32 * COUNTS_PER_TURN as i32
     }
 
     /// Starts from the first angle of the rotor: within the first turn, no turn counted.
@@ -55,12 +85,12 @@ impl Shaft {
         let angle = rotor_angle as i32 % COUNTS_PER_TURN as i32;
         let reversed = self.fine_per_count < 0 && angle != 0;
         self.advance_far(if reversed { angle - COUNTS_PER_TURN as i32 } else { angle });
-        self.turns = 0;
+        self.turns = Turns::new(0);
     }
 
     /// Makes the present position zero.
     pub const fn set_zero(&mut self) {
-        self.turns = 0;
+        self.turns = Turns::new(0);
         self.phase = 0;
     }
 
@@ -72,13 +102,13 @@ impl Shaft {
     /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`](super::shortest) gives.
     #[inline]
     pub const fn advance(&mut self, counts: i32) {
-        let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count));
+        let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count as i32));
         if next < 0 {
-            self.phase = next.wrapping_add(self.fine_per_turn);
-            self.turns = self.turns.wrapping_sub(1);
-        } else if next >= self.fine_per_turn {
-            self.phase = next.wrapping_sub(self.fine_per_turn);
-            self.turns = self.turns.wrapping_add(1);
+            self.phase = next.wrapping_add(self.fine_per_turn());
+            self.turns = self.turns.add(-1);
+        } else if next >= self.fine_per_turn() {
+            self.phase = next.wrapping_sub(self.fine_per_turn());
+            self.turns = self.turns.add(1);
         } else {
             self.phase = next;
         }
@@ -102,7 +132,7 @@ impl Shaft {
     /// Returns the position as turns and angle; the angle is rounded to `f32`.
     #[must_use]
     pub const fn position(&self) -> Position {
-        Position::new(self.turns, self.angle())
+        Position::new(self.turns.get(), self.angle())
     }
 
     /// Returns the angle within the turn: 0 up to, but not including, one turn.
@@ -117,29 +147,33 @@ impl Shaft {
     /// since zero was set; exact. After a position other than zero was set, rounded to whole counts.
     #[must_use]
     pub const fn rotor_counts(&self) -> i64 {
-        let fine =
-            self.turns.wrapping_mul(self.fine_per_turn as i64).wrapping_add(self.phase as i64);
-        let counts = divide(fine.unsigned_abs(), self.fine_per_count.unsigned_abs()).cast_signed();
+        let fine = self
+            .turns
+            .get()
+            .wrapping_mul(self.fine_per_turn() as i64)
+            .wrapping_add(self.phase as i64);
+        let counts =
+            divide(fine.unsigned_abs(), self.fine_per_count.unsigned_abs() as u32).cast_signed();
         if fine < 0 { counts.wrapping_neg() } else { counts }
     }
 
     /// Returns turns and phase of a position in this shaft's counts.
     #[must_use]
-    pub(crate) const fn locate(&self, position: Position) -> (i64, i32) {
+    pub(crate) const fn locate(&self, position: Position) -> (Turns, i32) {
         #[expect(clippy::cast_possible_truncation, reason = "0 to one turn; NaN is 0")]
         let phase = (position.angle().as_radians() / self.radians_per_fine + 0.5) as i32;
-        if phase < self.fine_per_turn {
-            (position.turns(), phase)
+        if phase < self.fine_per_turn() {
+            (Turns::new(position.turns()), phase)
         } else {
-            (position.turns().saturating_add(1), 0)
+            (Turns::new(position.turns().saturating_add(1)), 0)
         }
     }
 
     /// Returns the way to a located position in radians: exact near zero, saturated at 63 turns.
     #[must_use]
     #[inline]
-    pub(crate) const fn way_to(&self, turns: i64, phase: i32) -> f32 {
-        let whole = turns.wrapping_sub(self.turns);
+    pub(crate) const fn way_to(&self, turns: Turns, phase: i32) -> f32 {
+        let whole = turns.get().wrapping_sub(self.turns.get());
         #[expect(clippy::cast_possible_truncation, reason = "limited to 63")]
         let whole = if whole > 63 {
             63
@@ -149,7 +183,7 @@ impl Shaft {
             whole as i32
         };
         let fine =
-            whole.wrapping_mul(self.fine_per_turn).wrapping_add(phase.wrapping_sub(self.phase));
+            whole.wrapping_mul(self.fine_per_turn()).wrapping_add(phase.wrapping_sub(self.phase));
         fine as f32 * self.radians_per_fine
     }
 
@@ -157,7 +191,7 @@ impl Shaft {
     #[must_use]
     #[inline]
     pub(crate) const fn shortest_way_to(&self, phase: i32) -> f32 {
-        let turn = self.fine_per_turn;
+        let turn = self.fine_per_turn();
         let way = phase.wrapping_sub(self.phase);
         let way = if way >= turn / 2 {
             way.wrapping_sub(turn)
@@ -270,8 +304,8 @@ mod tests {
             shaft.set_position(Position::from_turns(turns));
             let (turns, phase) = shaft.locate(Position::new(turns, Angle::from_degrees(-1.0)));
             assert!((shaft.way_to(turns, phase).to_degrees() + 1.0).abs() < 1e-4);
-            assert!((shaft.way_to(turns - 500, phase) + 63.0 * TAU).abs() < 7.0);
-            assert!((shaft.way_to(i64::MAX, phase).abs() - 63.0 * TAU).abs() < 7.0);
+            assert!((shaft.way_to(turns.add(-500), phase) + 63.0 * TAU).abs() < 7.0);
+            assert!((shaft.way_to(Turns::new(i64::MAX), phase).abs() - 63.0 * TAU).abs() < 7.0);
         }
     }
 
@@ -311,7 +345,7 @@ mod tests {
             prop_assert_eq!(shaft.rotor_counts() - start, moved);
             let fine = (start + moved) * i64::from(gear.1);
             let turn = 8192 * i64::from(gear.0);
-            prop_assert_eq!((shaft.turns, i64::from(shaft.phase)), (fine.div_euclid(turn), fine.rem_euclid(turn)));
+            prop_assert_eq!((shaft.turns.get(), i64::from(shaft.phase)), (fine.div_euclid(turn), fine.rem_euclid(turn)));
         }
 
         /// Law: division by 16-bit digits is division.

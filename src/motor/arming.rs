@@ -60,6 +60,8 @@ pub enum ArmError {
     Stopped,
     /// There is no motor to arm.
     NoMotors,
+    /// The driver takes no frames.
+    BusDown,
 }
 
 impl core::fmt::Display for ArmError {
@@ -69,6 +71,7 @@ impl core::fmt::Display for ArmError {
             Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
             Self::Stopped => f.write_str("the emergency stop is set"),
             Self::NoMotors => f.write_str("no motor is attached"),
+            Self::BusDown => f.write_str("the CAN driver takes no frames"),
         }
     }
 }

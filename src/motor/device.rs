@@ -91,6 +91,7 @@ pub trait CanDevice {
     ///
     /// # Errors
     /// Names what stands in the way: motors without feedback, a CAN id with two owners, a set emergency stop.
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         if self.is_stopped() {
             return Err(ArmError::Stopped);

@@ -129,6 +129,6 @@ pub enum Recovery {
     /// It stays relaxed until it is armed again.
     #[default]
     Rearm,
-    /// It takes targets again; its output limit rises from zero to full in this time.
+    /// It takes targets again; its output limit rises from zero to full in this time, of 1 ms to 65 s.
     Ramp(Duration),
 }

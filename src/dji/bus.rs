@@ -1,0 +1,397 @@
+use super::command::{Outbox, Place};
+use super::config::PlainConfig;
+use super::handle::Key;
+use super::slot::{Cycle, Slot};
+use super::{AnyHandle, AttachError, Collision, Config, Facts, Feedback, Handle, Model, State};
+use crate::control::TimeStep;
+use crate::frame::CanFrame;
+use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::time::{Duration, Instant, Tick};
+use core::marker::PhantomData;
+
+/// The lowest feedback id, and how many there are: 0x201..=0x20B.
+const FIRST_FEEDBACK_ID: u32 = 0x201;
+const SLOTS: usize = 11;
+
+/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
+const LONGEST_STEP_S: f32 = 0.02;
+
+/// The motors of one CAN bus, their loops, and the frames for them.
+///
+/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. Storage is what the protocol
+/// needs: 11 feedback ids and 5 command frames, no capacity to choose. It can stand in a `static`.
+///
+/// # Examples
+/// ```
+/// use drivetrain::dji::{Bus, Config, M3508};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::CanDevice;
+/// use drivetrain::time::{Instant, Tick};
+/// use drivetrain::units::Current;
+///
+/// let mut bus = Bus::new();
+/// let wheel = bus.attach(Config::<M3508>::new(1))?;
+///
+/// let now = Instant::from_micros(1_000);
+/// let rest = CanFrame::standard(0x201, [0x0E, 0x16, 0, 0, 0xFF, 0xFD, 0x21, 0]).ok_or("not an 11-bit id")?;
+/// bus.ingest(&rest, now);
+/// bus.arm(now)?;
+///
+/// bus.set_current(wheel, Current::from_amperes(1.0))?;
+/// bus.update(Tick::new(now, 0.001));
+/// let frame = bus.next_frame().ok_or("nothing to send")?;
+/// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Bus<B = ()> {
+    pub(super) slots: [Slot; SLOTS],
+    pub(super) outbox: Outbox,
+    pub(super) now: u32,
+    pub(super) timeouts: Timeouts,
+    updated: Option<Instant>,
+    rejects: Rejects,
+    held_steps: u8,
+    turn: u8,
+    pub(super) armed: bool,
+    pub(super) stopped: bool,
+    brand: PhantomData<fn() -> B>,
+}
+
+#[cfg(target_pointer_width = "32")]
+const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3584);
+
+/// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Feedback frames of another length than 8 bytes.
+    pub bad_length: u32,
+    /// Feedback frames with an angle above 8191.
+    pub bad_field: u32,
+    /// Frames with a feedback id of this family that no attached motor has: a wrong id switch shows here.
+    pub unattached: u32,
+    /// Updates whose time step was zero, negative or NaN.
+    pub bad_steps: u32,
+    /// Command frames that an update had ready; wraps.
+    pub packed: u32,
+    /// Command frames that were replaced by newer ones before they were taken; wraps.
+    pub superseded: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Rejects {
+    bad_length: u32,
+    bad_field: u32,
+    unattached: u32,
+    bad_steps: u32,
+}
+
+impl Bus {
+    /// Makes a bus without motors.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::branded()
+    }
+}
+
+impl Default for Bus {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<B> Bus<B> {
+    /// Makes a bus without motors whose handles fit only a bus of the same brand.
+    ///
+    /// # Examples
+    /// ```compile_fail,E0308
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// struct Left;
+    /// struct Right;
+    /// let mut left = Bus::<Left>::branded();
+    /// let right = Bus::<Right>::branded();
+    /// let wheel = left.attach(Config::<M3508>::new(1)).expect("a free id");
+    /// right.state(wheel); // expected `AnyHandle<Right>`, found `Handle<M3508, Left>`
+    /// ```
+    #[must_use]
+    pub const fn branded() -> Self {
+        Self {
+            slots: [Slot::FREE; SLOTS],
+            outbox: Outbox::new(),
+            now: 0,
+            timeouts: Timeouts::new(),
+            updated: None,
+            rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
+            held_steps: 0,
+            turn: 0,
+            armed: false,
+            stopped: false,
+            brand: PhantomData,
+        }
+    }
+
+    /// Sets when feedback and commands count as lost.
+    #[must_use]
+    pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
+        self.timeouts = timeouts;
+        self
+    }
+
+    /// Sets how often a command frame of zeros is repeated; 10 ms at first, at most 10 s.
+    #[must_use]
+    pub const fn with_keep_alive(mut self, period: Duration) -> Self {
+        self.outbox.set_keep_alive(match period.micros_u32() {
+            Some(micros) if micros < 10_000_000 => micros,
+            _ => 10_000_000,
+        });
+        self
+    }
+
+    /// Attaches a motor.
+    ///
+    /// # Errors
+    /// When its id is out of range, another motor uses its feedback id or command slot, or a parameter of the
+    /// configuration is not usable. The bus is then as it was.
+    pub const fn attach<M: Model>(
+        &mut self,
+        config: Config<M>,
+    ) -> Result<Handle<M, B>, AttachError> {
+        match self.attach_plain(M::FACTS, &config.plain) {
+            Ok(key) => Ok(Handle::new(key)),
+            Err(error) => Err(error),
+        }
+    }
+
+    const fn attach_plain(
+        &mut self,
+        facts: &'static Facts,
+        config: &PlainConfig,
+    ) -> Result<Key, AttachError> {
+        let motor = MotorName::new(facts.name, config.id);
+        let Some((frame, slot)) = facts.place(config.id) else {
+            return Err(AttachError::Id { motor, highest: facts.ids });
+        };
+        let feedback_id = facts.feedback_base + config.id as u16;
+        let index = feedback_id as usize - FIRST_FEEDBACK_ID as usize;
+        let Some((_, [here, ..])) = self.slots.split_at_mut_checked(index) else {
+            return Err(AttachError::Id { motor, highest: facts.ids });
+        };
+        let place = Place::new(frame, slot);
+        if let Some(with) = here.name() {
+            let slot = if here.place.same_as(place) { Some((frame, slot)) } else { None };
+            return Err(AttachError::Collision(Collision { motor, with, feedback_id, slot }));
+        }
+        let Some(generation) = here.next_generation() else {
+            return Err(AttachError::WornOut { motor });
+        };
+        match Slot::new(facts, config, place, generation) {
+            Ok(slot) => *here = slot,
+            Err(error) => return Err(error),
+        }
+        self.outbox.open(frame);
+        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
+        let index = index as u8;
+        Ok(Key::new(index, generation))
+    }
+
+    /// Attaches several motors of one model.
+    ///
+    /// # Errors
+    /// The first error; no motor of the array is attached then.
+    pub fn attach_all<M: Model, const N: usize>(
+        &mut self,
+        configs: [Config<M>; N],
+    ) -> Result<[Handle<M, B>; N], AttachError> {
+        let mut failed = None;
+        let handles = configs.map(|config| {
+            self.attach(config).unwrap_or_else(|error| {
+                failed.get_or_insert(error);
+                Handle::new(Key::NONE)
+            })
+        });
+        match failed {
+            None => Ok(handles),
+            Some(error) => {
+                handles.into_iter().for_each(|handle| self.detach(handle));
+                Err(error)
+            }
+        }
+    }
+
+    /// Detaches a motor. Its command slot is sent as zero once more, then the frame stops when nobody else uses it.
+    pub fn detach(&mut self, motor: impl Into<AnyHandle<B>>) {
+        let Some(slot) = self.slot_mut(motor.into()) else { return };
+        let place = slot.place;
+        slot.free();
+        self.outbox.put(place, 0);
+        let shared = self
+            .slots
+            .iter()
+            .any(|slot| slot.facts().is_some() && slot.place.frame() == place.frame());
+        if !shared {
+            self.outbox.close(place.frame());
+        }
+    }
+
+    /// Takes a received frame that arrived at `now`. Constant time.
+    #[inline]
+    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
+        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
+        if slot.facts().is_none() {
+            self.rejects.unattached = self.rejects.unattached.saturating_add(1);
+            return Ingest::Unrelated;
+        }
+        if frame.length() != 8 {
+            self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        match Feedback::decode(frame.bytes()) {
+            Ok(feedback) => {
+                slot.receive(feedback, now.stamp(), &self.timeouts);
+                Ingest::Taken
+            }
+            Err(_) => {
+                self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
+                Ingest::Malformed(Malformed::Field)
+            }
+        }
+    }
+
+    /// Takes a received standard data frame from a driver without an `embedded-can` frame type.
+    pub fn ingest_raw(&mut self, id: u16, data: &[u8], now: Instant) -> Ingest {
+        match embedded_can::StandardId::new(id).and_then(|id| embedded_can::Frame::new(id, data)) {
+            Some(frame) => self.ingest(&frame, now),
+            None => Ingest::Unrelated,
+        }
+    }
+
+    /// Runs every loop once and encodes the commands.
+    ///
+    /// A `dt_s` of zero, below zero, infinite or NaN changes nothing and leaves the last commands for one update;
+    /// a second one in a row sends zeros. Above 20 ms integrals and derivatives rest for the step.
+    pub fn update(&mut self, tick: Tick) {
+        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
+        self.now = tick.now().stamp();
+        let before = self.updated.replace(tick.now());
+        let paused =
+            before.is_some_and(|before| tick.now().since(before) > Duration::from_secs(60));
+        if step.is_hold() {
+            self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
+            self.held_steps = self.held_steps.saturating_add(1);
+            if self.held_steps >= 2 {
+                self.outbox.clear();
+            }
+            self.outbox.finish_update(self.now);
+            return;
+        }
+        self.held_steps = 0;
+        if paused {
+            // Stamps of 32 bits cannot tell how long ago a frame was heard.
+            self.slots.iter_mut().for_each(Slot::lose);
+        }
+        let cycle = Cycle { now: self.now, step, timeouts: self.timeouts };
+        for slot in &mut self.slots {
+            if slot.facts().is_some() {
+                let raw = slot.update(&cycle);
+                self.outbox.put(slot.place, raw);
+            }
+        }
+        self.outbox.finish_update(self.now);
+        self.check_one_slot();
+    }
+
+    /// Does what one motor a tick is enough for.
+    #[inline]
+    fn check_one_slot(&mut self) {
+        self.turn = if usize::from(self.turn) + 1 < SLOTS { self.turn + 1 } else { 0 };
+        if let Some(slot) = self.slots.get_mut(usize::from(self.turn)) {
+            slot.ramp(self.now);
+        }
+    }
+
+    /// Returns a command frame that waits to be sent, and takes it off the list.
+    #[inline]
+    pub fn next_frame(&mut self) -> Option<CanFrame> {
+        self.outbox.next()
+    }
+
+    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+    pub fn requeue(&mut self, frame: &CanFrame) -> bool {
+        self.outbox.requeue(frame.header())
+    }
+
+    /// Returns what is known of a motor; `None` before its first frame, and once it is detached.
+    #[must_use]
+    pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {
+        self.slot(motor.into())?.state()
+    }
+
+    /// Tells whether a motor is heard; `None` once it is detached.
+    #[must_use]
+    pub fn link(&self, motor: impl Into<AnyHandle<B>>) -> Option<Link> {
+        Some(self.slot(motor.into())?.link())
+    }
+
+    /// Tells whether a motor takes targets: armed, and not relaxed by a fault.
+    #[must_use]
+    pub fn is_motor_armed(&self, motor: impl Into<AnyHandle<B>>) -> bool {
+        self.slot(motor.into()).is_some_and(Slot::is_armed)
+    }
+
+    /// Iterates over the attached motors, in the order of their feedback ids.
+    pub fn motors(&self) -> impl Iterator<Item = (AnyHandle<B>, MotorName)> + '_ {
+        (0..).zip(&self.slots).filter_map(|(index, slot)| {
+            let key = Key::new(index, slot.next_generation()?);
+            Some((AnyHandle::new(key), slot.name()?))
+        })
+    }
+
+    /// Returns what the bus has counted.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        let Rejects { bad_length, bad_field, unattached, bad_steps } = self.rejects;
+        let (packed, superseded) = (self.outbox.packed, self.outbox.superseded);
+        Counters { bad_length, bad_field, unattached, bad_steps, packed, superseded }
+    }
+
+    /// Returns id and mask for a hardware filter that lets all attached motors' feedback through.
+    ///
+    /// A frame passes when `frame id & mask == id & mask`. A mask cannot name any set of ids exactly, so a few
+    /// others may pass too. Without motors nothing but 0x7FF passes.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus = Bus::new();
+    /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.acceptance_filter(), (0x200, 0x7F8)); // 0x201..=0x204 need three open bits
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub fn acceptance_filter(&self) -> (u16, u16) {
+        let ids = || {
+            self.slots
+                .iter()
+                .zip(0x201_u16..)
+                .filter(|(slot, _)| slot.facts().is_some())
+                .map(|(_, id)| id)
+        };
+        let Some(first) = ids().next() else { return (0x7FF, 0x7FF) };
+        let differing = ids().fold(0, |bits, id| bits | (id ^ first));
+        let open = if differing == 0 { 0 } else { u16::MAX >> differing.leading_zeros() };
+        (first & !open, 0x7FF & !open)
+    }
+
+    pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {
+        self.slots.get(motor.key().index()).filter(|slot| slot.matches(motor.key()))
+    }
+
+    pub(super) fn slot_mut(&mut self, motor: AnyHandle<B>) -> Option<&mut Slot> {
+        self.slots.get_mut(motor.key().index()).filter(|slot| slot.matches(motor.key()))
+    }
+}

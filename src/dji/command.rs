@@ -1,0 +1,324 @@
+//! Command frames: values to wire words, and the box they wait in.
+
+use crate::frame::CanFrame;
+
+/// One of the five command frames: four motors each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum CommandFrame {
+    /// C6x0 #1..=4.
+    X200,
+    /// C6x0 #5..=8 and GM6020 (voltage) #1..=4.
+    X1FF,
+    /// GM6020 (voltage) #5..=7.
+    X2FF,
+    /// GM6020 (current) #1..=4.
+    X1FE,
+    /// GM6020 (current) #5..=7.
+    X2FE,
+}
+
+impl CommandFrame {
+    /// All of them, in the order of their index.
+    pub const ALL: [Self; 5] = [Self::X200, Self::X1FF, Self::X2FF, Self::X1FE, Self::X2FE];
+
+    /// Returns the CAN id.
+    #[must_use]
+    pub const fn id(self) -> u16 {
+        match self {
+            Self::X200 => 0x200,
+            Self::X1FF => 0x1FF,
+            Self::X2FF => 0x2FF,
+            Self::X1FE => 0x1FE,
+            Self::X2FE => 0x2FE,
+        }
+    }
+
+    const fn bit(self) -> u8 {
+        1 << self as u8
+    }
+
+    fn with_id(id: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|frame| u32::from(frame.id()) == id)
+    }
+}
+
+/// Converts a command to the wire: to the nearest, saturated at ±`limit`, NaN to 0.
+///
+/// Odd-symmetric: `to_raw(-x) == -to_raw(x)` for every `x` that is not NaN.
+#[inline]
+pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
+    let scaled = value * raw_per_unit;
+    #[expect(clippy::cast_possible_truncation, reason = "saturates, NaN gives 0")]
+    let nearest = (scaled + 0.5_f32.copysign(scaled)) as i32;
+    saturate(nearest, limit)
+}
+
+/// Limits a raw command to ±`limit`, which is not negative.
+#[inline]
+pub(super) const fn saturate(raw: i32, limit: i16) -> i16 {
+    if raw > limit as i32 {
+        limit
+    } else if raw < -(limit as i32) {
+        -limit
+    } else {
+        #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+        let raw = raw as i16;
+        raw
+    }
+}
+
+/// Where a motor's word stands: one of four slots in one of five frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Place(u8);
+
+impl Place {
+    pub(super) const fn new(frame: CommandFrame, slot: u8) -> Self {
+        Self((frame as u8) << 2 | (slot & 3))
+    }
+
+    pub(super) const fn same_as(self, other: Self) -> bool {
+        self.0 == other.0
+    }
+
+    pub(super) const fn frame(self) -> CommandFrame {
+        let [x200, x1ff, x2ff, x1fe, x2fe] = CommandFrame::ALL;
+        match self.0 >> 2 {
+            0 => x200,
+            1 => x1ff,
+            2 => x2ff,
+            3 => x1fe,
+            _ => x2fe,
+        }
+    }
+}
+
+/// The command words as they go out, and which frames wait.
+///
+/// A frame waits (is *dirty*) after an update that left it a non-zero word, or that turned its last one to zero;
+/// a frame of zeros is repeated only as a keep-alive. The newest words replace older ones that were not sent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Outbox {
+    words: [[[u8; 2]; 4]; 5],
+    in_use: u8,
+    ever_used: u8,
+    active: u8,
+    dirty: u8,
+    returned: u8,
+    first: u8,
+    keep_alive_us: u32,
+    kept_alive: u32,
+    pub(super) packed: u32,
+    pub(super) superseded: u32,
+}
+
+impl Outbox {
+    pub(super) const fn new() -> Self {
+        Self {
+            words: [[[0; 2]; 4]; 5],
+            in_use: 0,
+            ever_used: 0,
+            active: 0,
+            dirty: 0,
+            returned: 0,
+            first: 0,
+            keep_alive_us: 10_000,
+            kept_alive: 0,
+            packed: 0,
+            superseded: 0,
+        }
+    }
+
+    pub(super) const fn set_keep_alive(&mut self, period_us: u32) {
+        self.keep_alive_us = period_us;
+    }
+
+    /// Sends this frame from now on: the first time with the next update, whatever its words are.
+    pub(super) const fn open(&mut self, frame: CommandFrame) {
+        self.in_use |= frame.bit();
+        self.active |= frame.bit();
+        self.ever_used |= frame.bit();
+    }
+
+    /// Sends this frame once more, and then no longer.
+    pub(super) fn close(&mut self, frame: CommandFrame) {
+        self.in_use &= !frame.bit();
+        self.active &= !frame.bit();
+        self.mark(frame.bit());
+    }
+
+    #[inline]
+    pub(super) fn put(&mut self, place: Place, raw: i16) {
+        if let Some(word) = self.words.as_flattened_mut().get_mut(usize::from(place.0)) {
+            *word = raw.to_be_bytes();
+        }
+    }
+
+    /// Sets every word to zero, and has every frame in use sent.
+    pub(super) fn clear(&mut self) {
+        self.words = [[[0; 2]; 4]; 5];
+        self.active = 0;
+        self.mark(self.in_use);
+    }
+
+    /// Marks what this update gave to send.
+    #[inline]
+    pub(super) fn finish_update(&mut self, now: u32) {
+        let mut active = 0;
+        for (frame, words) in CommandFrame::ALL.iter().zip(&self.words) {
+            if *words != [[0; 2]; 4] {
+                active |= frame.bit();
+            }
+        }
+        let mut due = active | self.active;
+        self.active = active;
+        if now.wrapping_sub(self.kept_alive) >= self.keep_alive_us {
+            self.kept_alive = now;
+            due |= self.in_use;
+        }
+        self.mark(due);
+        self.dirty |= self.returned;
+        self.returned = 0;
+    }
+
+    #[inline]
+    fn mark(&mut self, frames: u8) {
+        self.packed = self.packed.wrapping_add(frames.count_ones());
+        self.superseded = self.superseded.wrapping_add((frames & self.dirty).count_ones());
+        self.dirty |= frames;
+    }
+
+    /// Takes the next waiting frame; each search starts after the frame that was sent last.
+    #[inline]
+    pub(super) fn next(&mut self) -> Option<CanFrame> {
+        if self.dirty == 0 {
+            return None;
+        }
+        let ahead = self.dirty & (u8::MAX << self.first);
+        let candidates = if ahead == 0 { self.dirty } else { ahead };
+        let index = candidates.trailing_zeros();
+        let frame = *CommandFrame::ALL.get(index as usize)?;
+        let words = self.words.get(index as usize)?;
+        self.dirty &= !frame.bit();
+        self.first = if frame as u8 == 4 { 0 } else { frame as u8 + 1 };
+        CanFrame::standard(frame.id(), *words.as_flattened().first_chunk()?)
+    }
+    /// Takes back a frame that was refused or evicted. It waits for the next update, so that a caller's loop ends,
+    /// and then goes first.
+    pub(super) fn requeue(&mut self, header: u32) -> bool {
+        match CommandFrame::with_id(header) {
+            Some(frame) if self.ever_used & frame.bit() != 0 => {
+                self.returned |= frame.bit();
+                self.first = frame as u8;
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embedded_can::Frame;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn ids(outbox: &mut Outbox) -> Vec<u32> {
+        core::iter::from_fn(|| outbox.next()).map(|frame| frame.header()).collect()
+    }
+
+    fn outbox(frames: &[CommandFrame]) -> Outbox {
+        let mut outbox = Outbox::new();
+        frames.iter().for_each(|frame| outbox.open(*frame));
+        outbox.set_keep_alive(u32::MAX);
+        outbox
+    }
+
+    #[test]
+    fn a_frame_of_zeros_is_sent_once_and_then_as_a_keep_alive_only() {
+        let mut outbox = outbox(&[CommandFrame::X200]);
+        outbox.set_keep_alive(5_000);
+        outbox.put(Place::new(CommandFrame::X200, 1), 100);
+        outbox.finish_update(1_000);
+        assert_eq!(ids(&mut outbox), [0x200]);
+        outbox.put(Place::new(CommandFrame::X200, 1), 0);
+        let sent: Vec<usize> = (2..12)
+            .map(|ms| {
+                outbox.finish_update(ms * 1_000);
+                ids(&mut outbox).len()
+            })
+            .collect();
+        assert_eq!(sent, [1, 0, 0, 1, 0, 0, 0, 0, 1, 0]);
+    }
+
+    #[test]
+    fn a_returned_frame_waits_for_the_next_update_and_goes_first() {
+        let mut outbox = outbox(&[CommandFrame::X200, CommandFrame::X1FF, CommandFrame::X2FE]);
+        for frame in [CommandFrame::X200, CommandFrame::X1FF, CommandFrame::X2FE] {
+            outbox.put(Place::new(frame, 0), 1);
+        }
+        outbox.finish_update(1);
+        assert_eq!(ids(&mut outbox), [0x200, 0x1FF, 0x2FE]);
+        assert!(outbox.requeue(0x1FF));
+        assert_eq!(outbox.next(), None);
+        outbox.finish_update(2);
+        assert_eq!(ids(&mut outbox), [0x1FF, 0x2FE, 0x200]);
+        assert!(!outbox.requeue(0x1FE), "not ours");
+        assert!(!outbox.requeue(0x8000_0200), "extended");
+    }
+
+    #[test]
+    fn a_frame_that_was_not_taken_is_superseded_by_the_newest_words() {
+        let mut outbox = outbox(&[CommandFrame::X200]);
+        for raw in [1, 2, 3] {
+            outbox.put(Place::new(CommandFrame::X200, 0), raw);
+            outbox.finish_update(0);
+        }
+        assert_eq!(outbox.next().map(|frame| frame.data()[..2].to_vec()), Some(std::vec![0, 3]));
+        assert_eq!((outbox.packed, outbox.superseded), (3, 2));
+    }
+
+    #[test]
+    fn ties_of_rounding_go_away_from_zero_and_nan_is_zero() {
+        for (value, raw) in [(0.5, 1), (-0.5, -1), (0.49, 0), (-0.0, 0), (f32::NAN, 0), (1e-40, 0)]
+        {
+            assert_eq!(to_raw(value, 1.0, 100), raw, "{value}");
+        }
+    }
+
+    proptest! {
+        /// Law: saturated, odd-symmetric and monotonic, for any bits.
+        #[test]
+        fn to_raw_saturates_symmetrically(a in any::<f32>(), b in any::<f32>(), limit in 0_i16..=i16::MAX, scale in -2000.0_f32..2000.0) {
+            let raw = |value| to_raw(value, scale, limit);
+            prop_assert!(raw(a).unsigned_abs() <= limit.unsigned_abs());
+            prop_assert_eq!(raw(-a), -raw(a));
+            if a <= b {
+                let (low, high) = if scale >= 0.0 { (raw(a), raw(b)) } else { (raw(b), raw(a)) };
+                prop_assert!(low <= high);
+            }
+        }
+
+        /// Law: every word stands in its slot, big-endian, and nothing else does.
+        #[test]
+        fn words_stand_in_their_slots(words: [[i16; 4]; 5]) {
+            let mut outbox = outbox(&CommandFrame::ALL);
+            for (frame, words) in CommandFrame::ALL.iter().zip(&words) {
+                for (slot, word) in (0..).zip(words) {
+                    outbox.put(Place::new(*frame, slot), *word);
+                }
+            }
+            outbox.finish_update(0);
+            outbox.mark(0b1_1111);
+            let mut seen = 0;
+            while let Some(frame) = outbox.next() {
+                let index = CommandFrame::ALL.iter().position(|known| u32::from(known.id()) == frame.header()).unwrap();
+                let decoded: Vec<i16> = frame.data().chunks(2).map(|word| i16::from_be_bytes([word[0], word[1]])).collect();
+                prop_assert_eq!(&decoded[..], &words[index][..]);
+                seen += 1;
+            }
+            prop_assert_eq!(seen, 5);
+        }
+    }
+}

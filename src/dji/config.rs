@@ -1,0 +1,161 @@
+use super::{CurrentControlled, Facts, Gm6020Voltage, Model, VoltageControlled};
+use crate::control::PidConfig;
+use crate::encoder::GearRatio;
+use crate::motor::Recovery;
+use crate::units::{Current, Voltage};
+use core::marker::PhantomData;
+
+/// What [`Bus::attach`](super::Bus::attach) needs to know of a motor.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::dji::{Config, M3508};
+/// use drivetrain::units::Current;
+///
+/// const SPEED: PidConfig = PidConfig::new(0.8, 4.0, 0.0); // A per rad/s, A per rad
+/// const WHEEL: Config<M3508> = Config::new(1)
+///     .reversed()
+///     .speed_loop(SPEED)
+///     .with_current_limit(Current::from_amperes(10.0));
+/// assert_eq!(WHEEL.id(), 1);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config<M: Model> {
+    pub(super) plain: PlainConfig,
+    model: PhantomData<fn() -> M>,
+}
+
+/// The same without the model as a type: what the body of the bus works on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PlainConfig {
+    pub(super) id: u8,
+    pub(super) reversed: bool,
+    pub(super) gear: GearRatio,
+    pub(super) command_raw: i16,
+    pub(super) command_full_scale: f32,
+    pub(super) limit: f32,
+    pub(super) torque_constant_nm_per_a: f32,
+    pub(super) speed: Option<PidConfig>,
+    pub(super) position: Option<PidConfig>,
+    pub(super) recovery: Recovery,
+}
+
+impl<M: Model> Config<M> {
+    /// Takes the id that is set on the ESC: 1..=8 for C610 and C620, 1..=7 for GM6020.
+    ///
+    /// Everything else is as the motor is sold: its gearbox, its full scale as the limit, not reversed, no loops.
+    #[must_use]
+    pub const fn new(id: u8) -> Self {
+        let facts: &Facts = M::FACTS;
+        Self {
+            plain: PlainConfig {
+                id,
+                reversed: false,
+                gear: facts.gear,
+                command_raw: facts.command_raw,
+                command_full_scale: facts.command_full_scale,
+                limit: facts.command_full_scale,
+                torque_constant_nm_per_a: facts.torque_constant_nm_per_a,
+                speed: None,
+                position: None,
+                recovery: Recovery::Rearm,
+            },
+            model: PhantomData,
+        }
+    }
+
+    /// Turns the positive direction around, for angle, velocity, current and command alike: a motor on the right
+    /// side of a chassis, say.
+    #[must_use]
+    pub const fn reversed(mut self) -> Self {
+        self.plain.reversed = !self.plain.reversed;
+        self
+    }
+
+    /// Adds a speed loop: rad/s of the output shaft in; amperes, or volts for a motor in voltage mode, out.
+    ///
+    /// Without an output limit of its own the loop gets the motor's.
+    #[must_use]
+    pub const fn speed_loop(mut self, speed: PidConfig) -> Self {
+        self.plain.speed = Some(speed);
+        self
+    }
+
+    /// Adds a position loop over a speed loop: rad of the output shaft in, rad/s out to the speed loop.
+    ///
+    /// The derivative works on the measured velocity. Without an output limit of its own the position loop gets
+    /// the motor's no-load speed.
+    #[must_use]
+    pub const fn position_loop(mut self, position: PidConfig, speed: PidConfig) -> Self {
+        self.plain.position = Some(position);
+        self.speed_loop(speed)
+    }
+
+    /// Replaces the gearbox. The torque constant follows, as long as it is not set itself.
+    #[must_use]
+    pub const fn with_gear(mut self, gear: GearRatio) -> Self {
+        let change = gear.as_f32() / self.plain.gear.as_f32();
+        self.plain.torque_constant_nm_per_a *= change;
+        self.plain.gear = gear;
+        self
+    }
+
+    /// Sets the torque at the output shaft for each ampere, gearbox included. For [`State::torque_nm`] only.
+    ///
+    /// [`State::torque_nm`]: super::State::torque_nm
+    #[must_use]
+    pub const fn with_torque_constant(mut self, nm_per_a: f32) -> Self {
+        self.plain.torque_constant_nm_per_a = nm_per_a;
+        self
+    }
+
+    /// Sets what happens when the motor is heard again after being offline.
+    #[must_use]
+    pub const fn with_recovery(mut self, recovery: Recovery) -> Self {
+        self.plain.recovery = recovery;
+        self
+    }
+
+    /// Returns the id.
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        self.plain.id
+    }
+}
+
+impl<M: CurrentControlled> Config<M> {
+    /// Lowers the largest current, for loops and direct commands alike. More than the ESC's full scale is refused
+    /// by `attach`.
+    #[must_use]
+    pub const fn with_current_limit(mut self, limit: Current) -> Self {
+        self.plain.limit = limit.as_amperes();
+        self
+    }
+}
+
+impl<M: VoltageControlled> Config<M> {
+    /// Lowers the largest voltage, for loops and direct commands alike. More than full scale is refused by `attach`.
+    #[must_use]
+    pub const fn with_voltage_limit(mut self, limit: Voltage) -> Self {
+        self.plain.limit = limit.as_volts();
+        self
+    }
+
+    /// Sets the volts that full scale stands for; sources say 24 V or 25.2 V. The limit becomes full scale.
+    #[must_use]
+    pub const fn with_nominal_voltage(mut self, full_scale: Voltage) -> Self {
+        self.plain.command_full_scale = full_scale.as_volts();
+        self.plain.limit = full_scale.as_volts();
+        self
+    }
+}
+
+impl Config<Gm6020Voltage> {
+    /// Sets full scale to ±30000, as motors of 2020 and before take it; today's take ±25000.
+    #[must_use]
+    pub const fn with_legacy_full_scale(mut self) -> Self {
+        self.plain.command_raw = 30_000;
+        self
+    }
+}

@@ -1,0 +1,200 @@
+use super::CommandFrame;
+use crate::motor::MotorName;
+
+/// Why a motor was not attached. The bus is as it was before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// The model has no such id.
+    Id {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The highest id of its model.
+        highest: u8,
+    },
+    /// Another motor is in the way.
+    Collision(Collision),
+    /// A parameter of the configuration is not usable.
+    Parameter {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The name of the parameter.
+        parameter: &'static str,
+    },
+    /// This place was attached and detached 16 times; a further handle could be confused with an old one.
+    WornOut {
+        /// The motor that was to be attached.
+        motor: MotorName,
+    },
+}
+
+/// Two motors that cannot share a bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Collision {
+    /// The motor that was to be attached.
+    pub motor: MotorName,
+    /// The motor that is there.
+    pub with: MotorName,
+    /// The feedback id that both would use.
+    pub feedback_id: u16,
+    /// The command frame and slot that both would use, if they share one.
+    pub slot: Option<(CommandFrame, u8)>,
+}
+
+impl AttachError {
+    /// Returns the error in words; `const`, so that a `const` wiring can fail to compile with them.
+    #[must_use]
+    pub const fn message(&self) -> Message {
+        let message = Message::new();
+        match self {
+            Self::Id { motor, highest } => {
+                message.name(*motor).text(": the id is not within 1..=").number(*highest)
+            }
+            Self::Collision(Collision { motor, with, feedback_id, slot }) => {
+                let message = message
+                    .name(*motor)
+                    .text(" collides with ")
+                    .name(*with)
+                    .text(" on ")
+                    .hex(*feedback_id);
+                match slot {
+                    Some((frame, slot)) => {
+                        message.text(" and on slot ").number(*slot).text(" of ").hex(frame.id())
+                    }
+                    None => message,
+                }
+            }
+            Self::Parameter { motor, parameter } => {
+                message.name(*motor).text(": ").text(parameter).text(" is not usable")
+            }
+            Self::WornOut { motor } => {
+                message.name(*motor).text(": attached and detached too often on this bus")
+            }
+        }
+    }
+}
+
+impl core::fmt::Display for AttachError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.message().as_str())
+    }
+}
+
+impl core::error::Error for AttachError {}
+
+/// A short text that is put together in `const` code.
+#[derive(Clone, Copy)]
+pub struct Message {
+    text: [u8; Self::CAPACITY],
+    length: usize,
+}
+
+impl Message {
+    const CAPACITY: usize = 112;
+
+    const fn new() -> Self {
+        Self { text: [0; Self::CAPACITY], length: 0 }
+    }
+
+    /// Returns the text.
+    #[must_use]
+    pub const fn as_str(&self) -> &str {
+        let Some((text, _)) = self.text.split_at_checked(self.length) else { return "" };
+        match core::str::from_utf8(text) {
+            Ok(text) => text,
+            Err(_) => "",
+        }
+    }
+
+    const fn byte(mut self, byte: u8) -> Self {
+        if self.length < Self::CAPACITY {
+            #[expect(
+                clippy::indexing_slicing,
+                reason = "checked right above; get_mut is not const"
+            )]
+            {
+                self.text[self.length] = byte;
+            }
+            self.length += 1;
+        }
+        self
+    }
+
+    const fn text(mut self, text: &str) -> Self {
+        let mut rest = text.as_bytes();
+        while let [byte, tail @ ..] = rest {
+            self = self.byte(*byte);
+            rest = tail;
+        }
+        self
+    }
+
+    const fn number(self, number: u8) -> Self {
+        let message = if number >= 100 { self.byte(b'0' + number / 100) } else { self };
+        let message = if number >= 10 { message.byte(b'0' + number / 10 % 10) } else { message };
+        message.byte(b'0' + number % 10)
+    }
+
+    const fn hex(self, number: u16) -> Self {
+        let mut message = self.text("0x");
+        let mut shift = 12;
+        while shift > 0 {
+            shift -= 4;
+            let digit = (number >> shift & 0xF) as u8;
+            message = message.byte(if digit < 10 { b'0' + digit } else { b'A' + digit - 10 });
+        }
+        message
+    }
+
+    const fn name(self, motor: MotorName) -> Self {
+        self.text(motor.model()).text(" #").number(motor.id())
+    }
+}
+
+impl core::fmt::Debug for Message {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        core::fmt::Debug::fmt(self.as_str(), f)
+    }
+}
+
+impl core::fmt::Display for Message {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    const GM6020: MotorName = MotorName::new("GM6020 (current)", 1);
+    const M3508: MotorName = MotorName::new("M3508", 5);
+
+    #[test]
+    fn a_collision_names_both_motors_the_id_and_the_slot() {
+        let feedback = Collision { motor: GM6020, with: M3508, feedback_id: 0x205, slot: None };
+        let message = AttachError::Collision(feedback).to_string();
+        assert_eq!(message, "GM6020 (current) #1 collides with M3508 #5 on 0x205");
+        let slot = Collision { slot: Some((CommandFrame::X1FF, 0)), ..feedback };
+        let message = AttachError::Collision(slot).to_string();
+        assert_eq!(
+            message,
+            "GM6020 (current) #1 collides with M3508 #5 on 0x205 and on slot 0 of 0x1FF"
+        );
+    }
+
+    #[test]
+    fn the_other_errors_name_motor_and_parameter() {
+        let id = AttachError::Id { motor: MotorName::new("M2006", 109), highest: 8 };
+        assert_eq!(id.to_string(), "M2006 #109: the id is not within 1..=8");
+        let parameter = AttachError::Parameter { motor: M3508, parameter: "kp" };
+        assert_eq!(parameter.to_string(), "M3508 #5: kp is not usable");
+    }
+
+    #[test]
+    fn a_message_beyond_its_capacity_is_cut() {
+        let long = core::str::from_utf8(&[b'x'; 200]).unwrap().to_string();
+        assert_eq!(Message::new().text(&long).as_str().len(), Message::CAPACITY);
+    }
+}

@@ -1,0 +1,205 @@
+use super::CommandFrame;
+use super::feedback::ErrorTable;
+use crate::encoder::GearRatio;
+
+/// What a command means to the ESC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Unit {
+    /// Torque current in amperes.
+    Ampere,
+    /// Terminal voltage in volts, nominal.
+    Volt,
+}
+
+/// The facts of one motor model: the only home of each number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facts {
+    /// The name in errors and logs.
+    pub name: &'static str,
+    /// The highest id; the lowest is 1.
+    pub ids: u8,
+    /// The command frame of ids 1..=4, and that of the ids above.
+    pub command: [CommandFrame; 2],
+    /// The feedback id less the motor's id.
+    pub feedback_base: u16,
+    /// The largest command, on the wire.
+    pub command_raw: i16,
+    /// The largest command, in [`unit`](Self::unit).
+    pub command_full_scale: f32,
+    /// The unit of the command.
+    pub unit: Unit,
+    /// The current feedback that stands for [`current_full_scale_a`](Self::current_full_scale_a), on the wire.
+    pub current_raw: i16,
+    /// Amperes at [`current_raw`](Self::current_raw).
+    pub current_full_scale_a: f32,
+    /// The gearbox that the motor is sold with.
+    pub gear: GearRatio,
+    /// Torque at the output shaft of that gearbox, in Nm for each ampere.
+    pub torque_constant_nm_per_a: f32,
+    /// Speed of the output shaft of that gearbox without load at 24 V, in rpm.
+    pub no_load_rpm: f32,
+    /// Whether byte 6 of the feedback is a temperature.
+    pub has_temperature: bool,
+    pub(crate) errors: ErrorTable,
+}
+
+impl Facts {
+    /// Returns the no-load speed of the rotor in rpm, rounded.
+    #[must_use]
+    pub const fn rotor_no_load_rpm(&self) -> u16 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "facts are below 20 000"
+        )]
+        let rpm = (self.no_load_rpm * self.gear.as_f32() + 0.5) as u16;
+        rpm
+    }
+
+    /// Returns command frame and slot of an id, or `None` when the model has no such id.
+    #[must_use]
+    pub const fn place(&self, id: u8) -> Option<(CommandFrame, u8)> {
+        let [low, high] = self.command;
+        match id {
+            1..=4 if id <= self.ids => Some((low, id - 1)),
+            5..=8 if id <= self.ids => Some((high, id - 5)),
+            _ => None,
+        }
+    }
+}
+
+const M2006_GEAR: GearRatio = known_gear(36, 1);
+const M3508_GEAR: GearRatio = known_gear(3591, 187);
+
+const fn known_gear(rotor: u16, output: u16) -> GearRatio {
+    match GearRatio::new(rotor, output) {
+        Ok(gear) => gear,
+        Err(_) => GearRatio::DIRECT,
+    }
+}
+
+// Ids, slots and scale: C610 user guide, pages 8 and 9. Gear, torque constant: taproot, hcs, IFR. No-load speed:
+// one public source (500 rpm at the output).
+static M2006_FACTS: Facts = Facts {
+    name: "M2006",
+    ids: 8,
+    command: [CommandFrame::X200, CommandFrame::X1FF],
+    feedback_base: 0x200,
+    command_raw: 10_000,
+    command_full_scale: 10.0,
+    unit: Unit::Ampere,
+    current_raw: 10_000,
+    current_full_scale_a: 10.0,
+    gear: M2006_GEAR,
+    torque_constant_nm_per_a: 0.18,
+    no_load_rpm: 500.0,
+    has_temperature: false,
+    errors: ErrorTable::C610,
+};
+
+// Scale: librm, IFR. Gear, torque constant: taproot, hcs, IFR. No-load speed: two public sources.
+static M3508_FACTS: Facts = Facts {
+    name: "M3508",
+    ids: 8,
+    command: [CommandFrame::X200, CommandFrame::X1FF],
+    feedback_base: 0x200,
+    command_raw: 16_384,
+    command_full_scale: 20.0,
+    unit: Unit::Ampere,
+    current_raw: 16_384,
+    current_full_scale_a: 20.0,
+    gear: M3508_GEAR,
+    torque_constant_nm_per_a: 0.3,
+    no_load_rpm: 482.0,
+    has_temperature: true,
+    errors: ErrorTable::C620,
+};
+
+// Limit 25000: taproot and current manuals. Volts: nominal. Torque constant, no-load speed: hcs, devrm. No error
+// list was found: the C620's is what public drivers use.
+static GM6020_VOLTAGE_FACTS: Facts = Facts {
+    name: "GM6020 (voltage)",
+    ids: 7,
+    command: [CommandFrame::X1FF, CommandFrame::X2FF],
+    feedback_base: 0x204,
+    command_raw: 25_000,
+    command_full_scale: 24.0,
+    unit: Unit::Volt,
+    current_raw: 16_384,
+    current_full_scale_a: 3.0,
+    gear: GearRatio::DIRECT,
+    torque_constant_nm_per_a: 0.741,
+    no_load_rpm: 320.0,
+    has_temperature: true,
+    errors: ErrorTable::C620,
+};
+
+// Frames and scale: hcs and one more public driver.
+static GM6020_CURRENT_FACTS: Facts = Facts {
+    name: "GM6020 (current)",
+    command: [CommandFrame::X1FE, CommandFrame::X2FE],
+    command_raw: 16_384,
+    command_full_scale: 3.0,
+    unit: Unit::Ampere,
+    ..GM6020_VOLTAGE_FACTS
+};
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// A motor model of this family, as a type: handles carry it, so that a target of the wrong kind does not compile.
+pub trait Model: sealed::Sealed + Copy + core::fmt::Debug + 'static {
+    /// The facts of this model.
+    const FACTS: &'static Facts;
+}
+
+/// A model whose command is a torque current.
+///
+/// # Examples
+/// A current for a motor in voltage mode does not compile:
+/// ```compile_fail,E0277
+/// use drivetrain::dji::{Bus, Config, Gm6020Voltage};
+/// use drivetrain::units::Current;
+///
+/// let mut bus = Bus::new();
+/// let yaw = bus.attach(Config::<Gm6020Voltage>::new(1))?;
+/// bus.set_current(yaw, Current::from_amperes(1.0))?; // the trait bound `Gm6020Voltage: CurrentControlled` …
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait CurrentControlled: Model {}
+
+/// A model whose command is a voltage.
+pub trait VoltageControlled: Model {}
+
+macro_rules! model {
+    ($(#[$doc:meta])* $model:ident, $facts:ident, $control:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct $model;
+
+        impl sealed::Sealed for $model {}
+        impl Model for $model {
+            const FACTS: &'static Facts = &$facts;
+        }
+        impl $control for $model {}
+    };
+}
+
+model! {
+    /// The M2006 with its C610 ESC: current control, no temperature.
+    M2006, M2006_FACTS, CurrentControlled
+}
+model! {
+    /// The M3508 with its C620 ESC: current control.
+    M3508, M3508_FACTS, CurrentControlled
+}
+model! {
+    /// The GM6020 as it is delivered: voltage control.
+    Gm6020Voltage, GM6020_VOLTAGE_FACTS, VoltageControlled
+}
+model! {
+    /// The GM6020 with current control switched on in RoboMaster Assistant.
+    Gm6020Current, GM6020_CURRENT_FACTS, CurrentControlled
+}

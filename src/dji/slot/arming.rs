@@ -1,0 +1,54 @@
+use super::Slot;
+use crate::dji::command::to_raw;
+use crate::motor::{Link, Timeouts};
+
+impl Slot {
+    /// Tells whether the motor is online with feedback that is fresh at `now`. A free slot is not missing.
+    pub(in crate::dji) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
+        let fresh = self.link == Link::Online && now.wrapping_sub(self.heard) <= timeouts.late_us();
+        self.facts.is_some() && !fresh
+    }
+
+    /// Takes targets from now on, starting from rest.
+    pub(in crate::dji) fn engage(&mut self, now: u32) {
+        self.relax();
+        self.armed = self.facts.is_some();
+        self.latched = false;
+        self.limit = self.full_limit;
+        self.commanded = now;
+    }
+
+    pub(in crate::dji) fn disarm(&mut self) {
+        self.relax();
+        self.armed = false;
+    }
+
+    pub(in crate::dji) const fn is_armed(&self) -> bool {
+        self.armed && !self.latched
+    }
+
+    /// Starts again from zero output after a recovery, where that is configured.
+    pub(super) fn start_ramp(&mut self) {
+        if self.armed && self.latched && self.ramp_ms.is_some() {
+            self.latched = false;
+            self.limit = 0;
+            self.ramp_started = self.heard;
+        }
+    }
+
+    /// Lets the output limit rise; to be called every few milliseconds.
+    pub(in crate::dji) fn ramp(&mut self, now: u32) {
+        if self.limit == self.full_limit {
+            return;
+        }
+        let elapsed_ms = now.wrapping_sub(self.ramp_started) / 1_000;
+        self.limit = match self.ramp_ms.map(|time| u32::from(time.get())) {
+            Some(time_ms) if elapsed_ms < time_ms => to_raw(
+                elapsed_ms as f32 / time_ms as f32,
+                f32::from(self.full_limit),
+                self.full_limit,
+            ),
+            _ => self.full_limit,
+        };
+    }
+}

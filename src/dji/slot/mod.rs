@@ -1,0 +1,265 @@
+//! One motor: feedback in, loops, raw command out.
+
+mod arming;
+mod receive;
+mod target;
+mod update;
+
+use super::command::{Place, to_raw};
+use super::config::PlainConfig;
+use super::handle::Key;
+use super::{AttachError, CommandFrame, Facts, Feedback, State};
+use crate::control::{Pid, PidConfig};
+use crate::encoder::{GearRatio, Homing, Position, Shaft, Turns};
+use crate::motor::{Link, MotorName, Recovery};
+use crate::units::{AngularVelocity, Current};
+use core::f32::consts::TAU;
+use core::num::NonZeroU16;
+
+pub(super) use update::Cycle;
+
+/// What the motor is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Target {
+    Relax,
+    Raw(i16),
+    Velocity(f32),
+    /// Phase of the shaft; the shortest way.
+    Angle(i32),
+    /// Turns and phase of the shaft.
+    Position(Turns, i32),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slot {
+    facts: Option<&'static Facts>,
+    target: Target,
+    shaft: Shaft,
+    feedback: Feedback,
+    heard: u32,
+    commanded: u32,
+    /// Up to this age of the last frame the shortest way is the way; 0 unless online.
+    trusted_gap_us: u32,
+    rad_per_s_per_rpm: f32,
+    raw_per_unit: f32,
+    nm_per_a: f32,
+    limit: i16,
+    full_limit: i16,
+    ramp_ms: Option<NonZeroU16>,
+    ramp_started: u32,
+    ambiguous_gaps: u16,
+    refused_targets: u16,
+    forgotten_targets: u16,
+    speed: Option<Pid>,
+    position: Option<Pid>,
+    id: u8,
+    generation: u8,
+    pub(super) place: Place,
+    link: Link,
+    good_frames: u8,
+    homing: Homing,
+    armed: bool,
+    latched: bool,
+}
+
+impl Slot {
+    pub(super) const FREE: Self = Self {
+        facts: None,
+        target: Target::Relax,
+        shaft: Shaft::new(GearRatio::DIRECT, false),
+        feedback: Feedback::NONE,
+        heard: 0,
+        commanded: 0,
+        trusted_gap_us: 0,
+        rad_per_s_per_rpm: 0.0,
+        raw_per_unit: 0.0,
+        nm_per_a: 0.0,
+        limit: 0,
+        full_limit: 0,
+        ramp_ms: None,
+        ramp_started: 0,
+        ambiguous_gaps: 0,
+        refused_targets: 0,
+        forgotten_targets: 0,
+        speed: None,
+        position: None,
+        id: 0,
+        generation: 0,
+        place: Place::new(CommandFrame::X200, 0),
+        link: Link::Unheard,
+        good_frames: 0,
+        homing: Homing::Relative,
+        armed: false,
+        latched: false,
+    };
+
+    /// Makes the slot of a motor, validating its configuration.
+    pub(super) const fn new(
+        facts: &'static Facts,
+        config: &PlainConfig,
+        place: Place,
+        generation: u8,
+    ) -> Result<Self, AttachError> {
+        let motor = MotorName::new(facts.name, config.id);
+        macro_rules! parameter {
+            ($name:expr) => {
+                AttachError::Parameter { motor, parameter: $name }
+            };
+        }
+        let full_scale = config.command_full_scale;
+        if !(full_scale.is_finite() && full_scale > 0.0) {
+            return Err(parameter!("nominal voltage"));
+        }
+        if !(config.limit > 0.0 && config.limit <= full_scale) {
+            return Err(parameter!("command limit"));
+        }
+        if !(config.torque_constant_nm_per_a.is_finite() && config.torque_constant_nm_per_a > 0.0) {
+            return Err(parameter!("torque constant"));
+        }
+        let sign = if config.reversed { -1.0 } else { 1.0 };
+        let raw_per_unit = config.command_raw as f32 / full_scale;
+        let limit = to_raw(config.limit, raw_per_unit, config.command_raw);
+        let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
+        let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
+        let speed = match limited_loop(config.speed, config.limit) {
+            Ok(speed) => speed,
+            Err(name) => return Err(parameter!(name)),
+        };
+        let position = match limited_loop(config.position, fastest) {
+            Ok(position) => position,
+            Err(name) => return Err(parameter!(name)),
+        };
+        let direct = config.gear.rotor() == config.gear.output();
+        Ok(Self {
+            facts: Some(facts),
+            shaft: Shaft::new(config.gear, config.reversed),
+            rad_per_s_per_rpm,
+            raw_per_unit: sign * raw_per_unit,
+            nm_per_a: config.torque_constant_nm_per_a,
+            limit,
+            full_limit: limit,
+            ramp_ms: ramp_time(config.recovery),
+            speed,
+            position,
+            id: config.id,
+            generation,
+            place,
+            homing: if direct { Homing::Absolute } else { Homing::Relative },
+            ..Self::FREE
+        })
+    }
+
+    /// Frees the slot; handles of the motor find nothing from now on.
+    pub(super) const fn free(&mut self) {
+        *self = Self { generation: self.generation + 1, ..Self::FREE };
+    }
+
+    /// Tells whether a handle's key names the motor that is here now.
+    pub(super) const fn matches(&self, key: Key) -> bool {
+        self.facts.is_some() && self.generation == key.generation()
+    }
+
+    /// Returns the generation of the next motor here, or `None` when there is none left.
+    pub(super) const fn next_generation(&self) -> Option<u8> {
+        if self.generation < Key::GENERATIONS { Some(self.generation) } else { None }
+    }
+
+    pub(super) const fn facts(&self) -> Option<&'static Facts> {
+        self.facts
+    }
+
+    pub(super) const fn name(&self) -> Option<MotorName> {
+        match self.facts {
+            Some(facts) => Some(MotorName::new(facts.name, self.id)),
+            None => None,
+        }
+    }
+
+    pub(super) const fn link(&self) -> Link {
+        self.link
+    }
+
+    /// Returns what is known; `None` before the first frame.
+    pub(super) fn state(&self) -> Option<State> {
+        let facts = self.facts?;
+        if self.link == Link::Unheard {
+            return None;
+        }
+        let amperes =
+            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
+                / f32::from(facts.current_raw);
+        Some(State {
+            motor: MotorName::new(facts.name, self.id),
+            position: self.shaft.position(),
+            homing: self.homing,
+            velocity: self.velocity(),
+            current: Current::from_amperes(amperes),
+            torque_nm: amperes * self.nm_per_a,
+            temperature_c: facts.has_temperature.then_some(self.feedback.temperature()),
+            error: facts.errors.read(self.feedback.error()),
+            rotor_counts: self.shaft.rotor_counts(),
+            ambiguous_gaps: self.ambiguous_gaps,
+            refused_targets: self.refused_targets,
+            forgotten_targets: self.forgotten_targets,
+            link: self.link,
+            feedback: self.feedback,
+        })
+    }
+
+    /// Returns the velocity of the output shaft.
+    #[inline]
+    pub(super) fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(f32::from(self.feedback.rpm()) * self.rad_per_s_per_rpm)
+    }
+
+    /// Calls the present position `position`. A motor that holds an angle or position is relaxed: its target
+    /// was given in the old terms.
+    pub(super) fn set_present_position(&mut self, position: Position) {
+        if matches!(self.target, Target::Angle(_) | Target::Position(..)) {
+            self.relax();
+        }
+        self.shaft.set_position(position);
+        self.homing = Homing::Homed;
+    }
+
+    fn direction(&self) -> f32 {
+        1.0_f32.copysign(self.raw_per_unit)
+    }
+}
+
+/// Whole milliseconds, at least one.
+const fn ramp_time(recovery: Recovery) -> Option<NonZeroU16> {
+    let Recovery::Ramp(time) = recovery else { return None };
+    let millis = match time.micros_u32() {
+        Some(micros) if micros <= 65_535_000 => micros / 1_000,
+        _ => 65_535,
+    };
+    #[expect(clippy::cast_possible_truncation, reason = "at most 65 535")]
+    let millis = NonZeroU16::new(millis as u16);
+    match millis {
+        None => Some(NonZeroU16::MIN),
+        some => some,
+    }
+}
+
+/// The velocity of the output shaft without load: what a position loop may ask for.
+const fn no_load_velocity(facts: &Facts, rad_per_s_per_rpm: f32) -> f32 {
+    facts.rotor_no_load_rpm() as f32 * rad_per_s_per_rpm.abs()
+}
+
+/// Makes a loop whose output stays within `limit`, or names the parameter that is not usable.
+const fn limited_loop(config: Option<PidConfig>, limit: f32) -> Result<Option<Pid>, &'static str> {
+    let Some(config) = config else { return Ok(None) };
+    match Pid::new(within(config, limit)) {
+        Ok(pid) => Ok(Some(pid)),
+        Err(error) => Err(error.parameter()),
+    }
+}
+
+/// Narrows the output of a loop to ±`limit`.
+const fn within(config: PidConfig, limit: f32) -> PidConfig {
+    let (lower, upper) = config.output_range();
+    let lower = if lower < -limit { -limit } else { lower };
+    let upper = if upper > limit { limit } else { upper };
+    config.with_output_range(lower, upper)
+}
