@@ -1,0 +1,105 @@
+use crate::frame::CanFrame;
+use crate::time::Instant;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embedded_can::Frame;
+use heapless::spsc;
+
+/// A queue of received frames with the time of their arrival, from a CAN interrupt to the control task.
+///
+/// It holds `N - 1` frames. A frame that finds it full is dropped and counted: the newest feedback is lost, and
+/// the motor's age does the rest.
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::runner::FrameQueue;
+/// use drivetrain::time::Instant;
+///
+/// let mut queue = FrameQueue::<4>::new(); // in firmware: in a `static`, by the means of the framework
+/// let (mut interrupt, mut task) = queue.split();
+/// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
+/// for at in 1..=5 {
+///     interrupt.push(&frame, Instant::from_micros(at));
+/// }
+/// assert_eq!(task.pop(), Some((frame, Instant::from_micros(1))));
+/// assert_eq!(task.dropped(), 2);
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug)]
+pub struct FrameQueue<const N: usize> {
+    frames: spsc::Queue<(CanFrame, Instant), N>,
+    dropped: AtomicU32,
+}
+
+/// The interrupt's end of a [`FrameQueue`].
+pub struct FrameSender<'q> {
+    frames: spsc::Producer<'q, (CanFrame, Instant)>,
+    dropped: &'q AtomicU32,
+}
+
+/// The task's end of a [`FrameQueue`].
+pub struct FrameReceiver<'q> {
+    frames: spsc::Consumer<'q, (CanFrame, Instant)>,
+    dropped: &'q AtomicU32,
+}
+
+impl<const N: usize> FrameQueue<N> {
+    /// Makes an empty queue.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { frames: spsc::Queue::new(), dropped: AtomicU32::new(0) }
+    }
+
+    /// Returns both ends.
+    pub fn split(&mut self) -> (FrameSender<'_>, FrameReceiver<'_>) {
+        let (producer, consumer) = self.frames.split();
+        let dropped = &self.dropped;
+        (FrameSender { frames: producer, dropped }, FrameReceiver { frames: consumer, dropped })
+    }
+}
+
+impl<const N: usize> Default for FrameQueue<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl FrameSender<'_> {
+    /// Puts a frame that arrived at `now` into the queue; `false` when it was full, or the frame had more than
+    /// 8 bytes, and was dropped.
+    pub fn push(&mut self, frame: &impl Frame, now: Instant) -> bool {
+        let kept =
+            CanFrame::copy_of(frame).is_some_and(|frame| self.frames.enqueue((frame, now)).is_ok());
+        if !kept {
+            // Only this end writes, so a load and a store are enough: there are cores without more.
+            let dropped = self.dropped.load(Ordering::Relaxed);
+            self.dropped.store(dropped.saturating_add(1), Ordering::Relaxed);
+        }
+        kept
+    }
+}
+
+impl FrameReceiver<'_> {
+    /// Takes the oldest frame and the time of its arrival.
+    pub fn pop(&mut self) -> Option<(CanFrame, Instant)> {
+        self.frames.dequeue()
+    }
+
+    /// Returns how many frames were dropped because the queue was full, saturating.
+    #[must_use]
+    pub fn dropped(&self) -> u32 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+}
+
+impl core::fmt::Debug for FrameSender<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "FrameSender({} waiting)", self.frames.len())
+    }
+}
+
+impl core::fmt::Debug for FrameReceiver<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "FrameReceiver({} waiting)", self.frames.len())
+    }
+}

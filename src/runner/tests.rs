@@ -1,0 +1,274 @@
+//! The runner against a scripted driver: any answer at any time.
+
+use super::*;
+use crate::dji::{Bus, Config, Handle, M3508};
+use crate::time::ManualClock;
+use embedded_can::{ErrorKind, Frame, StandardId};
+use std::collections::VecDeque;
+use std::vec::Vec;
+
+type Answer = Result<Option<CanFrame>, nb::Error<ErrorKind>>;
+
+/// Answers as scripted, then takes everything; records what was offered.
+#[derive(Default)]
+struct Scripted {
+    transmit: VecDeque<Answer>,
+    receive: VecDeque<Result<CanFrame, nb::Error<ErrorKind>>>,
+    offered: Vec<CanFrame>,
+    always: Option<nb::Error<ErrorKind>>,
+}
+
+impl embedded_can::nb::Can for Scripted {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> Answer {
+        self.offered.push(*frame);
+        match &self.always {
+            Some(error) => Err(*error),
+            None => self.transmit.pop_front().unwrap_or(Ok(None)),
+        }
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+        self.receive.pop_front().unwrap_or(Err(nb::Error::WouldBlock))
+    }
+}
+
+fn frame(id: u16, data: [u8; 8]) -> CanFrame {
+    CanFrame::standard(id, data).unwrap()
+}
+
+type TestRunner<'c> = Runner<Nb<Scripted>, &'c ManualClock, Bus>;
+
+/// Two M3508 in two command frames, armed, with a non-zero target for each.
+fn driving(clock: &ManualClock) -> (TestRunner<'_>, [Handle<M3508>; 2]) {
+    let mut bus = Bus::new();
+    let wheels = bus.attach_all([1, 5].map(Config::<M3508>::new)).unwrap();
+    let mut can = Scripted::default();
+    can.receive.extend([0x201, 0x205].map(|id| Ok(frame(id, [0; 8]))));
+    let mut runner = Runner::new(Nb(can), clock, bus);
+    runner.poll(8);
+    let tick = Tick::new(clock.now(), 0.001);
+    runner.arm(tick).unwrap();
+    set(&mut runner, wheels, 1);
+    runner.tick(tick);
+    runner.port_mut().0.offered.clear();
+    (runner, wheels)
+}
+
+fn set(runner: &mut TestRunner<'_>, wheels: [Handle<M3508>; 2], raw: i16) {
+    for wheel in wheels {
+        runner.device_mut().set_raw(wheel, raw).unwrap();
+    }
+}
+
+fn hear(runner: &mut TestRunner<'_>, clock: &ManualClock) {
+    for id in [0x201, 0x205] {
+        assert_eq!(runner.ingest(&frame(id, [0; 8]), clock.now()), Ingest::Taken);
+    }
+}
+
+fn offered(runner: &mut TestRunner<'_>) -> Vec<(u32, u8)> {
+    runner.port_mut().0.offered.drain(..).map(|frame| (frame.header(), frame.bytes()[1])).collect()
+}
+
+#[test]
+fn a_driver_that_would_block_for_ever_does_not_hold_the_loop() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    runner.port_mut().0.always = Some(nb::Error::WouldBlock);
+    for raw in 2..50 {
+        clock.advance(Duration::from_millis(1));
+        hear(&mut runner, &clock);
+        set(&mut runner, wheels, raw);
+        runner.tick(Tick::new(clock.now(), 0.001));
+    }
+    assert_eq!(offered(&mut runner).len(), 48, "one try a tick");
+    runner.port_mut().0.always = None;
+    clock.advance(Duration::from_millis(1));
+    set(&mut runner, wheels, 77);
+    runner.tick(Tick::new(clock.now(), 0.001));
+    let mut sent = offered(&mut runner);
+    sent.sort_unstable();
+    assert_eq!(sent, [(0x1FF, 77), (0x200, 77)], "the newest values, both frames");
+}
+
+#[test]
+fn a_refused_frame_goes_first_next_time() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    for raw in 2..1000 {
+        clock.advance(Duration::from_millis(1));
+        hear(&mut runner, &clock);
+        set(&mut runner, wheels, raw % 100 + 1);
+        // One place a tick: with a fixed order the second frame would never get it.
+        runner.port_mut().0.transmit.extend([Ok(None), Err(nb::Error::WouldBlock)]);
+        runner.tick(Tick::new(clock.now(), 0.001));
+    }
+    let sent: Vec<u32> = offered(&mut runner).chunks(2).map(|pair| pair[0].0).collect();
+    let first = sent.iter().filter(|id| **id == 0x200).count();
+    assert!((450..550).contains(&first), "{first} of {}", sent.len());
+}
+
+#[test]
+fn an_evicted_frame_is_sent_later_and_a_foreign_one_handed_back() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let foreign = frame(0x7FF, [9; 8]);
+    clock.advance(Duration::from_millis(1));
+    set(&mut runner, wheels, 2);
+    runner.port_mut().0.transmit.extend([Ok(Some(foreign)), Ok(Some(frame(0x200, [0; 8])))]);
+    let mut handed_back = Vec::new();
+    runner.tick_with(Tick::new(clock.now(), 0.001), |frame| handed_back.push(*frame));
+    assert_eq!(handed_back, [foreign]);
+    let statistics = runner.statistics();
+    assert_eq!((statistics.evicted, statistics.evicted_unrelated), (1, 1));
+    _ = offered(&mut runner);
+    clock.advance(Duration::from_millis(1));
+    runner.tick(Tick::new(clock.now(), 0.001));
+    assert_eq!(offered(&mut runner)[0].0, 0x200);
+}
+
+#[test]
+fn driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let error = |kind| nb::Error::Other(kind);
+    let can = &mut runner.port_mut().0;
+    can.receive.extend([
+        Err(error(ErrorKind::Overrun)),
+        Ok(frame(0x201, [0; 8])),
+        Err(error(ErrorKind::Crc)),
+    ]);
+    can.transmit.extend([Err(error(ErrorKind::Acknowledge)), Ok(None)]);
+    assert_eq!(runner.poll(16), 1);
+    set(&mut runner, wheels, 2);
+    runner.tick(Tick::new(clock.now(), 0.001));
+    let statistics = runner.statistics();
+    assert_eq!((statistics.receive_errors.overrun, statistics.receive_errors.crc), (1, 1));
+    assert_eq!(statistics.send_errors, ErrorCounts { acknowledge: 1, ..NO_ERRORS });
+    assert_eq!(offered(&mut runner).len(), 2);
+}
+
+#[test]
+fn a_driver_that_only_errs_ends_every_poll() {
+    let clock = ManualClock::new(Instant::START);
+    let mut can = Scripted::default();
+    can.receive.extend((0..1000).map(|_| Err(nb::Error::Other(ErrorKind::Other))));
+    let mut runner = Runner::new(Nb(can), &clock, Bus::new());
+    assert_eq!(runner.poll(16), 0);
+    assert_eq!(runner.statistics().receive_errors.other, 16);
+}
+
+#[test]
+fn a_flood_of_foreign_frames_is_bounded_and_handed_back_in_order() {
+    let clock = ManualClock::new(Instant::START);
+    let mut can = Scripted::default();
+    let flood: Vec<CanFrame> = (0..100)
+        .map(|id| CanFrame::new(StandardId::new(0x300 + id).unwrap(), &[1]).unwrap())
+        .collect();
+    can.receive.extend(flood.iter().map(|frame| Ok(*frame)));
+    let mut runner = Runner::new(Nb(can), &clock, Bus::new());
+    let mut seen = Vec::new();
+    assert_eq!(runner.poll_with(30, |frame| seen.push(*frame)), 30);
+    assert_eq!(seen, flood[..30]);
+    assert_eq!(runner.statistics().unrelated, 30);
+}
+
+#[test]
+fn a_bus_that_takes_nothing_for_100_ms_disarms_and_offers_zeros_afterwards() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    runner.port_mut().0.always = Some(nb::Error::Other(ErrorKind::Other));
+    for ms in 0..150 {
+        clock.advance(Duration::from_millis(1));
+        hear(&mut runner, &clock);
+        _ = runner.device_mut().set_raw(wheels[0], 900);
+        runner.tick(Tick::new(clock.now(), 0.001));
+        assert_eq!(runner.is_armed(), ms < 100, "{ms}");
+    }
+    assert_eq!((runner.is_bus_down(), runner.statistics().bus_losses), (true, 1));
+    let tick = Tick::new(clock.now(), 0.001);
+    assert_eq!(runner.arm(tick), Err(ArmError::BusDown));
+    runner.port_mut().0.always = None;
+    _ = offered(&mut runner);
+    clock.advance(Duration::from_millis(1));
+    runner.tick(Tick::new(clock.now(), 0.001));
+    assert_eq!(offered(&mut runner), [(0x200, 0), (0x1FF, 0)]);
+    assert!(!runner.is_bus_down() && !runner.is_armed());
+    assert_eq!(runner.arm(tick), Ok(()));
+}
+
+#[test]
+fn the_emergency_stop_acts_on_the_next_tick_and_stays() {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (runner, wheels) = driving(&clock);
+    let mut runner = runner.with_emergency_stop(&STOP);
+    set(&mut runner, wheels, 50);
+    STOP.set();
+    runner.tick(Tick::new(clock.now(), 0.001));
+    assert!(offered(&mut runner).iter().all(|(_, raw)| *raw == 0));
+    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::Stopped));
+    runner.clear_emergency_stop();
+    assert!(!runner.is_armed());
+    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
+}
+
+#[test]
+fn frames_add_up() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let answers = [Ok(None), Err(nb::Error::WouldBlock), Err(nb::Error::Other(ErrorKind::Bit))];
+    for round in 0..3_000_usize {
+        clock.advance(Duration::from_millis(1));
+        let id = 0x1FE + u16::try_from(round % 16).unwrap();
+        let length = round % 9;
+        let received = CanFrame::new(StandardId::new(id).unwrap(), &[0; 8][..length]).unwrap();
+        _ = runner.ingest(&received, clock.now());
+        hear(&mut runner, &clock);
+        set(&mut runner, wheels, 3);
+        runner.port_mut().0.transmit.push_back(answers[round % 3]);
+        runner.tick(Tick::new(clock.now(), 0.001));
+    }
+    let (s, bus) = (runner.statistics(), runner.device().counters());
+    assert_eq!(s.received, s.taken + s.unrelated + s.malformed);
+    assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total());
+    assert_eq!(s.malformed, bus.bad_length + bus.bad_field);
+    assert!(bus.packed >= s.sent && s.bus_losses == 0);
+}
+
+/// A driver that only sends, and waits.
+struct Blocking(Vec<CanFrame>);
+
+impl embedded_can::blocking::Can for Blocking {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), ErrorKind> {
+        self.0.push(*frame);
+        if self.0.len().is_multiple_of(2) { Err(ErrorKind::Stuff) } else { Ok(()) }
+    }
+
+    fn receive(&mut self) -> Result<CanFrame, ErrorKind> {
+        unreachable!("the runner never waits for a frame")
+    }
+}
+
+#[test]
+fn a_blocking_driver_sends_and_is_never_asked_for_a_frame() {
+    let clock = ManualClock::new(Instant::START);
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::new(1)).unwrap();
+    let mut runner = Runner::new(BlockingTx(Blocking(Vec::new())), &clock, bus);
+    assert_eq!(runner.poll(100), 0);
+    for _ in 0..30 {
+        clock.advance(Duration::from_millis(1));
+        let tick = runner.due().unwrap();
+        runner.tick(tick);
+    }
+    let s = runner.statistics();
+    assert!(s.sent >= 2 && s.send_errors.stuff >= 1);
+    assert_eq!(s.offered, s.sent + s.send_errors.stuff);
+}
