@@ -24,14 +24,8 @@ pub(super) const fn finite(value: f32) -> f32 {
     }
 }
 
-/// Returns 1, 0 or -1.
+/// Returns `value` within ±`limit`, which the caller knows to be zero or more.
 #[inline]
-pub(super) const fn sign(value: f32) -> f32 {
-    if value > 0.0 {
-        1.0
-    } else if value < 0.0 {
-        -1.0
-    } else {
-        0.0
-    }
+pub(super) const fn within(value: f32, limit: f32) -> f32 {
+    if value.abs() > limit { limit.copysign(value) } else { value }
 }

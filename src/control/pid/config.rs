@@ -3,6 +3,15 @@ use crate::control::error::{ConfigError, check, not_negative, ordered, positive}
 /// An option that is a threshold or a rate, and off.
 const OFF: f32 = f32::MAX;
 
+const ASYMMETRIC: u8 = 1;
+pub(super) const INTEGRAL_WEIGHT: u8 = 1 << 1;
+pub(super) const DEAD_BAND: u8 = 1 << 2;
+pub(super) const FEED_FORWARD: u8 = 1 << 3;
+pub(super) const SLEW_LIMIT: u8 = 1 << 4;
+pub(super) const CIRCLE: u8 = 1 << 5;
+pub(super) const DERIVATIVE_FILTER: u8 = 1 << 6;
+pub(super) const DERIVATIVE_ON_ERROR: u8 = 1 << 7;
+
 /// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
 ///
 /// With the output in a unit `U` and the measurement in a unit `M`, `kp` is in `U/M`, `ki` in `U/(M s)` and `kd`
@@ -229,17 +238,33 @@ impl PidConfig {
         positive("max_step", self.max_step_s)
     }
 
-    /// Tells whether gains and symmetric limits are all there is.
-    pub(super) const fn is_plain(&self) -> bool {
-        self.output_lower + self.output_upper == 0.0
-            && self.integral_separation >= OFF
-            && self.full_rate_below >= OFF
-            && self.dead_band == 0.0
-            && self.static_gain == 0.0
-            && self.velocity_gain == 0.0
-            && self.slew_per_s >= OFF
-            && self.period == 0.0
-            && self.derivative_time_s == 0.0
-            && !self.derivative_on_error
+    /// Returns the options that are in use; gains, limits that are symmetric, and anti-windup are none.
+    pub(super) const fn options(&self) -> u8 {
+        let mut options = 0;
+        if self.output_lower + self.output_upper != 0.0 {
+            options |= ASYMMETRIC;
+        }
+        if self.integral_separation < OFF || self.no_rate_above < OFF {
+            options |= INTEGRAL_WEIGHT;
+        }
+        if self.dead_band > 0.0 {
+            options |= DEAD_BAND;
+        }
+        if self.static_gain > 0.0 || self.velocity_gain > 0.0 {
+            options |= FEED_FORWARD;
+        }
+        if self.slew_per_s < OFF {
+            options |= SLEW_LIMIT;
+        }
+        if self.period > 0.0 {
+            options |= CIRCLE;
+        }
+        if self.derivative_time_s > 0.0 {
+            options |= DERIVATIVE_FILTER;
+        }
+        if self.derivative_on_error {
+            options |= DERIVATIVE_ON_ERROR;
+        }
+        options
     }
 }

@@ -1,6 +1,10 @@
 use super::PidConfig;
+use super::config::{
+    CIRCLE, DEAD_BAND, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, INTEGRAL_WEIGHT,
+    SLEW_LIMIT,
+};
 use crate::control::error::{ConfigError, not_negative};
-use crate::control::number::{finite, limited, sign};
+use crate::control::number::{finite, limited, within};
 use crate::control::step::TimeStep;
 use crate::math;
 
@@ -60,6 +64,7 @@ pub struct Pid {
     setpoint: f32,
     rejected: u16,
     track_output: bool,
+    options: u8,
 }
 
 /// The parts of an output, in its unit. Their sum is the output before limits.
@@ -86,10 +91,10 @@ impl Pid {
         if let Err(error) = config.validate() {
             return Err(error);
         }
-        Ok(Self {
+        let mut pid = Self {
             config,
-            integral_gate: gate(config.integral_limit),
-            output_gate: if config.is_plain() { gate(config.output_upper) } else { CLOSED },
+            integral_gate: CLOSED,
+            output_gate: CLOSED,
             integral: 0.0,
             error: UNKNOWN,
             measurement: UNKNOWN,
@@ -98,7 +103,10 @@ impl Pid {
             setpoint: 0.0,
             rejected: 0,
             track_output: false,
-        })
+            options: 0,
+        };
+        pid.configure(config);
+        Ok(pid)
     }
 
     /// Steps by `dt_s` seconds and returns the output.
@@ -124,7 +132,7 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.step_carefully(setpoint, measurement, step)
+        self.step_with_options(setpoint, measurement, step)
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
@@ -143,7 +151,7 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.step_error_carefully(error, rate, step)
+        self.step_error_with_options(error, rate, step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -210,7 +218,7 @@ impl Pid {
             p: config.kp * error,
             i: self.integral,
             d: -(config.kd * self.rate),
-            feed_forward: self.feed_forward(),
+            feed_forward: self.feed_forward(self.setpoint),
         }
     }
 
@@ -232,6 +240,14 @@ impl Pid {
         self.rejected
     }
 
+    const fn configure(&mut self, config: PidConfig) {
+        self.config = config;
+        self.options = config.options();
+        let plain = self.options == 0;
+        self.integral_gate = if plain { gate(config.integral_limit) } else { CLOSED };
+        self.output_gate = if plain { gate(config.output_upper) } else { CLOSED };
+    }
+
     fn change(&mut self, config: PidConfig) {
         if self.output_gate != CLOSED {
             // The plain path does not store its setpoint.
@@ -239,9 +255,7 @@ impl Pid {
             self.setpoint = if known { self.error + self.measurement } else { 0.0 };
         }
         let before = self.terms();
-        self.config = config;
-        self.integral_gate = gate(config.integral_limit);
-        self.output_gate = if config.is_plain() { gate(config.output_upper) } else { CLOSED };
+        self.configure(config);
         let after = self.terms();
         let carried = before.i
             + (before.p - after.p)
@@ -254,40 +268,38 @@ impl Pid {
         };
     }
 
-    fn feed_forward(&self) -> f32 {
-        self.config.static_gain * sign(self.setpoint) + self.config.velocity_gain * self.setpoint
+    const fn feed_forward(&self, setpoint: f32) -> f32 {
+        let along = self.config.velocity_gain * setpoint;
+        if setpoint == 0.0 { along } else { along + self.config.static_gain.copysign(setpoint) }
     }
 
     #[inline(never)]
-    fn step_carefully(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+    fn step_with_options(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let (error, travel) = self.error_and_travel(setpoint, measurement);
+        if let Some(output) = self.work::<false>(setpoint, error, travel * step.per_dt, step) {
+            self.measurement = measurement;
+            return output;
+        }
         if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
             return self.reject();
         }
-        let mut error = setpoint - measurement;
-        let mut travel = measurement - self.measurement;
-        if self.config.derivative_on_error {
-            travel = self.error - error;
-        }
-        if self.config.period > 0.0 {
-            error = math::wrap(error, self.config.period);
-            travel = math::wrap(travel, self.config.period);
-        }
-        if self.measurement == UNKNOWN {
-            travel = 0.0;
-        }
+        let known = if self.config.derivative_on_error { self.error } else { self.measurement };
+        let travel = if known == UNKNOWN { 0.0 } else { travel };
         self.measurement = measurement;
-        self.setpoint = setpoint;
-        self.advance(finite(error), finite(travel * step.per_dt), step)
+        self.work_carefully(setpoint, finite(error), finite(travel * step.per_dt), step)
     }
 
     #[inline(never)]
-    fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+    fn step_error_with_options(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        if let Some(output) = self.work::<false>(0.0, error, rate, step) {
+            self.measurement = UNKNOWN;
+            return output;
+        }
         if step.is_hold() || !error.is_finite() || !rate.is_finite() {
             return self.reject();
         }
         self.measurement = UNKNOWN;
-        self.setpoint = 0.0;
-        self.advance(error, rate, step)
+        self.work_carefully(0.0, error, rate, step)
     }
 
     const fn reject(&mut self) -> f32 {
@@ -295,59 +307,112 @@ impl Pid {
         self.output
     }
 
-    /// The whole controller, for finite arguments and a step that is normal or frozen.
-    fn advance(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let config = &self.config;
-        let first = self.error == UNKNOWN;
-        let in_band = error.abs() < config.dead_band;
-        let proportional = if in_band { 0.0 } else { finite(config.kp * error) };
-        let mut growth = 0.0;
-        if !step.is_frozen() {
-            self.rate = if config.derivative_time_s > 0.0 {
-                let gain = step.dt_s / (step.dt_s + config.derivative_time_s);
-                finite(self.rate + gain * (rate - self.rate))
-            } else {
-                rate
-            };
+    #[inline]
+    fn error_and_travel(&self, setpoint: f32, measurement: f32) -> (f32, f32) {
+        let error = setpoint - measurement;
+        let travel = if self.has(DERIVATIVE_ON_ERROR) {
+            self.error - error
+        } else {
+            measurement - self.measurement
+        };
+        if self.has(CIRCLE) {
+            (math::wrap(error, self.config.period), math::wrap(travel, self.config.period))
+        } else {
+            (error, travel)
         }
-        if !first && !step.is_frozen() {
-            growth = finite(config.ki * step.half_dt_s * (error + self.error) * self.weight(error));
-            if in_band && growth * self.integral >= 0.0 {
+    }
+
+    /// What happens seldom: the first call, a step that is frozen, values that overflow.
+    fn work_carefully(&mut self, setpoint: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let (mut rate, mut step) = (rate, *step);
+        if step.is_frozen() {
+            (rate, step.half_dt_s) = (self.rate, 0.0);
+        }
+        if self.track_output {
+            self.track_output = false;
+            let mut others = *self;
+            (others.setpoint, others.error, others.rate) =
+                (setpoint, error, self.filtered(rate, &step));
+            let Terms { p, d, feed_forward, .. } = others.terms();
+            if self.config.ki > 0.0 {
+                self.integral = finite(self.output - finite(p + d + feed_forward));
+            }
+        }
+        if self.error == UNKNOWN {
+            self.error = -error; // no interval yet: a mean of zero
+        }
+        self.work::<true>(setpoint, error, rate, &step).unwrap_or(self.output)
+    }
+
+    /// The whole controller. Unless `CAREFUL`, `None` says that something was not finite, and nothing has changed.
+    #[inline]
+    fn work<const CAREFUL: bool>(
+        &mut self,
+        setpoint: f32,
+        error: f32,
+        rate: f32,
+        step: &TimeStep,
+    ) -> Option<f32> {
+        let finite = |value| if CAREFUL { finite(value) } else { value };
+        let config = &self.config;
+        let rate = finite(self.filtered(rate, step));
+        let mut proportional = finite(config.kp * error);
+        let mut growth = finite(config.ki * step.half_dt_s * (error + self.error));
+        let evidence = growth;
+        if self.has(INTEGRAL_WEIGHT) {
+            growth *= self.weight(error);
+        }
+        if self.has(DEAD_BAND) && error.abs() < config.dead_band {
+            proportional = 0.0;
+            if growth * self.integral >= 0.0 {
                 growth = 0.0;
             }
         }
-        let others = finite(proportional - finite(config.kd * self.rate) + self.feed_forward());
-        if self.track_output {
-            self.track_output = false;
-            if config.ki > 0.0 {
-                self.integral = finite(self.output - others);
-            }
+        let mut others = finite(proportional - finite(config.kd * rate));
+        if self.has(FEED_FORWARD) {
+            others = finite(others + self.feed_forward(setpoint));
         }
         let limit = config.integral_limit;
-        let integral = limited(finite(self.integral + growth), -limit, limit);
+        let mut integral = within(finite(self.integral + growth), limit);
         let wanted = others + integral;
-        let slewed = if config.slew_per_s < f32::MAX {
-            let slew = config.slew_per_s * step.dt_s;
-            limited(wanted, self.output - slew, self.output + slew)
-        } else {
-            wanted
-        };
-        let output = limited(slewed, config.output_lower, config.output_upper);
-        let excess = finite(wanted - output);
-        self.integral = if config.tracking_time_s > 0.0 {
-            let drained = excess * (step.dt_s / config.tracking_time_s).min(1.0);
-            limited(integral - drained, -limit, limit)
-        } else if excess * growth > 0.0 && !config.wind_up {
-            self.integral
-        } else {
-            integral
-        };
+        if !CAREFUL && !passes(wanted + evidence + rate, gate(f32::MAX)) {
+            return None;
+        }
+        let mut output = wanted;
+        if self.has(SLEW_LIMIT) {
+            output =
+                self.output + within(finite(wanted - self.output), config.slew_per_s * step.dt_s);
+        }
+        output = limited(output, config.output_lower, config.output_upper);
+        let excess = wanted - output;
+        if excess != 0.0 {
+            if config.tracking_time_s > 0.0 {
+                let part = (step.dt_s / config.tracking_time_s).min(1.0);
+                integral = within(finite(integral - finite(excess) * part), limit);
+            } else if excess * growth > 0.0 && !config.wind_up {
+                integral = self.integral;
+            }
+        }
+        self.setpoint = setpoint;
         self.error = error;
+        self.rate = rate;
+        self.integral = integral;
         self.output = output;
-        output
+        Some(output)
+    }
+
+    #[inline]
+    fn filtered(&self, rate: f32, step: &TimeStep) -> f32 {
+        if self.has(DERIVATIVE_FILTER) {
+            let gain = step.dt_s / (step.dt_s + self.config.derivative_time_s);
+            self.rate + gain * (rate - self.rate)
+        } else {
+            rate
+        }
     }
 
     /// The part of its rate at which the integral works at this error.
+    #[inline]
     fn weight(&self, error: f32) -> f32 {
         let config = &self.config;
         let size = error.abs();
@@ -358,6 +423,11 @@ impl Pid {
         } else {
             1.0
         }
+    }
+
+    #[inline]
+    const fn has(&self, option: u8) -> bool {
+        self.options & option != 0
     }
 }
 
