@@ -1,0 +1,240 @@
+//! Reads a line of candump from left to right.
+
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+
+use super::{Expected, ParseError};
+use crate::frame::CanFrame;
+use crate::time::Instant;
+
+/// The bit that candump sets in the id of an error frame (`CAN_ERR_FLAG`).
+const ERROR_FRAME: u32 = 0x2000_0000;
+
+/// A place in a line. Every step moves it forward or fails, so that reading a line takes time in its length.
+pub(super) struct Cursor<'a> {
+    line: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Cursor<'a> {
+    pub(super) const fn new(line: &'a [u8]) -> Self {
+        Self { line, at: 0 }
+    }
+
+    pub(super) const fn error(&self, expected: Expected) -> ParseError {
+        ParseError { column: self.at + 1, expected }
+    }
+
+    pub(super) fn peek(&self) -> Option<u8> {
+        self.line.get(self.at).copied()
+    }
+
+    pub(super) fn accept(&mut self, byte: u8) -> bool {
+        let found = self.peek() == Some(byte);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn require(&mut self, byte: u8, expected: Expected) -> Result<(), ParseError> {
+        if self.accept(byte) { Ok(()) } else { Err(self.error(expected)) }
+    }
+
+    pub(super) fn skip_spaces(&mut self) {
+        while self.accept(b' ') || self.accept(b'\t') {}
+    }
+
+    /// Takes what stands before the next blank.
+    fn word(&mut self) -> &'a [u8] {
+        let rest = self.line.get(self.at..).unwrap_or(&[]);
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        self.at += length;
+        rest.get(..length).unwrap_or(&[])
+    }
+
+    pub(super) fn time(&mut self) -> Result<Option<Instant>, ParseError> {
+        if !self.accept(b'(') {
+            return Ok(None);
+        }
+        self.skip_spaces();
+        let (seconds, _) = self.decimal()?;
+        self.require(b'.', Expected::Time)?;
+        let (fraction, digits) = self.decimal()?;
+        let micros = match digits {
+            0..=6 => fraction * 10_u64.pow(6 - digits),
+            7..=9 => fraction / 10_u64.pow(digits - 6),
+            _ => return Err(self.error(Expected::Time)),
+        };
+        let total = seconds.checked_mul(1_000_000).and_then(|total| total.checked_add(micros));
+        let total = total.ok_or(self.error(Expected::Time))?;
+        self.require(b')', Expected::Time)?;
+        self.skip_spaces();
+        Ok(Some(Instant::from_micros(total)))
+    }
+
+    /// Takes a decimal number, and counts its digits.
+    fn decimal(&mut self) -> Result<(u64, u32), ParseError> {
+        let (mut value, mut digits) = (0_u64, 0);
+        while let Some(digit) = self.peek().filter(u8::is_ascii_digit) {
+            let next = value.checked_mul(10);
+            let next = next.and_then(|value| value.checked_add(u64::from(digit - b'0')));
+            value = next.ok_or(self.error(Expected::Time))?;
+            digits += 1;
+            self.at += 1;
+        }
+        if digits == 0 { Err(self.error(Expected::Time)) } else { Ok((value, digits)) }
+    }
+
+    pub(super) fn interface(&mut self) -> Result<&'a str, ParseError> {
+        let error = self.error(Expected::Interface);
+        let name = self.word();
+        let printable = matches!(name.len(), 1..=15) && name.iter().all(u8::is_ascii_graphic);
+        let name = core::str::from_utf8(name).ok().filter(|_| printable).ok_or(error);
+        self.skip_spaces();
+        name
+    }
+
+    /// Steps over the columns of `candump -x`: `RX - -`.
+    pub(super) fn skip_direction(&mut self) {
+        let start = self.at;
+        if !matches!(self.word(), b"RX" | b"TX") {
+            self.at = start;
+            return;
+        }
+        for _ in 0..2 {
+            self.skip_spaces();
+            self.word();
+        }
+        self.skip_spaces();
+    }
+
+    pub(super) fn id(&mut self) -> Result<Id, ParseError> {
+        let error = self.error(Expected::Id);
+        let start = self.at;
+        let mut raw = 0_u32;
+        while let Some(digit) = self.peek().and_then(nibble) {
+            if self.at - start == 8 {
+                return Err(error);
+            }
+            raw = raw << 4 | u32::from(digit);
+            self.at += 1;
+        }
+        let id = match self.at - start {
+            3 => u16::try_from(raw).ok().and_then(StandardId::new).map(Id::Standard),
+            8 if raw & !ExtendedId::MAX.as_raw() == ERROR_FRAME => {
+                return Err(ParseError { expected: Expected::NotAnErrorFrame, ..error });
+            }
+            8 => ExtendedId::new(raw).map(Id::Extended),
+            _ => None,
+        };
+        id.ok_or(error)
+    }
+
+    /// Reads what follows `#`.
+    pub(super) fn packed(&mut self, id: Id) -> Result<CanFrame, ParseError> {
+        if self.peek() == Some(b'#') {
+            return Err(self.error(Expected::ClassicFrame));
+        }
+        if self.accept(b'R') {
+            let length = self.peek().filter(u8::is_ascii_digit).map_or(0, |digit| digit - b'0');
+            let frame = CanFrame::new_remote(id, usize::from(length));
+            let frame = frame.ok_or(self.error(Expected::Length))?;
+            self.at += usize::from(self.peek().is_some_and(|digit| digit.is_ascii_digit()));
+            return self.packed_end(frame);
+        }
+        let mut data = Data::default();
+        while self.peek().is_some_and(|byte| !byte.is_ascii_whitespace() && byte != b'_') {
+            data.push(self)?;
+        }
+        let frame = CanFrame::new(id, data.bytes()).ok_or(self.error(Expected::End))?;
+        self.packed_end(frame)
+    }
+
+    /// Reads what may stand behind a packed frame: the raw length code of an 8-byte frame (`_9` to `_F`), the direction.
+    fn packed_end(&mut self, frame: CanFrame) -> Result<CanFrame, ParseError> {
+        if frame.length() == 8 && self.accept(b'_') {
+            let code = self.peek().and_then(nibble).filter(|code| *code > 8);
+            code.ok_or(self.error(Expected::End))?;
+            self.at += 1;
+        }
+        if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
+            return Err(self.error(Expected::End));
+        }
+        self.skip_spaces();
+        let error = self.error(Expected::End);
+        if matches!(self.word(), b"" | b"R" | b"T") && self.peek().is_none() {
+            Ok(frame)
+        } else {
+            Err(error)
+        }
+    }
+
+    /// Reads `[8]  0E 16 ..` or `[8]  remote request`.
+    pub(super) fn columns(&mut self, id: Id) -> Result<CanFrame, ParseError> {
+        if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
+            return Err(self.error(Expected::Id));
+        }
+        self.skip_spaces();
+        self.require(b'[', Expected::Length)?;
+        let declared = self.peek().filter(|byte| matches!(byte, b'0'..=b'8'));
+        let length = declared.map(|digit| digit - b'0').ok_or(self.error(Expected::Length))?;
+        self.at += 1;
+        if self.peek().is_some_and(|byte| byte.is_ascii_digit()) {
+            return Err(self.error(Expected::ClassicFrame)); // two digits: candump's mark of CAN FD
+        }
+        self.require(b']', Expected::Length)?;
+        self.skip_spaces();
+        let rest = self.line.get(self.at..).unwrap_or(&[]);
+        let frame = if rest.starts_with(b"remote request") {
+            self.at += b"remote request".len();
+            CanFrame::new_remote(id, usize::from(length))
+        } else {
+            let mut data = Data::default();
+            for _ in 0..length {
+                data.push(self)?;
+                if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
+                    return Err(self.error(Expected::DataByte));
+                }
+                self.skip_spaces();
+            }
+            CanFrame::new(id, data.bytes())
+        };
+        self.skip_spaces();
+        match (self.peek(), frame) {
+            (None | Some(b'\''), Some(frame)) => Ok(frame), // a quote begins the text column of -a
+            _ => Err(self.error(Expected::End)),
+        }
+    }
+}
+
+/// Up to 8 data bytes.
+#[derive(Default)]
+struct Data {
+    bytes: [u8; 8],
+    length: usize,
+}
+
+impl Data {
+    fn push(&mut self, cursor: &mut Cursor<'_>) -> Result<(), ParseError> {
+        let place = self.bytes.get_mut(self.length).ok_or(cursor.error(Expected::End))?;
+        *place = 0;
+        for _ in 0..2 {
+            let digit = cursor.peek().and_then(nibble);
+            *place = *place << 4 | digit.ok_or(cursor.error(Expected::DataByte))?;
+            cursor.at += 1;
+        }
+        self.length += 1;
+        Ok(())
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or(&[])
+    }
+}
+
+const fn nibble(digit: u8) -> Option<u8> {
+    match digit {
+        b'0'..=b'9' => Some(digit - b'0'),
+        b'A'..=b'F' => Some(digit - b'A' + 10),
+        b'a'..=b'f' => Some(digit - b'a' + 10),
+        _ => None,
+    }
+}
