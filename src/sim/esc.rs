@@ -1,8 +1,8 @@
-use super::facts::Facts;
 use super::mailbox::Mailboxes;
 use super::motor::{LostCommand, MotorConfig, MotorState};
 use super::random::Random;
 use super::rotor::{Drive, Rotor};
+use crate::dji::{Facts, Unit};
 use crate::frame::CanFrame;
 use crate::units::{AngularVelocity, Current};
 
@@ -27,7 +27,8 @@ pub(crate) struct Tampering {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Esc {
     pub(crate) config: MotorConfig,
-    facts: Facts,
+    facts: &'static Facts,
+    command_raw: i16,
     command_id: u16,
     slot: u8,
     pub(crate) rotor: Rotor,
@@ -51,8 +52,8 @@ pub(crate) struct Esc {
 impl Esc {
     /// Takes its place in the world: `index` picks the stream of chance. `None` when the model has no such id.
     pub(crate) fn new(config: MotorConfig, seed: u64, index: u64, now_ns: u64) -> Option<Self> {
-        let facts = Facts::of(config.model);
-        let (command_id, slot) = facts.place(config.id)?;
+        let facts = config.model.facts();
+        let (command_frame, slot) = facts.place(config.id)?;
         let mut random = Random::new(seed, 2 * index + 1);
         let angle = random.below(8192);
         let phase = random.below(1_000_000);
@@ -62,7 +63,8 @@ impl Esc {
         let mut esc = Self {
             config,
             facts,
-            command_id,
+            command_raw: if config.legacy_full_scale { 30_000 } else { facts.command_raw },
+            command_id: command_frame.id(),
             slot,
             rotor: Rotor::new(&config, angle),
             mailboxes: Mailboxes::new(),
@@ -109,7 +111,7 @@ impl Esc {
         let word = frame.bytes().chunks_exact(2).nth(usize::from(self.slot));
         if let Some([high, low]) = word {
             let raw = i16::from_be_bytes([*high, *low]);
-            self.command = raw.clamp(-self.facts.command_raw, self.facts.command_raw);
+            self.command = raw.clamp(-self.command_raw, self.command_raw);
             self.commanded_ns = now_ns;
         }
     }
@@ -122,12 +124,12 @@ impl Esc {
                 self.command = 0;
             }
         }
-        let share = f32::from(self.command) / f32::from(self.facts.command_raw);
+        let share = f32::from(self.command) / f32::from(self.command_raw);
         let value = share * self.facts.command_full_scale;
-        let drive = match (self.loss.is_none(), self.facts.in_volts) {
+        let drive = match (self.loss.is_none(), self.facts.unit) {
             (false, _) => Drive::Open,
-            (true, true) => Drive::Volts(value),
-            (true, false) => Drive::Amperes(value),
+            (true, Unit::Volt) => Drive::Volts(value),
+            (true, Unit::Ampere) => Drive::Amperes(value),
         };
         self.rotor.step_current(drive, dt_s);
     }
@@ -309,6 +311,21 @@ mod tests {
             }
             let bytes = *feedback(&mut esc).bytes();
             assert_eq!(i16::from_be_bytes([bytes[4], bytes[5]]), -raw, "{model:?}");
+        }
+    }
+
+    #[test]
+    fn an_old_gm6020_has_more_counts_for_the_same_volts() {
+        let config = MotorConfig::new(Model::Gm6020Voltage, 1);
+        for (config, limit) in [(config, 25_000), (config.with_legacy_full_scale(), 30_000)] {
+            let mut esc = Esc::new(config, 1, 0, 0).unwrap();
+            esc.receive(&command(0x1FF, 0, i16::MAX), 0);
+            assert_eq!(esc.command, limit);
+            for _ in 0..20_000 {
+                esc.step_current(0, STEP);
+                esc.rotor.step_motion(0.0, STEP);
+            }
+            assert!((esc.rotor.rotor_rpm() - 320.0).abs() < 0.5);
         }
     }
 

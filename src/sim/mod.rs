@@ -64,7 +64,6 @@ mod controller;
 mod engine;
 mod error;
 mod esc;
-mod facts;
 mod fault;
 mod line;
 mod mailbox;

@@ -1,4 +1,5 @@
-use super::{Line, facts::Facts};
+use super::Line;
+use crate::dji::{self, Facts};
 use crate::time::Duration;
 use crate::units::{AngularVelocity, Current};
 
@@ -15,6 +16,19 @@ pub enum Model {
     Gm6020Voltage,
     /// The GM6020 with current control switched on: ids 1 to 7.
     Gm6020Current,
+}
+
+impl Model {
+    /// Returns what the wire and the data sheets say about it.
+    #[must_use]
+    pub const fn facts(self) -> &'static Facts {
+        match self {
+            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
+            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
+            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
+            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
+        }
+    }
 }
 
 /// What the simulated ESC does when no command arrives any more.
@@ -53,6 +67,7 @@ pub struct MotorConfig {
     pub(crate) load_inertia_kg_m2: f32,
     pub(crate) rotor_angle: Option<u16>,
     pub(crate) clock_ppm: Option<i16>,
+    pub(crate) legacy_full_scale: bool,
 }
 
 impl MotorConfig {
@@ -68,6 +83,7 @@ impl MotorConfig {
             load_inertia_kg_m2: 0.0,
             rotor_angle: None,
             clock_ppm: None,
+            legacy_full_scale: false,
         }
     }
 
@@ -101,6 +117,12 @@ impl MotorConfig {
     #[must_use]
     pub const fn with_rotor_angle(self, counts: u16) -> Self {
         Self { rotor_angle: Some(counts & 0x1FFF), ..self }
+    }
+
+    /// Makes full scale ±30000, as a GM6020 of 2020 and before has it; no other model has such a past.
+    #[must_use]
+    pub const fn with_legacy_full_scale(self) -> Self {
+        Self { legacy_full_scale: matches!(self.model, Model::Gm6020Voltage), ..self }
     }
 
     /// Sets by how many millionths the ESC's period is longer than 1 ms; by default the seed chooses within ±50.
@@ -143,7 +165,7 @@ pub struct MotorState {
 
 /// The physical constants of a model, at the output shaft. Units are SI.
 ///
-/// Torque constant, gear and no-load speed are documented (see `Facts`). The M3508's resistance follows from
+/// Torque constant, gear and no-load speed are documented (see [`Facts`]). The M3508's resistance follows from
 /// its documented rated point, 469 rpm at 10 A and 3 Nm. **Everything else is an estimate** of the right order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Constants {

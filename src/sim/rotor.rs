@@ -1,4 +1,3 @@
-use super::facts::Facts;
 use super::motor::{Constants, MotorConfig};
 use core::f32::consts::TAU;
 
@@ -36,16 +35,16 @@ pub(crate) struct Rotor {
 
 impl Rotor {
     pub(crate) const fn new(config: &MotorConfig, angle_counts: u16) -> Self {
-        let facts = Facts::of(config.model);
+        let facts = config.model.facts();
         let constants = Constants::of(config.model);
         Self {
             constants,
             torque_constant: facts.torque_constant_nm_per_a,
-            back_emf: constants.back_emf(&facts),
+            back_emf: constants.back_emf(facts),
             current_limit: facts.current_full_scale_a,
             supply_v: config.supply_v,
             inertia: constants.inertia + config.load_inertia_kg_m2,
-            gear: facts.gear,
+            gear: facts.gear.as_f32(),
             angle: (angle_counts as i64) << 19,
             velocity: 0.0,
             current: 0.0,
@@ -147,6 +146,7 @@ const AMBIENT_C: f32 = 25.0;
 mod tests {
     use super::super::Model;
     use super::*;
+    use crate::dji::Unit;
 
     const STEP: f32 = 1e-4;
     const MODELS: [Model; 4] =
@@ -157,8 +157,8 @@ mod tests {
     }
 
     fn full(model: Model) -> Drive {
-        let facts = Facts::of(model);
-        if facts.in_volts {
+        let facts = model.facts();
+        if facts.unit == Unit::Volt {
             Drive::Volts(facts.command_full_scale)
         } else {
             Drive::Amperes(facts.command_full_scale)
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn documented_no_load_speeds_come_out_in_both_directions() {
         for model in MODELS {
-            let documented = Facts::of(model).no_load_rpm;
+            let documented = model.facts().no_load_rpm;
             for (drive, sign) in [(full(model), 1.0), (reversed(full(model)), -1.0)] {
                 let mut rotor = rotor(model);
                 run(&mut rotor, drive, 20_000);
@@ -211,7 +211,7 @@ mod tests {
             let config = MotorConfig::new(model, 1).with_supply_v(12.0);
             let mut rotor = Rotor::new(&config, 0);
             run(&mut rotor, full(model), 20_000);
-            let share = rpm(&rotor) / Facts::of(model).no_load_rpm;
+            let share = rpm(&rotor) / model.facts().no_load_rpm;
             assert!((0.48..0.5).contains(&share), "{model:?}: {share}");
         }
     }
@@ -225,9 +225,9 @@ mod tests {
                 let mut rotor = rotor(model);
                 for _ in 0..1000 {
                     rotor.step_current(drive, STEP);
-                    assert!(rotor.current().abs() <= Facts::of(model).current_full_scale_a);
+                    assert!(rotor.current().abs() <= model.facts().current_full_scale_a);
                 }
-                assert!(rotor.current().abs() > 0.999 * Facts::of(model).current_full_scale_a);
+                assert!(rotor.current().abs() > 0.999 * model.facts().current_full_scale_a);
             }
         }
     }
@@ -249,8 +249,7 @@ mod tests {
     fn a_current_below_friction_does_not_move_the_shaft() {
         for model in MODELS {
             let mut rotor = rotor(model);
-            let breakaway =
-                Constants::of(model).coulomb / Facts::of(model).torque_constant_nm_per_a;
+            let breakaway = Constants::of(model).coulomb / model.facts().torque_constant_nm_per_a;
             run(&mut rotor, Drive::Amperes(0.9 * breakaway), 1000);
             assert_eq!((rotor.angle, rotor.velocity().to_bits()), (0, 0), "{model:?}");
             run(&mut rotor, Drive::Amperes(1.1 * breakaway), 1000);
