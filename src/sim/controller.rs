@@ -1,0 +1,399 @@
+use super::mailbox::Offer;
+use super::{Fault, Line, World};
+use crate::frame::CanFrame;
+use embedded_can::ErrorKind;
+
+/// How long a blocking call waits, in simulated time, before it gives up.
+const PATIENCE_NS: u64 = 1_000_000_000;
+/// A blocking call looks again at least this often.
+const NAP_NS: u64 = 100_000;
+
+/// The driver's end of a simulated bus: three transmit mailboxes and a receive queue.
+///
+/// It implements [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], so it can stand in for any
+/// driver. A frame that is handed over begins at the earliest when time moves: those handed over at one instant
+/// compete by their ids.
+///
+/// * `transmit` with full mailboxes evicts the pending frame of lowest priority for one of strictly higher
+///   priority and returns it; otherwise it would block. A frame in transmission is not evicted, and frames of one
+///   id keep their order.
+/// * `receive` reports an overrun once, then goes on with what was kept; the newest frames are the ones missed.
+/// * The blocking calls move the time of the world until they are done, for a second at most.
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::sim::World;
+/// use embedded_can::nb::Can;
+///
+/// let world = World::new(1);
+/// let mut can = world.controller();
+/// for id in [0x300, 0x100, 0x200] {
+///     let frame = CanFrame::standard(id, [0; 8]).ok_or("id")?;
+///     assert_eq!(can.transmit(&frame), Ok(None));
+/// }
+/// let urgent = CanFrame::standard(0x080, [0; 8]).ok_or("id")?;
+/// let evicted = can.transmit(&urgent).map_err(|_| "refused")?;
+/// assert_eq!(evicted.map(|frame| frame.header()), Some(0x300));
+/// let late = CanFrame::standard(0x301, [0; 8]).ok_or("id")?;
+/// assert_eq!(can.transmit(&late), Err(nb::Error::WouldBlock));
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug)]
+pub struct Controller<'a> {
+    world: &'a World,
+    line: Line,
+}
+
+/// Why a call to a [`Controller`] failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ControllerError {
+    /// The controller is bus-off.
+    BusOff,
+    /// Frames were missed because the receive queue was full. Reported once; those before them are still there.
+    Overrun,
+    /// [`Fault::DriverErrors`] wants it so.
+    Scripted,
+    /// A blocking call waited for a second.
+    TimedOut,
+}
+
+impl core::fmt::Display for ControllerError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::BusOff => "the controller is bus-off",
+            Self::Overrun => "frames were missed: the receive queue was full",
+            Self::Scripted => "a scripted error of the driver",
+            Self::TimedOut => "waited for a simulated second",
+        })
+    }
+}
+
+impl core::error::Error for ControllerError {}
+
+impl embedded_can::Error for ControllerError {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Overrun => ErrorKind::Overrun,
+            Self::Scripted => ErrorKind::Acknowledge,
+            Self::BusOff | Self::TimedOut => ErrorKind::Other,
+        }
+    }
+}
+
+impl<'a> Controller<'a> {
+    pub(super) const fn new(world: &'a World, line: Line) -> Self {
+        Self { world, line }
+    }
+
+    /// Takes back what waits in the mailboxes, except for a frame in transmission.
+    ///
+    /// embedded-can has no such call; drivers have it as `abort`.
+    pub fn abort_pending(&mut self) {
+        self.world.with(|engine| engine.wire_mut(self.line).mailboxes.abort());
+    }
+
+    /// Fails where any call of the driver fails.
+    fn check(&self) -> Result<(), ControllerError> {
+        self.world.with(|engine| {
+            let now_ns = engine.now_ns;
+            let error = if engine.faults.is_active(Fault::BusOff(self.line), now_ns) {
+                ControllerError::BusOff
+            } else if engine.faults.driver_error(self.line, now_ns) {
+                ControllerError::Scripted
+            } else {
+                return Ok(());
+            };
+            let traffic = &mut engine.wire_mut(self.line).traffic;
+            traffic.errors = traffic.errors.saturating_add(1);
+            Err(error)
+        })
+    }
+
+    fn is_blocked(&self) -> bool {
+        let blocked = Fault::WouldBlock(self.line);
+        self.world.with(|engine| engine.faults.is_active(blocked, engine.now_ns))
+    }
+
+    fn offer(&self, frame: &CanFrame) -> Offer {
+        let blocked = self.is_blocked();
+        self.world.with(|engine| {
+            let wire = engine.wire_mut(self.line);
+            let offer = if blocked { Offer::Refused } else { wire.mailboxes.offer(*frame) };
+            match offer {
+                Offer::Taken => {}
+                Offer::Replaced(_) => wire.traffic.evicted = wire.traffic.evicted.saturating_add(1),
+                Offer::Refused => wire.traffic.refused = wire.traffic.refused.saturating_add(1),
+            }
+            offer
+        })
+    }
+
+    fn take(&self) -> nb::Result<CanFrame, ControllerError> {
+        let missed = self.world.with(|engine| engine.wire_mut(self.line).take_overrun());
+        if missed {
+            return Err(nb::Error::Other(ControllerError::Overrun));
+        }
+        let heard = self.world.with(|engine| engine.wire_mut(self.line).take_heard());
+        heard.ok_or(nb::Error::WouldBlock)
+    }
+
+    /// Moves time until `attempt` gives something.
+    fn wait<T>(
+        &self,
+        mut attempt: impl FnMut() -> Option<Result<T, ControllerError>>,
+    ) -> Result<T, ControllerError> {
+        let deadline_ns = self.world.with(|engine| engine.now_ns.saturating_add(PATIENCE_NS));
+        loop {
+            if let Some(result) = attempt() {
+                return result;
+            }
+            let waiting = self.world.with(|engine| {
+                let limit_ns = engine.now_ns.saturating_add(NAP_NS);
+                if let Some(record) = engine.run_until(limit_ns) {
+                    let _full = engine.unseen.push(record);
+                }
+                engine.now_ns < deadline_ns
+            });
+            if !waiting {
+                return Err(ControllerError::TimedOut);
+            }
+        }
+    }
+}
+
+impl embedded_can::nb::Can for Controller<'_> {
+    type Frame = CanFrame;
+    type Error = ControllerError;
+
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ControllerError> {
+        self.check()?;
+        match self.offer(frame) {
+            Offer::Taken => Ok(None),
+            Offer::Replaced(evicted) => Ok(Some(evicted)),
+            Offer::Refused => Err(nb::Error::WouldBlock),
+        }
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, ControllerError> {
+        self.check()?;
+        self.take()
+    }
+}
+
+impl embedded_can::blocking::Can for Controller<'_> {
+    type Frame = CanFrame;
+    type Error = ControllerError;
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), ControllerError> {
+        self.wait(|| {
+            if let Err(error) = self.check() {
+                return Some(Err(error));
+            }
+            let line = self.line;
+            let room = self.world.with(|engine| engine.wire(line).mailboxes.has_room());
+            // Room first: a blocking driver waits, it does not evict.
+            (room && !self.is_blocked()).then(|| {
+                self.offer(frame);
+                Ok(())
+            })
+        })
+    }
+
+    fn receive(&mut self) -> Result<CanFrame, ControllerError> {
+        self.wait(|| match self.check().map_err(nb::Error::Other).and_then(|()| self.take()) {
+            Ok(frame) => Some(Ok(frame)),
+            Err(nb::Error::Other(error)) => Some(Err(error)),
+            Err(nb::Error::WouldBlock) => None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Record, Sender};
+    use crate::time::{Duration, Instant};
+    use embedded_can::nb::Can as _;
+    use std::vec::Vec;
+
+    fn frame(id: u16, tag: u8) -> CanFrame {
+        CanFrame::standard(id, [tag; 8]).unwrap()
+    }
+
+    fn run(world: &World, micros: u64) -> Vec<Record> {
+        let mut records = Vec::new();
+        world.advance_with(Duration::from_micros(micros), |record| records.push(*record));
+        records
+    }
+
+    fn frames(records: &[Record]) -> Vec<CanFrame> {
+        records.iter().map(|record| record.frame).collect()
+    }
+
+    #[test]
+    fn frames_of_one_instant_leave_in_the_order_of_their_ids() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        for id in [0x300, 0x100, 0x200] {
+            assert_eq!(can.transmit(&frame(id, 0)), Ok(None));
+        }
+        world.inject(Line::Can1, frame(0x150, 0)).unwrap();
+        let records = run(&world, 1_000);
+        assert_eq!(
+            frames(&records),
+            [frame(0x100, 0), frame(0x150, 0), frame(0x200, 0), frame(0x300, 0)]
+        );
+        assert_eq!(records[1].sender, Sender::Foreign);
+    }
+
+    #[test]
+    fn a_frame_on_the_wire_is_not_interrupted_by_a_more_urgent_one() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        assert_eq!(can.transmit(&frame(0x300, 0)), Ok(None));
+        run(&world, 50);
+        assert_eq!(can.transmit(&frame(0x100, 0)), Ok(None));
+        assert_eq!(frames(&run(&world, 400)), [frame(0x300, 0), frame(0x100, 0)]);
+    }
+
+    #[test]
+    fn frames_follow_each_other_after_exactly_their_bits_and_the_pause() {
+        for (bits_per_s, bit_us) in [(1_000_000, 1), (500_000, 2), (250_000, 4)] {
+            let world = World::new(1).with_bit_rate(Line::Can1, bits_per_s);
+            let mut can = world.controller();
+            for tag in 1..=3 {
+                assert_eq!(can.transmit(&frame(0x200, tag)), Ok(None));
+            }
+            let records = run(&world, 2_000);
+            let mut end_bits = 0;
+            for record in &records {
+                end_bits += u64::from(record.bits);
+                assert_eq!(record.bits, crate::sim::frame_bits(&record.frame));
+                assert_eq!(record.at.as_micros(), (end_bits - 3) * bit_us);
+            }
+            let traffic = world.traffic(Line::Can1);
+            assert_eq!((traffic.frames, traffic.busy_bits, traffic.sent), (3, end_bits, 3));
+            assert_eq!(traffic.total_bits, 2_000 / bit_us);
+        }
+    }
+
+    #[test]
+    fn an_evicted_frame_comes_back_and_never_leaves() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        for id in [0x201, 0x202, 0x203] {
+            assert_eq!(can.transmit(&frame(id, 0)), Ok(None));
+        }
+        run(&world, 10); // 0x201 is on the wire
+        assert_eq!(can.transmit(&frame(0x100, 0)), Ok(Some(frame(0x203, 0))));
+        assert_eq!(can.transmit(&frame(0x200, 0)), Ok(Some(frame(0x202, 0))));
+        assert_eq!(can.transmit(&frame(0x200, 1)), Err(nb::Error::WouldBlock));
+        let order = [frame(0x201, 0), frame(0x100, 0), frame(0x200, 0)];
+        assert_eq!(frames(&run(&world, 1_000)), order);
+        let traffic = world.traffic(Line::Can1);
+        assert_eq!((traffic.evicted, traffic.refused), (2, 1));
+    }
+
+    #[test]
+    fn the_controller_does_not_hear_itself_and_the_buses_do_not_hear_each_other() {
+        let world = World::new(1);
+        let (mut can1, mut can2) = (world.controller(), world.controller_on(Line::Can2));
+        assert_eq!(can1.transmit(&frame(0x100, 0)), Ok(None));
+        world.inject(Line::Can2, frame(0x101, 0)).unwrap();
+        assert_eq!(run(&world, 1_000).len(), 2);
+        assert_eq!(can1.receive(), Err(nb::Error::WouldBlock));
+        assert_eq!(can2.receive(), Ok(frame(0x101, 0)));
+    }
+
+    #[test]
+    fn a_full_receive_queue_keeps_the_old_counts_the_new_and_says_so_once() {
+        let world = World::new(1).with_receive_depth(Line::Can1, 3);
+        let mut can = world.controller();
+        for tag in 0..5 {
+            world.inject(Line::Can1, frame(0x400, tag)).unwrap();
+        }
+        run(&world, 1_000);
+        assert_eq!(can.receive(), Err(nb::Error::Other(ControllerError::Overrun)));
+        for tag in 0..3 {
+            assert_eq!(can.receive(), Ok(frame(0x400, tag)));
+        }
+        assert_eq!(can.receive(), Err(nb::Error::WouldBlock));
+        let traffic = world.traffic(Line::Can1);
+        assert_eq!((traffic.heard, traffic.overruns), (3, 2));
+    }
+
+    #[test]
+    fn blocking_calls_move_time_until_they_are_done() {
+        use embedded_can::blocking::Can;
+        let world = World::new(1);
+        let mut can = world.controller();
+        for tag in 0..4 {
+            assert_eq!(Can::transmit(&mut can, &frame(0x200, tag)), Ok(()));
+        }
+        let waited = world.now();
+        assert!((108..=135).contains(&waited.as_micros()), "{waited:?}: one frame");
+        assert_eq!(run(&world, 1_000).len(), 4); // also the one that passed meanwhile
+        world.inject(Line::Can1, frame(0x300, 9)).unwrap();
+        assert_eq!(Can::receive(&mut can), Ok(frame(0x300, 9)));
+        let before = world.now();
+        assert_eq!(Can::receive(&mut can), Err(ControllerError::TimedOut));
+        assert_eq!(world.now().since(before), Duration::from_secs(1));
+    }
+
+    #[test]
+    fn bus_off_is_an_error_and_afterwards_the_mailboxes_send_what_they_hold() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        let window = Instant::from_micros(1_000)..Instant::from_micros(5_000);
+        world.fault(Fault::BusOff(Line::Can1), window).unwrap();
+        run(&world, 950);
+        assert_eq!(can.transmit(&frame(0x200, 1)), Ok(None));
+        let cut_off = run(&world, 2_050);
+        assert_eq!(frames(&cut_off), [frame(0x200, 1)]);
+        assert!(!cut_off[0].delivered && world.traffic(Line::Can1).sent == 0);
+        let off = Err(nb::Error::Other(ControllerError::BusOff));
+        assert_eq!(can.transmit(&frame(0x200, 2)), off.map(Some));
+        world.inject(Line::Can1, frame(0x400, 0)).unwrap();
+        assert_eq!(frames(&run(&world, 1_900)), [frame(0x400, 0)]); // which it does not hear
+        let records = run(&world, 1_000);
+        assert_eq!(frames(&records), [frame(0x200, 1)]);
+        assert_eq!(records[0].at.as_micros(), 5_000 + u64::from(records[0].bits) - 3);
+        assert_eq!(can.receive(), Err(nb::Error::WouldBlock));
+        assert_eq!(world.traffic(Line::Can1).errors, 1);
+    }
+
+    #[test]
+    fn without_a_cable_the_mailboxes_fill_and_can_be_emptied_by_hand() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        world.fault(Fault::Unplugged(Line::Can1), ..Instant::from_micros(5_000)).unwrap();
+        for tag in 0..3 {
+            assert_eq!(can.transmit(&frame(0x200, tag)), Ok(None));
+            run(&world, 1_000);
+        }
+        assert_eq!(can.transmit(&frame(0x200, 3)), Err(nb::Error::WouldBlock));
+        can.abort_pending();
+        assert_eq!(can.transmit(&frame(0x200, 4)), Ok(None));
+        assert_eq!(frames(&run(&world, 10_000)), [frame(0x200, 4)]);
+    }
+
+    #[test]
+    fn a_scripted_driver_blocks_or_fails_in_its_window_only() {
+        let world = World::new(1);
+        let mut can = world.controller();
+        let (first, second) = (Instant::from_micros(100), Instant::from_micros(200));
+        let errors = Fault::DriverErrors { line: Line::Can1, probability: 1.0 };
+        world.fault(Fault::WouldBlock(Line::Can1), ..first).unwrap();
+        world.fault(errors, first..second).unwrap();
+        assert_eq!(can.transmit(&frame(0x200, 0)), Err(nb::Error::WouldBlock));
+        run(&world, 100);
+        let scripted = nb::Error::Other(ControllerError::Scripted);
+        assert_eq!(can.transmit(&frame(0x200, 0)), Err(scripted));
+        assert_eq!(can.receive(), Err(scripted));
+        run(&world, 100);
+        assert_eq!(can.transmit(&frame(0x200, 0)), Ok(None));
+    }
+}

@@ -1,0 +1,254 @@
+use super::esc::Esc;
+use super::fault::Faults;
+use super::line::{Line, Record, Sender, Wire};
+use super::mailbox::Offer;
+use super::motor::{MotorConfig, MotorState};
+use super::ring::Ring;
+use super::{AttachError, MotorKey};
+use crate::frame::CanFrame;
+use embedded_can::Frame;
+
+/// The step of the motors and of the chassis.
+const STEP_NS: u64 = 100_000;
+const STEP_S: f32 = 1e-4;
+/// Every so many steps the temperatures move.
+const STEPS_A_WARMING: u64 = 10;
+
+/// What happens next. At equal times the earlier one in this list goes first.
+#[derive(Debug, Clone, Copy)]
+enum Event {
+    FrameEnd(Line),
+    Step,
+    Feedback(usize),
+    Fault,
+    Arbitration(Line),
+}
+
+/// Everything in a world: a list of things to come, and the state that they change.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Engine {
+    pub(crate) seed: u64,
+    pub(crate) now_ns: u64,
+    stepped_ns: u64,
+    steps: u64,
+    wires: [Wire; 2],
+    escs: [Option<Esc>; MotorKey::CAPACITY],
+    pub(crate) faults: Faults,
+    /// Frames that passed while a blocking call waited.
+    pub(crate) unseen: Ring<Record, 64>,
+}
+
+impl Engine {
+    pub(crate) const fn new(seed: u64) -> Self {
+        Self {
+            seed,
+            now_ns: 0,
+            stepped_ns: 0,
+            steps: 0,
+            wires: [Wire::new(Line::Can1), Wire::new(Line::Can2)],
+            escs: [None; MotorKey::CAPACITY],
+            faults: Faults::new(),
+            unseen: Ring::new(),
+        }
+    }
+
+    pub(crate) const fn wire(&self, line: Line) -> &Wire {
+        let [can1, can2] = &self.wires;
+        match line {
+            Line::Can1 => can1,
+            Line::Can2 => can2,
+        }
+    }
+
+    pub(crate) const fn wire_mut(&mut self, line: Line) -> &mut Wire {
+        let [can1, can2] = &mut self.wires;
+        match line {
+            Line::Can1 => can1,
+            Line::Can2 => can2,
+        }
+    }
+
+    pub(crate) fn attach(&mut self, config: MotorConfig) -> Result<MotorKey, AttachError> {
+        let free = self.escs.iter().position(Option::is_none).ok_or(AttachError::Full)?;
+        let key = MotorKey::new(free).ok_or(AttachError::Full)?;
+        let esc = Esc::new(config, self.seed, u64::from(key.0), self.now_ns);
+        let esc = esc.ok_or(AttachError::Id { model: config.model, id: config.id })?;
+        if let Some(slot) = self.escs.get_mut(free) {
+            *slot = Some(esc);
+        }
+        Ok(key)
+    }
+
+    pub(crate) fn esc_mut(&mut self, key: MotorKey) -> Option<&mut Esc> {
+        self.escs.get_mut(usize::from(key.0))?.as_mut()
+    }
+
+    pub(crate) fn motor(&self, key: MotorKey) -> Option<MotorState> {
+        let esc = self.escs.get(usize::from(key.0))?.as_ref()?;
+        Some(esc.state(self.since_step_s()))
+    }
+
+    /// Returns the time since the last step of the motors: below one step.
+    fn since_step_s(&self) -> f32 {
+        (self.now_ns - self.stepped_ns) as f32 * 1e-9
+    }
+
+    /// Lets happen what happens until `limit_ns`, up to and including the next frame.
+    pub(crate) fn run_until(&mut self, limit_ns: u64) -> Option<Record> {
+        loop {
+            let (at_ns, event) = self.next_event();
+            if at_ns > limit_ns {
+                self.now_ns = self.now_ns.max(limit_ns);
+                return None;
+            }
+            self.now_ns = self.now_ns.max(at_ns);
+            match event {
+                Event::FrameEnd(line) => {
+                    if let Some(record) = self.end_frame(line) {
+                        return Some(record);
+                    }
+                }
+                Event::Step => self.step(),
+                Event::Feedback(index) => self.send_feedback(index),
+                Event::Fault => {
+                    while let Some((line, frame)) = self.faults.next_of_flood(self.now_ns) {
+                        // A foreign node whose queue is full skips a turn.
+                        let _full = self.wire_mut(line).foreign.push(frame);
+                    }
+                }
+                Event::Arbitration(line) => self.arbitrate(line),
+            }
+        }
+    }
+
+    fn next_event(&self) -> (u64, Event) {
+        let mut next = (u64::MAX, Event::Fault);
+        let mut offer = |at_ns: u64, event: Event| {
+            if at_ns < next.0 {
+                next = (at_ns, event);
+            }
+        };
+        for wire in &self.wires {
+            if let Some(end_ns) = wire.flight_end() {
+                offer(end_ns, Event::FrameEnd(wire.line));
+            }
+        }
+        offer(self.stepped_ns + STEP_NS, Event::Step);
+        for (index, esc) in self.escs.iter().enumerate() {
+            if let Some(due_ns) = esc.as_ref().and_then(Esc::due) {
+                offer(due_ns, Event::Feedback(index));
+            }
+        }
+        offer(self.faults.next_event(self.now_ns), Event::Fault);
+        for wire in &self.wires {
+            if let Some(idle_ns) = wire.idle_from() {
+                if self.winner(wire.line).is_some() {
+                    offer(idle_ns.max(self.now_ns), Event::Arbitration(wire.line));
+                }
+            }
+        }
+        next
+    }
+
+    /// Moves motors and chassis by one step.
+    fn step(&mut self) {
+        self.stepped_ns += STEP_NS;
+        self.steps += 1;
+        for (index, slot) in self.escs.iter_mut().enumerate() {
+            let (Some(esc), Some(key)) = (slot, MotorKey::new(index)) else { continue };
+            let dead = self.faults.power_loss(key, self.now_ns);
+            esc.set_powered(dead, self.now_ns);
+            esc.step_current(self.now_ns, STEP_S);
+        }
+        for esc in self.escs.iter_mut().flatten() {
+            esc.rotor.step_motion(0.0, STEP_S);
+            if self.steps.is_multiple_of(STEPS_A_WARMING) {
+                esc.rotor.step_temperature(STEP_S * STEPS_A_WARMING as f32);
+            }
+        }
+    }
+
+    /// Lets an ESC hand its feedback to its mailboxes.
+    fn send_feedback(&mut self, index: usize) {
+        let since_step_s = self.since_step_s();
+        let (Some(Some(esc)), Some(key)) = (self.escs.get_mut(index), MotorKey::new(index)) else {
+            return;
+        };
+        let tampering = self.faults.tampering(key, self.now_ns);
+        let Some(frame) = esc.feedback(since_step_s, &tampering) else { return };
+        let (line, offer) = (esc.config.line, esc.mailboxes.offer(frame));
+        if offer != Offer::Taken {
+            let traffic = &mut self.wire_mut(line).traffic;
+            traffic.starved = traffic.starved.saturating_add(1);
+        }
+    }
+
+    /// Returns the frame of highest priority among all that wait on a bus, and its sender.
+    fn winner(&self, line: Line) -> Option<(CanFrame, Sender)> {
+        let wire = self.wire(line);
+        let connected = self.faults.is_connected(line, self.now_ns);
+        let controller = wire.mailboxes.candidate().filter(|_| connected);
+        let controller = controller.map(|frame| (frame, Sender::Controller));
+        let foreign = wire.foreign.peek().map(|frame| (frame, Sender::Foreign));
+        let motors = self.escs.iter().enumerate().filter_map(|(index, esc)| {
+            let esc = esc.as_ref().filter(|esc| esc.config.line == line)?;
+            Some((esc.mailboxes.candidate()?, Sender::Motor(MotorKey::new(index)?)))
+        });
+        let rank = |(frame, _): &(CanFrame, Sender)| (frame.id(), frame.is_remote_frame());
+        controller.into_iter().chain(foreign).chain(motors).min_by_key(rank)
+    }
+
+    fn arbitrate(&mut self, line: Line) {
+        let Some((frame, sender)) = self.winner(line) else { return };
+        let now_ns = self.now_ns;
+        match sender {
+            Sender::Controller => self.wire_mut(line).mailboxes.begin(),
+            Sender::Foreign => {}
+            Sender::Motor(key) => {
+                if let Some(esc) = self.esc_mut(key) {
+                    esc.mailboxes.begin();
+                }
+            }
+        }
+        self.wire_mut(line).begin(frame, sender, now_ns);
+    }
+
+    /// Takes a frame off the wire and gives it to all the others.
+    fn end_frame(&mut self, line: Line) -> Option<Record> {
+        let now_ns = self.now_ns;
+        let flight = self.wire(line).flight()?;
+        let (frame, sender) = (flight.frame, flight.sender);
+        let connected = self.faults.is_connected(line, now_ns);
+        match sender {
+            Sender::Controller if !connected => {
+                // Cut off in the middle: the frame is for nobody, and still waits.
+                let wire = self.wire_mut(line);
+                wire.mailboxes.give_up();
+                return wire.finish(now_ns, false);
+            }
+            Sender::Controller => {
+                let wire = self.wire_mut(line);
+                wire.mailboxes.finish();
+                wire.traffic.sent = wire.traffic.sent.saturating_add(1);
+            }
+            Sender::Foreign => {
+                let _sent = self.wire_mut(line).foreign.pop();
+            }
+            Sender::Motor(key) => {
+                if let Some(esc) = self.esc_mut(key) {
+                    esc.mailboxes.finish();
+                }
+            }
+        }
+        let copies = self.faults.copies(line, &frame, now_ns);
+        for _ in 0..copies {
+            if sender != Sender::Controller && connected {
+                self.wire_mut(line).hear(frame);
+            }
+            for esc in self.escs.iter_mut().flatten().filter(|esc| esc.config.line == line) {
+                esc.receive(&frame, now_ns);
+            }
+        }
+        self.wire_mut(line).finish(now_ns, copies > 0)
+    }
+}

@@ -1,0 +1,387 @@
+use super::mailbox::Mailboxes;
+use super::motor::{LostCommand, MotorConfig, MotorState};
+use super::random::Random;
+use super::rotor::{Drive, Rotor};
+use crate::dji::{Facts, Unit};
+use crate::frame::CanFrame;
+use crate::units::{AngularVelocity, Current};
+
+/// Nominal time between two feedback frames.
+const PERIOD_NS: u64 = 1_000_000;
+/// The longest time that the ESC's firmware is late with a frame. An estimate.
+const JITTER_NS: u32 = 10_000;
+/// A seeded clock is at most this far off, in millionths: a common crystal. An estimate.
+const CLOCK_PPM: u32 = 50;
+
+/// What a fault does to the feedback of one ESC.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+pub(crate) struct Tampering {
+    pub(crate) silent: bool,
+    pub(crate) stuck: bool,
+    pub(crate) angle: Option<u16>,
+    pub(crate) error: u8,
+    pub(crate) length: Option<u8>,
+}
+
+/// An ESC with its motor: takes command slots from the wire, and puts feedback on it from a clock of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Esc {
+    pub(crate) config: MotorConfig,
+    facts: &'static Facts,
+    command_raw: i16,
+    command_id: u16,
+    slot: u8,
+    pub(crate) rotor: Rotor,
+    pub(crate) mailboxes: Mailboxes,
+    random: Random,
+    period_ns: u64,
+    /// The ideal time of the next frame by the ESC's own clock.
+    grid_ns: u64,
+    /// The same with jitter.
+    due_ns: u64,
+    /// Set while there is no supply: whether the angle is then forgotten.
+    loss: Option<bool>,
+    command: i16,
+    commanded_ns: u64,
+    /// Counts that are taken off the angle before it is sent.
+    zero: i64,
+    /// Angle and speed as last sent.
+    sent: [u8; 4],
+}
+
+impl Esc {
+    /// Takes its place in the world: `index` picks the stream of chance. `None` when the model has no such id.
+    pub(crate) fn new(config: MotorConfig, seed: u64, index: u64, now_ns: u64) -> Option<Self> {
+        let facts = config.model.facts();
+        let (command_frame, slot) = facts.place(config.id)?;
+        let mut random = Random::new(seed, 2 * index + 1);
+        let angle = random.below(8192);
+        let phase = random.below(1_000_000);
+        let ppm = i64::from(random.below(2 * CLOCK_PPM + 1)) - i64::from(CLOCK_PPM);
+        let ppm = config.clock_ppm.map_or(ppm, i64::from);
+        let angle = config.rotor_angle.or(u16::try_from(angle).ok()).unwrap_or(0);
+        let mut esc = Self {
+            config,
+            facts,
+            command_raw: if config.legacy_full_scale { 30_000 } else { facts.command_raw },
+            command_id: command_frame.id(),
+            slot,
+            rotor: Rotor::new(&config, angle),
+            mailboxes: Mailboxes::new(),
+            random,
+            period_ns: PERIOD_NS.saturating_add_signed(ppm), // 1 ppm of 1 ms is 1 ns
+            grid_ns: now_ns + u64::from(phase),
+            due_ns: 0,
+            loss: None,
+            command: 0,
+            commanded_ns: now_ns,
+            zero: 0,
+            sent: [0; 4],
+        };
+        esc.due_ns = esc.grid_ns + u64::from(esc.random.below(JITTER_NS));
+        Some(esc)
+    }
+
+    /// Gives the supply (`None`) or takes it away, with or without the zero of the angle. A fresh start forgets
+    /// the command and begins at another phase.
+    pub(crate) fn set_powered(&mut self, loss: Option<bool>, now_ns: u64) {
+        match (self.loss, loss) {
+            (Some(forgets_angle), None) => {
+                self.command = 0;
+                self.grid_ns = now_ns + u64::from(self.random.below(1_000_000));
+                self.due_ns = self.grid_ns + u64::from(self.random.below(JITTER_NS));
+                if forgets_angle {
+                    self.zero = self.rotor.counts(0.0);
+                }
+            }
+            (None, Some(_)) => self.mailboxes.clear(),
+            _ => {}
+        }
+        self.loss = loss;
+    }
+
+    /// Takes a frame from the bus.
+    pub(crate) fn receive(&mut self, frame: &CanFrame, now_ns: u64) {
+        if self.loss.is_some()
+            || frame.header() != u32::from(self.command_id)
+            || frame.length() != 8
+        {
+            return;
+        }
+        let word = frame.bytes().chunks_exact(2).nth(usize::from(self.slot));
+        if let Some([high, low]) = word {
+            let raw = i16::from_be_bytes([*high, *low]);
+            self.command = raw.clamp(-self.command_raw, self.command_raw);
+            self.commanded_ns = now_ns;
+        }
+    }
+
+    /// Moves the winding's current by one step.
+    pub(crate) fn step_current(&mut self, now_ns: u64, dt_s: f32) {
+        if let LostCommand::ZeroAfter(limit) = self.config.lost_command {
+            let silence_us = now_ns.saturating_sub(self.commanded_ns) / 1_000;
+            if silence_us > limit.as_micros() {
+                self.command = 0;
+            }
+        }
+        let share = f32::from(self.command) / f32::from(self.command_raw);
+        let value = share * self.facts.command_full_scale;
+        let drive = match (self.loss.is_none(), self.facts.unit) {
+            (false, _) => Drive::Open,
+            (true, Unit::Volt) => Drive::Volts(value),
+            (true, Unit::Ampere) => Drive::Amperes(value),
+        };
+        self.rotor.step_current(drive, dt_s);
+    }
+
+    /// Returns when the next feedback frame is due; `None` without a supply.
+    pub(crate) fn due(&self) -> Option<u64> {
+        self.loss.is_none().then_some(self.due_ns)
+    }
+
+    /// Builds the feedback frame that is due, `since_step_s` after the last step of the motor. `None` when a
+    /// fault keeps it back.
+    pub(crate) fn feedback(
+        &mut self,
+        since_step_s: f32,
+        tampering: &Tampering,
+    ) -> Option<CanFrame> {
+        self.grid_ns += self.period_ns;
+        self.due_ns = self.grid_ns + u64::from(self.random.below(JITTER_NS));
+        if tampering.silent {
+            return None;
+        }
+        if !tampering.stuck {
+            let [angle_high, angle_low] = self.angle(since_step_s).to_be_bytes();
+            let [speed_high, speed_low] = nearest_i16(self.rotor.rotor_rpm()).to_be_bytes();
+            self.sent = [angle_high, angle_low, speed_high, speed_low];
+        }
+        let [mut angle_high, mut angle_low, speed_high, speed_low] = self.sent;
+        if let Some(angle) = tampering.angle {
+            [angle_high, angle_low] = angle.to_be_bytes();
+        }
+        let scale = f32::from(self.facts.current_raw) / self.facts.current_full_scale_a;
+        let [current_high, current_low] = nearest_i16(self.rotor.current() * scale).to_be_bytes();
+        let data = [
+            angle_high,
+            angle_low,
+            speed_high,
+            speed_low,
+            current_high,
+            current_low,
+            if self.facts.has_temperature { nearest_u8(self.rotor.temperature()) } else { 0 },
+            tampering.error,
+        ];
+        let id = self.facts.feedback_base + u16::from(self.config.id);
+        let frame = CanFrame::standard(id, data)?;
+        match tampering.length {
+            Some(length) => {
+                use embedded_can::Frame;
+                CanFrame::new(frame.id(), data.get(..usize::from(length))?)
+            }
+            None => Some(frame),
+        }
+    }
+
+    fn angle(&self, since_step_s: f32) -> u16 {
+        let counts = self.rotor.counts(since_step_s).wrapping_sub(self.zero);
+        u16::try_from(counts & 0x1FFF).unwrap_or(0)
+    }
+
+    /// Returns the true state, `since_step_s` after the last step of the motor.
+    pub(crate) fn state(&self, since_step_s: f32) -> MotorState {
+        MotorState {
+            rotor_counts: self.rotor.counts(since_step_s),
+            velocity: AngularVelocity::from_rad_per_s(self.rotor.velocity()),
+            current: Current::from_amperes(self.rotor.current()),
+            torque_nm: self.rotor.torque_nm(),
+            temperature_c: self.rotor.temperature(),
+            command: self.command,
+        }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounds half away from zero, and saturates")]
+fn nearest_i16(value: f32) -> i16 {
+    (value + 0.5_f32.copysign(value)) as i16
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounds, and saturates"
+)]
+fn nearest_u8(value: f32) -> u8 {
+    (value + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+    use super::*;
+    use crate::time::Duration;
+    use embedded_can::Frame;
+
+    const STEP: f32 = 1e-4;
+
+    fn esc(model: Model, id: u8) -> Esc {
+        Esc::new(MotorConfig::new(model, id).with_rotor_angle(100), 1, 0, 0).unwrap()
+    }
+
+    fn command(id: u16, slot: usize, raw: i16) -> CanFrame {
+        let mut data = [0; 8];
+        data[2 * slot..2 * slot + 2].copy_from_slice(&raw.to_be_bytes());
+        CanFrame::standard(id, data).unwrap()
+    }
+
+    fn feedback(esc: &mut Esc) -> CanFrame {
+        esc.feedback(0.0, &Tampering::default()).unwrap()
+    }
+
+    #[test]
+    fn every_id_listens_in_its_slot_and_answers_with_its_id() {
+        let table = [
+            (Model::M2006, 1, 0x200, 0, 0x201),
+            (Model::M3508, 4, 0x200, 3, 0x204),
+            (Model::M3508, 5, 0x1FF, 0, 0x205),
+            (Model::M2006, 8, 0x1FF, 3, 0x208),
+            (Model::Gm6020Voltage, 1, 0x1FF, 0, 0x205),
+            (Model::Gm6020Voltage, 7, 0x2FF, 2, 0x20B),
+            (Model::Gm6020Current, 4, 0x1FE, 3, 0x208),
+            (Model::Gm6020Current, 5, 0x2FE, 0, 0x209),
+        ];
+        for (model, id, command_id, slot, feedback_id) in table {
+            let mut esc = esc(model, id);
+            for (other_id, other_slot) in [(command_id, (slot + 1) % 4), (command_id ^ 0x400, slot)]
+            {
+                esc.receive(&command(other_id, other_slot, 500), 0);
+                assert_eq!(esc.command, 0, "{model:?} {id}");
+            }
+            esc.receive(&command(command_id, slot, -500), 0);
+            assert_eq!(esc.command, -500, "{model:?} {id}");
+            assert_eq!(feedback(&mut esc).header(), feedback_id);
+        }
+    }
+
+    #[test]
+    fn ids_that_no_switch_can_set_are_refused() {
+        for (model, id) in [(Model::M3508, 0), (Model::M3508, 9), (Model::Gm6020Current, 8)] {
+            assert!(Esc::new(MotorConfig::new(model, id), 1, 0, 0).is_none());
+        }
+    }
+
+    #[test]
+    fn commands_beyond_the_range_are_cut_and_short_or_remote_frames_ignored() {
+        let mut esc = esc(Model::M2006, 1);
+        esc.receive(&command(0x200, 0, i16::MIN), 0);
+        assert_eq!(esc.command, -10_000);
+        let id = command(0x200, 0, 0).id();
+        esc.receive(&CanFrame::new(id, &[1, 2, 3, 4, 5, 6, 7]).unwrap(), 0);
+        esc.receive(&CanFrame::new_remote(id, 8).unwrap(), 0);
+        assert_eq!(esc.command, -10_000);
+    }
+
+    #[test]
+    fn feedback_is_quantised_as_on_the_wire() {
+        let mut esc = esc(Model::M3508, 1);
+        assert_eq!(feedback(&mut esc).bytes(), &[0, 100, 0, 0, 0, 0, 25, 0]);
+        esc.receive(&command(0x200, 0, 8192), 0); // 10 A
+        for _ in 0..100_000 {
+            esc.step_current(0, STEP);
+        }
+        assert_eq!(feedback(&mut esc).bytes()[4..6], 8192_i16.to_be_bytes());
+        for _ in 0..10_000 {
+            esc.step_current(0, STEP);
+            esc.rotor.step_motion(0.0, STEP);
+        }
+        let bytes = *feedback(&mut esc).bytes();
+        let speed = i16::from_be_bytes([bytes[2], bytes[3]]);
+        assert!((9_250..9_262).contains(&speed), "{speed} rpm at the rotor, 482 * 19.2 = 9256");
+        assert!(u16::from_be_bytes([bytes[0], bytes[1]]) < 8192);
+    }
+
+    #[test]
+    fn scales_are_those_of_each_esc() {
+        for (model, raw) in
+            [(Model::M2006, 1000), (Model::M3508, 819), (Model::Gm6020Current, 5461)]
+        {
+            let mut esc = esc(model, 1);
+            for _ in 0..1000 {
+                esc.rotor.step_current(Drive::Amperes(-1.0), STEP);
+            }
+            let bytes = *feedback(&mut esc).bytes();
+            assert_eq!(i16::from_be_bytes([bytes[4], bytes[5]]), -raw, "{model:?}");
+        }
+    }
+
+    #[test]
+    fn an_old_gm6020_has_more_counts_for_the_same_volts() {
+        let config = MotorConfig::new(Model::Gm6020Voltage, 1);
+        for (config, limit) in [(config, 25_000), (config.with_legacy_full_scale(), 30_000)] {
+            let mut esc = Esc::new(config, 1, 0, 0).unwrap();
+            esc.receive(&command(0x1FF, 0, i16::MAX), 0);
+            assert_eq!(esc.command, limit);
+            for _ in 0..20_000 {
+                esc.step_current(0, STEP);
+                esc.rotor.step_motion(0.0, STEP);
+            }
+            assert!((esc.rotor.rotor_rpm() - 320.0).abs() < 0.5);
+        }
+    }
+
+    #[test]
+    fn a_c610_has_no_temperature() {
+        let mut esc = esc(Model::M2006, 1);
+        esc.rotor.set_temperature(80.0);
+        assert_eq!(feedback(&mut esc).bytes()[6], 0);
+    }
+
+    #[test]
+    fn without_commands_the_last_one_holds_unless_told_otherwise() {
+        let lost = LostCommand::ZeroAfter(Duration::from_millis(20));
+        let config = MotorConfig::new(Model::M3508, 1);
+        for (config, later) in [(config, 1000), (config.with_lost_command(lost), 0)] {
+            let mut esc = Esc::new(config, 1, 0, 0).unwrap();
+            esc.receive(&command(0x200, 0, 1000), 0);
+            esc.step_current(20_000_000, STEP);
+            assert_eq!(esc.command, 1000);
+            esc.step_current(20_001_000, STEP);
+            assert_eq!(esc.command, later);
+        }
+    }
+
+    #[test]
+    fn a_power_cycle_forgets_the_command_and_moves_the_phase() {
+        let mut esc = esc(Model::M3508, 1);
+        esc.receive(&command(0x200, 0, 1000), 0);
+        let phase = esc.due().unwrap() % 1_000_000;
+        esc.set_powered(Some(true), 0);
+        assert_eq!(esc.due(), None);
+        esc.receive(&command(0x200, 0, 1000), 0);
+        esc.set_powered(None, 50_000_000);
+        assert_eq!(esc.command, 0);
+        assert_ne!(esc.due().unwrap() % 1_000_000, phase);
+        assert_eq!(feedback(&mut esc).bytes()[..2], [0, 0]); // and it takes its angle as zero
+    }
+
+    #[test]
+    fn the_free_running_clock_keeps_its_rate_whatever_the_jitter() {
+        let config = MotorConfig::new(Model::M3508, 1).with_clock_ppm(40);
+        let mut esc = Esc::new(config, 9, 3, 0).unwrap();
+        let first = esc.due().unwrap();
+        for _ in 0..10_000 {
+            let _frame = feedback(&mut esc);
+        }
+        let elapsed = esc.due().unwrap() - first;
+        assert!(elapsed.abs_diff(10_000 * 1_000_040) <= u64::from(JITTER_NS), "{elapsed}");
+    }
+
+    #[test]
+    fn rounding_is_to_the_nearest_and_saturates() {
+        assert_eq!(
+            [0.4, 0.5, -0.5, -1.4, 1e9, -1e9, f32::NAN].map(nearest_i16),
+            [0, 1, -1, -1, 32767, -32768, 0]
+        );
+        assert_eq!([-5.0, 33.4, 999.0].map(nearest_u8), [0, 33, 255]);
+    }
+}

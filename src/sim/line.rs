@@ -1,0 +1,280 @@
+use super::bits::{INTERMISSION_BITS, frame_bits};
+use super::mailbox::Mailboxes;
+use super::ring::Ring;
+use crate::frame::CanFrame;
+use crate::time::Instant;
+use embedded_can::{Frame, Id};
+
+/// One of the two buses of a [`World`](super::World).
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Line {
+    /// The first bus.
+    #[default]
+    Can1,
+    /// The second bus.
+    Can2,
+}
+
+/// Who sent a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Sender {
+    /// The controller under test.
+    Controller,
+    /// A simulated motor.
+    Motor(super::MotorKey),
+    /// Anybody else: [`World::inject`](super::World::inject) or a flood.
+    Foreign,
+}
+
+/// A frame that was on the wire.
+///
+/// Its `Display` is a line of candump's log form.
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::sim::{Line, World};
+/// use drivetrain::time::Duration;
+///
+/// let world = World::new(1);
+/// let frame = CanFrame::standard(0x201, [0x0E, 0x16, 0, 0, 0xFF, 0xFD, 0x21, 0]).ok_or("id")?;
+/// world.inject(Line::Can1, frame).map_err(|_| "full")?;
+/// let mut log = String::new();
+/// world.advance_with(Duration::from_millis(1), |record| log += &record.to_string());
+/// assert_eq!(log, "(0.000117) can0 201#0E160000FFFD2100");
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Record {
+    /// When its last bit was over, in whole microseconds.
+    pub at: Instant,
+    /// The bus.
+    pub line: Line,
+    /// The frame.
+    pub frame: CanFrame,
+    /// Who sent it.
+    pub sender: Sender,
+    /// The time that it took, with the pause after it, in bits.
+    pub bits: u32,
+    /// Whether it reached the others; `false` when a fault lost it or cut it off.
+    pub delivered: bool,
+}
+
+impl core::fmt::Display for Record {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let micros = self.at.as_micros();
+        let line = match self.line {
+            Line::Can1 => "can0",
+            Line::Can2 => "can1",
+        };
+        write!(f, "({}.{:06}) {line} ", micros / 1_000_000, micros % 1_000_000)?;
+        match self.frame.id() {
+            Id::Standard(id) => write!(f, "{:03X}#", id.as_raw())?,
+            Id::Extended(id) => write!(f, "{:08X}#", id.as_raw())?,
+        }
+        if self.frame.is_remote_frame() {
+            return write!(f, "R{}", self.frame.length());
+        }
+        self.frame.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
+    }
+}
+
+/// What went over one bus since the start of the world.
+///
+/// # Examples
+/// ```
+/// use drivetrain::sim::{Line, Model, MotorConfig, World};
+/// use drivetrain::time::Duration;
+///
+/// let world = World::new(1);
+/// for id in 1..=4 {
+///     world.attach(MotorConfig::new(Model::M3508, id))?;
+/// }
+/// world.advance(Duration::from_secs(1));
+/// let traffic = world.traffic(Line::Can1);
+/// assert!((3_998..=4_001).contains(&traffic.frames)); // four ESCs, 1 kHz each by their own clocks
+/// assert!(traffic.load() > 0.44 && traffic.load() < 0.54); // 111 to 135 bits a frame
+/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Traffic {
+    /// Bits that passed.
+    pub total_bits: u64,
+    /// Bits that frames took, each with the pause after it.
+    pub busy_bits: u64,
+    /// Frames on the wire.
+    pub frames: u32,
+    /// Frames on the wire that a fault lost.
+    pub lost: u32,
+    /// Feedback frames that an ESC threw away because its mailboxes were full.
+    pub starved: u32,
+    /// Frames of the controller that left it for good.
+    pub sent: u32,
+    /// Frames that the controller heard.
+    pub heard: u32,
+    /// Frames that the controller missed because its receive queue was full.
+    pub overruns: u32,
+    /// Frames that the controller evicted from its mailboxes.
+    pub evicted: u32,
+    /// Frames that the controller refused with would-block.
+    pub refused: u32,
+    /// Calls of the controller's driver that returned an error.
+    pub errors: u32,
+}
+
+impl Traffic {
+    /// Returns the share of the time in which the bus was busy, 0 to 1; 0 when no time passed.
+    #[must_use]
+    pub fn load(&self) -> f32 {
+        if self.total_bits == 0 { 0.0 } else { self.busy_bits as f32 / self.total_bits as f32 }
+    }
+
+    /// Returns what was added since an earlier reading of the same bus.
+    #[must_use]
+    pub const fn since(&self, earlier: &Self) -> Self {
+        Self {
+            total_bits: self.total_bits.saturating_sub(earlier.total_bits),
+            busy_bits: self.busy_bits.saturating_sub(earlier.busy_bits),
+            frames: self.frames.saturating_sub(earlier.frames),
+            lost: self.lost.saturating_sub(earlier.lost),
+            starved: self.starved.saturating_sub(earlier.starved),
+            sent: self.sent.saturating_sub(earlier.sent),
+            heard: self.heard.saturating_sub(earlier.heard),
+            overruns: self.overruns.saturating_sub(earlier.overruns),
+            evicted: self.evicted.saturating_sub(earlier.evicted),
+            refused: self.refused.saturating_sub(earlier.refused),
+            errors: self.errors.saturating_sub(earlier.errors),
+        }
+    }
+}
+
+/// A frame in transmission.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Flight {
+    pub(crate) frame: CanFrame,
+    pub(crate) sender: Sender,
+    bits: u32,
+    end_ns: u64,
+}
+
+/// The longest receive queue.
+const RECEIVE_CAPACITY: usize = 64;
+
+/// One bus: the wire, the controller's mailboxes and receive queue, and the foreign node.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wire {
+    pub(crate) line: Line,
+    bit_ns: u32,
+    pub(crate) mailboxes: Mailboxes,
+    receive: Ring<CanFrame, RECEIVE_CAPACITY>,
+    receive_depth: usize,
+    overrun: bool,
+    pub(crate) foreign: Ring<CanFrame, 64>,
+    flight: Option<Flight>,
+    /// When the pause after the last frame is over.
+    idle_ns: u64,
+    pub(crate) traffic: Traffic,
+}
+
+impl Wire {
+    pub(crate) const fn new(line: Line) -> Self {
+        Self {
+            line,
+            bit_ns: 1_000,
+            mailboxes: Mailboxes::new(),
+            receive: Ring::new(),
+            receive_depth: RECEIVE_CAPACITY,
+            overrun: false,
+            foreign: Ring::new(),
+            flight: None,
+            idle_ns: 0,
+            traffic: Traffic {
+                total_bits: 0,
+                busy_bits: 0,
+                frames: 0,
+                lost: 0,
+                starved: 0,
+                sent: 0,
+                heard: 0,
+                overruns: 0,
+                evicted: 0,
+                refused: 0,
+                errors: 0,
+            },
+        }
+    }
+
+    pub(crate) const fn set_bit_rate(&mut self, bits_per_s: u32) {
+        let bit_ns = 1_000_000_000_u32.checked_div(bits_per_s);
+        self.bit_ns = match bit_ns {
+            Some(0) | None => 1,
+            Some(bit_ns) => bit_ns,
+        };
+    }
+
+    pub(crate) fn set_receive_depth(&mut self, depth: usize) {
+        self.receive_depth = depth.clamp(1, RECEIVE_CAPACITY);
+    }
+
+    pub(crate) const fn traffic(&self, now_ns: u64) -> Traffic {
+        Traffic { total_bits: now_ns / self.bit_ns as u64, ..self.traffic }
+    }
+
+    /// Returns when the frame in transmission has ended.
+    pub(crate) fn flight_end(&self) -> Option<u64> {
+        self.flight.map(|flight| flight.end_ns)
+    }
+
+    /// Returns when the next frame may begin; `None` during one.
+    pub(crate) fn idle_from(&self) -> Option<u64> {
+        self.flight.is_none().then_some(self.idle_ns)
+    }
+
+    /// Puts the winner of an arbitration on the wire.
+    pub(crate) fn begin(&mut self, frame: CanFrame, sender: Sender, now_ns: u64) {
+        let bits = frame_bits(&frame);
+        let bit_ns = u64::from(self.bit_ns);
+        self.idle_ns = now_ns + u64::from(bits) * bit_ns;
+        let end_ns = now_ns + u64::from(bits - INTERMISSION_BITS) * bit_ns;
+        self.flight = Some(Flight { frame, sender, bits, end_ns });
+    }
+
+    /// Takes the frame in transmission off the wire, and counts it.
+    pub(crate) fn finish(&mut self, now_ns: u64, delivered: bool) -> Option<Record> {
+        let Flight { frame, sender, bits, .. } = self.flight.take()?;
+        self.traffic.busy_bits += u64::from(bits);
+        self.traffic.frames = self.traffic.frames.saturating_add(1);
+        if !delivered {
+            self.traffic.lost = self.traffic.lost.saturating_add(1);
+        }
+        let at = Instant::from_micros(now_ns / 1_000);
+        Some(Record { at, line: self.line, frame, sender, bits, delivered })
+    }
+
+    pub(crate) const fn flight(&self) -> Option<Flight> {
+        self.flight
+    }
+
+    /// Gives a frame to the controller.
+    pub(crate) fn hear(&mut self, frame: CanFrame) {
+        if self.receive.len() >= self.receive_depth || self.receive.push(frame).is_err() {
+            self.traffic.overruns = self.traffic.overruns.saturating_add(1);
+            self.overrun = true;
+        } else {
+            self.traffic.heard = self.traffic.heard.saturating_add(1);
+        }
+    }
+
+    /// Tells once that frames were missed.
+    pub(crate) const fn take_overrun(&mut self) -> bool {
+        core::mem::replace(&mut self.overrun, false)
+    }
+
+    /// Takes a frame that the controller heard.
+    pub(crate) fn take_heard(&mut self) -> Option<CanFrame> {
+        self.receive.pop()
+    }
+}

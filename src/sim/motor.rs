@@ -1,0 +1,240 @@
+use super::Line;
+use crate::dji::{self, Facts};
+use crate::time::Duration;
+use crate::units::{AngularVelocity, Current};
+
+/// A motor model with its ESC, as it can be simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Model {
+    /// The M2006 on its C610: ids 1 to 8.
+    M2006,
+    /// The M3508 on its C620: ids 1 to 8.
+    M3508,
+    /// The GM6020 as it is delivered, commanded in volts: ids 1 to 7.
+    Gm6020Voltage,
+    /// The GM6020 with current control switched on: ids 1 to 7.
+    Gm6020Current,
+}
+
+impl Model {
+    /// Returns what the wire and the data sheets say about it.
+    #[must_use]
+    pub const fn facts(self) -> &'static Facts {
+        match self {
+            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
+            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
+            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
+            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
+        }
+    }
+}
+
+/// What the simulated ESC does when no command arrives any more.
+///
+/// What a real one does is not documented, so the default is the worst case.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum LostCommand {
+    /// It goes on with the last command for ever.
+    #[default]
+    HoldLast,
+    /// It goes to zero this long after the last command.
+    ZeroAfter(Duration),
+}
+
+/// A motor to attach to a [`World`](super::World).
+///
+/// # Examples
+/// ```
+/// use drivetrain::sim::{Model, MotorConfig, World};
+/// use drivetrain::time::Duration;
+///
+/// let world = World::new(1);
+/// let wheel = world.attach(MotorConfig::new(Model::M3508, 2).with_rotor_angle(8000))?;
+/// world.advance(Duration::from_millis(3)); // nothing commands it, so it stands
+/// assert_eq!(world.motor(wheel).map(|motor| motor.rotor_counts), Some(8000));
+/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorConfig {
+    pub(crate) model: Model,
+    pub(crate) id: u8,
+    pub(crate) line: Line,
+    pub(crate) lost_command: LostCommand,
+    pub(crate) supply_v: f32,
+    pub(crate) load_inertia_kg_m2: f32,
+    pub(crate) rotor_angle: Option<u16>,
+    pub(crate) clock_ppm: Option<i16>,
+    pub(crate) legacy_full_scale: bool,
+}
+
+impl MotorConfig {
+    /// Takes the model and the id that is set on its ESC.
+    #[must_use]
+    pub const fn new(model: Model, id: u8) -> Self {
+        Self {
+            model,
+            id,
+            line: Line::Can1,
+            lost_command: LostCommand::HoldLast,
+            supply_v: 24.0,
+            load_inertia_kg_m2: 0.0,
+            rotor_angle: None,
+            clock_ppm: None,
+            legacy_full_scale: false,
+        }
+    }
+
+    /// Puts the motor on a bus other than the first.
+    #[must_use]
+    pub const fn with_line(self, line: Line) -> Self {
+        Self { line, ..self }
+    }
+
+    /// Chooses what the ESC does when commands stop; by default it holds the last one.
+    #[must_use]
+    pub const fn with_lost_command(self, lost_command: LostCommand) -> Self {
+        Self { lost_command, ..self }
+    }
+
+    /// Sets the supply in volts, 24 by default; what is not a positive number counts as 24.
+    #[must_use]
+    pub const fn with_supply_v(self, supply_v: f32) -> Self {
+        let supply_v = if supply_v > 0.0 && supply_v < 1e3 { supply_v } else { 24.0 };
+        Self { supply_v, ..self }
+    }
+
+    /// Fixes an inertia to the output shaft, in kg m²; what is not a positive number counts as none.
+    #[must_use]
+    pub const fn with_load_inertia_kg_m2(self, inertia: f32) -> Self {
+        let inertia = if inertia > 0.0 && inertia < 1e3 { inertia } else { 0.0 };
+        Self { load_inertia_kg_m2: inertia, ..self }
+    }
+
+    /// Sets the rotor's angle at the start, in counts of which a turn has 8192; by default the seed chooses.
+    #[must_use]
+    pub const fn with_rotor_angle(self, counts: u16) -> Self {
+        Self { rotor_angle: Some(counts & 0x1FFF), ..self }
+    }
+
+    /// Makes full scale ±30000, as a GM6020 of 2020 and before has it; no other model has such a past.
+    #[must_use]
+    pub const fn with_legacy_full_scale(self) -> Self {
+        Self { legacy_full_scale: matches!(self.model, Model::Gm6020Voltage), ..self }
+    }
+
+    /// Sets by how many millionths the ESC's period is longer than 1 ms; by default the seed chooses within ±50.
+    #[must_use]
+    pub const fn with_clock_ppm(self, ppm: i16) -> Self {
+        Self { clock_ppm: Some(ppm), ..self }
+    }
+}
+
+/// A motor of a [`World`](super::World).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MotorKey(pub(crate) u8);
+
+impl MotorKey {
+    /// The number of motors in a world.
+    pub const CAPACITY: usize = 16;
+
+    pub(crate) fn new(index: usize) -> Option<Self> {
+        u8::try_from(index).ok().filter(|_| index < Self::CAPACITY).map(Self)
+    }
+}
+
+/// The true state of a simulated motor, before anything is rounded for the wire. Counter-clockwise is positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorState {
+    /// The rotor's angle since it started, in counts of which a turn has 8192: the first turn begins at 0.
+    pub rotor_counts: i64,
+    /// The velocity of the output shaft.
+    pub velocity: AngularVelocity,
+    /// The torque current.
+    pub current: Current,
+    /// The torque of the motor at the output shaft, friction not taken off, in Nm.
+    pub torque_nm: f32,
+    /// The temperature that the ESC measures, in °C.
+    pub temperature_c: f32,
+    /// The command that the ESC acts on, as on the wire.
+    pub command: i16,
+}
+
+/// The physical constants of a model, at the output shaft. Units are SI.
+///
+/// Torque constant, gear and no-load speed are documented (see [`Facts`]). The M3508's resistance follows from
+/// its documented rated point, 469 rpm at 10 A and 3 Nm. **Everything else is an estimate** of the right order.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Constants {
+    /// Rotor and gearbox, kg m².
+    pub(crate) inertia: f32,
+    /// Nm
+    pub(crate) coulomb: f32,
+    /// Nm s/rad
+    pub(crate) viscous: f32,
+    /// Ω, of the supply's loss of speed under load.
+    pub(crate) resistance: f32,
+    /// s: of the ESC's closed current loop; in voltage mode the winding's own, inductance over resistance.
+    pub(crate) current_time_constant: f32,
+    /// K/A², final rise of temperature.
+    pub(crate) heating: f32,
+    /// s
+    pub(crate) thermal_time_constant: f32,
+}
+
+/// About 0.5 A without load, at speed. All estimates.
+const M2006: Constants = Constants {
+    inertia: 2.0e-3,
+    coulomb: 0.05,
+    viscous: 0.8e-3,
+    resistance: 0.46,
+    current_time_constant: 0.5e-3,
+    heating: 4.0,
+    thermal_time_constant: 200.0,
+};
+
+/// About 0.8 A without load, at speed. Resistance from the rated point, the rest estimates.
+const M3508: Constants = Constants {
+    inertia: 8.0e-3,
+    coulomb: 0.12,
+    viscous: 2.2e-3,
+    resistance: 0.065,
+    current_time_constant: 0.5e-3,
+    heating: 0.6,
+    thermal_time_constant: 300.0,
+};
+
+/// About 0.1 A without load, at speed. All estimates.
+const GM6020_CURRENT: Constants = Constants {
+    inertia: 0.8e-3,
+    coulomb: 0.05,
+    viscous: 1.0e-3,
+    resistance: 1.8,
+    current_time_constant: 0.5e-3,
+    heating: 15.0,
+    thermal_time_constant: 400.0,
+};
+
+/// The same motor with its winding's time constant: 5.7 mH over 1.8 Ω, estimates.
+const GM6020_VOLTAGE: Constants = Constants { current_time_constant: 3.2e-3, ..GM6020_CURRENT };
+
+impl Constants {
+    pub(crate) const fn of(model: Model) -> Self {
+        match model {
+            Model::M2006 => M2006,
+            Model::M3508 => M3508,
+            Model::Gm6020Voltage => GM6020_VOLTAGE,
+            Model::Gm6020Current => GM6020_CURRENT,
+        }
+    }
+
+    /// Returns the back-EMF constant in V s/rad with which the documented no-load speed comes out at 24 V.
+    pub(crate) const fn back_emf(&self, facts: &Facts) -> f32 {
+        let no_load = facts.no_load_rpm * (core::f32::consts::TAU / 60.0);
+        let friction = self.coulomb + self.viscous * no_load;
+        (24.0 - self.resistance * friction / facts.torque_constant_nm_per_a) / no_load
+    }
+}

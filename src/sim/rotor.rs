@@ -1,0 +1,325 @@
+use super::motor::{Constants, MotorConfig};
+use core::f32::consts::TAU;
+
+/// One turn of the rotor in the unit in which its angle is kept.
+const TURN: f32 = 4_294_967_296.0;
+
+/// What the power stage of the ESC is told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Drive {
+    /// The power stage is open: no current.
+    Open,
+    Amperes(f32),
+    Volts(f32),
+}
+
+/// The electrical and mechanical part of a motor: winding, rotor, gearbox, friction.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rotor {
+    constants: Constants,
+    torque_constant: f32,
+    back_emf: f32,
+    current_limit: f32,
+    supply_v: f32,
+    inertia: f32,
+    gear: f32,
+    /// Rotor turns times 2^32: exact for 2^31 turns, whatever the speed.
+    angle: i64,
+    /// Output shaft, rad/s.
+    velocity: f32,
+    current: f32,
+    /// Nm at the output shaft, from outside; positive turns counter-clockwise.
+    pub(crate) load_nm: f32,
+    temperature: f64,
+}
+
+impl Rotor {
+    pub(crate) const fn new(config: &MotorConfig, angle_counts: u16) -> Self {
+        let facts = config.model.facts();
+        let constants = Constants::of(config.model);
+        Self {
+            constants,
+            torque_constant: facts.torque_constant_nm_per_a,
+            back_emf: constants.back_emf(facts),
+            current_limit: facts.current_full_scale_a,
+            supply_v: config.supply_v,
+            inertia: constants.inertia + config.load_inertia_kg_m2,
+            gear: facts.gear.as_f32(),
+            angle: (angle_counts as i64) << 19,
+            velocity: 0.0,
+            current: 0.0,
+            load_nm: 0.0,
+            temperature: AMBIENT_C as f64,
+        }
+    }
+
+    /// Moves the current by one step of `dt_s`.
+    pub(crate) fn step_current(&mut self, drive: Drive, dt_s: f32) {
+        let time_constant = self.constants.current_time_constant;
+        let share = dt_s / (time_constant + dt_s); // backward Euler: never overshoots
+        let settled = match drive {
+            Drive::Open => {
+                self.current = 0.0;
+                return;
+            }
+            Drive::Amperes(target) => target,
+            Drive::Volts(target) => {
+                let volts = target.clamp(-self.supply_v, self.supply_v);
+                (volts - self.back_emf * self.velocity) / self.constants.resistance
+            }
+        };
+        let current = self.current + (settled - self.current) * share;
+        // What the supply can drive against the back-EMF; between the two, what the ESC allows.
+        let generated = self.back_emf * self.velocity;
+        let highest = (self.supply_v - generated) / self.constants.resistance;
+        let lowest = (-self.supply_v - generated) / self.constants.resistance;
+        self.current =
+            current.min(highest).max(lowest).clamp(-self.current_limit, self.current_limit);
+    }
+
+    /// Returns the torque of the motor at the output shaft in Nm, before friction.
+    pub(crate) fn torque_nm(&self) -> f32 {
+        self.torque_constant * self.current
+    }
+
+    /// Moves speed and angle by one step of `dt_s`, with one more torque at the output shaft.
+    pub(crate) fn step_motion(&mut self, other_torque_nm: f32, dt_s: f32) {
+        let impulse = (self.torque_nm() + self.load_nm + other_torque_nm) * dt_s;
+        let moving = (self.inertia * self.velocity + impulse)
+            / (self.inertia + self.constants.viscous * dt_s);
+        // Dry friction takes speed away, and never more than there is.
+        let loss = self.constants.coulomb * dt_s / self.inertia;
+        self.velocity = if moving.abs() <= loss { 0.0 } else { moving - loss.copysign(moving) };
+        self.angle = self.angle.wrapping_add(self.travel(dt_s));
+    }
+
+    /// Returns the angle that the rotor covers in `dt_s`, in turns times 2^32.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "saturates; far below 2^63 at any real speed"
+    )]
+    fn travel(&self, dt_s: f32) -> i64 {
+        (self.velocity * dt_s * (self.gear / TAU) * TURN) as i64
+    }
+
+    /// Moves the temperature by one step of `dt_s`; call it less often than the others.
+    pub(crate) fn step_temperature(&mut self, dt_s: f32) {
+        let settled = f64::from(AMBIENT_C + self.constants.heating * self.current * self.current);
+        let share = f64::from(dt_s / self.constants.thermal_time_constant);
+        self.temperature += (settled - self.temperature) * share;
+    }
+
+    /// Returns the rotor's angle `dt_s` after the last step, in counts of which a turn has 8192.
+    pub(crate) fn counts(&self, dt_s: f32) -> i64 {
+        self.angle.wrapping_add(self.travel(dt_s)) >> 19
+    }
+
+    /// Returns the velocity of the output shaft in rad/s.
+    pub(crate) const fn velocity(&self) -> f32 {
+        self.velocity
+    }
+
+    /// Returns the velocity of the rotor in rpm.
+    pub(crate) fn rotor_rpm(&self) -> f32 {
+        self.velocity * self.gear * (60.0 / TAU)
+    }
+
+    pub(crate) const fn current(&self) -> f32 {
+        self.current
+    }
+
+    /// Returns the temperature in °C.
+    #[expect(clippy::cast_possible_truncation, reason = "a temperature fits f32")]
+    pub(crate) const fn temperature(&self) -> f32 {
+        self.temperature as f32
+    }
+
+    pub(crate) const fn set_temperature(&mut self, celsius: f32) {
+        self.temperature = celsius as f64;
+    }
+}
+
+/// Room temperature in °C.
+const AMBIENT_C: f32 = 25.0;
+
+#[cfg(test)]
+mod tests {
+    use super::super::Model;
+    use super::*;
+    use crate::dji::Unit;
+
+    const STEP: f32 = 1e-4;
+    const MODELS: [Model; 4] =
+        [Model::M2006, Model::M3508, Model::Gm6020Voltage, Model::Gm6020Current];
+
+    fn rotor(model: Model) -> Rotor {
+        Rotor::new(&MotorConfig::new(model, 1), 0)
+    }
+
+    fn full(model: Model) -> Drive {
+        let facts = model.facts();
+        if facts.unit == Unit::Volt {
+            Drive::Volts(facts.command_full_scale)
+        } else {
+            Drive::Amperes(facts.command_full_scale)
+        }
+    }
+
+    fn reversed(drive: Drive) -> Drive {
+        match drive {
+            Drive::Open => Drive::Open,
+            Drive::Amperes(amperes) => Drive::Amperes(-amperes),
+            Drive::Volts(volts) => Drive::Volts(-volts),
+        }
+    }
+
+    fn run(rotor: &mut Rotor, drive: Drive, steps: u32) {
+        for _ in 0..steps {
+            rotor.step_current(drive, STEP);
+            rotor.step_motion(0.0, STEP);
+        }
+    }
+
+    fn rpm(rotor: &Rotor) -> f32 {
+        rotor.velocity() * 60.0 / TAU
+    }
+
+    #[test]
+    fn documented_no_load_speeds_come_out_in_both_directions() {
+        for model in MODELS {
+            let documented = model.facts().no_load_rpm;
+            for (drive, sign) in [(full(model), 1.0), (reversed(full(model)), -1.0)] {
+                let mut rotor = rotor(model);
+                run(&mut rotor, drive, 20_000);
+                let error = sign * rpm(&rotor) / documented - 1.0;
+                assert!(error.abs() < 1e-3, "{model:?}: {} rpm", rpm(&rotor));
+            }
+        }
+    }
+
+    #[test]
+    fn the_m3508_meets_its_rated_point() {
+        let mut rotor = rotor(Model::M3508);
+        rotor.load_nm = -3.0;
+        run(&mut rotor, full(Model::M3508), 20_000);
+        assert!((rpm(&rotor) - 469.0).abs() < 1.0, "{} rpm", rpm(&rotor));
+    }
+
+    #[test]
+    fn half_the_supply_gives_about_half_the_speed() {
+        for model in MODELS {
+            let config = MotorConfig::new(model, 1).with_supply_v(12.0);
+            let mut rotor = Rotor::new(&config, 0);
+            run(&mut rotor, full(model), 20_000);
+            let share = rpm(&rotor) / model.facts().no_load_rpm;
+            assert!((0.48..0.5).contains(&share), "{model:?}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_current_of_a_held_shaft_stays_at_the_limit_of_the_esc() {
+        for model in MODELS {
+            for drive in
+                [full(model), reversed(full(model)), Drive::Amperes(1e9), Drive::Volts(-1e9)]
+            {
+                let mut rotor = rotor(model);
+                for _ in 0..1000 {
+                    rotor.step_current(drive, STEP);
+                    assert!(rotor.current().abs() <= model.facts().current_full_scale_a);
+                }
+                assert!(rotor.current().abs() > 0.999 * model.facts().current_full_scale_a);
+            }
+        }
+    }
+
+    #[test]
+    fn torque_follows_the_documented_constant() {
+        for (model, nm_per_a) in
+            [(Model::M2006, 0.18), (Model::M3508, 0.3), (Model::Gm6020Current, 0.741)]
+        {
+            let mut rotor = rotor(model);
+            for _ in 0..1000 {
+                rotor.step_current(Drive::Amperes(1.0), STEP);
+            }
+            assert!((rotor.torque_nm() - nm_per_a).abs() < 1e-4, "{model:?}");
+        }
+    }
+
+    #[test]
+    fn a_current_below_friction_does_not_move_the_shaft() {
+        for model in MODELS {
+            let mut rotor = rotor(model);
+            let breakaway = Constants::of(model).coulomb / model.facts().torque_constant_nm_per_a;
+            run(&mut rotor, Drive::Amperes(0.9 * breakaway), 1000);
+            assert_eq!((rotor.angle, rotor.velocity().to_bits()), (0, 0), "{model:?}");
+            run(&mut rotor, Drive::Amperes(1.1 * breakaway), 1000);
+            assert!(rotor.angle > 0, "{model:?}");
+        }
+    }
+
+    #[test]
+    fn an_open_motor_only_loses_energy_and_comes_to_rest() {
+        for model in MODELS {
+            let mut rotor = rotor(model);
+            run(&mut rotor, full(model), 5_000);
+            let mut last = rotor.velocity();
+            for _ in 0..100_000 {
+                run(&mut rotor, Drive::Open, 1);
+                assert!(rotor.velocity() >= 0.0 && rotor.velocity() <= last, "{model:?}");
+                last = rotor.velocity();
+            }
+            assert_eq!(last.to_bits(), 0, "{model:?} still turns");
+        }
+    }
+
+    #[test]
+    fn work_of_the_motor_is_kinetic_energy_and_friction() {
+        for model in MODELS {
+            let (mut rotor, constants) = (rotor(model), Constants::of(model));
+            let (mut work, mut lost) = (0.0_f64, 0.0_f64);
+            for _ in 0..3_000 {
+                rotor.step_current(full(model), STEP);
+                let before = f64::from(rotor.velocity());
+                rotor.step_motion(0.0, STEP);
+                let mean = 0.5 * (before + f64::from(rotor.velocity())) * f64::from(STEP);
+                work += f64::from(rotor.torque_nm()) * mean;
+                lost += f64::from(constants.coulomb + constants.viscous * rotor.velocity()) * mean;
+            }
+            let speed = f64::from(rotor.velocity());
+            let kinetic = 0.5 * f64::from(constants.inertia) * speed * speed;
+            let balance = (work - lost - kinetic) / work;
+            assert!(balance.abs() < 2e-3, "{model:?}: {balance}");
+        }
+    }
+
+    #[test]
+    fn a_motor_driven_above_its_no_load_speed_brakes() {
+        let mut rotor = rotor(Model::M3508);
+        rotor.load_nm = 10.0;
+        run(&mut rotor, Drive::Amperes(0.0), 20_000);
+        assert!(rotor.current() < 0.0 && rpm(&rotor) > 482.0);
+    }
+
+    #[test]
+    fn heat_settles_where_current_and_room_balance() {
+        let mut rotor = rotor(Model::M3508);
+        for _ in 0..1000 {
+            rotor.step_current(Drive::Amperes(10.0), STEP);
+        }
+        for _ in 0..3_000_000 {
+            rotor.step_temperature(1e-3);
+        }
+        assert!((rotor.temperature() - 85.0).abs() < 0.5, "{}", rotor.temperature());
+    }
+
+    #[test]
+    fn angles_are_exact_over_many_turns() {
+        let mut rotor = rotor(Model::M2006);
+        rotor.angle = i64::from(i32::MAX) << 32;
+        let before = rotor.counts(0.0);
+        rotor.velocity = TAU / 36.0; // one rotor turn a second
+        assert!((rotor.counts(0.5) - before - 4096).abs() <= 1);
+        rotor.velocity = -rotor.velocity;
+        assert!((rotor.counts(0.5) - before + 4096).abs() <= 1);
+    }
+}
