@@ -1,0 +1,99 @@
+//! A CAN interrupt that stamps frames into a queue, a 1 kHz task, and a 100 Hz task that sets targets.
+//!
+//! Threads stand for the contexts of a microcontroller: the frame queue is the same there (RTIC: a local resource of
+//! the interrupt and one of the task), and the mailbox of targets is a critical-section mutex.
+//! `cargo run --example interrupt_queue`
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::runner::{BlockingTx, EmergencyStop, FrameQueue, Runner};
+use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::time::{Duration, Instant};
+use drivetrain::units::AngularVelocity;
+use std::error::Error;
+use std::sync::Mutex;
+use std::sync::mpsc;
+use std::thread;
+
+/// Set from any context; the runner looks at it in each tick.
+static STOP: EmergencyStop = EmergencyStop::new();
+
+fn main() -> Result<(), Box<dyn Error>> {
+    const SPEED: PidConfig = PidConfig::new(0.5, 3.0, 0.0);
+
+    let world = World::new(3);
+    world.attach(MotorConfig::new(Model::M3508, 1))?;
+
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED))?;
+    // This driver's transmit waits for a place and its receive belongs to the interrupt: so the runner only sends.
+    let clock = world.clock();
+    let mut runner =
+        Runner::new(BlockingTx(world.controller()), clock, bus).with_emergency_stop(&STOP);
+
+    let mut queue = FrameQueue::<16>::new();
+    let (mut interrupt, mut received) = queue.split();
+    let target = Mutex::new(AngularVelocity::ZERO); // the newest value only
+    let (wire, hardware) = mpsc::channel::<(CanFrame, Instant)>();
+    let (handled, wait) = mpsc::channel::<()>();
+
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            for (frame, arrived) in hardware {
+                interrupt.push(&frame, arrived);
+                if handled.send(()).is_err() {
+                    break;
+                }
+            }
+        });
+
+        let mut reached = 0.0_f32;
+        for ms in 0..1_000_u64 {
+            let mut frames = 0;
+            world.advance(Duration::from_millis(1));
+            while let Ok(frame) = embedded_can::nb::Can::receive(&mut world.controller()) {
+                frames += usize::from(wire.send((frame, world.now())).is_ok());
+            }
+            wait.iter().take(frames).for_each(drop);
+
+            if ms % 10 == 0 {
+                // The 100 Hz task.
+                if let Ok(mut target) = target.lock() {
+                    *target = AngularVelocity::from_rpm(if ms < 800 { 200.0 } else { 0.0 });
+                }
+            }
+            if ms == 900 {
+                STOP.set();
+            }
+
+            // The 1 kHz task.
+            while let Some((frame, arrived)) = received.pop() {
+                _ = runner.ingest(&frame, arrived);
+            }
+            let Some(tick) = runner.due() else { continue };
+            if !runner.is_armed() {
+                _ = runner.arm(tick);
+            }
+            let newest = target.lock().map_or(AngularVelocity::ZERO, |target| *target);
+            _ = runner.device_mut().set_velocity(wheel, newest); // refused, harmlessly, until armed
+            runner.tick(tick);
+
+            let rpm = runner.device().state(wheel).map_or(0.0, |state| state.velocity.as_rpm());
+            if ms == 799 {
+                reached = rpm;
+            }
+            if ms % 100 == 99 {
+                println!("{:>4} ms  {rpm:6.1} rpm  armed {}", ms + 1, runner.is_armed());
+            }
+        }
+        drop(wire);
+        println!("{} frames dropped by the queue", received.dropped());
+        if (reached - 200.0).abs() > 4.0 || runner.is_armed() {
+            return Err(
+                format!("reached {reached:.1} rpm of 200, armed {}", runner.is_armed()).into()
+            );
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,80 @@
+//! Without the runner: an own loop over the calls of the bus, for any driver, with or without `embedded-can` traits.
+//!
+//! A GM6020 turns its absolute angle back and forth. `cargo run --example sans_io`
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Gm6020Voltage};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::CanDevice;
+use drivetrain::sim::{Controller, Model, MotorConfig, World};
+use drivetrain::time::{Duration, Tick, Ticker};
+use drivetrain::units::Angle;
+use std::error::Error;
+
+/// Stands for the driver of a board: two functions over raw ids and bytes.
+struct Driver<'w>(Controller<'w>);
+
+impl Driver<'_> {
+    fn receive(&mut self) -> Option<(u16, Vec<u8>)> {
+        use embedded_can::{Frame, Id, nb::Can};
+        let frame = self.0.receive().ok()?;
+        let Id::Standard(id) = frame.id() else { return None };
+        Some((id.as_raw(), frame.data().to_vec()))
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> bool {
+        use embedded_can::nb::Can;
+        self.0.transmit(frame).is_ok()
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    const ANGLE: PidConfig = PidConfig::new(15.0, 0.0, 0.0);
+    const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0);
+
+    let world = World::new(1);
+    world.attach(MotorConfig::new(Model::Gm6020Voltage, 1))?;
+    let mut driver = Driver(world.controller());
+
+    let mut bus = Bus::new();
+    let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(ANGLE, RATE))?;
+    let mut ticker = Ticker::new(Duration::from_millis(1));
+
+    for ms in 0..3_000_u32 {
+        world.advance(Duration::from_millis(1));
+        let now = world.now();
+        while let Some((id, data)) = driver.receive() {
+            _ = bus.ingest_raw(id, &data, now);
+        }
+        let Some(tick) = ticker.due(now) else { continue };
+        if !bus.is_armed() {
+            _ = bus.arm(now); // again in the next millisecond, until the motor is heard
+        } else {
+            let target = if ms % 2_000 < 1_000 { 90.0 } else { 270.0 };
+            bus.set_angle(yaw, Angle::from_degrees(target))?;
+        }
+        step(&mut bus, &mut driver, tick);
+        if ms % 250 == 249 {
+            let angle =
+                bus.state(yaw).map_or(f32::NAN, |state| state.position.angle().as_degrees());
+            println!("{ms:>5} ms  {angle:7.2} degrees");
+        }
+    }
+    let angle = bus.state(yaw).ok_or("the motor was never heard")?.position.angle();
+    if (angle.as_degrees() - 90.0).abs() > 1.0 {
+        return Err(
+            format!("the motor stands at {:.2} degrees instead of 90", angle.as_degrees()).into()
+        );
+    }
+    Ok(())
+}
+
+fn step(bus: &mut Bus, driver: &mut Driver<'_>, tick: Tick) {
+    bus.update(tick);
+    while let Some(frame) = bus.next_frame() {
+        if !driver.send(&frame) {
+            bus.requeue(&frame); // offered again after the next update, with newer values
+            break;
+        }
+    }
+}
