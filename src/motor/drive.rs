@@ -12,6 +12,22 @@ pub trait VelocityDrive<H: Copy> {
     /// # Errors
     /// Says why the motor cannot take the target now. The value is then not kept for later.
     fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError>;
+
+    /// Sets the velocities of several motors: of all wheels of a chassis, say.
+    ///
+    /// # Errors
+    /// The first error. The motors after it are set all the same.
+    fn drive(
+        &mut self,
+        targets: impl IntoIterator<Item = (H, AngularVelocity)>,
+    ) -> Result<(), TargetError> {
+        let mut outcome = Ok(());
+        for (motor, target) in targets {
+            let set = self.set_velocity(motor, target);
+            outcome = outcome.and(set);
+        }
+        outcome
+    }
 }
 
 impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
