@@ -1,0 +1,124 @@
+use crate::geometry::{Body, Twist};
+use crate::units::AngularVelocity;
+
+/// A layout of wheels: what each must do for a motion of the body, and what motion they make.
+///
+/// Every layout has `inverse` and `forward` as its own functions; the trait is what
+/// [`Chassis`](super::Chassis) needs to work with all of them.
+pub trait Kinematics {
+    /// One `T` for each wheel, under the wheel's name.
+    type Wheels<T: Copy>: Copy;
+    /// What a wheel does: its velocity, and for a steered one its angle too.
+    type Speed: WheelSpeed;
+
+    /// Returns what each wheel must do for the motion `twist` of the body.
+    fn inverse(&self, twist: Twist<Body>) -> Self::Wheels<Self::Speed>;
+
+    /// Returns the motion of the body that fits best to what the wheels do.
+    fn forward(&self, wheels: Self::Wheels<Self::Speed>) -> Twist<Body>;
+
+    /// Returns the motion of the body from the wheels that are known; `None` when they do not determine it.
+    fn forward_partial(&self, wheels: Self::Wheels<Option<Self::Speed>>) -> Option<Twist<Body>>;
+
+    /// Returns the radius of the wheels in m.
+    fn wheel_radius_m(&self) -> f32;
+
+    /// Turns the value of every wheel into another.
+    fn map<T: Copy, U: Copy>(wheels: Self::Wheels<T>, f: impl FnMut(T) -> U) -> Self::Wheels<U>;
+
+    /// Pairs the values of every wheel.
+    fn zip<T: Copy, U: Copy>(a: Self::Wheels<T>, b: Self::Wheels<U>) -> Self::Wheels<(T, U)>;
+
+    /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
+    ///
+    /// A limit below zero or NaN counts as zero; if any wheel is NaN or infinite, all stop.
+    #[must_use]
+    fn desaturate(
+        &self,
+        wheels: Self::Wheels<Self::Speed>,
+        limit: AngularVelocity,
+    ) -> Self::Wheels<Self::Speed> {
+        let mut fastest = Fastest::default();
+        let _: Self::Wheels<()> = Self::map(wheels, |wheel| fastest.see(wheel.velocity()));
+        Self::map(wheels, |wheel| fastest.limit(wheel, limit))
+    }
+
+    /// Returns the largest difference in m/s between a wheel and the rigid motion that fits best.
+    ///
+    /// Zero when all wheels roll. A lifted, slipping or blocked wheel of an over-determined layout shows here
+    /// with a part of its error (a quarter with four wheels); with as few wheels as unknowns it is always zero.
+    fn slip_m_s(&self, wheels: Self::Wheels<Self::Speed>) -> f32 {
+        let rolling = self.inverse(self.forward(wheels));
+        let mut largest = 0.0_f32;
+        let _: Self::Wheels<()> = Self::map(Self::zip(wheels, rolling), |(is, fits)| {
+            let difference = is.distance(fits);
+            if difference > largest || difference.is_nan() {
+                largest = difference;
+            }
+        });
+        largest * self.wheel_radius_m()
+    }
+}
+
+/// What a wheel does, as far as limiting and comparing needs to know it.
+pub trait WheelSpeed: Copy {
+    /// Returns the rolling velocity of the wheel, positive forward.
+    fn velocity(self) -> AngularVelocity;
+
+    /// Returns the same motion, faster by `factor`.
+    #[must_use]
+    fn scaled(self, factor: f32) -> Self;
+
+    /// Returns the same wheel standing still, a steered one at its angle.
+    #[must_use]
+    fn stopped(self) -> Self;
+
+    /// Returns the absolute difference to another motion of the same wheel in rad/s.
+    fn distance(self, other: Self) -> f32;
+}
+
+impl WheelSpeed for AngularVelocity {
+    fn velocity(self) -> AngularVelocity {
+        self
+    }
+
+    fn scaled(self, factor: f32) -> Self {
+        self * factor
+    }
+
+    fn stopped(self) -> Self {
+        Self::ZERO
+    }
+
+    fn distance(self, other: Self) -> f32 {
+        (self - other).as_rad_per_s().abs()
+    }
+}
+
+/// Finds the largest speed of some wheels, then brings each under a limit by the common factor.
+#[derive(Debug, Default)]
+pub(super) struct Fastest {
+    rad_per_s: f32,
+    broken: bool,
+}
+
+impl Fastest {
+    pub(super) fn see(&mut self, velocity: AngularVelocity) {
+        let speed = velocity.as_rad_per_s().abs();
+        self.broken |= !speed.is_finite();
+        if speed > self.rad_per_s {
+            self.rad_per_s = speed;
+        }
+    }
+
+    pub(super) fn limit<S: WheelSpeed>(&self, wheel: S, limit: AngularVelocity) -> S {
+        let limit = limit.as_rad_per_s();
+        if self.broken || limit.is_nan() || limit <= 0.0 {
+            wheel.stopped()
+        } else if self.rad_per_s > limit {
+            wheel.scaled(limit / self.rad_per_s)
+        } else {
+            wheel
+        }
+    }
+}

@@ -1,0 +1,365 @@
+use super::error::positive;
+use super::{GeometryError, Kinematics, MecanumWheels};
+use crate::geometry::{Body, Twist};
+use crate::units::AngularVelocity;
+
+/// The dimensions of a mecanum chassis: all in m, above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MecanumGeometry {
+    /// Radius of the wheels, over the rollers.
+    pub wheel_radius_m: f32,
+    /// Half the distance from the front axle to the rear one.
+    pub half_wheelbase_m: f32,
+    /// Half the distance from the left wheels to the right ones, centre to centre.
+    pub half_track_m: f32,
+}
+
+/// How the rollers of the four wheels lie.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum RollerMounting {
+    /// The rollers that touch the floor form an O: the usual one. From above the visible rollers form an X.
+    #[default]
+    FloorO,
+    /// The rollers that touch the floor form an X. The lever arm for turning is the difference of half track and
+    /// half wheelbase, so a square chassis cannot turn.
+    FloorX,
+}
+
+/// The kinematics of four mecanum wheels.
+///
+/// With the lever arm `L = half track + half wheelbase` and the wheel radius `r`:
+///
+/// ```text
+/// r * front_left  = vx - vy - L wz        r * front_right = vx + vy + L wz
+/// r * rear_left   = vx + vy - L wz        r * rear_right  = vx - vy + L wz
+/// ```
+///
+/// A positive wheel velocity rolls forward on every wheel; how its motor is mounted is the motor's business.
+/// The other mounting of the rollers changes the sign of vy, and `L` to half track - half wheelbase.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{Mecanum, MecanumGeometry};
+/// use drivetrain::geometry::Twist;
+///
+/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.3, half_track_m: 0.2 };
+/// let mecanum = Mecanum::new(geometry)?;
+/// let wheels = mecanum.inverse(Twist::new(1.0, 0.5, 2.0));
+/// assert!((wheels.front_left.as_rad_per_s() - (1.0 - 0.5 - 0.5 * 2.0) / 0.1).abs() < 1e-4);
+/// assert!((wheels.front_right.as_rad_per_s() - (1.0 + 0.5 + 0.5 * 2.0) / 0.1).abs() < 1e-4);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Mecanum {
+    /// Wheel velocity for 1 m/s forward, 1 m/s to the left, 1 rad/s.
+    per_x: f32,
+    per_y: f32,
+    per_yaw: f32,
+    /// The same the other way, a quarter for each wheel.
+    x_per: f32,
+    y_per: f32,
+    yaw_per: f32,
+    wheel_radius_m: f32,
+}
+
+impl Mecanum {
+    /// Takes the dimensions, with the rollers in the usual mounting.
+    ///
+    /// # Errors
+    /// Names the length that is not above zero and finite.
+    pub const fn new(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
+        Self::with_rollers(geometry, RollerMounting::FloorO)
+    }
+
+    /// Takes the dimensions and the mounting of the rollers.
+    ///
+    /// # Errors
+    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for
+    /// [`RollerMounting::FloorX`] when half track and half wheelbase differ by less than 1 %.
+    pub const fn with_rollers(
+        geometry: MecanumGeometry,
+        mounting: RollerMounting,
+    ) -> Result<Self, GeometryError> {
+        let MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m } = geometry;
+        if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
+            return Err(error);
+        }
+        if let Err(error) = positive(half_wheelbase_m, "half_wheelbase_m") {
+            return Err(error);
+        }
+        if let Err(error) = positive(half_track_m, "half_track_m") {
+            return Err(error);
+        }
+        let (arm_m, side) = match mounting {
+            RollerMounting::FloorO => (half_track_m + half_wheelbase_m, 1.0),
+            RollerMounting::FloorX => (half_track_m - half_wheelbase_m, -1.0),
+        };
+        if arm_m.abs() < 0.01 * (half_track_m + half_wheelbase_m) {
+            return Err(GeometryError::Singular("rotation: the chassis is square"));
+        }
+        Ok(Self {
+            per_x: 1.0 / wheel_radius_m,
+            per_y: side / wheel_radius_m,
+            per_yaw: arm_m / wheel_radius_m,
+            x_per: 0.25 * wheel_radius_m,
+            y_per: 0.25 * side * wheel_radius_m,
+            yaw_per: 0.25 * wheel_radius_m / arm_m,
+            wheel_radius_m,
+        })
+    }
+
+    /// Returns the wheel velocities for the motion `twist` of the body.
+    #[must_use]
+    #[inline]
+    pub const fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
+        let x = twist.vx_m_s * self.per_x;
+        let y = twist.vy_m_s * self.per_y;
+        let yaw = twist.wz_rad_s * self.per_yaw;
+        let (falling, rising) = (x - y, x + y);
+        MecanumWheels {
+            front_left: AngularVelocity::from_rad_per_s(falling - yaw),
+            front_right: AngularVelocity::from_rad_per_s(rising + yaw),
+            rear_left: AngularVelocity::from_rad_per_s(rising - yaw),
+            rear_right: AngularVelocity::from_rad_per_s(falling + yaw),
+        }
+    }
+
+    /// Returns the motion of the body that fits the wheel velocities best (least squares).
+    #[must_use]
+    #[inline]
+    pub const fn forward(&self, wheels: MecanumWheels<AngularVelocity>) -> Twist<Body> {
+        let front_left = wheels.front_left.as_rad_per_s();
+        let front_right = wheels.front_right.as_rad_per_s();
+        let rear_left = wheels.rear_left.as_rad_per_s();
+        let rear_right = wheels.rear_right.as_rad_per_s();
+        let (falling, rising) = (front_left + rear_right, front_right + rear_left);
+        let (falling_yaw, rising_yaw) = (rear_right - front_left, front_right - rear_left);
+        Twist::new(
+            (rising + falling) * self.x_per,
+            (rising - falling) * self.y_per,
+            (rising_yaw + falling_yaw) * self.yaw_per,
+        )
+    }
+}
+
+impl Kinematics for Mecanum {
+    type Wheels<T: Copy> = MecanumWheels<T>;
+    type Speed = AngularVelocity;
+
+    fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
+        self.inverse(twist)
+    }
+
+    fn forward(&self, wheels: MecanumWheels<AngularVelocity>) -> Twist<Body> {
+        self.forward(wheels)
+    }
+
+    /// Three wheels are enough: a rigid chassis has `front_left + front_right = rear_left + rear_right`.
+    fn forward_partial(
+        &self,
+        wheels: MecanumWheels<Option<AngularVelocity>>,
+    ) -> Option<Twist<Body>> {
+        let MecanumWheels { front_left: fl, front_right: fr, rear_left: rl, rear_right: rr } =
+            wheels;
+        let all = match (fl, fr, rl, rr) {
+            (None, Some(fr), Some(rl), Some(rr)) => [rl + rr - fr, fr, rl, rr],
+            (Some(fl), None, Some(rl), Some(rr)) => [fl, rl + rr - fl, rl, rr],
+            (Some(fl), Some(fr), None, Some(rr)) => [fl, fr, fl + fr - rr, rr],
+            (Some(fl), Some(fr), Some(rl), None) => [fl, fr, rl, fl + fr - rl],
+            _ => wheels.all()?.into_array(),
+        };
+        Some(self.forward(MecanumWheels::from_array(all)))
+    }
+
+    fn wheel_radius_m(&self) -> f32 {
+        self.wheel_radius_m
+    }
+
+    fn map<T: Copy, U: Copy>(wheels: MecanumWheels<T>, f: impl FnMut(T) -> U) -> MecanumWheels<U> {
+        wheels.map(f)
+    }
+
+    fn zip<T: Copy, U: Copy>(a: MecanumWheels<T>, b: MecanumWheels<U>) -> MecanumWheels<(T, U)> {
+        a.zip(b)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "halves and quarters are exact")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SQUARE: MecanumGeometry =
+        MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.25 };
+    const OBLONG: MecanumGeometry =
+        MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.5 };
+
+    fn wheels(mecanum: &Mecanum, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
+        mecanum.inverse(Twist::new(vx, vy, wz)).map(AngularVelocity::as_rad_per_s).into_array()
+    }
+
+    fn usual() -> Mecanum {
+        Mecanum::new(SQUARE).unwrap()
+    }
+
+    #[test]
+    fn driving_forward_turns_all_wheels_forward() {
+        assert_eq!(wheels(&usual(), 1.0, 0.0, 0.0), [2.0, 2.0, 2.0, 2.0]);
+        assert_eq!(wheels(&usual(), -1.0, 0.0, 0.0), [-2.0, -2.0, -2.0, -2.0]);
+    }
+
+    // The first seed registers FR, FL, RL, RR on rows in the order FL, FR, RL, RR: its robot turned when it should strafe.
+    #[test]
+    fn strafe_left_turns_front_left_backward() {
+        assert_eq!(wheels(&usual(), 0.0, 1.0, 0.0), [-2.0, 2.0, 2.0, -2.0]);
+    }
+
+    #[test]
+    fn strafe_right_turns_front_left_forward() {
+        assert_eq!(wheels(&usual(), 0.0, -1.0, 0.0), [2.0, -2.0, -2.0, 2.0]);
+    }
+
+    #[test]
+    fn turning_counter_clockwise_turns_the_left_wheels_backward() {
+        assert_eq!(wheels(&usual(), 0.0, 0.0, 2.0), [-2.0, 2.0, -2.0, 2.0]);
+        assert_eq!(wheels(&usual(), 0.0, 0.0, -2.0), [2.0, -2.0, 2.0, -2.0]);
+    }
+
+    #[test]
+    fn rolling_front_left_backward_and_front_right_forward_is_a_strafe_to_the_left() {
+        let turn = AngularVelocity::from_rad_per_s;
+        let strafe = MecanumWheels::from_array([-2.0, 2.0, 2.0, -2.0].map(turn));
+        assert_eq!(usual().forward(strafe), Twist::new(0.0, 1.0, 0.0));
+        let spin = MecanumWheels::from_array([-2.0, 2.0, -2.0, 2.0].map(turn));
+        assert_eq!(usual().forward(spin), Twist::new(0.0, 0.0, 2.0));
+    }
+
+    // The fourth seed's rows are left-handed (y forward, x right, clockwise positive) and have no unit.
+    #[test]
+    fn the_fourth_seeds_rows_agree_after_its_axes_are_turned_into_ours() {
+        let (right, front, clockwise) = (0.3_f32, 0.7_f32, 0.2_f32);
+        let one = right - front + clockwise; // its wheel 1, front right, positive backward
+        let fr = wheels(&usual(), front, -right, -clockwise / 0.5)[1] * 0.5;
+        assert!((fr + one).abs() < 1e-6);
+    }
+
+    #[test]
+    fn with_the_other_rollers_strafe_left_turns_front_left_forward() {
+        let other = Mecanum::with_rollers(OBLONG, RollerMounting::FloorX).unwrap();
+        assert_eq!(wheels(&other, 0.0, 1.0, 0.0), [2.0, -2.0, -2.0, 2.0]);
+        assert_eq!(wheels(&other, 0.0, 0.0, 4.0), [-2.0, 2.0, -2.0, 2.0]);
+    }
+
+    #[test]
+    fn with_the_other_rollers_a_square_chassis_is_refused() {
+        let error = Mecanum::with_rollers(SQUARE, RollerMounting::FloorX);
+        assert!(matches!(error, Err(GeometryError::Singular(_))));
+    }
+
+    #[test]
+    fn a_length_of_zero_nan_or_infinity_is_named() {
+        for bad in [0.0, -0.1, f32::NAN, f32::INFINITY] {
+            let radius = Mecanum::new(MecanumGeometry { wheel_radius_m: bad, ..SQUARE });
+            assert_eq!(radius, Err(GeometryError::NotPositive("wheel_radius_m")));
+            let track = Mecanum::new(MecanumGeometry { half_track_m: bad, ..SQUARE });
+            assert_eq!(track, Err(GeometryError::NotPositive("half_track_m")));
+        }
+    }
+
+    #[test]
+    fn a_lifted_wheel_shows_as_slip_and_rolling_shows_none() {
+        let mecanum = usual();
+        let rolling = mecanum.inverse(Twist::new(0.5, -0.25, 1.0));
+        assert!(mecanum.slip_m_s(rolling) < 1e-6);
+        let lifted = MecanumWheels {
+            front_left: rolling.front_left + AngularVelocity::from_rad_per_s(8.0),
+            ..rolling
+        };
+        assert!((mecanum.slip_m_s(lifted) - 8.0 * 0.5 / 4.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn any_one_wheel_may_be_lost_and_two_may_not() {
+        let mecanum = usual();
+        let motion = Twist::new(0.5, -0.25, 1.0);
+        let full = mecanum.inverse(motion).map(Some);
+        for lost in 0..4 {
+            let mut partial = full.into_array();
+            partial[lost] = None;
+            let partial = MecanumWheels::from_array(partial);
+            assert_eq!(mecanum.forward_partial(partial), Some(motion));
+        }
+        let two = MecanumWheels { front_left: None, rear_right: None, ..full };
+        assert_eq!(mecanum.forward_partial(two), None);
+    }
+
+    #[test]
+    fn a_wheel_limit_that_is_broken_or_a_broken_wheel_stops_all() {
+        let limit = AngularVelocity::from_rad_per_s;
+        let fast = usual().inverse(Twist::new(1.0, 0.5, 0.0));
+        let still = MecanumWheels::splat(AngularVelocity::ZERO);
+        assert_eq!(fast.desaturate(limit(f32::NAN)), still);
+        assert_eq!(fast.desaturate(limit(-1.0)), still);
+        assert_eq!(fast.desaturate(limit(f32::INFINITY)), fast);
+        let broken = MecanumWheels { rear_left: limit(f32::NAN), ..fast };
+        assert_eq!(broken.desaturate(limit(10.0)), still);
+    }
+
+    fn geometries() -> impl Strategy<Value = MecanumGeometry> {
+        (0.02_f32..0.3, 0.05_f32..1.0, 0.05_f32..1.0).prop_map(|(r, a, b)| MecanumGeometry {
+            wheel_radius_m: r,
+            half_wheelbase_m: a,
+            half_track_m: b,
+        })
+    }
+
+    fn twists() -> impl Strategy<Value = Twist<Body>> {
+        (-5.0_f32..5.0, -5.0_f32..5.0, -20.0_f32..20.0).prop_map(|(x, y, w)| Twist::new(x, y, w))
+    }
+
+    fn largest(twist: Twist<Body>) -> f32 {
+        twist.vx_m_s.abs().max(twist.vy_m_s.abs()).max(twist.wz_rad_s.abs())
+    }
+
+    proptest! {
+        #[test]
+        fn forward_undoes_inverse(geometry in geometries(), twist in twists()) {
+            let mecanum = Mecanum::new(geometry).unwrap();
+            let error = mecanum.forward(mecanum.inverse(twist)) - twist;
+            let arm = geometry.half_track_m + geometry.half_wheelbase_m;
+            let size = twist.linear().norm() + arm * twist.wz_rad_s.abs();
+            prop_assert!(error.linear().norm() <= 1e-5 * size, "{error:?}");
+            prop_assert!(error.wz_rad_s.abs() * arm <= 1e-5 * size, "{error:?}");
+        }
+
+        #[test]
+        fn desaturating_keeps_the_direction_of_travel(
+            geometry in geometries(), twist in twists(), limit in 0.1_f32..50.0
+        ) {
+            let mecanum = Mecanum::new(geometry).unwrap();
+            let limited = mecanum.inverse(twist).desaturate(AngularVelocity::from_rad_per_s(limit));
+            for wheel in limited {
+                prop_assert!(wheel.as_rad_per_s().abs() <= limit * 1.000_001);
+            }
+            let slower = mecanum.forward(limited);
+            let scale = largest(slower) / largest(twist).max(1e-9);
+            prop_assert!(scale <= 1.0 + 1e-5);
+            prop_assert!(largest(slower - twist * scale) <= 2e-5 * (1.0 + largest(twist)));
+        }
+
+        #[test]
+        fn forward_is_linear(geometry in geometries(), a in twists(), b in twists(), k in -2.0_f32..2.0) {
+            let mecanum = Mecanum::new(geometry).unwrap();
+            let (left, right) = (mecanum.inverse(a), mecanum.inverse(b));
+            let together = mecanum.forward(left.zip(right).map(|(l, r)| l * k + r));
+            let apart = mecanum.forward(left) * k + mecanum.forward(right);
+            prop_assert!(largest(together - apart) <= 1e-4 * (1.0 + largest(a) + largest(b)) );
+        }
+    }
+}
