@@ -14,6 +14,8 @@ pub enum AttachError {
         /// The id that was asked for.
         id: u8,
     },
+    /// A parameter of the chassis, by its name, is not above zero and at most 1000.
+    Chassis(&'static str),
 }
 
 impl core::fmt::Display for AttachError {
@@ -21,6 +23,7 @@ impl core::fmt::Display for AttachError {
         match self {
             Self::Full => write!(f, "a world holds {} motors", MotorKey::CAPACITY),
             Self::Id { model, id } => write!(f, "{model:?} has no id {id}"),
+            Self::Chassis(name) => write!(f, "{name} of the chassis is not between 0 and 1000"),
         }
     }
 }

@@ -20,6 +20,7 @@
 //! | [`World`] | the two buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
+//! | [`ChassisConfig`], [`ChassisState`] | a mecanum body on four of them |
 //! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
 //! | [`Record`], [`Traffic`] | every frame with its time, as a line of candump; bus load and counters |
@@ -60,6 +61,8 @@
 //! [`World::advance_with`] and answer with [`World::inject`].
 
 mod bits;
+mod body;
+mod chassis;
 mod controller;
 mod engine;
 mod error;
@@ -74,6 +77,7 @@ mod rotor;
 mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
+pub use chassis::{ChassisConfig, ChassisState};
 pub use controller::{Controller, ControllerError};
 pub use error::AttachError;
 pub use fault::{Fault, FaultsFull};

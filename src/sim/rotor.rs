@@ -119,6 +119,11 @@ impl Rotor {
         self.velocity
     }
 
+    /// Returns the inertia at the output shaft in kg m².
+    pub(crate) const fn inertia(&self) -> f32 {
+        self.inertia
+    }
+
     /// Returns the velocity of the rotor in rpm.
     pub(crate) fn rotor_rpm(&self) -> f32 {
         self.velocity * self.gear * (60.0 / TAU)

@@ -1,7 +1,8 @@
+use super::chassis::Chassis;
 use super::engine::Engine;
 use super::{
-    AttachError, Controller, Fault, FaultsFull, Line, MotorConfig, MotorKey, MotorState, Record,
-    Traffic,
+    AttachError, ChassisConfig, ChassisState, Controller, Fault, FaultsFull, Line, MotorConfig,
+    MotorKey, MotorState, Record, Traffic,
 };
 use crate::frame::CanFrame;
 use crate::time::{Clock, Duration, Instant};
@@ -133,6 +134,39 @@ impl World {
     #[must_use]
     pub fn motor(&self, motor: MotorKey) -> Option<MotorState> {
         self.with(|engine| engine.motor(motor))
+    }
+
+    /// Puts four motors under a chassis; their shafts then carry it. A second one replaces the first.
+    ///
+    /// # Errors
+    /// Names the parameter that makes no sense.
+    pub fn attach_chassis(
+        &self,
+        config: ChassisConfig,
+        wheels: [MotorKey; 4],
+    ) -> Result<(), AttachError> {
+        config.validate().map_err(AttachError::Chassis)?;
+        let chassis = Chassis { body: config.body(), wheels };
+        self.with(|engine| engine.chassis = Some(chassis));
+        Ok(())
+    }
+
+    /// Returns where the chassis truly is; `None` without one.
+    #[must_use]
+    pub fn chassis(&self) -> Option<ChassisState> {
+        self.with(|engine| engine.chassis.as_ref().map(Chassis::state))
+    }
+
+    /// Pushes the chassis from now on: N along the world's x and y axes, and Nm counter-clockwise. What is not
+    /// finite counts as zero.
+    pub fn push_chassis(&self, x_n: f32, y_n: f32, torque_nm: f32) {
+        let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+        let push = [x_n, y_n, torque_nm].map(finite);
+        self.with(|engine| {
+            if let Some(chassis) = &mut engine.chassis {
+                chassis.body.push = push;
+            }
+        });
     }
 
     /// Puts a torque on the output shaft of a motor, in Nm; positive turns it counter-clockwise. What is not

@@ -1,0 +1,151 @@
+//! The whole path on the simulated bus: runner, DJI bus, motors, and what goes wrong between them.
+
+#![cfg(test)]
+#![cfg(feature = "sim")]
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::motor::{CanDevice, Link};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{Controller, Fault, Line, Model, MotorConfig, MotorKey, SimClock, World};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::AngularVelocity;
+
+const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(20.0);
+
+type Robot<'a> = Runner<Nb<Controller<'a>>, SimClock<'a>, Bus>;
+
+fn at(millis: u64) -> Instant {
+    Instant::START + Duration::from_millis(millis)
+}
+
+fn rpm(value: f32) -> AngularVelocity {
+    AngularVelocity::from_rpm(value)
+}
+
+/// A world with two M3508, and a robot on it that has them in speed loops.
+fn two_wheels(world: &World) -> ([MotorKey; 2], [Handle<M3508>; 2], Robot<'_>) {
+    let keys = [1, 2].map(|id| world.attach(MotorConfig::new(Model::M3508, id)).unwrap());
+    let mut bus = Bus::new();
+    let handles = [1, 2].map(|id| bus.attach(Config::<M3508>::new(id).speed_loop(SPEED)).unwrap());
+    (keys, handles, Runner::new(Nb(world.controller()), world.clock(), bus))
+}
+
+/// Runs the loop of a robot for a time, with `work` before each tick.
+fn run(world: &World, robot: &mut Robot<'_>, millis: u64, mut work: impl FnMut(&mut Bus, Tick)) {
+    for _ in 0..10 * millis {
+        world.advance(Duration::from_micros(100));
+        robot.poll(16);
+        if let Some(tick) = robot.due() {
+            let _missing = robot.is_armed() || robot.arm(tick).is_ok();
+            work(robot.device_mut(), tick);
+            robot.tick(tick);
+        }
+    }
+}
+
+#[test]
+fn a_speed_loop_reaches_its_target_and_the_library_sees_what_is_true() {
+    let world = World::new(7);
+    let (keys, handles, mut robot) = two_wheels(&world);
+    let targets = [rpm(100.0), rpm(-300.0)];
+    run(&world, &mut robot, 500, |bus, _| {
+        for (handle, target) in handles.into_iter().zip(targets) {
+            let _disarmed = bus.set_velocity(handle, target);
+        }
+    });
+    for ((key, handle), target) in keys.into_iter().zip(handles).zip(targets) {
+        let truth = world.motor(key).unwrap();
+        assert!((truth.velocity / target - 1.0).abs() < 0.01, "{truth:?}");
+        let state = robot.device().state(handle).unwrap();
+        assert_eq!((state.link, state.ambiguous_gaps), (Link::Online, 0));
+        assert!((state.velocity - truth.velocity).abs() < rpm(1.0));
+        assert!((state.current - truth.current).abs().as_amperes() < 0.05);
+        // The last frame is a millisecond old at most: 8192 counts at 19.2 * 300 rpm are 787 a millisecond.
+        assert!(state.rotor_counts.abs_diff(truth.rotor_counts) < 1_000, "{state:?} {truth:?}");
+    }
+    let (statistics, traffic) = (robot.statistics(), world.traffic(Line::Can1));
+    assert_eq!((statistics.sent, statistics.refused), (traffic.sent, 0));
+    assert!((traffic.load() - 0.33).abs() < 0.05, "{traffic:?}"); // three frames a millisecond
+}
+
+#[test]
+fn a_silent_motor_gets_zero_and_the_other_goes_on() {
+    let world = World::new(8);
+    let (keys, handles, mut robot) = two_wheels(&world);
+    world.fault(Fault::Silent(keys[0]), at(300)..at(450)).unwrap();
+    let target = |bus: &mut Bus, _: Tick| {
+        for handle in handles {
+            let _refused = bus.set_velocity(handle, rpm(200.0));
+        }
+    };
+    run(&world, &mut robot, 299, target);
+    assert!(handles.iter().all(|handle| robot.device().link(*handle) == Some(Link::Online)));
+    run(&world, &mut robot, 15, target);
+    assert_eq!(world.motor(keys[0]).unwrap().command, 0); // late after 10 ms
+    run(&world, &mut robot, 100, target);
+    assert_eq!(robot.device().link(handles[0]), Some(Link::Offline));
+    let other = world.motor(keys[1]).unwrap().velocity;
+    assert!((other / rpm(200.0) - 1.0).abs() < 0.02, "{other:?}");
+}
+
+#[test]
+fn what_waits_in_the_mailboxes_at_bus_off_still_goes_out_afterwards() {
+    let world = World::new(9);
+    let (keys, handles, mut robot) = two_wheels(&world);
+    world.fault(Fault::Unplugged(Line::Can1), at(300)..at(900)).unwrap();
+    run(&world, &mut robot, 850, |bus, _| {
+        for handle in handles {
+            let _refused = bus.set_velocity(handle, rpm(200.0));
+        }
+    });
+    // The ESCs hold their last command, and three old frames wait: no call of embedded-can takes them back.
+    assert!(world.motor(keys[0]).unwrap().command != 0);
+    let before = world.traffic(Line::Can1).sent;
+    robot.device_mut().emergency_stop();
+    let mut commands = Vec::new();
+    for _ in 0..1_000 {
+        world.advance_with(Duration::from_micros(100), |record| {
+            if record.frame.header() == 0x200 {
+                commands.push(*record.frame.bytes());
+            }
+        });
+        robot.poll(16);
+        if let Some(tick) = robot.due() {
+            robot.tick(tick);
+        }
+    }
+    assert!(world.traffic(Line::Can1).sent > before + 3);
+    let stale = commands.iter().take_while(|data| **data != [0; 8]).count();
+    assert!((1..=3).contains(&stale), "{stale} frames from before the stop");
+    assert!(commands[stale..].iter().all(|data| *data == [0; 8]));
+    assert_eq!(world.motor(keys[0]).unwrap().command, 0);
+}
+
+#[test]
+fn two_runs_of_one_seed_are_the_same_to_the_last_bit() {
+    let story = || {
+        let world = World::new(11);
+        let (keys, handles, mut robot) = two_wheels(&world);
+        let line = Line::Can1;
+        world.fault(Fault::LostFrames { line, id: None, probability: 0.2 }, ..).unwrap();
+        run(&world, &mut robot, 300, |bus, tick| {
+            let wave = (tick.now().as_micros() / 1_000 % 200) as f32;
+            for handle in handles {
+                let _refused = bus.set_velocity(handle, rpm(wave));
+            }
+        });
+        let truth = keys.map(|key| world.motor(key).unwrap());
+        (
+            truth.map(|motor| (motor.rotor_counts, motor.velocity.as_rad_per_s().to_bits())),
+            robot.statistics(),
+        )
+    };
+    let (first, second) = (story(), story());
+    assert_eq!(first, second);
+    assert!(world_moved(first.0));
+}
+
+fn world_moved(truth: [(i64, u32); 2]) -> bool {
+    truth.iter().all(|(counts, _)| counts.abs() > 8192)
+}
