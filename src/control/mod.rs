@@ -2,11 +2,15 @@
 
 mod differentiator;
 mod error;
+mod filter;
 mod number;
 mod pid;
+mod shaping;
 mod step;
 
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::{ConfigError, ConfigFault};
+pub use filter::{Biquad, LowPass, Median, MovingAverage};
 pub use pid::{IncrementalPid, IncrementalPidConfig, Pid, PidConfig, Terms};
+pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;

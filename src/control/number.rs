@@ -23,9 +23,3 @@ pub(super) const fn finite(value: f32) -> f32 {
         f32::MAX.copysign(value)
     }
 }
-
-/// Returns `value` within ±`limit`, which the caller knows to be zero or more.
-#[inline]
-pub(super) const fn within(value: f32, limit: f32) -> f32 {
-    if value.abs() > limit { limit.copysign(value) } else { value }
-}

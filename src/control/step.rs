@@ -31,7 +31,8 @@ impl TimeStep {
     #[inline]
     pub const fn new(dt_s: f32, dt_max_s: f32) -> Self {
         let per_dt = 1.0 / dt_s;
-        if dt_s > 0.0 && dt_s <= f32::MAX && per_dt <= f32::MAX {
+        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity are none of it.
+        if per_dt.to_bits().wrapping_sub(1) < f32::MAX.to_bits() {
             if dt_s > dt_max_s {
                 return Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
             }

@@ -66,6 +66,14 @@ pub const fn wrap(x: f32, period: f32) -> f32 {
     if rest.abs() < 0.5 * period { rest } else { at_the_edge(rest, x, period) }
 }
 
+/// Returns what [`wrap`] does, or NaN where that needs a second look: half a period away, and past `f32`'s reach.
+#[inline]
+pub(crate) const fn near(x: f32, period: f32) -> f32 {
+    let turns = (x / period + ROUND) - ROUND;
+    let rest = x - turns * period;
+    if rest.abs() < 0.5 * period { rest } else { f32::NAN }
+}
+
 /// Returns the value in [0, `period`) that differs from `x` by whole periods.
 ///
 /// Errors, NaN, infinity and bad periods as in [`wrap`]. What rounding would put on `period`, such as a tiny negative

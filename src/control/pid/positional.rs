@@ -4,7 +4,7 @@ use super::config::{
     SLEW_LIMIT,
 };
 use crate::control::error::{ConfigError, not_negative};
-use crate::control::number::{finite, limited, within};
+use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 use crate::math;
 
@@ -151,7 +151,7 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.step_error_with_options(error, rate, step)
+        self.try_work(0.0, UNKNOWN, error, rate, step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -275,73 +275,99 @@ impl Pid {
 
     #[inline(never)]
     fn step_with_options(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let (error, travel) = self.error_and_travel(setpoint, measurement);
-        if let Some(output) = self.work::<false>(setpoint, error, travel * step.per_dt, step) {
-            self.measurement = measurement;
-            return output;
-        }
-        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
-            return self.reject();
-        }
-        let known = if self.config.derivative_on_error { self.error } else { self.measurement };
-        let travel = if known == UNKNOWN { 0.0 } else { travel };
-        self.measurement = measurement;
-        self.work_carefully(setpoint, finite(error), finite(travel * step.per_dt), step)
-    }
-
-    #[inline(never)]
-    fn step_error_with_options(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        if let Some(output) = self.work::<false>(0.0, error, rate, step) {
-            self.measurement = UNKNOWN;
-            return output;
-        }
-        if step.is_hold() || !error.is_finite() || !rate.is_finite() {
-            return self.reject();
-        }
-        self.measurement = UNKNOWN;
-        self.work_carefully(0.0, error, rate, step)
-    }
-
-    const fn reject(&mut self) -> f32 {
-        self.rejected = self.rejected.saturating_add(1);
-        self.output
-    }
-
-    #[inline]
-    fn error_and_travel(&self, setpoint: f32, measurement: f32) -> (f32, f32) {
-        let error = setpoint - measurement;
-        let travel = if self.has(DERIVATIVE_ON_ERROR) {
+        let mut error = setpoint - measurement;
+        let mut travel = if self.has(DERIVATIVE_ON_ERROR) {
             self.error - error
         } else {
             measurement - self.measurement
         };
         if self.has(CIRCLE) {
-            (math::wrap(error, self.config.period), math::wrap(travel, self.config.period))
-        } else {
-            (error, travel)
+            let period = self.config.period;
+            (error, travel) = (math::near(error, period), math::near(travel, period));
+        }
+        self.try_work(setpoint, measurement, error, travel * step.per_dt, step)
+    }
+
+    #[inline(never)]
+    fn try_work(
+        &mut self,
+        setpoint: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        match self.work::<false>(setpoint, error, rate, step) {
+            Some(output) => {
+                self.measurement = measurement;
+                output
+            }
+            None => self.work_carefully(setpoint, measurement, error, rate, step),
         }
     }
 
-    /// What happens seldom: the first call, a step that is frozen, values that overflow.
-    fn work_carefully(&mut self, setpoint: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let (mut rate, mut step) = (rate, *step);
+    /// What happens seldom: bad arguments, the first call, a step that is frozen, half a turn, values that overflow.
+    #[cold]
+    #[inline(never)]
+    fn work_carefully(
+        &mut self,
+        setpoint: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        // `step_error` passes no measurement, and an error and a rate that may be used as they are.
+        let formed = measurement == UNKNOWN;
+        let usable = if formed {
+            error.is_finite() && rate.is_finite()
+        } else {
+            setpoint.is_finite() && measurement.is_finite()
+        };
+        if step.is_hold() || !usable {
+            self.rejected = self.rejected.saturating_add(1);
+            return self.output;
+        }
+        let (mut error, mut rate, mut step) = (error, rate, *step);
+        if !formed {
+            (error, rate) = self.error_and_rate(setpoint, measurement, &step);
+        }
+        self.measurement = measurement;
         if step.is_frozen() {
             (rate, step.half_dt_s) = (self.rate, 0.0);
         }
         if self.track_output {
-            self.track_output = false;
-            let mut others = *self;
-            (others.setpoint, others.error, others.rate) =
-                (setpoint, error, self.filtered(rate, &step));
-            let Terms { p, d, feed_forward, .. } = others.terms();
-            if self.config.ki > 0.0 {
-                self.integral = finite(self.output - finite(p + d + feed_forward));
-            }
+            self.take_over(setpoint, error, self.filtered(rate, &step));
         }
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
         self.work::<true>(setpoint, error, rate, &step).unwrap_or(self.output)
+    }
+
+    /// Error and rate by way of sums that are finite and angles that are exact.
+    fn error_and_rate(&self, setpoint: f32, measurement: f32, step: &TimeStep) -> (f32, f32) {
+        let shortest = |way: f32| {
+            finite(if self.has(CIRCLE) { math::wrap(way, self.config.period) } else { way })
+        };
+        let error = shortest(setpoint - measurement);
+        let (known, travel) = if self.has(DERIVATIVE_ON_ERROR) {
+            (self.error, self.error - error)
+        } else {
+            (self.measurement, measurement - self.measurement)
+        };
+        let rate = if known == UNKNOWN { 0.0 } else { finite(shortest(travel) * step.per_dt) };
+        (error, rate)
+    }
+
+    /// Lets the integral make up what the other terms lack to the output that was set.
+    fn take_over(&mut self, setpoint: f32, error: f32, rate: f32) {
+        let next = Self { setpoint, error, rate, ..*self };
+        let Terms { p, d, feed_forward, .. } = next.terms();
+        self.track_output = false;
+        if self.config.ki > 0.0 {
+            self.integral = finite(self.output - finite(p + d + feed_forward));
+        }
     }
 
     /// The whole controller. Unless `CAREFUL`, `None` says that something was not finite, and nothing has changed.
@@ -373,22 +399,22 @@ impl Pid {
             others = finite(others + self.feed_forward(setpoint));
         }
         let limit = config.integral_limit;
-        let mut integral = within(finite(self.integral + growth), limit);
+        let mut integral = limited(finite(self.integral + growth), -limit, limit);
         let wanted = others + integral;
         if !CAREFUL && !passes(wanted + evidence + rate, gate(f32::MAX)) {
             return None;
         }
         let mut output = wanted;
         if self.has(SLEW_LIMIT) {
-            output =
-                self.output + within(finite(wanted - self.output), config.slew_per_s * step.dt_s);
+            let reach = config.slew_per_s * step.dt_s;
+            output = limited(output, self.output - reach, self.output + reach);
         }
         output = limited(output, config.output_lower, config.output_upper);
         let excess = wanted - output;
         if excess != 0.0 {
             if config.tracking_time_s > 0.0 {
-                let part = (step.dt_s / config.tracking_time_s).min(1.0);
-                integral = within(finite(integral - finite(excess) * part), limit);
+                let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
+                integral = limited(finite(integral - finite(excess) * part), -limit, limit);
             } else if excess * growth > 0.0 && !config.wind_up {
                 integral = self.integral;
             }

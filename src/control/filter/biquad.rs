@@ -1,0 +1,223 @@
+use crate::control::error::{ConfigError, ConfigFault, check, positive};
+use crate::math;
+
+/// A second-order filter for samples at a fixed rate: low-pass or notch.
+///
+/// ```text
+/// y = (b0 x + b1 x1 + b2 x2 - a1 y1 - a2 y2) / a0
+/// w = 2 pi f / sample_hz,   alpha = sin(w) / (2 q)
+/// low-pass: b0 = b2 = (1 - cos w)/2, b1 = 1 - cos w    notch: b0 = b2 = 1, b1 = -2 cos w
+/// both:     a0 = 1 + alpha, a1 = -2 cos w, a2 = 1 - alpha
+/// ```
+/// Computed in the transposed direct form II. Source: Bristow-Johnson, "Cookbook formulae for audio equalizer biquad
+/// filter coefficients".
+///
+/// Rounding grows as the cut-off falls: at a thousandth of the sample rate it reaches 0.2 % of the signal. Below that use
+/// a [`LowPass`](super::LowPass), or filter every tenth sample.
+///
+/// # Edge behaviour
+/// The first sample is the first output, at rest. A sample that is NaN or infinite, or so large that the sum overflows: the
+/// last output is returned, the state stays and [`rejected`](Self::rejected) grows.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::Biquad;
+///
+/// // A belt that rings at 35 Hz, in a loop of 1 kHz.
+/// const BELT: Biquad = match Biquad::notch(35.0, 2.0, 1000.0) {
+///     Ok(filter) => filter,
+///     Err(_) => panic!("notch"),
+/// };
+/// let mut filter = BELT;
+/// assert_eq!(filter.update(4.0), 4.0);
+/// assert!((filter.update(4.0) - 4.0).abs() < 1e-5); // a constant passes
+/// assert!(Biquad::low_pass(500.0, 0.707, 1000.0).is_err()); // at half the sample rate
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Biquad {
+    b0: f32,
+    b1: f32,
+    b2: f32,
+    a1: f32,
+    a2: f32,
+    s1: f32,
+    s2: f32,
+    value: f32,
+    rejected: u16,
+    started: bool,
+}
+
+impl Biquad {
+    /// The quality of a Butterworth low-pass: flat in the pass band, 71 % (-3 dB) at the cut-off.
+    pub const BUTTERWORTH: f32 = core::f32::consts::FRAC_1_SQRT_2;
+
+    /// Lets through what is below `cutoff_hz`. A `q` of [`BUTTERWORTH`](Self::BUTTERWORTH) is flat; a larger one peaks.
+    ///
+    /// # Errors
+    /// Names `cutoff`, `q` or `sample_hz` when NaN, infinite, zero or negative; `cutoff` when not below half of `sample_hz`.
+    pub const fn low_pass(cutoff_hz: f32, q: f32, sample_hz: f32) -> Result<Self, ConfigError> {
+        check!(check_all("cutoff", cutoff_hz, q, sample_hz));
+        let (sine, cosine) = math::sin_cos(core::f32::consts::TAU * (cutoff_hz / sample_hz));
+        let mut filter = Self::normalized(0.0, 0.0, sine / (2.0 * q), cosine);
+        // (1 - cos w) / a0, from the rounded a1 and a2: so a constant passes unchanged at low cut-offs too.
+        let rise = 0.5 * ((1.0 + filter.a1) + filter.a2);
+        (filter.b0, filter.b1, filter.b2) = (0.5 * rise, rise, 0.5 * rise);
+        Ok(filter)
+    }
+
+    /// Takes out a narrow band about `center_hz`, `center_hz / q` wide at -3 dB.
+    ///
+    /// # Errors
+    /// Names `center`, `q` or `sample_hz` when NaN, infinite, zero or negative; `center` when not below half of `sample_hz`.
+    pub const fn notch(center_hz: f32, q: f32, sample_hz: f32) -> Result<Self, ConfigError> {
+        check!(check_all("center", center_hz, q, sample_hz));
+        let (sine, cosine) = math::sin_cos(core::f32::consts::TAU * (center_hz / sample_hz));
+        Ok(Self::normalized(1.0, -2.0 * cosine, sine / (2.0 * q), cosine))
+    }
+
+    const fn normalized(b0: f32, b1: f32, alpha: f32, cosine: f32) -> Self {
+        let scale = 1.0 / (1.0 + alpha);
+        Self {
+            b0: b0 * scale,
+            b1: b1 * scale,
+            b2: b0 * scale,
+            a1: -2.0 * cosine * scale,
+            a2: (1.0 - alpha) * scale,
+            s1: 0.0,
+            s2: 0.0,
+            value: 0.0,
+            rejected: 0,
+            started: false,
+        }
+    }
+
+    /// Takes the next sample and returns the new value.
+    pub const fn update(&mut self, input: f32) -> f32 {
+        if !self.started && input.is_finite() {
+            self.reset_to(input);
+            return self.value;
+        }
+        let value = self.b0 * input + self.s1;
+        let s1 = self.b1 * input - self.a1 * value + self.s2;
+        let s2 = self.b2 * input - self.a2 * value;
+        if value.is_finite() && s1.is_finite() && s2.is_finite() {
+            (self.value, self.s1, self.s2) = (value, s1, s2);
+        } else {
+            self.rejected = self.rejected.saturating_add(1);
+        }
+        self.value
+    }
+
+    /// Forgets the past: the next sample is the first one.
+    pub const fn reset(&mut self) {
+        self.reset_to(0.0);
+        self.started = false;
+    }
+
+    /// Puts the filter at rest at `value`, as after a long constant input. NaN and infinity count as zero.
+    pub const fn reset_to(&mut self, value: f32) {
+        let value = if value.is_finite() { value } else { 0.0 };
+        self.value = value;
+        self.s2 = (self.b2 - self.a2) * value;
+        self.s1 = (self.b1 - self.a1) * value + self.s2;
+        self.started = true;
+    }
+
+    /// Returns the last output; zero before the first sample.
+    #[must_use]
+    pub const fn value(&self) -> f32 {
+        self.value
+    }
+
+    /// Returns the number of samples that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+}
+
+const fn check_all(
+    name: &'static str,
+    frequency_hz: f32,
+    q: f32,
+    sample_hz: f32,
+) -> Result<(), ConfigError> {
+    check!(positive(name, frequency_hz));
+    check!(positive("q", q));
+    check!(positive("sample_hz", sample_hz));
+    if frequency_hz >= 0.5 * sample_hz {
+        return Err(ConfigError::new(name, ConfigFault::Unstable));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+
+    /// The part of a sine of this frequency that passes, at 1 kHz.
+    fn gain_at(mut filter: Biquad, frequency_hz: f32) -> f32 {
+        let step = core::f32::consts::TAU * frequency_hz / 1000.0;
+        let power: f32 = (0..4000_u16)
+            .map(|sample| filter.update(math::sin_cos(step * f32::from(sample)).0))
+            .skip(2000)
+            .map(|value| value * value)
+            .sum();
+        (power / 1000.0).sqrt()
+    }
+
+    #[test]
+    fn low_pass_keeps_71_percent_at_the_cut_off_and_a_hundredth_a_decade_up() {
+        let filter = Biquad::low_pass(20.0, Biquad::BUTTERWORTH, 1000.0).unwrap();
+        assert!((gain_at(filter, 20.0) - 0.707).abs() < 0.005);
+        assert!((gain_at(filter, 2.0) - 1.0).abs() < 0.005);
+        assert!(gain_at(filter, 200.0) < 0.01);
+    }
+
+    #[test]
+    fn notch_takes_out_its_centre_only() {
+        let filter = Biquad::notch(50.0, 2.0, 1000.0).unwrap();
+        assert!(gain_at(filter, 50.0) < 0.01);
+        assert!(gain_at(filter, 5.0) > 0.99 && gain_at(filter, 300.0) > 0.98);
+    }
+
+    #[test]
+    fn a_constant_passes_from_the_first_sample() {
+        for frequency_hz in [1.0, 30.0, 499.0] {
+            let mut filter = Biquad::low_pass(frequency_hz, 0.707, 1000.0).unwrap();
+            for _ in 0..10_000 {
+                assert!((filter.update(100.0) - 100.0).abs() < 0.2);
+            }
+        }
+    }
+
+    #[test]
+    fn bad_samples_change_nothing_and_are_counted() {
+        let mut filter = Biquad::low_pass(20.0, 0.707, 1000.0).unwrap();
+        assert_eq!(filter.update(f32::NAN), 0.0);
+        filter.update(1.0);
+        filter.update(2.0);
+        let before = filter;
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(filter.update(bad), before.value());
+        }
+        assert_eq!((filter.rejected(), Biquad { rejected: 1, ..filter }), (4, before));
+        let mut notch = Biquad::notch(300.0, 0.3, 1000.0).unwrap();
+        for sample in [f32::MAX, f32::MIN, f32::MAX, 1.0, 2.0] {
+            assert!(notch.update(sample).is_finite());
+        }
+    }
+
+    #[test]
+    fn a_frequency_or_a_quality_that_cannot_be_is_named() {
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(Biquad::low_pass(bad, 0.7, 1000.0).unwrap_err().parameter(), "cutoff");
+            assert_eq!(Biquad::notch(bad, 0.7, 1000.0).unwrap_err().parameter(), "center");
+            assert_eq!(Biquad::notch(10.0, bad, 1000.0).unwrap_err().parameter(), "q");
+            assert_eq!(Biquad::notch(10.0, 1.0, bad).unwrap_err().parameter(), "sample_hz");
+        }
+        assert_eq!(Biquad::notch(500.0, 1.0, 1000.0).unwrap_err().fault(), ConfigFault::Unstable);
+    }
+}

@@ -1,0 +1,134 @@
+use crate::control::error::{ConfigError, check, positive};
+use crate::control::number::limited;
+use crate::control::pid::PidConfig;
+use crate::control::step::TimeStep;
+
+/// Bounds the rate at which a value rises and falls.
+///
+/// # Edge behaviour
+/// Starts from zero, or from what was given to [`reset_to`](Self::reset_to). `dt_s` zero, negative, NaN or infinite, or a target
+/// that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s (see
+/// [`with_max_step`](Self::with_max_step)) counts as that: a pause is no permission to jump.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::SlewLimiter;
+///
+/// let mut speed = SlewLimiter::new(2.0, 5.0)?; // up by 2, down by 5 a second
+/// assert_eq!(speed.update(1.0, 0.1), 0.2);
+/// assert_eq!(speed.update(-1.0, 0.1), -0.3);
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SlewLimiter {
+    up_per_s: f32,
+    down_per_s: f32,
+    max_step_s: f32,
+    value: f32,
+    rejected: u16,
+}
+
+impl SlewLimiter {
+    /// Takes the largest rise and the largest fall a second, both more than zero.
+    ///
+    /// # Errors
+    /// Names `up` or `down` when NaN, infinite, zero or negative.
+    pub const fn new(up_per_s: f32, down_per_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("up", up_per_s));
+        check!(positive("down", down_per_s));
+        let max_step_s = PidConfig::MAX_STEP_S;
+        Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rejected: 0 })
+    }
+
+    /// Sets the longest step in seconds that is believed.
+    ///
+    /// # Errors
+    /// Names `max_step` when NaN, infinite, zero or negative.
+    pub const fn with_max_step(self, max_step_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("max_step", max_step_s));
+        Ok(Self { max_step_s, ..self })
+    }
+
+    /// Steps by `dt_s` seconds towards `target` and returns the new value.
+    pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
+        let dt_s = TimeStep::new(dt_s, self.max_step_s).dt_s;
+        if dt_s > 0.0 && target.is_finite() {
+            let lowest = self.value - self.down_per_s * dt_s;
+            self.value = limited(target, lowest, self.value + self.up_per_s * dt_s);
+        } else {
+            self.rejected = self.rejected.saturating_add(1);
+        }
+        self.value
+    }
+
+    /// Puts the value at `value`. NaN and infinity count as zero.
+    pub const fn reset_to(&mut self, value: f32) {
+        self.value = if value.is_finite() { value } else { 0.0 };
+    }
+
+    /// Returns the last output.
+    #[must_use]
+    pub const fn value(&self) -> f32 {
+        self.value
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_long_pause_is_no_permission_to_jump() {
+        let mut limiter = SlewLimiter::new(1.0, 1.0).unwrap();
+        assert_eq!(limiter.update(100.0, 10.0), 0.1);
+        assert_eq!(limiter.with_max_step(2.0).unwrap().update(100.0, 10.0), 2.1);
+    }
+
+    #[test]
+    fn bad_targets_and_bad_times_change_nothing_and_are_counted() {
+        let mut limiter = SlewLimiter::new(1.0, 1.0).unwrap();
+        limiter.reset_to(0.5);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!((limiter.update(bad, 0.01), limiter.update(1.0, bad)), (0.5, 0.5));
+        }
+        assert_eq!((limiter.update(1.0, 0.0), limiter.update(1.0, -0.01)), (0.5, 0.5));
+        assert_eq!(limiter.rejected(), 8);
+    }
+
+    #[test]
+    fn a_rate_that_cannot_be_is_named() {
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(SlewLimiter::new(bad, 1.0).unwrap_err().parameter(), "up");
+            assert_eq!(SlewLimiter::new(1.0, bad).unwrap_err().parameter(), "down");
+            let limiter = SlewLimiter::new(1.0, 1.0).unwrap();
+            assert_eq!(limiter.with_max_step(bad).unwrap_err().parameter(), "max_step");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_value_goes_towards_the_target_and_never_past_it(
+            up in 1e-3_f32..1e3, down in 1e-3_f32..1e3, start in -100.0_f32..100.0, target in -100.0_f32..100.0,
+        ) {
+            let mut limiter = SlewLimiter::new(up, down).unwrap();
+            limiter.reset_to(start);
+            let mut last = start;
+            for _ in 0..50 {
+                let value = limiter.update(target, 0.01);
+                prop_assert!((target - value).abs() <= (target - last).abs());
+                prop_assert!(value - last <= up * 0.01 + 1e-5 && last - value <= down * 0.01 + 1e-5);
+                prop_assert!((value - target) * (start - target) >= 0.0);
+                last = value;
+            }
+        }
+    }
+}
