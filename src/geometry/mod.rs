@@ -17,9 +17,16 @@
 //! | item | what it is |
 //! |---|---|
 //! | [`Vec2`], [`Vec3`] | plain numbers along the axes, without a frame |
+//! | [`Point2`], [`Point3`] | a place in a frame |
 //! | [`Rotation2`], [`Heading`] | a turn in the plane; a heading keeps the angle too |
-//! | [`Twist`] | a velocity in the plane: two of translation, one of rotation |
+//! | [`Rotation3`], [`RollPitchYaw`] | a turn in space: unit quaternion; three angles |
+//! | [`Transform2`], [`Transform3`] | where one frame stands in another |
+//! | [`Pose2`], [`Pose3`] | position and direction in a frame |
+//! | [`Twist`], [`Arc`] | a velocity in the plane; the stretch it makes in a time |
 //! | [`Body`], [`World`], [`Gimbal`] | names of frames |
+//!
+//! A frame of your own is any type: `#[derive(Debug, PartialEq)] enum Camera {}`. The names cost nothing at run time.
+//! What they cannot see: two robots whose frames have the same name, and numbers of the wrong unit.
 //!
 //! The types catch a twist of the wrong frame:
 //!
@@ -29,12 +36,26 @@
 //! let sum = Twist::<Body>::new(1.0, 0.0, 0.0) + Twist::<World>::new(1.0, 0.0, 0.0);
 //! ```
 
+mod arc;
+mod error;
 mod frame;
+mod point;
+mod pose;
 mod rotation2;
+mod rotation3;
+mod transform2;
+mod transform3;
 mod twist;
 mod vector;
 
+pub use arc::Arc;
+pub use error::MatrixError;
 pub use frame::{Body, Gimbal, World};
+pub use point::{Point2, Point3};
+pub use pose::{Pose2, Pose3};
 pub use rotation2::{Heading, Rotation2};
+pub use rotation3::{RollPitchYaw, Rotation3};
+pub use transform2::Transform2;
+pub use transform3::Transform3;
 pub use twist::Twist;
 pub use vector::{Vec2, Vec3};

@@ -1,0 +1,132 @@
+use super::vector::copy;
+use super::{Heading, Point2, Point3, Rotation2, Rotation3, Transform2, Transform3, Vec2};
+use crate::math::wrap_pi;
+use crate::units::Angle;
+use core::marker::PhantomData;
+
+/// A position and a direction in the plane, in the frame `F`: what an odometry reports and a person reads.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{geometry::{Body, Point2, Pose2, World}, units::Angle};
+///
+/// let robot = Pose2::<World>::new(1.0, 2.0, Angle::from_degrees(90.0));
+/// let ahead = robot.to_transform::<Body>().apply(Point2::new(0.5, 0.0));
+/// assert!((ahead.x_m - 1.0).abs() < 1e-6 && (ahead.y_m - 2.5).abs() < 1e-6);
+/// ```
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
+pub struct Pose2<F> {
+    /// Position along x in m.
+    pub x_m: f32,
+    /// Position along y in m.
+    pub y_m: f32,
+    /// Direction of the body's x axis, counter-clockwise from the x axis of `F`.
+    pub angle: Angle,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    frame: PhantomData<F>,
+}
+
+copy!(Pose2<F>);
+
+impl<F> Pose2<F> {
+    /// At the origin, facing along x.
+    pub const ORIGIN: Self = Self::new(0.0, 0.0, Angle::ZERO);
+
+    /// Takes the position in m and the direction.
+    #[must_use]
+    pub const fn new(x_m: f32, y_m: f32, angle: Angle) -> Self {
+        Self { x_m, y_m, angle, frame: PhantomData }
+    }
+
+    /// Returns the position.
+    #[must_use]
+    pub const fn position(self) -> Point2<F> {
+        Point2::new(self.x_m, self.y_m)
+    }
+
+    /// Returns the direction with its sine and cosine.
+    #[must_use]
+    pub const fn heading(self) -> Heading {
+        Heading::new(self.angle)
+    }
+
+    /// Returns the transform from the frame that stands at this pose.
+    #[must_use]
+    pub const fn to_transform<Own>(self) -> Transform2<Own, F> {
+        Transform2::new(Rotation2::new(self.angle), Vec2::new(self.x_m, self.y_m))
+    }
+
+    /// Returns this pose as seen from another of the same frame; its angle is in -π..=π.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{geometry::{Body, Pose2, World}, units::Angle};
+    ///
+    /// let robot = Pose2::<World>::new(1.0, 1.0, Angle::from_degrees(90.0));
+    /// let goal = Pose2::<World>::new(1.0, 3.0, Angle::from_degrees(180.0));
+    /// let seen: Pose2<Body> = goal.relative_to(robot);
+    /// assert!((seen.x_m - 2.0).abs() < 1e-6 && seen.y_m.abs() < 1e-6); // 2 m ahead
+    /// assert!((seen.angle.as_degrees() - 90.0).abs() < 1e-4);
+    /// ```
+    #[must_use]
+    pub const fn relative_to<Own>(self, base: Self) -> Pose2<Own> {
+        let way = Vec2::new(self.x_m - base.x_m, self.y_m - base.y_m);
+        let seen = base.heading().rotation().inverse().apply(way);
+        let turn = wrap_pi(self.angle.as_radians() - base.angle.as_radians());
+        Pose2::new(seen.x, seen.y, Angle::from_radians(turn))
+    }
+}
+
+impl<F> Default for Pose2<F> {
+    fn default() -> Self {
+        Self::ORIGIN
+    }
+}
+
+/// A position and an orientation in space, in the frame `F`.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{geometry::{Body, Point3, Pose3, Rotation3, RollPitchYaw, World}, units::Angle};
+///
+/// // The first seed's camera: at (1, 2, 0.5), turned 90 degrees to the left.
+/// let yaw = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
+/// let camera = Pose3::<World>::new(Point3::new(1.0, 2.0, 0.5), yaw);
+/// let seen = camera.to_transform::<Body>().apply(Point3::new(0.0, 1.0, 0.0));
+/// assert!(seen.x_m.abs() < 1e-6 && (seen.y_m - 2.0).abs() < 1e-6 && (seen.z_m - 0.5).abs() < 1e-6);
+/// ```
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
+pub struct Pose3<F> {
+    /// Where the origin stands.
+    pub position: Point3<F>,
+    /// How the axes are turned against those of `F`.
+    pub rotation: Rotation3,
+}
+
+copy!(Pose3<F>);
+
+impl<F> Pose3<F> {
+    /// Takes position and orientation.
+    #[must_use]
+    pub const fn new(position: Point3<F>, rotation: Rotation3) -> Self {
+        Self { position, rotation }
+    }
+
+    /// Returns the transform from the frame that stands at this pose.
+    #[must_use]
+    pub const fn to_transform<Own>(self) -> Transform3<Own, F> {
+        Transform3::new(self.rotation, self.position.to_vec())
+    }
+
+    /// Returns this pose as seen from another of the same frame.
+    #[must_use]
+    pub fn relative_to<Own>(self, base: Self) -> Pose3<Own> {
+        let back = base.rotation.inverse();
+        let way = back.apply((self.position - base.position).to_vec());
+        Pose3::new(Point3::from_vec(way), back.compose(self.rotation))
+    }
+}

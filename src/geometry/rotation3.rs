@@ -1,0 +1,359 @@
+use super::error::TOLERANCE;
+use super::rotation2::angle_of;
+use super::{MatrixError, Vec3};
+use crate::math::{sin_cos, sqrt};
+use crate::units::Angle;
+
+/// A turn in space, kept as a unit quaternion; every composition brings its length back to 1.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{geometry::{RollPitchYaw, Rotation3, Vec3}, units::Angle};
+///
+/// let left = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
+/// let turned = left.apply(Vec3::new(1.0, 0.0, 0.0));
+/// assert!(turned.x.abs() < 1e-6 && (turned.y - 1.0).abs() < 1e-6);
+/// assert!((left.compose(left).roll_pitch_yaw().yaw.as_degrees().abs() - 180.0).abs() < 1e-4);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Rotation3 {
+    w: f32,
+    vector: Vec3,
+}
+
+/// A turn in space as three angles: yaw about z, then pitch about the new y, then roll about the new x (Rz Ry Rx).
+///
+/// Positive roll lowers the right side, positive pitch lowers the nose, positive yaw turns left.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RollPitchYaw {
+    /// About x.
+    pub roll: Angle,
+    /// About y. Read back, it is in -90..=90 degrees.
+    pub pitch: Angle,
+    /// About z.
+    pub yaw: Angle,
+}
+
+impl From<RollPitchYaw> for Rotation3 {
+    fn from(angles: RollPitchYaw) -> Self {
+        let half = |angle: Angle| sin_cos(0.5 * angle.as_radians());
+        let ((sr, cr), (sp, cp), (sy, cy)) =
+            (half(angles.roll), half(angles.pitch), half(angles.yaw));
+        Self {
+            w: cy * cp * cr + sy * sp * sr,
+            vector: Vec3::new(
+                cy * cp * sr - sy * sp * cr,
+                cy * sp * cr + sy * cp * sr,
+                sy * cp * cr - cy * sp * sr,
+            ),
+        }
+        .normalized()
+    }
+}
+
+impl Rotation3 {
+    /// No turn.
+    pub const IDENTITY: Self = Self { w: 1.0, vector: Vec3::ZERO };
+
+    /// Takes a quaternion of any length but zero; `w` is the real part.
+    ///
+    /// # Errors
+    /// [`MatrixError::NotFinite`] for NaN and infinity, [`MatrixError::NotRotation`] when the squared length is below
+    /// 1e-12 or above 1e12.
+    pub fn from_quaternion(w: f32, x: f32, y: f32, z: f32) -> Result<Self, MatrixError> {
+        let vector = Vec3::new(x, y, z);
+        if !(w.is_finite() && vector.is_finite()) {
+            return Err(MatrixError::NotFinite);
+        }
+        let square = w * w + vector.dot(vector);
+        if !(1e-12..=1e12).contains(&square) {
+            return Err(MatrixError::NotRotation);
+        }
+        let scale = 1.0 / sqrt(square);
+        Ok(Self { w: w * scale, vector: vector * scale })
+    }
+
+    /// Returns the quaternion as w, x, y, z with w the real part.
+    #[must_use]
+    pub const fn to_quaternion(self) -> [f32; 4] {
+        [self.w, self.vector.x, self.vector.y, self.vector.z]
+    }
+
+    /// Turns a vector.
+    #[must_use]
+    pub fn apply(self, vector: Vec3) -> Vec3 {
+        let twice = self.vector.cross(vector) * 2.0;
+        vector + twice * self.w + self.vector.cross(twice)
+    }
+
+    /// Returns the turn by `first`, then by `self`.
+    #[must_use]
+    pub fn compose(self, first: Self) -> Self {
+        let (a, b) = (self.vector, first.vector);
+        Self { w: self.w * first.w - a.dot(b), vector: b * self.w + a * first.w + a.cross(b) }
+            .normalized()
+    }
+
+    /// Returns the turn back.
+    #[must_use]
+    pub const fn inverse(self) -> Self {
+        let Vec3 { x, y, z } = self.vector;
+        Self { w: self.w, vector: Vec3::new(-x, -y, -z) }
+    }
+
+    /// Returns the angle of the whole turn, in 0..=180 degrees.
+    #[must_use]
+    pub fn angle(self) -> Angle {
+        Angle::from_radians(2.0 * angle_of(self.vector.norm(), self.w.abs()))
+    }
+
+    /// Returns the turn that lies the fraction `t` of the shorter way from `self` to `other`, at constant speed.
+    ///
+    /// `t` = 0 gives `self`, 1 gives `other`. For half turns either way is the shorter one.
+    #[must_use]
+    pub fn interpolate(self, other: Self, t: f32) -> Self {
+        let way = self.inverse().compose(other);
+        let side = if way.w < 0.0 { -1.0 } else { 1.0 };
+        let length = way.vector.norm();
+        let half = angle_of(length, way.w * side);
+        let (sin, cos) = sin_cos(half * t);
+        // sin(half t) / sin(half), which is t where both vanish.
+        let share = if length < 1e-4 { t } else { sin / length };
+        self.compose(Self { w: cos, vector: way.vector * (side * share) })
+    }
+
+    /// Returns the three angles: pitch in -90..=90 degrees, the others in -180..=180.
+    ///
+    /// At a pitch of ±90 degrees (to 1e-5 rad) roll and yaw turn about the same axis; roll is then 0 and yaw takes all.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{geometry::{RollPitchYaw, Rotation3}, units::Angle};
+    ///
+    /// let degrees = Angle::from_degrees;
+    /// let nose_down = RollPitchYaw { roll: degrees(20.0), pitch: degrees(90.0), yaw: degrees(50.0) };
+    /// let read = Rotation3::from(nose_down).roll_pitch_yaw();
+    /// assert_eq!(read.roll, Angle::ZERO);
+    /// assert!((read.yaw.as_degrees() - 30.0).abs() < 1e-3); // 50 - 20
+    /// ```
+    #[must_use]
+    pub fn roll_pitch_yaw(self) -> RollPitchYaw {
+        let [[r00, r01, r02], [r10, r11, r12], [r20, _, _]] = self.to_matrix();
+        let level = sqrt(r00 * r00 + r10 * r10);
+        let pitch = angle_of(-r20, level);
+        let (roll, yaw) = if level < 1e-5 {
+            (0.0, angle_of(-r01, r11))
+        } else {
+            let yaw = angle_of(r10, r00);
+            let (sin, cos) = (r10 / level, r00 / level);
+            // Roll is what is left after yaw, so that errors of yaw near the lock cancel in the whole.
+            (angle_of(sin * r02 - cos * r12, cos * r11 - sin * r01), yaw)
+        };
+        let angle = Angle::from_radians;
+        RollPitchYaw { roll: angle(roll), pitch: angle(pitch), yaw: angle(yaw) }
+    }
+
+    /// Returns the rotation matrix, rows first.
+    #[must_use]
+    pub const fn to_matrix(self) -> [[f32; 3]; 3] {
+        let Self { w, vector: Vec3 { x, y, z } } = self;
+        let (x2, y2, z2) = (x + x, y + y, z + z);
+        let (xx, yy, zz) = (x * x2, y * y2, z * z2);
+        let (xy, xz, yz) = (x * y2, x * z2, y * z2);
+        let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+        [
+            [1.0 - (yy + zz), xy - wz, xz + wy],
+            [xy + wz, 1.0 - (xx + zz), yz - wx],
+            [xz - wy, yz + wx, 1.0 - (xx + yy)],
+        ]
+    }
+
+    /// Takes a rotation matrix, rows first.
+    ///
+    /// # Errors
+    /// [`MatrixError`] when a number is not finite, or the rows are not perpendicular and of length 1 (to 1e-3) or
+    /// mirror.
+    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, MatrixError> {
+        if !matrix.as_flattened().iter().all(|number| number.is_finite()) {
+            return Err(MatrixError::NotFinite);
+        }
+        let [x, y, z] = matrix.map(|[a, b, c]| Vec3::new(a, b, c));
+        // The third row is the cross product of the others exactly when nothing is skewed, scaled or mirrored.
+        let third = x.cross(y) - z;
+        let lengths = [x.dot(x) - 1.0, y.dot(y) - 1.0, x.dot(y), third.norm()];
+        if lengths.iter().any(|error| error.abs() > 2.0 * TOLERANCE) {
+            return Err(MatrixError::NotRotation);
+        }
+        Ok(Self::from_rows(matrix))
+    }
+
+    /// Divides by the largest of w, x, y, z (Shepperd), so that nothing cancels. The rows are trusted.
+    pub(super) fn from_rows(matrix: [[f32; 3]; 3]) -> Self {
+        let [[r00, r01, r02], [r10, r11, r12], [r20, r21, r22]] = matrix;
+        let (w, x, y, z) = if r00 + r11 + r22 > 0.0 {
+            (1.0 + r00 + r11 + r22, r21 - r12, r02 - r20, r10 - r01)
+        } else if r00 >= r11 && r00 >= r22 {
+            (r21 - r12, 1.0 + r00 - r11 - r22, r01 + r10, r02 + r20)
+        } else if r11 >= r22 {
+            (r02 - r20, r01 + r10, 1.0 - r00 + r11 - r22, r12 + r21)
+        } else {
+            (r10 - r01, r02 + r20, r12 + r21, 1.0 - r00 - r11 + r22)
+        };
+        let scale = 1.0 / sqrt(w * w + x * x + y * y + z * z);
+        Self { w: w * scale, vector: Vec3::new(x, y, z) * scale }
+    }
+
+    /// One Newton step of 1/sqrt at 1: an error e of the length becomes 1.5 e^2.
+    fn normalized(self) -> Self {
+        let scale = 1.5 - 0.5 * (self.w * self.w + self.vector.dot(self.vector));
+        Self { w: self.w * scale, vector: self.vector * scale }
+    }
+}
+
+impl Default for Rotation3 {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn turn(roll: f32, pitch: f32, yaw: f32) -> Rotation3 {
+        let angle = Angle::from_degrees;
+        Rotation3::from(RollPitchYaw { roll: angle(roll), pitch: angle(pitch), yaw: angle(yaw) })
+    }
+
+    fn close(a: Vec3, b: Vec3) {
+        assert!((a - b).norm() < 1e-6, "{a:?}, expected {b:?}");
+    }
+
+    const FORWARD: Vec3 = Vec3::new(1.0, 0.0, 0.0);
+    const LEFT: Vec3 = Vec3::new(0.0, 1.0, 0.0);
+    const UP: Vec3 = Vec3::new(0.0, 0.0, 1.0);
+
+    #[test]
+    fn yaw_turns_forward_to_left_pitch_to_down_and_roll_left_to_up() {
+        close(turn(0.0, 0.0, 90.0).apply(FORWARD), LEFT);
+        close(turn(0.0, 0.0, -90.0).apply(FORWARD), -LEFT);
+        close(turn(0.0, 90.0, 0.0).apply(FORWARD), -UP);
+        close(turn(0.0, -90.0, 0.0).apply(FORWARD), UP);
+        close(turn(90.0, 0.0, 0.0).apply(LEFT), UP);
+        close(turn(-90.0, 0.0, 0.0).apply(LEFT), -UP);
+    }
+
+    #[test]
+    fn the_order_is_roll_first_then_pitch_then_yaw() {
+        let stepwise =
+            turn(0.0, 0.0, 30.0).compose(turn(0.0, 40.0, 0.0)).compose(turn(50.0, 0.0, 0.0));
+        close(stepwise.apply(LEFT), turn(50.0, 40.0, 30.0).apply(LEFT));
+    }
+
+    #[test]
+    fn at_gimbal_lock_roll_is_zero_and_the_turn_is_the_same() {
+        for pitch in [90.0, -90.0] {
+            let locked = turn(-35.0, pitch, 20.0);
+            let read = locked.roll_pitch_yaw();
+            assert_eq!(read.roll, Angle::ZERO);
+            assert!((read.pitch.as_degrees() - pitch).abs() < 0.03, "{read:?}");
+            let again = Rotation3::from(read);
+            assert!(again.inverse().compose(locked).angle().as_radians() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn half_turns_about_each_axis_survive_the_matrix() {
+        for half in [turn(180.0, 0.0, 0.0), turn(0.0, 180.0, 0.0), turn(0.0, 0.0, 180.0)] {
+            let again = Rotation3::from_matrix(half.to_matrix()).unwrap();
+            assert!(again.inverse().compose(half).angle().as_radians() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn matrices_and_quaternions_that_are_no_rotation_are_refused() {
+        let mirror = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
+        assert_eq!(Rotation3::from_matrix(mirror), Err(MatrixError::NotRotation));
+        let scaled = [[1.01, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.01]];
+        assert_eq!(Rotation3::from_matrix(scaled), Err(MatrixError::NotRotation));
+        let nan = [[f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(Rotation3::from_matrix(nan), Err(MatrixError::NotFinite));
+        assert_eq!(Rotation3::from_quaternion(0.0, 0.0, 0.0, 0.0), Err(MatrixError::NotRotation));
+        assert_eq!(
+            Rotation3::from_quaternion(0.0, f32::NAN, 0.0, 0.0),
+            Err(MatrixError::NotFinite)
+        );
+        let long = Rotation3::from_quaternion(2.0, 0.0, 0.0, 2.0).unwrap(); // F63: normalised
+        close(long.apply(FORWARD), LEFT);
+    }
+
+    #[test]
+    fn a_million_compositions_keep_length_and_angle() {
+        let step = turn(0.0, 0.0, 0.05);
+        let mut whole = Rotation3::IDENTITY;
+        for _ in 0..1_000_000 {
+            whole = step.compose(whole);
+        }
+        let length = sqrt(whole.w * whole.w + whole.vector.dot(whole.vector));
+        assert!((length - 1.0).abs() < 2e-7, "{length}");
+        // What the step really turns, in f64: its rounding would otherwise be counted a million times.
+        let each = 2.0 * f64::from(step.vector.z).atan2(f64::from(step.w));
+        let expected = (each * 1e6).rem_euclid(core::f64::consts::TAU);
+        let is = f64::from(whole.roll_pitch_yaw().yaw.as_radians());
+        let error = (is - expected).rem_euclid(core::f64::consts::TAU);
+        let error = error.min(core::f64::consts::TAU - error);
+        assert!(error < 1e-4, "{error}");
+    }
+
+    fn rotations() -> impl Strategy<Value = Rotation3> {
+        (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0)
+            .prop_filter_map("too short", |(w, x, y, z)| {
+                Rotation3::from_quaternion(w, x, y, z).ok()
+            })
+    }
+
+    fn vectors() -> impl Strategy<Value = Vec3> {
+        (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0).prop_map(|(x, y, z)| Vec3::new(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn angles_and_back_is_the_same_turn(turn in rotations(), vector in vectors()) {
+            let again = Rotation3::from(turn.roll_pitch_yaw());
+            prop_assert!((again.apply(vector) - turn.apply(vector)).norm() < 5e-6);
+        }
+
+        #[test]
+        fn matrix_and_back_is_the_same_turn(turn in rotations(), vector in vectors()) {
+            let again = Rotation3::from_matrix(turn.to_matrix()).unwrap();
+            prop_assert!((again.apply(vector) - turn.apply(vector)).norm() < 2e-6);
+        }
+
+        #[test]
+        fn turning_back_undoes_turning(turn in rotations(), vector in vectors()) {
+            prop_assert!((turn.inverse().apply(turn.apply(vector)) - vector).norm() < 2e-6);
+        }
+
+        #[test]
+        fn composition_is_one_turn_after_the_other(
+            a in rotations(), b in rotations(), vector in vectors()
+        ) {
+            let error = a.compose(b).apply(vector) - a.apply(b.apply(vector));
+            prop_assert!(error.norm() < 2e-6);
+        }
+
+        #[test]
+        fn half_way_twice_is_the_whole_way(a in rotations(), b in rotations()) {
+            let half = a.interpolate(b, 0.5);
+            let there = a.inverse().compose(half).angle().as_radians();
+            let rest = half.inverse().compose(b).angle().as_radians();
+            prop_assert!((there - rest).abs() < 2e-3, "{there} {rest}");
+            prop_assert!(there < core::f32::consts::FRAC_PI_2 + 2e-3);
+        }
+    }
+}

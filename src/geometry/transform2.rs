@@ -1,0 +1,289 @@
+use super::error::TOLERANCE;
+use super::vector::copy;
+use super::{Arc, MatrixError, Point2, Pose2, Rotation2, Vec2};
+use core::marker::PhantomData;
+
+/// Where the frame `From` stands in the frame `To`; applied to a point in `From` it gives the point in `To`.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{geometry::{Body, Point2, Rotation2, Transform2, Vec2}, units::Angle};
+///
+/// #[derive(Debug, PartialEq)]
+/// enum Sensor {}
+///
+/// // The first seed's example: a sensor at (0.2, 0.1), turned 45 degrees to the left, sees a point 0.5 m ahead.
+/// let turn = Rotation2::new(Angle::from_degrees(45.0));
+/// let sensor_to_body = Transform2::<Sensor, Body>::new(turn, Vec2::new(0.2, 0.1));
+/// let point: Point2<Body> = sensor_to_body.apply(Point2::new(0.5, 0.0));
+/// assert!((point.x_m - 0.553_553_4).abs() < 1e-6 && (point.y_m - 0.453_553_4).abs() < 1e-6);
+/// ```
+///
+/// A point of another frame is refused:
+/// ```compile_fail
+/// use drivetrain::geometry::{Body, Gimbal, Point2, Transform2, World};
+///
+/// let body_to_world = Transform2::<Body, World>::IDENTITY;
+/// body_to_world.apply(Point2::<Gimbal>::new(0.5, 0.0));
+/// ```
+///
+/// and so is a chain whose links do not meet:
+/// ```compile_fail
+/// use drivetrain::geometry::{Body, Gimbal, Transform2, World};
+///
+/// Transform2::<Body, World>::IDENTITY.compose(Transform2::<Body, Gimbal>::IDENTITY);
+/// ```
+#[derive(Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
+pub struct Transform2<From, To> {
+    rotation: Rotation2,
+    translation_m: Vec2,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    frames: PhantomData<(From, To)>,
+}
+
+copy!(Transform2<From, To>);
+
+impl<From, To> Transform2<From, To> {
+    /// Both frames in the same place.
+    pub const IDENTITY: Self = Self::new(Rotation2::IDENTITY, Vec2::ZERO);
+
+    /// Takes the turn of `From` against `To`, and where the origin of `From` stands in `To` in m.
+    #[must_use]
+    pub const fn new(rotation: Rotation2, translation_m: Vec2) -> Self {
+        Self { rotation, translation_m, frames: PhantomData }
+    }
+
+    /// Returns the turn of `From` against `To`.
+    #[must_use]
+    pub const fn rotation(self) -> Rotation2 {
+        self.rotation
+    }
+
+    /// Returns where the origin of `From` stands in `To`, in m.
+    #[must_use]
+    pub const fn translation_m(self) -> Vec2 {
+        self.translation_m
+    }
+
+    /// Returns the point of `From` as seen in `To`.
+    #[must_use]
+    #[inline]
+    pub const fn apply(self, point: Point2<From>) -> Point2<To> {
+        let turned = self.rotation.apply(point.to_vec());
+        Point2::new(turned.x + self.translation_m.x, turned.y + self.translation_m.y)
+    }
+
+    /// Returns the transform that goes through `first` and then through `self`.
+    ///
+    /// Rounding adds up as in [`Rotation2`]; call [`normalized`](Self::normalized) once in some thousand.
+    #[must_use]
+    #[inline]
+    pub const fn compose<Start>(self, first: Transform2<Start, From>) -> Transform2<Start, To> {
+        let turned = self.rotation.apply(first.translation_m);
+        Transform2::new(
+            self.rotation.compose(first.rotation),
+            Vec2::new(turned.x + self.translation_m.x, turned.y + self.translation_m.y),
+        )
+    }
+
+    /// Returns the transform back.
+    #[must_use]
+    #[inline]
+    pub const fn inverse(self) -> Transform2<To, From> {
+        let back = self.rotation.inverse();
+        let origin = back.apply(self.translation_m);
+        Transform2::new(back, Vec2::new(-origin.x, -origin.y))
+    }
+
+    /// Returns where `From` stands as seen from `base`, both given in `To`.
+    #[must_use]
+    pub const fn relative_to<Base>(self, base: Transform2<Base, To>) -> Transform2<From, Base> {
+        base.inverse().compose(self)
+    }
+
+    /// Returns the transform with its rotation brought back to length 1.
+    #[must_use]
+    pub const fn normalized(self) -> Self {
+        Self::new(self.rotation.normalized(), self.translation_m)
+    }
+
+    /// Returns the transform at the fraction `t` of the way to `other`: the origin on the straight line, the turn evenly
+    /// by the shorter way. For the way along a constant twist, scale the [`log`](Self::log) of the relative transform.
+    #[must_use]
+    pub fn interpolate(self, other: Self, t: f32) -> Self {
+        let way = other.translation_m - self.translation_m;
+        Self::new(self.rotation.interpolate(other.rotation, t), self.translation_m + way * t)
+    }
+
+    /// Returns where a body stands after the stretch, seen from where it started: the exponential.
+    #[must_use]
+    pub const fn exp(arc: Arc) -> Self {
+        let (line, turn) = arc.chord();
+        Self::new(turn, line)
+    }
+
+    /// Returns the stretch at constant twist that leads here, turning by at most half a revolution: the logarithm.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::geometry::{Arc, Body, Transform2, World};
+    ///
+    /// let arc = Arc::new(1.0, -0.2, 0.7);
+    /// let back = Transform2::<Body, World>::exp(arc).log();
+    /// assert!((back.x_m - 1.0).abs() < 1e-6 && (back.y_m + 0.2).abs() < 1e-6);
+    /// assert!((back.theta_rad - 0.7).abs() < 1e-6);
+    /// ```
+    #[must_use]
+    pub fn log(self) -> Arc {
+        Arc::over_chord(self.translation_m, self.rotation.angle().as_radians())
+    }
+
+    /// Returns the same place as position and angle in `To`.
+    #[must_use]
+    pub fn to_pose(self) -> Pose2<To> {
+        Pose2::new(self.translation_m.x, self.translation_m.y, self.rotation.angle())
+    }
+
+    /// Returns the homogeneous matrix, rows first.
+    #[must_use]
+    pub const fn to_matrix(self) -> [[f32; 3]; 3] {
+        let (cos, sin) = (self.rotation.cos(), self.rotation.sin());
+        [[cos, -sin, self.translation_m.x], [sin, cos, self.translation_m.y], [0.0, 0.0, 1.0]]
+    }
+
+    /// Takes a homogeneous matrix, rows first.
+    ///
+    /// # Errors
+    /// [`MatrixError`] when a number is not finite, the upper left 2x2 is no rotation (to 1e-3) or the last row is not
+    /// 0, 0, 1.
+    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, MatrixError> {
+        let [[a, b, x], [c, d, y], last] = matrix;
+        if !matrix.as_flattened().iter().all(|number| number.is_finite()) {
+            return Err(MatrixError::NotFinite);
+        }
+        let near = |is: f32, should: f32| (is - should).abs() <= TOLERANCE;
+        if !(near(a, d) && near(b, -c) && near(a * a + c * c, 1.0)) {
+            return Err(MatrixError::NotRotation);
+        }
+        if !last.iter().zip([0.0, 0.0, 1.0]).all(|(&is, should)| near(is, should)) {
+            return Err(MatrixError::NotHomogeneous);
+        }
+        let rotation = Rotation2::from_parts(0.5 * (a + d), 0.5 * (c - b)).normalized();
+        Ok(Self::new(rotation, Vec2::new(x, y)))
+    }
+}
+
+impl<From, To> Default for Transform2<From, To> {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Body, World};
+    use crate::units::Angle;
+    use proptest::prelude::*;
+
+    type BodyToWorld = Transform2<Body, World>;
+
+    fn at(x: f32, y: f32, angle: f32) -> BodyToWorld {
+        Transform2::new(Rotation2::new(Angle::from_radians(angle)), Vec2::new(x, y))
+    }
+
+    fn difference(a: BodyToWorld, b: BodyToWorld) -> f32 {
+        let mut worst = 0.0_f32;
+        for (left, right) in a.to_matrix().as_flattened().iter().zip(b.to_matrix().as_flattened()) {
+            worst = worst.max((left - right).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn a_quarter_turn_then_a_step_composes_in_that_order() {
+        // Copy and compose in the first seed's system shared one matrix.
+        let turn = at(0.0, 0.0, core::f32::consts::FRAC_PI_2);
+        let step = Transform2::<Body, Body>::new(Rotation2::IDENTITY, Vec2::new(1.0, 0.0));
+        let ahead = turn.compose(step).apply(Point2::ORIGIN);
+        assert!(ahead.x_m.abs() < 1e-6 && (ahead.y_m - 1.0).abs() < 1e-6, "{ahead:?}");
+        let copy = turn;
+        assert_eq!(copy, turn);
+    }
+
+    #[test]
+    fn a_quarter_of_a_circle_ends_beside_its_centre() {
+        let quarter = core::f32::consts::FRAC_PI_2;
+        let end = BodyToWorld::exp(Arc::new(quarter, 0.0, quarter)); // radius 1, to the left
+        assert!(difference(end, at(1.0, 1.0, quarter)) < 1e-6, "{end:?}");
+        let end = BodyToWorld::exp(Arc::new(quarter, 0.0, -quarter));
+        assert!(difference(end, at(1.0, -1.0, -quarter)) < 1e-6, "{end:?}");
+    }
+
+    #[test]
+    fn a_tiny_turn_keeps_its_sideways_way() {
+        let (line, _) = Arc::new(1.0, 0.0, 1e-5).chord();
+        assert!((line.y - 5e-6).abs() < 1e-11, "1 - cos(theta) would cancel: {}", line.y);
+    }
+
+    #[test]
+    fn matrices_that_are_no_transform_are_refused() {
+        let matrix = at(1.0, 2.0, 0.5).to_matrix();
+        let with = |row: usize, column: usize, value: f32| {
+            let mut changed = matrix;
+            changed[row][column] = value;
+            BodyToWorld::from_matrix(changed)
+        };
+        assert_eq!(with(0, 2, f32::NAN), Err(MatrixError::NotFinite));
+        assert_eq!(with(0, 0, -0.5), Err(MatrixError::NotRotation));
+        assert_eq!(with(2, 2, 2.0), Err(MatrixError::NotHomogeneous));
+        assert!(
+            BodyToWorld::from_matrix(matrix).is_ok_and(|t| difference(t, at(1.0, 2.0, 0.5)) < 1e-6)
+        );
+    }
+
+    fn transforms() -> impl Strategy<Value = BodyToWorld> {
+        (-10.0_f32..10.0, -10.0_f32..10.0, -7.0_f32..7.0).prop_map(|(x, y, a)| at(x, y, a))
+    }
+
+    fn loops() -> impl Strategy<Value = Transform2<Body, Body>> {
+        transforms().prop_map(|t| Transform2::new(t.rotation(), t.translation_m()))
+    }
+
+    proptest! {
+        #[test]
+        fn a_transform_after_its_inverse_changes_nothing(t in transforms()) {
+            let nothing = t.inverse().compose(t);
+            prop_assert!(nothing.translation_m().norm() < 1e-5);
+            prop_assert!(nothing.rotation().angle().as_radians().abs() < 1e-6);
+        }
+
+        #[test]
+        fn composition_is_associative(a in transforms(), b in loops(), c in loops()) {
+            let error = difference(a.compose(b).compose(c), a.compose(b.compose(c)));
+            prop_assert!(error < 2e-5, "{error}");
+        }
+
+        #[test]
+        fn the_inverse_of_a_chain_is_the_reversed_chain(a in transforms(), b in loops()) {
+            let whole = a.compose(b).inverse();
+            let parts = b.inverse().compose(a.inverse());
+            prop_assert!((whole.translation_m() - parts.translation_m()).norm() < 2e-5);
+        }
+
+        #[test]
+        fn exp_undoes_log(x in -5.0_f32..5.0, y in -5.0_f32..5.0, theta in -3.0_f32..3.0) {
+            let error = BodyToWorld::exp(Arc::new(x, y, theta)).log() - Arc::new(x, y, theta);
+            prop_assert!(error.x_m.abs() < 1e-5 && error.y_m.abs() < 1e-5, "{error:?}");
+            prop_assert!(error.theta_rad.abs() < 1e-6, "{error:?}");
+        }
+
+        #[test]
+        fn a_relative_pose_leads_from_the_base_to_the_pose(a in transforms(), b in transforms()) {
+            let seen: Transform2<Body, Body> = a.relative_to(b);
+            prop_assert!(difference(b.compose(seen), a) < 2e-5);
+        }
+    }
+}
