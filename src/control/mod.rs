@@ -1,5 +1,6 @@
 //! Controllers, filters and profiles: `f32`, no heap, the time as an argument.
 
+mod actuator;
 mod differentiator;
 mod error;
 mod filter;
@@ -8,6 +9,7 @@ mod pid;
 mod shaping;
 mod step;
 
+pub use actuator::{PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig};
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::{ConfigError, ConfigFault};
 pub use filter::{Biquad, LowPass, Median, MovingAverage};
