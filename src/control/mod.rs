@@ -8,6 +8,7 @@ mod number;
 mod pid;
 mod shaping;
 mod step;
+mod tuning;
 
 pub use actuator::{PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig};
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
@@ -16,3 +17,6 @@ pub use filter::{Biquad, LowPass, Median, MovingAverage};
 pub use pid::{IncrementalPid, IncrementalPidConfig, Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
+pub use tuning::{
+    Gains, Oscillation, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
+};
