@@ -111,7 +111,14 @@ impl Pid {
 
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
-        self.step(setpoint, measurement, &TimeStep::new(dt_s, self.config.max_step_s))
+        self.step(setpoint, measurement, &self.time_step(dt_s))
+    }
+
+    /// Validates `dt_s` against the longest step of this controller.
+    #[must_use]
+    #[inline]
+    pub const fn time_step(&self, dt_s: f32) -> TimeStep {
+        TimeStep::new(dt_s, self.config.max_step_s)
     }
 
     /// Steps by a time that was validated before, and returns the output.

@@ -1,0 +1,298 @@
+use super::speed::{SpeedActuator, SpeedActuatorConfig};
+use super::{optional_filter, restart, through};
+use crate::control::error::{ConfigError, ConfigFault, check};
+use crate::control::filter::LowPass;
+use crate::control::pid::{Pid, PidConfig};
+use crate::control::step::TimeStep;
+
+/// What a [`PositionActuator`] is made from: an angle loop over a speed loop, and options that are off until named.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
+///
+/// // Angle in degrees to speed in rad/s, at most 10 rad/s; speed to volts.
+/// let angle = PidConfig::new(0.2, 0.0, 0.0).with_output_limit(10.0).with_period(360.0);
+/// let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 5.0, 0.0).with_output_limit(24.0));
+/// let yaw = PositionActuatorConfig::new(angle, speed).with_outer_divider(5);
+/// assert!(PositionActuator::new(yaw).is_ok());
+/// assert_eq!(PositionActuator::new(yaw.with_outer_divider(0)).unwrap_err().parameter(), "outer_divider");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PositionActuatorConfig {
+    angle: PidConfig,
+    speed: SpeedActuatorConfig,
+    angle_cutoff_hz: Option<f32>,
+    outer_divider: u8,
+}
+
+impl PositionActuatorConfig {
+    /// Takes the angle loop, whose output is the setpoint of the speed loop, and the speed loop.
+    #[must_use]
+    pub const fn new(angle: PidConfig, speed: SpeedActuatorConfig) -> Self {
+        Self { angle, speed, angle_cutoff_hz: None, outer_divider: 1 }
+    }
+
+    /// Filters the measured angle with a first-order low-pass of this cut-off, more than zero. Off by default.
+    ///
+    /// Not for an angle that jumps at the end of a turn.
+    #[must_use]
+    pub const fn with_angle_filter(self, cutoff_hz: f32) -> Self {
+        Self { angle_cutoff_hz: Some(cutoff_hz), ..self }
+    }
+
+    /// Runs the angle loop on every `divider`-th step only, more than zero. The default is 1.
+    #[must_use]
+    pub const fn with_outer_divider(self, divider: u8) -> Self {
+        Self { outer_divider: divider, ..self }
+    }
+}
+
+/// An angle loop over a speed loop, with their filters.
+///
+/// # Edge behaviour
+/// That of the [`Pid`]: a bad time, setpoint, angle or speed changes nothing, the last output is returned and
+/// [`rejected`](Self::rejected) grows. With a divider, the angle loop runs on the first step and then on every n-th, with the
+/// time that has passed for it; a longest step of its own applies to that sum.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
+///
+/// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
+/// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 0.0, 0.0));
+/// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
+/// assert_eq!(arm.update(1.0, 0.0, 1.0, 0.001), 6.0); // 4 rad/s wanted, 1 rad/s measured
+/// assert_eq!(arm.speed_setpoint(), 4.0);
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PositionActuator {
+    filter: Option<LowPass>,
+    angle: Pid,
+    speed: SpeedActuator,
+    passed_s: f32,
+    rejected: u16,
+    outer_divider: u8,
+    until_outer: u8,
+}
+
+impl PositionActuator {
+    /// Takes and checks the configuration.
+    ///
+    /// # Errors
+    /// Names the parameter of a loop as [`Pid::new`] does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
+    /// is NaN, infinite, zero or negative, `outer_divider` when zero.
+    pub const fn new(config: PositionActuatorConfig) -> Result<Self, ConfigError> {
+        if config.outer_divider == 0 {
+            return Err(ConfigError::new("outer_divider", ConfigFault::NotPositive));
+        }
+        check!(config.angle.validate());
+        let filter = match optional_filter("angle_filter", config.angle_cutoff_hz) {
+            Ok(filter) => filter,
+            Err(error) => return Err(error),
+        };
+        let angle = match Pid::new(config.angle) {
+            Ok(pid) => pid,
+            Err(error) => return Err(error),
+        };
+        match SpeedActuator::new(config.speed) {
+            Ok(speed) => Ok(Self {
+                filter,
+                angle,
+                speed,
+                passed_s: 0.0,
+                rejected: 0,
+                outer_divider: config.outer_divider,
+                until_outer: 0,
+            }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Steps by `dt_s` seconds and returns the output.
+    pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
+        let step = self.speed.pid().time_step(dt_s);
+        if !(setpoint.is_finite() && angle.is_finite() && speed.is_finite()) || step.is_hold() {
+            return self.reject();
+        }
+        let angle = through(&mut self.filter, angle, &step);
+        if let Some(outer) = self.outer_step(dt_s) {
+            self.angle.step(setpoint, angle, &outer);
+        }
+        self.speed.step(self.angle.output(), speed, &step)
+    }
+
+    /// Steps with an angle error that was formed elsewhere (from integers, on a circle): the measured speed is its rate.
+    ///
+    /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right. The angle filter does not apply.
+    pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
+        let step = self.speed.pid().time_step(dt_s);
+        if !(error.is_finite() && speed.is_finite()) || step.is_hold() {
+            return self.reject();
+        }
+        if let Some(outer) = self.outer_step(dt_s) {
+            self.angle.step_error(error, speed, &outer);
+        }
+        self.speed.step(self.angle.output(), speed, &step)
+    }
+
+    /// Forgets everything but the configuration and the count of rejected steps.
+    pub const fn reset(&mut self) {
+        restart(&mut self.filter);
+        self.angle.reset();
+        self.speed.reset();
+        (self.passed_s, self.until_outer) = (0.0, 0);
+    }
+
+    /// Returns the last output.
+    #[must_use]
+    pub const fn output(&self) -> f32 {
+        self.speed.output()
+    }
+
+    /// Returns the last output of the angle loop.
+    #[must_use]
+    pub const fn speed_setpoint(&self) -> f32 {
+        self.angle.output()
+    }
+
+    /// Returns the angle loop, for its terms and its configuration.
+    #[must_use]
+    pub const fn angle_pid(&self) -> &Pid {
+        &self.angle
+    }
+
+    /// Returns the angle loop, for changing its gains.
+    pub const fn angle_pid_mut(&mut self) -> &mut Pid {
+        &mut self.angle
+    }
+
+    /// Returns the speed loop with its filters.
+    #[must_use]
+    pub const fn speed(&self) -> &SpeedActuator {
+        &self.speed
+    }
+
+    /// Returns the speed loop with its filters, for changing its gains.
+    pub const fn speed_mut(&mut self) -> &mut SpeedActuator {
+        &mut self.speed
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+
+    /// Returns the time for the angle loop when it is its turn.
+    fn outer_step(&mut self, dt_s: f32) -> Option<TimeStep> {
+        self.passed_s += dt_s;
+        if self.until_outer > 0 {
+            self.until_outer -= 1;
+            return None;
+        }
+        let outer = self.angle.time_step(self.passed_s);
+        (self.passed_s, self.until_outer) = (0.0, self.outer_divider - 1);
+        Some(outer)
+    }
+
+    const fn reject(&mut self) -> f32 {
+        self.rejected = self.rejected.saturating_add(1);
+        self.output()
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+
+    const DT_S: f32 = 0.001;
+
+    fn config() -> PositionActuatorConfig {
+        PositionActuatorConfig::new(
+            PidConfig::new(10.0, 1.0, 0.1).with_output_limit(4.0),
+            SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)),
+        )
+    }
+
+    #[test]
+    fn it_brings_an_inertia_to_its_angle_in_both_directions() {
+        for target in [1.0, -1.0] {
+            let mut actuator = PositionActuator::new(config().with_outer_divider(2)).unwrap();
+            let (mut angle, mut speed) = (0.0_f32, 0.0_f32);
+            let mut fastest = 0.0_f32;
+            for _ in 0..3000 {
+                speed += actuator.update(target, angle, speed, DT_S) * 20.0 * DT_S;
+                angle += speed * DT_S;
+                fastest = fastest.max(speed.abs());
+            }
+            assert!((angle - target).abs() < 0.02, "{angle}");
+            assert!(fastest < 4.4, "{fastest}"); // the limit of the angle loop
+        }
+    }
+
+    #[test]
+    fn the_angle_loop_runs_on_every_nth_step_with_its_own_time() {
+        let only_integral = PositionActuatorConfig::new(
+            PidConfig::new(0.0, 1.0, 0.0),
+            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0)),
+        );
+        let mut actuator = PositionActuator::new(only_integral.with_outer_divider(5)).unwrap();
+        let mut changes = 0;
+        let mut last = 0.0;
+        for _ in 0..=100 {
+            actuator.update(1.0, 0.0, 0.0, DT_S);
+            changes += u32::from(actuator.speed_setpoint() != last);
+            last = actuator.speed_setpoint();
+        }
+        assert_eq!(changes, 20);
+        assert!((last - 0.1).abs() < 1e-5, "{last}"); // 100 ms of 1
+    }
+
+    #[test]
+    fn bad_samples_and_bad_times_leave_no_trace() {
+        let config = config().with_angle_filter(50.0).with_outer_divider(3);
+        let (mut clean, mut hit) =
+            (PositionActuator::new(config).unwrap(), PositionActuator::new(config).unwrap());
+        for sample in 0..20_u8 {
+            let angle = f32::from(sample) * 0.1;
+            let expected = clean.update(3.0, angle, 1.0, DT_S);
+            let held = hit.output();
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                assert_eq!(hit.update(bad, angle, 1.0, DT_S), held);
+                assert_eq!(hit.update(3.0, bad, 1.0, DT_S), held);
+                assert_eq!(hit.update(3.0, angle, bad, DT_S), held);
+                assert_eq!(hit.update(3.0, angle, 1.0, bad), held);
+                assert_eq!(hit.update_error(bad, 1.0, DT_S), held);
+            }
+            assert_eq!(hit.update(3.0, angle, 1.0, DT_S), expected);
+        }
+        assert_eq!((hit.rejected(), PositionActuator { rejected: 0, ..hit }), (300, clean));
+    }
+
+    #[test]
+    fn a_positive_kd_of_the_angle_loop_damps_by_way_of_the_error_too() {
+        let damper = PositionActuatorConfig::new(
+            PidConfig::new(0.0, 0.0, 1.0),
+            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0)),
+        );
+        let mut actuator = PositionActuator::new(damper).unwrap();
+        assert!(actuator.update_error(0.0, 2.0, DT_S) < 0.0);
+        assert!(actuator.update_error(0.0, -2.0, DT_S) > 0.0);
+    }
+
+    #[test]
+    fn reset_forgets() {
+        let mut actuator = PositionActuator::new(config()).unwrap();
+        for _ in 0..10 {
+            actuator.update(1.0, 0.0, 0.0, DT_S);
+        }
+        actuator.reset();
+        assert_eq!(actuator, PositionActuator::new(config()).unwrap());
+    }
+}

@@ -1,0 +1,220 @@
+use super::{optional_filter, restart, through};
+use crate::control::error::{ConfigError, check};
+use crate::control::filter::LowPass;
+use crate::control::pid::{Pid, PidConfig};
+use crate::control::step::TimeStep;
+
+/// What a [`SpeedActuator`] is made from: a speed loop, and filters that are off until named.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
+///
+/// let wheel = SpeedActuatorConfig::new(PidConfig::new(0.1, 0.5, 0.0).with_output_limit(20.0))
+///     .with_feedback_filter(100.0)
+///     .with_output_filter(0.0);
+/// assert_eq!(SpeedActuator::new(wheel).unwrap_err().parameter(), "output_filter");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SpeedActuatorConfig {
+    pid: PidConfig,
+    feedback_cutoff_hz: Option<f32>,
+    output_cutoff_hz: Option<f32>,
+}
+
+impl SpeedActuatorConfig {
+    /// Takes the speed loop.
+    #[must_use]
+    pub const fn new(pid: PidConfig) -> Self {
+        Self { pid, feedback_cutoff_hz: None, output_cutoff_hz: None }
+    }
+
+    /// Filters the measured speed with a first-order low-pass of this cut-off, more than zero. Off by default.
+    #[must_use]
+    pub const fn with_feedback_filter(self, cutoff_hz: f32) -> Self {
+        Self { feedback_cutoff_hz: Some(cutoff_hz), ..self }
+    }
+
+    /// Filters the output with a first-order low-pass of this cut-off, more than zero. Off by default.
+    #[must_use]
+    pub const fn with_output_filter(self, cutoff_hz: f32) -> Self {
+        Self { output_cutoff_hz: Some(cutoff_hz), ..self }
+    }
+}
+
+/// A speed loop with its filters: speed, low-pass, [`Pid`], low-pass, output.
+///
+/// # Edge behaviour
+/// That of the [`Pid`]: a bad time, setpoint or speed changes nothing, the last output is returned and
+/// [`rejected`](Self::rejected) grows. The output is within the limits of the loop.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
+///
+/// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(PidConfig::new(0.1, 0.5, 0.0)))?;
+/// assert_eq!(wheel.update(40.0, 10.0, 0.001), 3.0);
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SpeedActuator {
+    feedback: Option<LowPass>,
+    pid: Pid,
+    filter: Option<LowPass>,
+    output: f32,
+}
+
+impl SpeedActuator {
+    /// Takes and checks the configuration.
+    ///
+    /// # Errors
+    /// Names the parameter of the loop as [`Pid::new`] does, or `feedback_filter` or `output_filter` when the cut-off is NaN,
+    /// infinite, zero or negative.
+    pub const fn new(config: SpeedActuatorConfig) -> Result<Self, ConfigError> {
+        check!(config.pid.validate());
+        let feedback = match optional_filter("feedback_filter", config.feedback_cutoff_hz) {
+            Ok(filter) => filter,
+            Err(error) => return Err(error),
+        };
+        let filter = match optional_filter("output_filter", config.output_cutoff_hz) {
+            Ok(filter) => filter,
+            Err(error) => return Err(error),
+        };
+        match Pid::new(config.pid) {
+            Ok(pid) => Ok(Self { feedback, pid, filter, output: 0.0 }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Steps by `dt_s` seconds and returns the output.
+    pub fn update(&mut self, setpoint: f32, speed: f32, dt_s: f32) -> f32 {
+        let step = self.pid.time_step(dt_s);
+        self.step(setpoint, speed, &step)
+    }
+
+    /// Steps by a time that was validated before, and returns the output.
+    pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
+        let refused = self.pid.rejected();
+        let usable = !step.is_hold() && setpoint.is_finite() && speed.is_finite();
+        let speed = if usable { through(&mut self.feedback, speed, step) } else { speed };
+        let wanted = self.pid.step(setpoint, speed, step);
+        if usable && self.pid.rejected() == refused {
+            self.output = through(&mut self.filter, wanted, step);
+        }
+        self.output
+    }
+
+    /// Forgets everything but the configuration and the count of rejected steps.
+    pub const fn reset(&mut self) {
+        restart(&mut self.feedback);
+        restart(&mut self.filter);
+        self.pid.reset();
+        self.output = 0.0;
+    }
+
+    /// Resets, and lets the first call return `output` as [`Pid::reset_to`] does.
+    pub fn reset_to(&mut self, output: f32) {
+        self.reset();
+        self.pid.reset_to(output);
+        self.output = self.pid.output();
+    }
+
+    /// Returns the last output.
+    #[must_use]
+    pub const fn output(&self) -> f32 {
+        self.output
+    }
+
+    /// Returns the loop, for its terms and its configuration.
+    #[must_use]
+    pub const fn pid(&self) -> &Pid {
+        &self.pid
+    }
+
+    /// Returns the loop, for changing its gains.
+    pub const fn pid_mut(&mut self) -> &mut Pid {
+        &mut self.pid
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.pid.rejected()
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+
+    const DT_S: f32 = 0.001;
+
+    fn filtered() -> SpeedActuatorConfig {
+        SpeedActuatorConfig::new(PidConfig::new(1.0, 2.0, 0.0).with_output_limit(5.0))
+            .with_feedback_filter(50.0)
+            .with_output_filter(50.0)
+    }
+
+    #[test]
+    fn without_filters_it_is_its_pid() {
+        let config = PidConfig::new(1.0, 2.0, 0.01).with_output_limit(5.0);
+        let mut actuator = SpeedActuator::new(SpeedActuatorConfig::new(config)).unwrap();
+        let mut pid = Pid::new(config).unwrap();
+        for sample in 0..50_u8 {
+            let speed = f32::from(sample) * 0.1;
+            assert_eq!(actuator.update(3.0, speed, DT_S), pid.update(3.0, speed, DT_S));
+        }
+    }
+
+    #[test]
+    fn both_filters_smooth() {
+        let mut actuator = SpeedActuator::new(filtered()).unwrap();
+        assert_eq!(actuator.update(0.0, 0.0, DT_S), 0.0);
+        let first = actuator.update(4.0, 0.0, DT_S);
+        assert!(first > 0.5 && first < 1.5, "{first}"); // a quarter of the step after dt / (dt + T)
+        let before = actuator.output();
+        assert!((actuator.update(4.0, 1.0, DT_S) - before).abs() < 1.0);
+    }
+
+    #[test]
+    fn bad_samples_and_bad_times_leave_no_trace() {
+        let (mut clean, mut hit) =
+            (SpeedActuator::new(filtered()).unwrap(), SpeedActuator::new(filtered()).unwrap());
+        for sample in 0..20_u8 {
+            let speed = f32::from(sample) * 0.1;
+            let expected = clean.update(3.0, speed, DT_S);
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let held = hit.output();
+                assert_eq!(hit.update(3.0, bad, DT_S), held);
+                assert_eq!(hit.update(bad, speed, DT_S), held);
+                assert_eq!(hit.update(3.0, speed, bad), held);
+            }
+            assert_eq!(hit.update(3.0, speed, DT_S), expected);
+        }
+        assert_eq!(hit.rejected(), 180);
+    }
+
+    #[test]
+    fn reset_to_takes_over_without_a_jump() {
+        let mut actuator = SpeedActuator::new(filtered()).unwrap();
+        actuator.update(1.0, 0.0, DT_S);
+        actuator.reset_to(2.0);
+        assert_eq!(actuator.output(), 2.0);
+        assert!((actuator.update(9.0, 8.0, DT_S) - 2.0).abs() < 1e-5);
+        actuator.reset();
+        assert_eq!(actuator.output(), 0.0);
+    }
+
+    #[test]
+    fn a_cut_off_that_cannot_be_is_named() {
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            let new = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+            let feedback = SpeedActuator::new(new.with_feedback_filter(bad)).unwrap_err();
+            assert_eq!(feedback.parameter(), "feedback_filter");
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Finding gains and judging them.
+//!
+//! 1. [`RelayTuner`] swings the plant with two output values and measures how it answers: an [`Oscillation`].
+//! 2. [`Oscillation::gains`] turns that into [`Gains`] by a [`TuningRule`] with a name and a source.
+//! 3. [`StepResponse`] measures what the loop with these gains does.
+
+mod relay;
+mod step_response;
+
+pub use relay::{Gains, Oscillation, RelayTuner, RelayTunerConfig, TuningRule};
+pub use step_response::{StepMeasures, StepResponse};

@@ -1,0 +1,214 @@
+use crate::control::error::{ConfigError, ConfigFault, check, positive};
+use crate::control::number::finite;
+use crate::control::step::TimeStep;
+
+/// How well a loop follows a step of its setpoint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct StepMeasures {
+    /// Seconds from 10 % to 90 % of the step; `None` when 90 % was not reached.
+    pub rise_time_s: Option<f32>,
+    /// How far the value went past the target, as a part of the step: 0.2 is 20 %. Never negative.
+    pub overshoot: f32,
+    /// Seconds after which the value stayed within the tolerance; `None` when it was outside at the end.
+    pub settling_time_s: Option<f32>,
+    /// Target minus value, averaged over the last tenth of the time, in units of the value.
+    pub steady_error: f32,
+}
+
+/// Measures the answer of a loop to a step, sample by sample, without storing it.
+///
+/// # Edge behaviour
+/// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. Samples after
+/// the end are left out.
+///
+/// # Examples
+/// A first-order lag of 0.1 s rises in `0.1 ln 9` = 0.22 s and settles to 2 % in `0.1 ln 50` = 0.39 s.
+/// ```
+/// use drivetrain::control::StepResponse;
+///
+/// let mut response = StepResponse::new(0.0, 5.0, 1.0, 0.02)?;
+/// let mut value = 0.0;
+/// while !response.is_complete() {
+///     value += (5.0 - value) * 0.001 / 0.1;
+///     response.record(value, 0.001);
+/// }
+/// let measures = response.measures();
+/// assert!((measures.rise_time_s.unwrap_or(0.0) - 0.22).abs() < 0.002);
+/// assert!((measures.settling_time_s.unwrap_or(0.0) - 0.39).abs() < 0.003);
+/// assert_eq!(measures.overshoot, 0.0);
+/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct StepResponse {
+    start: f32,
+    target: f32,
+    duration_s: f32,
+    tolerance: f32,
+    passed_s: f32,
+    tenth_at_s: Option<f32>,
+    nine_tenths_at_s: Option<f32>,
+    outside_until_s: f32,
+    inside: bool,
+    peak: f32,
+    late_error: f32,
+    late_samples: u32,
+    rejected: u16,
+}
+
+impl StepResponse {
+    /// Takes the value before the step, the new setpoint, how long to measure, and the tolerance as a part of the step (0.02 is the custom).
+    ///
+    /// # Errors
+    /// Names `target` when it is the start, or one of them is NaN or infinite; `duration` or `tolerance` when NaN, infinite, zero or
+    /// negative.
+    pub const fn new(
+        start: f32,
+        target: f32,
+        duration_s: f32,
+        tolerance: f32,
+    ) -> Result<Self, ConfigError> {
+        if !(target - start).is_finite() || target - start == 0.0 {
+            return Err(ConfigError::new("target", ConfigFault::NotFinite));
+        }
+        check!(positive("duration", duration_s));
+        check!(positive("tolerance", tolerance));
+        Ok(Self {
+            start,
+            target,
+            duration_s,
+            tolerance,
+            passed_s: 0.0,
+            tenth_at_s: None,
+            nine_tenths_at_s: None,
+            outside_until_s: 0.0,
+            inside: false,
+            peak: 0.0,
+            late_error: 0.0,
+            late_samples: 0,
+            rejected: 0,
+        })
+    }
+
+    /// Takes the value `dt_s` seconds after the one before; the first, `dt_s` after the step.
+    pub fn record(&mut self, value: f32, dt_s: f32) {
+        if self.is_complete() {
+            return;
+        }
+        if TimeStep::new(dt_s, f32::MAX).is_hold() || !value.is_finite() {
+            self.rejected = self.rejected.saturating_add(1);
+            return;
+        }
+        self.passed_s += dt_s;
+        let part = finite((value - self.start) / (self.target - self.start));
+        if part >= 0.1 && self.tenth_at_s.is_none() {
+            self.tenth_at_s = Some(self.passed_s);
+        }
+        if part >= 0.9 && self.nine_tenths_at_s.is_none() {
+            self.nine_tenths_at_s = Some(self.passed_s);
+        }
+        if part > self.peak {
+            self.peak = part;
+        }
+        self.inside = (part - 1.0).abs() <= self.tolerance;
+        if !self.inside {
+            self.outside_until_s = self.passed_s;
+        }
+        if self.passed_s >= 0.9 * self.duration_s {
+            self.late_samples = self.late_samples.saturating_add(1);
+            let weight = 1.0 / self.late_samples as f32;
+            let error = finite(self.target - value);
+            self.late_error = finite(self.late_error + weight * finite(error - self.late_error));
+        }
+    }
+
+    /// Tells whether the time is over.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.passed_s >= self.duration_s
+    }
+
+    /// Returns the measures of what was recorded so far.
+    #[must_use]
+    pub fn measures(&self) -> StepMeasures {
+        let rise_time_s = match (self.tenth_at_s, self.nine_tenths_at_s) {
+            (Some(tenth), Some(nine_tenths)) => Some(nine_tenths - tenth),
+            _ => None,
+        };
+        StepMeasures {
+            rise_time_s,
+            overshoot: if self.peak > 1.0 { self.peak - 1.0 } else { 0.0 },
+            settling_time_s: if self.inside { Some(self.outside_until_s) } else { None },
+            steady_error: self.late_error,
+        }
+    }
+
+    /// Returns the number of samples that were left out; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+
+    /// The step response of `w² / (s² + 2 z w s + w²)` with w = 10 rad/s, scaled.
+    fn second_order(damping: f32, start: f32, target: f32) -> StepMeasures {
+        let mut response = StepResponse::new(start, target, 5.0, 0.02).unwrap();
+        let (mut position, mut rate) = (0.0_f32, 0.0_f32);
+        while !response.is_complete() {
+            rate += (100.0 * (1.0 - position) - 20.0 * damping * rate) * 1e-4;
+            position += rate * 1e-4;
+            response.record(start + (target - start) * position, 1e-4);
+        }
+        response.measures()
+    }
+
+    #[test]
+    fn overshoot_is_that_of_the_textbook_up_and_down() {
+        // exp(-pi z / sqrt(1 - z²)): 16.3 % for z = 0.5.
+        for (start, target) in [(0.0, 1.0), (3.0, -2.0)] {
+            let measures = second_order(0.5, start, target);
+            assert!((measures.overshoot - 0.163).abs() < 0.003, "{measures:?}");
+            assert!((measures.settling_time_s.unwrap() - 0.81).abs() < 0.03, "{measures:?}");
+            assert!(measures.steady_error.abs() < 1e-3);
+        }
+        assert_eq!(second_order(1.0, 0.0, 1.0).overshoot, 0.0);
+    }
+
+    #[test]
+    fn a_loop_that_stays_short_neither_rises_nor_settles() {
+        let mut response = StepResponse::new(0.0, 10.0, 1.0, 0.02).unwrap();
+        for _ in 0..1001 {
+            response.record(8.0, 0.001);
+        }
+        let measures = response.measures();
+        assert_eq!((measures.rise_time_s, measures.settling_time_s), (None, None));
+        assert!(response.is_complete() && (measures.steady_error - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn bad_samples_are_left_out_and_counted() {
+        let mut response = StepResponse::new(0.0, 1.0, 1.0, 0.02).unwrap();
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            response.record(bad, 0.001);
+            response.record(1.0, bad);
+        }
+        response.record(1.0, 0.0);
+        let untouched = StepResponse::new(0.0, 1.0, 1.0, 0.02).unwrap();
+        assert_eq!((response.rejected(), StepResponse { rejected: 0, ..response }), (7, untouched));
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_named() {
+        assert_eq!(StepResponse::new(1.0, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");
+        assert_eq!(StepResponse::new(f32::NAN, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");
+        assert_eq!(StepResponse::new(0.0, 1.0, 0.0, 0.02).unwrap_err().parameter(), "duration");
+        assert_eq!(StepResponse::new(0.0, 1.0, 1.0, -1.0).unwrap_err().parameter(), "tolerance");
+    }
+}
