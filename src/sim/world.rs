@@ -50,6 +50,14 @@ impl World {
         self
     }
 
+    /// Gives the controller of one bus an acceptance filter: a standard data frame passes when `id & mask` is the
+    /// same for both, and nothing else passes. A mask of 0 lets everything through.
+    #[must_use]
+    pub fn with_filter(self, line: Line, id: u16, mask: u16) -> Self {
+        self.with(|engine| engine.wire_mut(line).set_filter(id, mask));
+        self
+    }
+
     /// Puts a motor on a bus. Two with the same id are possible, as in reality.
     ///
     /// # Errors
