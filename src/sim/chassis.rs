@@ -102,6 +102,7 @@ impl ChassisConfig {
 /// The chassis starts at the origin, facing along the world's x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ChassisState {
     /// Along the world's x axis, in m.
     pub x_m: f64,
