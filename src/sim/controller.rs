@@ -216,7 +216,7 @@ mod tests {
     use super::*;
     use crate::sim::{Record, Sender};
     use crate::time::{Duration, Instant};
-    use embedded_can::nb::Can as _;
+    use embedded_can::{Frame as _, nb::Can as _};
     use std::vec::Vec;
 
     fn frame(id: u16, tag: u8) -> CanFrame {
@@ -323,6 +323,22 @@ mod tests {
         assert_eq!(can.receive(), Err(nb::Error::WouldBlock));
         let traffic = world.traffic(Line::Can1);
         assert_eq!((traffic.heard, traffic.overruns), (3, 2));
+    }
+
+    #[test]
+    fn a_filter_keeps_out_other_ids_and_other_kinds_of_frame() {
+        let world = World::new(1).with_filter(Line::Can1, 0x200, 0x7F8);
+        let extended = embedded_can::ExtendedId::new(0x201).unwrap();
+        let remote = CanFrame::new_remote(frame(0x201, 0).id(), 8).unwrap();
+        for frame in
+            [frame(0x208, 0), CanFrame::new(extended, &[]).unwrap(), remote, frame(0x207, 1)]
+        {
+            world.inject(Line::Can1, frame).unwrap();
+        }
+        run(&world, 1_000);
+        assert_eq!(world.controller().receive(), Ok(frame(0x207, 1)));
+        assert_eq!(world.controller().receive(), Err(nb::Error::WouldBlock));
+        assert_eq!(world.traffic(Line::Can1).heard, 1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use super::chassis::{Chassis, FORWARD};
+use super::chassis::Chassis;
 use super::esc::Esc;
 use super::fault::Faults;
 use super::line::{Line, Record, Sender, Wire};
@@ -178,13 +178,13 @@ impl Engine {
         let mut ground_nm = [0.0; MotorKey::CAPACITY];
         let Some(chassis) = &mut self.chassis else { return ground_nm };
         let mut wheels = [(0.0, 1.0); 4];
-        for ((wheel, key), forward) in wheels.iter_mut().zip(chassis.wheels).zip(FORWARD) {
+        for (wheel, (key, forward)) in wheels.iter_mut().zip(chassis.mounted()) {
             if let Some(Some(esc)) = self.escs.get(usize::from(key.0)) {
                 *wheel = (forward * esc.rotor.velocity(), esc.rotor.inertia());
             }
         }
         let torques = chassis.body.step(wheels, STEP_S);
-        for ((torque, key), forward) in torques.into_iter().zip(chassis.wheels).zip(FORWARD) {
+        for (torque, (key, forward)) in torques.into_iter().zip(chassis.mounted()) {
             if let Some(sum) = ground_nm.get_mut(usize::from(key.0)) {
                 *sum += forward * torque;
             }

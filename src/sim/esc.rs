@@ -6,8 +6,6 @@ use crate::dji::{Facts, Unit};
 use crate::frame::CanFrame;
 use crate::units::{AngularVelocity, Current};
 
-/// Nominal time between two feedback frames.
-const PERIOD_NS: u64 = 1_000_000;
 /// The longest time that the ESC's firmware is late with a frame. An estimate.
 const JITTER_NS: u32 = 10_000;
 /// A seeded clock is at most this far off, in millionths: a common crystal. An estimate.
@@ -56,9 +54,11 @@ impl Esc {
         let (command_frame, slot) = facts.place(config.id)?;
         let mut random = Random::new(seed, 2 * index + 1);
         let angle = random.below(8192);
-        let phase = random.below(1_000_000);
+        let period_ns = config.period.as_micros() * 1_000;
+        let phase = random.below(u32::try_from(period_ns).unwrap_or(u32::MAX));
         let ppm = i64::from(random.below(2 * CLOCK_PPM + 1)) - i64::from(CLOCK_PPM);
         let ppm = config.clock_ppm.map_or(ppm, i64::from);
+        let too_long_ns = ppm * i64::from(config.period.micros_u32().unwrap_or(u32::MAX)) / 1_000;
         let angle = config.rotor_angle.or(u16::try_from(angle).ok()).unwrap_or(0);
         let mut esc = Self {
             config,
@@ -69,7 +69,7 @@ impl Esc {
             rotor: Rotor::new(&config, angle),
             mailboxes: Mailboxes::new(),
             random,
-            period_ns: PERIOD_NS.saturating_add_signed(ppm), // 1 ppm of 1 ms is 1 ns
+            period_ns: period_ns.saturating_add_signed(too_long_ns),
             grid_ns: now_ns + u64::from(phase),
             due_ns: 0,
             loss: None,
@@ -374,6 +374,21 @@ mod tests {
         }
         let elapsed = esc.due().unwrap() - first;
         assert!(elapsed.abs_diff(10_000 * 1_000_040) <= u64::from(JITTER_NS), "{elapsed}");
+    }
+
+    #[test]
+    fn the_rate_is_as_set_and_never_silly() {
+        for (micros, expected) in [(2_000, 2_000), (0, 100), (u64::MAX, 1_000_000)] {
+            let config = MotorConfig::new(Model::M3508, 1).with_clock_ppm(0);
+            let config = config.with_feedback_period(Duration::from_micros(micros));
+            let mut esc = Esc::new(config, 1, 0, 0).unwrap();
+            let first = esc.due().unwrap();
+            for _ in 0..100 {
+                let _frame = feedback(&mut esc);
+            }
+            let elapsed = esc.due().unwrap() - first;
+            assert!(elapsed.abs_diff(100 * expected * 1_000) <= u64::from(JITTER_NS));
+        }
     }
 
     #[test]

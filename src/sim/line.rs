@@ -47,6 +47,7 @@ pub enum Sender {
 /// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Record {
     /// When its last bit was over, in whole microseconds.
     pub at: Instant,
@@ -100,6 +101,7 @@ impl core::fmt::Display for Record {
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Traffic {
     /// Bits that passed.
     pub total_bits: u64,
@@ -113,7 +115,7 @@ pub struct Traffic {
     pub starved: u32,
     /// Frames of the controller that left it for good.
     pub sent: u32,
-    /// Frames that the controller heard.
+    /// Frames that the controller heard and its filter let through.
     pub heard: u32,
     /// Frames that the controller missed because its receive queue was full.
     pub overruns: u32,
@@ -171,6 +173,8 @@ pub(crate) struct Wire {
     pub(crate) mailboxes: Mailboxes,
     receive: Ring<CanFrame, RECEIVE_CAPACITY>,
     receive_depth: usize,
+    /// Id and mask of the standard data frames that the controller takes.
+    filter: (u16, u16),
     overrun: bool,
     pub(crate) foreign: Ring<CanFrame, 64>,
     flight: Option<Flight>,
@@ -187,6 +191,7 @@ impl Wire {
             mailboxes: Mailboxes::new(),
             receive: Ring::new(),
             receive_depth: RECEIVE_CAPACITY,
+            filter: (0, 0),
             overrun: false,
             foreign: Ring::new(),
             flight: None,
@@ -217,6 +222,17 @@ impl Wire {
 
     pub(crate) fn set_receive_depth(&mut self, depth: usize) {
         self.receive_depth = depth.clamp(1, RECEIVE_CAPACITY);
+    }
+
+    pub(crate) const fn set_filter(&mut self, id: u16, mask: u16) {
+        self.filter = (id, mask);
+    }
+
+    /// Tells whether the acceptance filter lets a frame through.
+    fn accepts(&self, frame: &CanFrame) -> bool {
+        let (id, mask) = self.filter;
+        // The header of anything but a standard data frame is above all ids.
+        mask == 0 || u16::try_from(frame.header()).is_ok_and(|header| header & mask == id & mask)
     }
 
     pub(crate) const fn traffic(&self, now_ns: u64) -> Traffic {
@@ -260,6 +276,9 @@ impl Wire {
 
     /// Gives a frame to the controller.
     pub(crate) fn hear(&mut self, frame: CanFrame) {
+        if !self.accepts(&frame) {
+            return;
+        }
         if self.receive.len() >= self.receive_depth || self.receive.push(frame).is_err() {
             self.traffic.overruns = self.traffic.overruns.saturating_add(1);
             self.overrun = true;

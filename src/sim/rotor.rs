@@ -203,6 +203,15 @@ mod tests {
     }
 
     #[test]
+    fn the_back_emf_that_follows_is_the_one_in_the_docs() {
+        let documented =
+            [(Model::M2006, 0.454), (Model::M3508, 0.475), (Model::Gm6020Voltage, 0.71)];
+        for (model, v_s_per_rad) in documented {
+            assert!((rotor(model).back_emf - v_s_per_rad).abs() < 6e-4, "{model:?}");
+        }
+    }
+
+    #[test]
     fn the_m3508_meets_its_rated_point() {
         let mut rotor = rotor(Model::M3508);
         rotor.load_nm = -3.0;

@@ -4,6 +4,7 @@ use super::{
     AttachError, ChassisConfig, ChassisState, Controller, Fault, FaultsFull, Line, MotorConfig,
     MotorKey, MotorState, Record, Traffic,
 };
+use crate::chassis::MecanumWheels;
 use crate::frame::CanFrame;
 use crate::time::{Clock, Duration, Instant};
 use core::cell::RefCell;
@@ -47,6 +48,14 @@ impl World {
     #[must_use]
     pub fn with_receive_depth(self, line: Line, frames: usize) -> Self {
         self.with(|engine| engine.wire_mut(line).set_receive_depth(frames));
+        self
+    }
+
+    /// Gives the controller of one bus an acceptance filter: a standard data frame passes when `id & mask` is the
+    /// same for both, and nothing else passes. A mask of 0 lets everything through.
+    #[must_use]
+    pub fn with_filter(self, line: Line, id: u16, mask: u16) -> Self {
+        self.with(|engine| engine.wire_mut(line).set_filter(id, mask));
         self
     }
 
@@ -136,14 +145,15 @@ impl World {
         self.with(|engine| engine.motor(motor))
     }
 
-    /// Puts four motors under a chassis; their shafts then carry it. A second one replaces the first.
+    /// Puts four motors under a chassis; their shafts then carry it. They may sit on both buses. A second chassis
+    /// replaces the first.
     ///
     /// # Errors
     /// Names the parameter that makes no sense.
     pub fn attach_chassis(
         &self,
         config: ChassisConfig,
-        wheels: [MotorKey; 4],
+        wheels: MecanumWheels<MotorKey>,
     ) -> Result<(), AttachError> {
         config.validate().map_err(AttachError::Chassis)?;
         let chassis = Chassis { body: config.body(), wheels };
