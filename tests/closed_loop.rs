@@ -187,11 +187,11 @@ fn lost_frames_at_speed_lose_no_turn() {
     }
 }
 
-/// Four wheels at speed; the first one falls silent for `silent` ms at 500 ms. Returns what the bus saw.
-fn silence(
-    silent: u64,
-    config: impl Fn(u8) -> Config<M3508>,
-) -> (Vec<(u64, [i16; 4])>, Vec<(u64, Link)>, bool) {
+/// What was sent (µs), how the first wheel was heard (ms), and whether it was armed in the end.
+type Silence = (Vec<(u64, [i16; 4])>, Vec<(u64, Link)>, bool);
+
+/// Four wheels at speed; the first one falls silent for `silent` ms at 500 ms.
+fn silence(silent: u64, config: impl Fn(u8) -> Config<M3508>) -> Silence {
     let world = World::new(4);
     let keys: Vec<MotorKey> =
         (1..=4).map(|id| world.attach(MotorConfig::new(SimModel::M3508, id)).unwrap()).collect();

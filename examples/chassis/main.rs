@@ -1,0 +1,85 @@
+//! A 20 kg mecanum robot on four M3508 drives a square and spins, on the simulator, through the public API.
+//!
+//! ```text
+//! cargo run --release --example chassis -- [--seconds S] [--output FILE.svg] [--csv FILE] [--candump FILE]
+//!                                          [--seed N] [--fault silent-motor|lost-frames|bus-off]
+//! ```
+
+mod log;
+mod options;
+mod plot;
+mod report;
+mod scenario;
+
+use log::Log;
+use options::{Options, Request};
+use scenario::Scenario;
+use std::error::Error;
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::time::Instant;
+
+fn main() -> ExitCode {
+    match Options::parse(std::env::args().skip(1)) {
+        Ok(Request::Run(options)) => match run(&options) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("chassis: {error}");
+                ExitCode::FAILURE
+            }
+        },
+        Ok(Request::Help) => {
+            println!("{}", options::USAGE);
+            ExitCode::SUCCESS
+        }
+        Err(message) => {
+            eprintln!("chassis: {message}\n{}", options::USAGE);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let show_progress = std::io::stderr().is_terminal();
+    let start = Instant::now();
+    let scenario = Scenario { seconds: options.seconds, seed: options.seed, fault: options.fault };
+    let mut log = Log::create(options.candump.as_deref())?;
+    let show = |share| {
+        if show_progress {
+            progress(share);
+        }
+    };
+    let run = scenario.run(show, |record| log.write(record))?;
+    log.finish()?;
+    let elapsed = start.elapsed();
+    if show_progress {
+        eprintln!();
+    }
+    plot::write(&options.output, &run)?;
+    if let Some(path) = &options.csv {
+        report::write_csv(path, &run)?;
+    }
+    print!("{}", report::table(&run));
+    println!("plot: {}", options.output.display());
+    let ticks = run.samples.len().max(1);
+    eprintln!(
+        "host: {:.2} s for {:.1} s simulated, {:.2} us a tick with the whole simulation",
+        elapsed.as_secs_f64(),
+        options.seconds,
+        elapsed.as_secs_f64() * 1e6 / ticks as f64
+    );
+    Ok(())
+}
+
+fn progress(share: f32) {
+    const WIDTH: usize = 50;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1")]
+    let done = (share * WIDTH as f32) as usize;
+    eprint!(
+        "\r[{}{}] {:3.0} %",
+        "#".repeat(done),
+        " ".repeat(WIDTH.saturating_sub(done)),
+        share * 100.0
+    );
+    _ = std::io::stderr().flush();
+}

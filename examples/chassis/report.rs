@@ -1,0 +1,105 @@
+//! Numbers for people, and rows for programs.
+
+use super::scenario::{Run, Sample};
+use drivetrain::chassis::MecanumWheels;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Result, Write};
+use std::path::Path;
+
+const NAMES: MecanumWheels<&str> = MecanumWheels {
+    front_left: "front left",
+    front_right: "front right",
+    rear_left: "rear left",
+    rear_right: "rear right",
+};
+
+pub(crate) fn table(run: &Run) -> String {
+    let mut text = String::new();
+    let largest = run
+        .samples
+        .iter()
+        .flat_map(|s| s.target_rpm.into_array())
+        .fold(0.0_f32, |m, rpm| m.max(rpm.abs()));
+    _ = writeln!(
+        text,
+        "{:<12} {:>14} {:>14}   (largest target {largest:.1} rpm)",
+        "wheel", "RMS error rpm", "max error rpm"
+    );
+    for (index, name) in NAMES.into_array().into_iter().enumerate() {
+        let (rms, max) = wheel_error(&run.samples, index);
+        _ = writeln!(text, "{name:<12} {rms:>14.2} {max:>14.2}");
+    }
+    let (path_max, path_end) = path_error(&run.samples);
+    if run.trouble.is_none() {
+        let share = run.settled_error * 100.0;
+        _ = writeln!(
+            text,
+            "settled      {share:.2} % of the largest target, 300 ms into constant motion, worst wheel"
+        );
+    }
+    _ = writeln!(text, "path         {path_max:.3} m off at most, {path_end:.3} m at the end");
+    let statistics = &run.statistics;
+    _ = writeln!(
+        text,
+        "bus          {:.1} % load, {} frames",
+        run.traffic.load() * 100.0,
+        run.traffic.frames
+    );
+    _ = writeln!(
+        text,
+        "frames       {} received, {} sent, {} refused, {} send errors, {} evicted, {} overruns",
+        statistics.received,
+        statistics.sent,
+        statistics.refused,
+        statistics.send_errors.total(),
+        statistics.evicted,
+        run.overruns
+    );
+    if let Some((trouble, from, until)) = run.trouble {
+        _ = writeln!(
+            text,
+            "fault        {} from {from:.2} s to {until:.2} s; disarmed for {} ms in all",
+            trouble.name(),
+            run.refused_to_arm
+        );
+    }
+    text
+}
+
+fn wheel_error(samples: &[Sample], wheel: usize) -> (f64, f32) {
+    let errors = samples.iter().filter_map(|sample| {
+        Some(
+            sample.target_rpm.into_array().get(wheel)?
+                - sample.measured_rpm.into_array().get(wheel)?,
+        )
+    });
+    let (sum, max) = errors.fold((0.0_f64, 0.0_f32), |(sum, max), error| {
+        (sum + f64::from(error) * f64::from(error), max.max(error.abs()))
+    });
+    ((sum / samples.len().max(1) as f64).sqrt(), max)
+}
+
+fn path_error(samples: &[Sample]) -> (f32, f32) {
+    let error = |s: &Sample| (s.position_m.0 - s.planned_m.0).hypot(s.position_m.1 - s.planned_m.1);
+    (samples.iter().map(error).fold(0.0, f32::max), samples.last().map_or(0.0, error))
+}
+
+pub(crate) fn write_csv(path: &Path, run: &Run) -> Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    writeln!(
+        file,
+        "time_s,armed,target_fl_rpm,target_fr_rpm,target_rl_rpm,target_rr_rpm,fl_rpm,fr_rpm,rl_rpm,rr_rpm,x_m,y_m,heading_rad"
+    )?;
+    for sample in &run.samples {
+        write!(file, "{:.3},{}", sample.time_s, u8::from(sample.armed))?;
+        for rpm in
+            sample.target_rpm.into_array().into_iter().chain(sample.measured_rpm.into_array())
+        {
+            write!(file, ",{rpm:.3}")?;
+        }
+        let (x, y) = sample.position_m;
+        writeln!(file, ",{x:.5},{y:.5},{:.5}", sample.heading_rad)?;
+    }
+    file.flush()
+}

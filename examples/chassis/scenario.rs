@@ -1,0 +1,289 @@
+//! The robot, what it is asked to do, and what came of it.
+
+use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::geometry::{Heading, Twist, World as WorldFrame};
+use drivetrain::motor::VelocityDrive;
+use drivetrain::runner::{Nb, Runner, Statistics};
+use drivetrain::sim::{
+    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, MotorKey, Record, SimClock,
+    Traffic, World,
+};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
+use std::error::Error;
+
+const GEOMETRY: MecanumGeometry =
+    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+/// A per rad/s and A per rad of the output shaft.
+const SPEED: PidConfig = PidConfig::new(4.0, 40.0, 0.0);
+const CRUISE_M_S: f32 = 1.0;
+const SPIN_RAD_S: f32 = 3.0;
+/// Everything speeds up and slows down within this time.
+const RAMP_S: f32 = 0.3;
+/// After this time of constant velocity the wheels have to be where they belong.
+const SETTLING_S: f32 = 0.3;
+
+type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+type Wheels = MecanumWheels<Handle<M3508>>;
+
+/// What can be made to go wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Trouble {
+    SilentMotor,
+    LostFrames,
+    BusOff,
+}
+
+impl Trouble {
+    pub(crate) const ALL: [Self; 3] = [Self::SilentMotor, Self::LostFrames, Self::BusOff];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::SilentMotor => "silent-motor",
+            Self::LostFrames => "lost-frames",
+            Self::BusOff => "bus-off",
+        }
+    }
+
+    fn schedule(
+        self,
+        world: &World,
+        wheel: MotorKey,
+        seconds: f32,
+    ) -> Result<(Instant, Instant), Box<dyn Error>> {
+        let (fault, length_s) = match self {
+            Self::SilentMotor => (Fault::Silent(wheel), 0.4),
+            Self::LostFrames => {
+                (Fault::LostFrames { line: Line::Can1, id: None, probability: 0.3 }, 0.3 * seconds)
+            }
+            Self::BusOff => (Fault::BusOff(Line::Can1), 0.3),
+        };
+        let window = (at(0.3 * seconds), at(0.3 * seconds + length_s));
+        world.fault(fault, window.0..window.1)?;
+        Ok(window)
+    }
+}
+
+pub(crate) struct Scenario {
+    pub(crate) seconds: f32,
+    pub(crate) seed: u64,
+    pub(crate) fault: Option<Trouble>,
+}
+
+/// One millisecond.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sample {
+    pub(crate) time_s: f32,
+    pub(crate) target_rpm: MecanumWheels<f32>,
+    pub(crate) measured_rpm: MecanumWheels<f32>,
+    pub(crate) armed: bool,
+    /// Where the robot is, and where it was to be: x and y in m.
+    pub(crate) position_m: (f32, f32),
+    pub(crate) planned_m: (f32, f32),
+    pub(crate) heading_rad: f32,
+}
+
+pub(crate) struct Run {
+    pub(crate) samples: Vec<Sample>,
+    /// The largest error of a wheel, as a share of the largest target, from 300 ms into each segment of constant body
+    /// twist on.
+    pub(crate) settled_error: f32,
+    pub(crate) traffic: Traffic,
+    pub(crate) statistics: Statistics,
+    pub(crate) overruns: u32,
+    pub(crate) refused_to_arm: u32,
+    pub(crate) trouble: Option<(Trouble, f32, f32)>,
+}
+
+impl Scenario {
+    /// Shows its progress, 0 to 1, and every frame on the wire.
+    pub(crate) fn run(
+        &self,
+        mut progress: impl FnMut(f32),
+        mut record: impl FnMut(&Record),
+    ) -> Result<Run, Box<dyn Error>> {
+        let world = World::new(self.seed);
+        let motors = attach_motors(&world)?;
+        let trouble = match self.fault {
+            Some(fault) => {
+                let (from, until) = fault.schedule(&world, motors.front_left, self.seconds)?;
+                Some((fault, seconds_of(from), seconds_of(until)))
+            }
+            None => None,
+        };
+        let (mut robot, wheels) = robot(&world)?;
+        let mecanum = Mecanum::new(GEOMETRY)?;
+        let plan = Plan::new(self.seconds);
+        let end = at(self.seconds);
+        let mut run = Run {
+            samples: Vec::new(),
+            settled_error: 0.0,
+            traffic: Traffic::default(),
+            statistics: Statistics::default(),
+            overruns: 0,
+            refused_to_arm: 0,
+            trouble,
+        };
+        let mut planned = (0.0, 0.0);
+        while world.now() < end {
+            world.advance_with(Duration::from_micros(100), &mut record);
+            robot.poll(16);
+            let Some(tick) = robot.due() else { continue };
+            let time_s = seconds_of(tick.now());
+            let heading = heading(&world);
+            let wanted = plan.twist(time_s);
+            planned =
+                (planned.0 + wanted.vx_m_s * tick.dt_s(), planned.1 + wanted.vy_m_s * tick.dt_s());
+            let targets = mecanum.inverse(wanted.to_body(heading));
+            run.refused_to_arm += u32::from(!drive(&mut robot, wheels, targets, tick));
+            let sample = observe(&world, &robot, wheels, targets, time_s, planned);
+            if plan.is_settled(time_s) && sample.armed {
+                run.settled_error = run.settled_error.max(share_of_error(&sample));
+            }
+            run.samples.push(sample);
+            if run.samples.len().is_multiple_of(250) {
+                progress(time_s / self.seconds);
+            }
+        }
+        progress(1.0);
+        run.traffic = world.traffic(Line::Can1);
+        run.statistics = robot.statistics();
+        run.overruns = robot.overruns();
+        Ok(run)
+    }
+}
+
+/// Four M3508 under a chassis of 20 kg.
+fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
+    let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
+    let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
+        .try_map(motor)?;
+    world.attach_chassis(ChassisConfig::new(GEOMETRY), keys)?;
+    Ok(keys)
+}
+
+/// The code that would run on the microcontroller.
+fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
+    let mut bus = Bus::new();
+    let wheel = |id| Config::<M3508>::new(id).speed_loop(SPEED);
+    let wheels = MecanumWheels {
+        front_left: bus.attach(wheel(2))?,
+        front_right: bus.attach(wheel(1).reversed())?,
+        rear_left: bus.attach(wheel(3))?,
+        rear_right: bus.attach(wheel(4).reversed())?,
+    };
+    Ok((Runner::new(Nb(world.controller()), world.clock(), bus), wheels))
+}
+
+/// Drives all wheels, or none: a wheel that is lost stops the others until all can be armed again.
+///
+/// This robot arms by itself, which only a simulated one may. Returns whether it is armed.
+fn drive(
+    robot: &mut Robot<'_>,
+    wheels: Wheels,
+    targets: MecanumWheels<AngularVelocity>,
+    tick: Tick,
+) -> bool {
+    let all_armed = wheels.into_array().iter().all(|wheel| robot.device().is_motor_armed(*wheel));
+    let armed = all_armed || robot.arm(tick).is_ok();
+    let targets = if armed { targets } else { MecanumWheels::splat(AngularVelocity::ZERO) };
+    _ = robot.device_mut().drive(wheels.zip(targets).into_array());
+    robot.tick(tick);
+    armed
+}
+
+fn observe(
+    world: &World,
+    robot: &Robot<'_>,
+    wheels: Wheels,
+    targets: MecanumWheels<AngularVelocity>,
+    time_s: f32,
+    planned_m: (f32, f32),
+) -> Sample {
+    let bus = robot.device();
+    let state = world.chassis();
+    Sample {
+        time_s,
+        target_rpm: targets.map(AngularVelocity::as_rpm),
+        measured_rpm: wheels
+            .map(|wheel| bus.state(wheel).map_or(0.0, |state| state.velocity.as_rpm())),
+        armed: wheels.into_array().iter().all(|wheel| bus.is_motor_armed(*wheel)),
+        position_m: state.map_or((0.0, 0.0), |state| (narrow(state.x_m), narrow(state.y_m))),
+        planned_m,
+        heading_rad: state.map_or(0.0, |state| narrow(state.heading_rad)),
+    }
+}
+
+/// Stands for the IMU.
+fn heading(world: &World) -> Heading {
+    Heading::new(Angle::from_radians(
+        world.chassis().map_or(0.0, |state| narrow(state.heading_rad)),
+    ))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "some metres or radians")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+fn share_of_error(sample: &Sample) -> f32 {
+    let largest =
+        sample.target_rpm.into_array().iter().fold(0.0_f32, |most, rpm| most.max(rpm.abs()));
+    let error = |(target, measured): (f32, f32)| (target - measured).abs();
+    let errors = sample.target_rpm.zip(sample.measured_rpm).map(error).into_array();
+    errors.iter().fold(0.0_f32, |most, error| most.max(*error)) / largest
+}
+
+fn at(seconds: f32) -> Instant {
+    Instant::START + Duration::from_secs_f32(seconds).unwrap_or(Duration::ZERO)
+}
+
+fn seconds_of(instant: Instant) -> f32 {
+    instant.since(Instant::START).as_secs_f32()
+}
+
+/// A rest, four sides of a square, a spin on the spot, a rest; each part a share of the whole time.
+struct Plan {
+    part_s: f32,
+}
+
+impl Plan {
+    const REST: f32 = 0.5;
+
+    fn new(seconds: f32) -> Self {
+        Self { part_s: (seconds - 2.0 * Self::REST) / 5.0 }
+    }
+
+    /// Returns the number of the part, and the time since its start.
+    fn part(&self, time_s: f32) -> (i32, f32) {
+        let moving = time_s - Self::REST;
+        if moving < 0.0 {
+            return (-1, moving);
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "at most 600 s")]
+        let part = (moving / self.part_s) as i32;
+        (part, moving - part as f32 * self.part_s)
+    }
+
+    fn twist(&self, time_s: f32) -> Twist<WorldFrame> {
+        let (part, within) = self.part(time_s);
+        let rise = (within / RAMP_S).min((self.part_s - within) / RAMP_S).clamp(0.0, 1.0);
+        let (v, w) = (CRUISE_M_S * rise, SPIN_RAD_S * rise);
+        match part {
+            0 => Twist::new(v, 0.0, 0.0),
+            1 => Twist::new(0.0, v, 0.0),
+            2 => Twist::new(-v, 0.0, 0.0),
+            3 => Twist::new(0.0, -v, 0.0),
+            4 => Twist::new(0.0, 0.0, w),
+            _ => Twist::new(0.0, 0.0, 0.0),
+        }
+    }
+
+    /// Tells whether the twist has been constant, and not zero, for 300 ms.
+    fn is_settled(&self, time_s: f32) -> bool {
+        let (part, within) = self.part(time_s);
+        (0..=4).contains(&part) && within > RAMP_S + SETTLING_S && within < self.part_s - RAMP_S
+    }
+}
