@@ -6,10 +6,11 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::motor::{CanDevice, Link};
-use drivetrain::runner::{Nb, Runner};
+use drivetrain::runner::{BlockingTx, Nb, Runner};
 use drivetrain::sim::{Controller, Fault, Line, Model, MotorConfig, MotorKey, SimClock, World};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
+use embedded_can::nb::Can;
 
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(20.0);
 
@@ -120,6 +121,29 @@ fn what_waits_in_the_mailboxes_at_bus_off_still_goes_out_afterwards() {
     assert!((1..=3).contains(&stale), "{stale} frames from before the stop");
     assert!(commands[stale..].iter().all(|data| *data == [0; 8]));
     assert_eq!(world.motor(keys[0]).unwrap().command, 0);
+}
+
+#[test]
+fn over_a_blocking_driver_frames_come_in_by_another_door_and_sending_takes_time() {
+    let world = World::new(10);
+    let key = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let mut bus = Bus::new();
+    let handle = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)).unwrap();
+    let mut robot = Runner::new(BlockingTx(world.controller()), world.clock(), bus);
+    let mut interrupt = world.controller();
+    while world.now() < at(500) {
+        world.advance(Duration::from_micros(100));
+        while let Ok(frame) = interrupt.receive() {
+            let _unrelated = robot.ingest(&frame, world.now());
+        }
+        if let Some(tick) = robot.due() {
+            let _missing = robot.is_armed() || robot.arm(tick).is_ok();
+            let _disarmed = robot.device_mut().set_velocity(handle, rpm(100.0));
+            robot.tick(tick);
+        }
+    }
+    let velocity = world.motor(key).unwrap().velocity;
+    assert!((velocity / rpm(100.0) - 1.0).abs() < 0.02, "{velocity:?}");
 }
 
 #[test]

@@ -7,6 +7,12 @@ use core::ops::{Bound, RangeBounds};
 use embedded_can::{Frame, Id};
 
 /// Something that goes wrong in a [`World`](super::World) for a while.
+///
+/// What needs no fault: a second master ([`World::inject`](super::World::inject) of a command frame), two motors with
+/// one id (attach both), a burst after a stall (advance without receiving), an overrun (the same, with
+/// [`World::with_receive_depth`](super::World::with_receive_depth)), heat
+/// ([`World::set_temperature_c`](super::World::set_temperature_c)), a blocked shaft or a runaway
+/// ([`World::set_load_nm`](super::World::set_load_nm)), a full bus (eight motors).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
