@@ -117,7 +117,7 @@ fn hipnuc_finds_the_good_frame_in_the_public_resync_stream() {
     let vector = vector("hipnuc.resync");
     let (frames, counts) = frames::<_, 518>(HipNuc, &hex(&vector["input"]["stream"]));
     let expect = &vector["expect"];
-    assert_eq!(frames.len() as i64, expect["valid_frames"].as_i64().unwrap());
+    assert_eq!(frames.len() as u64, expect["valid_frames"].as_u64().unwrap());
     assert_eq!(i64::from(counts.length_errors), expect["length_errors"]);
     assert_eq!(i64::from(counts.checksum_errors), expect["crc_errors"]);
 }
