@@ -83,7 +83,7 @@ impl<'a> Record<'a> {
 /// use drivetrain::wire::candump::Record;
 ///
 /// let error = Record::parse(b"can0 201#0E1").unwrap_err();
-/// assert_eq!(error.to_string(), "column 12: expected two hexadecimal digits");
+/// assert_eq!(error.to_string(), "column 13: expected two hexadecimal digits");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

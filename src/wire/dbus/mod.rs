@@ -1,0 +1,209 @@
+//! DBUS: what a DR16 receiver hears of a remote control. 100000 baud, 8 data bits, even parity, inverted.
+//!
+//! ```text
+//! bits 0..44   4 channels of 11 bits, 364..=1684, centre 1024      bytes  6..12  mouse x, y, z i16
+//! bits 44..46  right switch: 1 up, 2 down, 3 middle                bytes 12, 13  mouse buttons: 0 or 1
+//! bits 46..48  left switch                                         bytes 14..16  keys
+//! all low byte, low bit first                                      bytes 16..18  dial like a channel, 0: none
+//! ```
+//!
+//! A frame has neither header nor checksum. It is told apart by the pause before it (18 bytes take 2.2 ms, one frame
+//! comes every 14 ms), and believed only when every field has a value that it can have. What is not believed is not
+//! used in part: the state is neutral at once, until the next good frame.
+//!
+//! ```
+//! use drivetrain::time::{Duration, Instant};
+//! use drivetrain::wire::dbus::{Dbus, Key, Remote, Switch};
+//!
+//! let mut dbus = Dbus::new();
+//! let now = Instant::START;
+//! let mut received: &[u8] =
+//!     &[0x94, 0x66, 0x0B, 0xA5, 0xD9, 0x92, 0, 0, 0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0];
+//! while let Some(remote) = dbus.read(&mut received, now) {
+//!     assert_eq!((remote.right.x, remote.right.y), (1.0, -1.0));
+//!     assert_eq!(remote.right_switch, Switch::Up);
+//!     assert!(remote.keys.is_pressed(Key::Shift));
+//! }
+//! let later = now + Duration::from_millis(101);
+//! assert_eq!(dbus.remote(later), Remote::default()); // lost: neutral
+//! ```
+//!
+//! Call [`read`](Dbus::read) with every portion of bytes soon after it came, at least every 2 ms, or from the interrupt
+//! that the serial port raises in a pause: with several frames in one late portion the pauses between them are not seen.
+//! Even so they are read, but noise between them is found only by its values.
+//!
+//! Source: taproot (GPL, facts only), librm; a public dump. Older headers, made after the first manual, put Q, E, Shift and
+//! Ctrl into bits 4 to 7 of the keys.
+
+mod remote;
+
+pub use remote::{Key, Keys, Mouse, Remote, Stick, Switch};
+
+use super::{Deadline, Edge};
+use crate::time::{Duration, Instant};
+
+/// The length of a frame in bytes.
+pub const FRAME_LENGTH: usize = 18;
+
+/// How many frames came, and what was thrown away. All counts saturate.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DbusCounts {
+    /// Good frames.
+    pub frames: u32,
+    /// Frames with a value that its field cannot have.
+    pub implausible: u32,
+    /// Frames that ended early: less than 18 bytes before a pause.
+    pub truncated: u32,
+    /// Bytes that belonged to no frame, or to a truncated one.
+    pub skipped_bytes: u32,
+}
+
+/// A streaming decoder of DBUS that watches the signal.
+#[derive(Debug, Clone)]
+pub struct Dbus {
+    pause: Duration,
+    dead_band: u16,
+    buffer: [u8; FRAME_LENGTH],
+    length: usize,
+    /// Out of step after an implausible frame: nothing counts before the next pause.
+    lost_step: bool,
+    last_byte: Option<Instant>,
+    latest: Remote,
+    deadline: Deadline,
+    counts: DbusCounts,
+}
+
+impl Default for Dbus {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Dbus {
+    /// A pause is 3 ms, the signal is lost after 100 ms, the dead band is 10 of 660 counts.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            pause: Duration::from_millis(3),
+            dead_band: 10,
+            buffer: [0; FRAME_LENGTH],
+            length: 0,
+            lost_step: false,
+            last_byte: None,
+            latest: Remote::NEUTRAL,
+            deadline: Deadline::new(Duration::from_millis(100)),
+            counts: DbusCounts { frames: 0, implausible: 0, truncated: 0, skipped_bytes: 0 },
+        }
+    }
+
+    /// Sets the silence that separates two frames. It must be longer than the time between two calls of
+    /// [`read`](Self::read) within a frame, and shorter than the pause of the receiver (11.8 ms, 4.8 ms for a
+    /// receiver that sends every 7 ms).
+    #[must_use]
+    pub const fn with_pause(self, pause: Duration) -> Self {
+        Self { pause, ..self }
+    }
+
+    /// Sets the silence after which the signal is lost.
+    #[must_use]
+    pub const fn with_deadline(self, deadline: Duration) -> Self {
+        Self { deadline: Deadline::new(deadline), ..self }
+    }
+
+    /// Sets how many counts around the centre are zero: 0 to 659. Beyond, the value begins at zero and reaches ±1 at
+    /// ±660 counts.
+    #[must_use]
+    pub const fn with_dead_band(self, counts: u16) -> Self {
+        Self { dead_band: if counts < 659 { counts } else { 659 }, ..self }
+    }
+
+    /// Returns the next frame, and takes from `input` the bytes that it looked at; `now` is when they arrived. `None`
+    /// when `input` is used up.
+    #[must_use]
+    pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<Remote> {
+        if input.is_empty() {
+            return None;
+        }
+        if self.last_byte.is_some_and(|last| now.since(last) >= self.pause) {
+            self.note_pause();
+        }
+        self.last_byte = Some(now);
+        while let Some((byte, rest)) = input.split_first() {
+            *input = rest;
+            let place = self.buffer.get_mut(self.length).filter(|_| !self.lost_step);
+            let Some(place) = place else {
+                count(&mut self.counts.skipped_bytes, 1);
+                continue;
+            };
+            *place = *byte;
+            self.length += 1;
+            if self.length == FRAME_LENGTH {
+                self.length = 0;
+                if let Some(remote) = self.judge(now) {
+                    return Some(remote);
+                }
+            }
+        }
+        None
+    }
+
+    /// Notes that the line was silent: the next byte begins a frame.
+    ///
+    /// For the idle interrupt of a serial port. Without it, [`read`](Self::read) tells a pause by its time.
+    pub fn note_pause(&mut self) {
+        if self.length > 0 {
+            count(&mut self.counts.truncated, 1);
+            count(&mut self.counts.skipped_bytes, u32::try_from(self.length).unwrap_or(u32::MAX));
+        }
+        self.length = 0;
+        self.lost_step = false;
+    }
+
+    /// Returns what the remote control shows; neutral before the first frame, when the signal is lost, and after an
+    /// implausible frame.
+    #[must_use]
+    pub fn remote(&self, now: Instant) -> Remote {
+        if self.is_live(now) { self.latest } else { Remote::NEUTRAL }
+    }
+
+    /// Returns whether the last frame was good and came in time.
+    #[must_use]
+    pub fn is_live(&self, now: Instant) -> bool {
+        self.deadline.is_live(now)
+    }
+
+    /// Returns the oldest change between heard and lost that was not fetched yet.
+    #[must_use]
+    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+        self.deadline.edge(now)
+    }
+
+    /// Returns how many frames came, and what was thrown away.
+    #[must_use]
+    pub const fn counts(&self) -> DbusCounts {
+        self.counts
+    }
+
+    fn judge(&mut self, now: Instant) -> Option<Remote> {
+        let remote = Remote::from_frame(&self.buffer, self.dead_band);
+        match remote {
+            Some(remote) => {
+                count(&mut self.counts.frames, 1);
+                self.latest = remote;
+                self.deadline.meet(now);
+            }
+            None => {
+                count(&mut self.counts.implausible, 1);
+                self.lost_step = true;
+                self.deadline.revoke(now);
+            }
+        }
+        remote
+    }
+}
+
+fn count(counter: &mut u32, more: u32) {
+    *counter = counter.saturating_add(more);
+}

@@ -1,0 +1,134 @@
+use super::checksum;
+use crate::wire::{Protocol, Reject};
+
+/// The most parameters that a [`Status`] holds: a longer reply is refused by its length.
+pub const MAX_PARAMETERS: usize = 32;
+
+/// The longest status frame that is read, in bytes, and a good buffer size for instructions.
+pub const MAX_FRAME: usize = MAX_PARAMETERS + OVERHEAD;
+
+/// Header, id, length, error and checksum in bytes.
+const OVERHEAD: usize = 6;
+
+/// The answer of a servo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Status {
+    id: u8,
+    errors: ServoErrors,
+    parameters: [u8; MAX_PARAMETERS],
+    length: u8,
+}
+
+impl Status {
+    /// Returns the number of the servo: 0 to 253.
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        self.id
+    }
+
+    /// Returns what the servo complains about.
+    #[must_use]
+    pub const fn errors(&self) -> ServoErrors {
+        self.errors
+    }
+
+    /// Returns the bytes that were asked for; none after a ping or a write.
+    #[must_use]
+    pub fn parameters(&self) -> &[u8] {
+        self.parameters.get(..usize::from(self.length)).unwrap_or(&[])
+    }
+}
+
+/// The error bits of a status.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::feetech::ServoErrors;
+///
+/// let errors = ServoErrors(0b0010_0100);
+/// assert!(errors.overheat() && errors.overload() && !errors.voltage());
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ServoErrors(
+    /// The bits as they came.
+    pub u8,
+);
+
+impl ServoErrors {
+    /// Returns whether there is no complaint.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Returns whether the supply voltage is out of its limits: bit 0.
+    #[must_use]
+    pub const fn voltage(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// Returns whether the position sensor failed: bit 1.
+    #[must_use]
+    pub const fn sensor(self) -> bool {
+        self.0 & 1 << 1 != 0
+    }
+
+    /// Returns whether the servo is too hot: bit 2.
+    #[must_use]
+    pub const fn overheat(self) -> bool {
+        self.0 & 1 << 2 != 0
+    }
+
+    /// Returns whether the current is too high: bit 3.
+    #[must_use]
+    pub const fn overcurrent(self) -> bool {
+        self.0 & 1 << 3 != 0
+    }
+
+    /// Returns whether the load is too high: bit 5.
+    #[must_use]
+    pub const fn overload(self) -> bool {
+        self.0 & 1 << 5 != 0
+    }
+}
+
+/// The format of [`Status`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Link`](crate::wire::Link).
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Sts;
+
+impl Protocol for Sts {
+    type Frame = Status;
+    const PREFIX: usize = 4;
+
+    fn header(&self) -> &[u8] {
+        &[0xFF, 0xFF]
+    }
+
+    /// A status comes from one servo, so an id above 253 is noise: most often a third `FF` before a frame.
+    fn length(&self, prefix: &[u8]) -> Option<usize> {
+        let [.., id, length] = prefix else { return None };
+        let parameters = usize::from(*length).checked_sub(2)?;
+        (*id < 254 && parameters <= MAX_PARAMETERS).then_some(parameters + OVERHEAD)
+    }
+
+    fn parse(&self, frame: &[u8]) -> Result<Status, Reject> {
+        let [_, _, summed @ .., sum] = frame else { return Err(Reject::Length) };
+        let [id, _, errors, parameters @ ..] = summed else { return Err(Reject::Length) };
+        if checksum(summed) != *sum {
+            return Err(Reject::Checksum);
+        }
+        let length = u8::try_from(parameters.len()).map_err(|_| Reject::Length)?;
+        let mut status = Status {
+            id: *id,
+            errors: ServoErrors(*errors),
+            parameters: [0; MAX_PARAMETERS],
+            length,
+        };
+        let place = status.parameters.get_mut(..parameters.len()).ok_or(Reject::Length)?;
+        place.copy_from_slice(parameters);
+        Ok(status)
+    }
+}

@@ -1,0 +1,139 @@
+//! The serial protocol of HiPNUC IMUs: measurements and attitude, 115200 baud.
+//!
+//! ```text
+//! 5A A5 | length u16 of the payload | CRC u16 | payload: tag, fields        all little-endian
+//! CRC-16/XMODEM over the first four bytes and the payload
+//! ```
+//!
+//! | tag | payload | here |
+//! |---|---|---|
+//! | `91` | 76 bytes, floats | read |
+//! | `92` | 48 bytes, scaled integers; gone from the vendor's code since 2025-11 | read |
+//! | others (`81`, `83`, ..) | | skipped, counted as [foreign](super::Counts::foreign_frames) |
+//!
+//! The 82 bytes of a `91` frame take 7.1 ms at 115200 baud: 100 Hz is the limit there, 400 Hz needs 460800 baud.
+//!
+//! **Use the quaternion.** It is normalised here (a live sensor was seen to send 0.99904), and a frame without a usable
+//! one is refused. The three Euler angles on the wire mean different rotations in different firmware, and no field says
+//! which, see [`EulerOrder`]; [`Attitude::euler`] computes them from the quaternion in the order you name.
+//!
+//! A heading that stands still may be a robot at rest or a dead sensor. Put the decoder into a
+//! [`Link`](super::Link): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
+//! latched when no new one came in time.
+//!
+//! ```
+//! use drivetrain::time::{Duration, Instant};
+//! use drivetrain::wire::{Link, hipnuc::{EulerOrder, HipNuc, MAX_FRAME}};
+//!
+//! let mut imu = Link::<HipNuc, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+//! let now = Instant::START;
+//! let mut received: &[u8] = &[0x5A, 0xA5]; // from the serial port
+//! while let Some(frame) = imu.read(&mut received, now) {
+//!     let (roll, pitch, yaw) = frame.attitude.euler(EulerOrder::PitchX);
+//! }
+//! assert!(imu.latest(now).is_none()); // no heading to trust yet
+//! ```
+//!
+//! Source: hipnuc/products (`hipnuc_dec.c`, Apache-2.0), `CH0x0` manual 6.3; their golden frames are in the tests.
+
+mod attitude;
+mod payload;
+
+pub use attitude::{Attitude, EulerOrder};
+
+use super::field::Reader;
+use super::{Protocol, Reject};
+use crate::units::{Angle, AngularVelocity};
+
+/// A buffer for every frame that the sensors send by themselves (the longest, `81`, has 110 bytes).
+pub const MAX_FRAME: usize = 128;
+
+/// The longest payload of the protocol in bytes: the vendor's decoder has room for no more.
+const MAX_PAYLOAD: u16 = 512;
+
+/// Header, length and CRC in bytes.
+const OVERHEAD: usize = 6;
+
+static CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_XMODEM);
+
+/// One measurement of an IMU. All its numbers are finite.
+///
+/// Axes are those printed on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Imu {
+    /// Status bits, as they came.
+    pub status: u16,
+    /// Temperature of the sensor in degrees Celsius.
+    pub temperature_c: i8,
+    /// Air pressure in pascals, as it came; meaningless on sensors without barometer.
+    pub pressure_pa: f32,
+    /// Milliseconds since the sensor started, wrapping; `None` in a `92` frame, whose sources disagree on it.
+    pub time_ms: Option<u32>,
+    /// Acceleration along x, y, z in m/s², gravity included: +9.8 upwards at rest.
+    pub acceleration_m_s2: [f32; 3],
+    /// Angular velocity around x, y, z; counter-clockwise is positive.
+    pub angular_velocity: [AngularVelocity; 3],
+    /// Magnetic field along x, y, z in microtesla.
+    pub magnetic_field_ut: [f32; 3],
+    /// Roll as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    pub roll: Angle,
+    /// Pitch as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    pub pitch: Angle,
+    /// Yaw as the sensor computed it.
+    pub yaw: Angle,
+    /// The orientation, from the quaternion of the frame, normalised.
+    pub attitude: Attitude,
+}
+
+/// The format of HiPNUC frames, for a [`Deframer`](super::Deframer) or a [`Link`](super::Link).
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct HipNuc;
+
+impl Protocol for HipNuc {
+    type Frame = Imu;
+    const PREFIX: usize = 4;
+
+    fn header(&self) -> &[u8] {
+        &[0x5A, 0xA5]
+    }
+
+    fn length(&self, prefix: &[u8]) -> Option<usize> {
+        let (_, length) = prefix.split_last_chunk()?;
+        let length = u16::from_le_bytes(*length);
+        matches!(length, 1..=MAX_PAYLOAD).then_some(usize::from(length) + OVERHEAD)
+    }
+
+    fn is_new(&self, previous: &Imu, imu: &Imu) -> bool {
+        imu.time_ms.is_none() || imu.time_ms != previous.time_ms
+    }
+
+    fn parse(&self, frame: &[u8]) -> Result<Imu, Reject> {
+        let (head, rest) = frame.split_first_chunk::<4>().ok_or(Reject::Length)?;
+        let (crc, payload) = rest.split_first_chunk().ok_or(Reject::Length)?;
+        let mut digest = CRC.digest();
+        digest.update(head);
+        digest.update(payload);
+        if digest.finalize() != u16::from_le_bytes(*crc) {
+            return Err(Reject::Checksum);
+        }
+        let (tag, fields) = payload.split_first().ok_or(Reject::Length)?;
+        let imu = match (tag, payload.len()) {
+            (0x91, 76) => payload::read_91(Reader(fields)),
+            (0x92, 48) => payload::read_92(Reader(fields)),
+            _ => return Err(Reject::Foreign),
+        };
+        imu.filter(Imu::is_finite).ok_or(Reject::Content)
+    }
+}
+
+impl Imu {
+    fn is_finite(&self) -> bool {
+        let numbers = self.acceleration_m_s2.iter().chain(&self.magnetic_field_ut);
+        let angles = [self.roll, self.pitch, self.yaw];
+        numbers.chain([&self.pressure_pa]).all(|number| number.is_finite())
+            && self.angular_velocity.iter().all(|rate| rate.is_finite())
+            && angles.iter().all(|angle| angle.is_finite())
+    }
+}

@@ -1,0 +1,159 @@
+use super::{JOINTS, check, seal};
+use crate::wire::field::{Reader, Writer};
+use crate::wire::{BufferTooSmall, Protocol, Reject};
+
+/// The length of a telemetry frame in bytes: 10.5 ms at 115200 baud, of the 50 ms between two frames.
+pub const TELEMETRY_LENGTH: usize = 121;
+
+/// The length byte: the payload without header, length and CRC.
+const PAYLOAD: u8 = 116;
+
+/// What the robot reports.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Telemetry {
+    /// Positions of the joints in pulses from their offset; 65536 a turn.
+    pub positions_pulses: [i32; JOINTS],
+    /// Speeds of the joints in rpm.
+    pub speeds_rpm: [i8; JOINTS],
+    /// Multi-turn position of the gripper's GM6020, in the firmware's unit.
+    pub gm6020_position: i32,
+    /// Multi-turn position of the gripper's C610, in the firmware's unit.
+    pub c610_position: i32,
+    /// Euler angles of the four IMUs in degrees, in the order of the wire, as they came: the document calls them pitch,
+    /// roll and yaw, and nothing confirms it. May be NaN.
+    pub imu_angles_deg: [[f32; 3]; 4],
+}
+
+/// The first two bytes of a telemetry frame.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TelemetryHeader {
+    /// `AA 55`, the same as of a command: the robot's document.
+    Document,
+    /// `BB 66`: the robot's newer firmware.
+    #[default]
+    Firmware,
+}
+
+/// The order of the bytes of a number.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ByteOrder {
+    /// Low byte first: the memory of a Cortex-M.
+    #[default]
+    Little,
+    /// High byte first.
+    Big,
+}
+
+/// The format of [`Telemetry`] frames: the two things in which the sources differ.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::Deframer;
+/// use drivetrain::wire::host_link::*;
+///
+/// let format = TelemetryFormat::new().with_header(TelemetryHeader::Document);
+/// let telemetry = Telemetry { speeds_rpm: [-3; JOINTS], ..Telemetry::default() };
+/// let mut buffer = [0; TELEMETRY_LENGTH];
+/// let mut bytes = format.encode(&telemetry, &mut buffer)?;
+/// assert_eq!(bytes[..3], [0xAA, 0x55, 116]);
+///
+/// let mut decoder = Deframer::<_, TELEMETRY_LENGTH>::new(format);
+/// assert_eq!(decoder.read(&mut bytes), Some(telemetry));
+/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TelemetryFormat {
+    header: TelemetryHeader,
+    floats: ByteOrder,
+}
+
+impl TelemetryFormat {
+    /// Header `BB 66`, floats low byte first: what the newer firmware sends.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { header: TelemetryHeader::Firmware, floats: ByteOrder::Little }
+    }
+
+    /// Sets the first two bytes.
+    #[must_use]
+    pub const fn with_header(self, header: TelemetryHeader) -> Self {
+        Self { header, ..self }
+    }
+
+    /// Sets the byte order of the Euler angles. The integers and the CRC have their high byte first in any case.
+    #[must_use]
+    pub const fn with_floats(self, floats: ByteOrder) -> Self {
+        Self { floats, ..self }
+    }
+
+    /// Writes the frame, and returns the part of `out` that it fills.
+    ///
+    /// # Errors
+    /// [`BufferTooSmall`] when `out` has less than [`TELEMETRY_LENGTH`] bytes.
+    pub fn encode<'a>(
+        &self,
+        telemetry: &Telemetry,
+        out: &'a mut [u8],
+    ) -> Result<&'a [u8], BufferTooSmall> {
+        let mut writer = Writer::new(out, TELEMETRY_LENGTH)?;
+        writer.put(self.header());
+        for position in telemetry.positions_pulses {
+            writer.put(&position.to_be_bytes());
+        }
+        for speed in telemetry.speeds_rpm {
+            writer.put(&speed.to_be_bytes());
+        }
+        writer.put(&telemetry.gm6020_position.to_be_bytes());
+        writer.put(&telemetry.c610_position.to_be_bytes());
+        for angle in telemetry.imu_angles_deg.as_flattened() {
+            writer.put(&match self.floats {
+                ByteOrder::Little => angle.to_le_bytes(),
+                ByteOrder::Big => angle.to_be_bytes(),
+            });
+        }
+        Ok(seal(writer))
+    }
+
+    fn read(&self, mut body: Reader<'_>) -> Option<Telemetry> {
+        let _header: [u8; 3] = body.take()?;
+        let float = |body: &mut Reader<'_>| {
+            let bytes = body.take()?;
+            Some(match self.floats {
+                ByteOrder::Little => f32::from_le_bytes(bytes),
+                ByteOrder::Big => f32::from_be_bytes(bytes),
+            })
+        };
+        Some(Telemetry {
+            positions_pulses: body.array(Reader::i32_be)?,
+            speeds_rpm: body.take()?.map(u8::cast_signed),
+            gm6020_position: body.i32_be()?,
+            c610_position: body.i32_be()?,
+            imu_angles_deg: body.array(|body| body.array(float))?,
+        })
+    }
+}
+
+impl Protocol for TelemetryFormat {
+    type Frame = Telemetry;
+    const PREFIX: usize = 3;
+
+    fn header(&self) -> &[u8] {
+        match self.header {
+            TelemetryHeader::Document => &[0xAA, 0x55, PAYLOAD],
+            TelemetryHeader::Firmware => &[0xBB, 0x66, PAYLOAD],
+        }
+    }
+
+    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+        Some(TELEMETRY_LENGTH)
+    }
+
+    fn parse(&self, frame: &[u8]) -> Result<Telemetry, Reject> {
+        self.read(check(frame)?).ok_or(Reject::Length)
+    }
+}

@@ -1,0 +1,95 @@
+use super::{Counts, Deadline, Deframer, Edge, Protocol};
+use crate::time::{Duration, Instant};
+
+/// A [`Deframer`] that keeps its latest frame, and takes it away when no new one came in time.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Duration, Instant};
+/// use drivetrain::wire::host_link::{Command, CommandFormat, COMMAND_LENGTH};
+/// use drivetrain::wire::{Edge, Link};
+///
+/// let ms = |ms| Instant::START + Duration::from_millis(ms);
+/// let mut host = Link::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+/// let mut buffer = [0; COMMAND_LENGTH];
+/// let mut received = Command::default().encode(&mut buffer)?;
+/// assert_eq!(host.read(&mut received, ms(1)), Some(Command::default()));
+///
+/// assert!(host.latest(ms(101)).is_some());
+/// assert!(host.latest(ms(102)).is_none()); // relax the robot
+/// assert_eq!(host.edge(ms(102)), Some(Edge::Heard { at: ms(1) }));
+/// assert_eq!(host.edge(ms(102)), Some(Edge::Lost { at: ms(101) }));
+/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Link<P: Protocol, const N: usize> {
+    decoder: Deframer<P, N>,
+    deadline: Deadline,
+    latest: Option<P::Frame>,
+    frozen_frames: u32,
+}
+
+impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
+    /// Takes the protocol, and the age at which its last frame no longer counts.
+    #[must_use]
+    pub const fn new(protocol: P, deadline: Duration) -> Self {
+        Self {
+            decoder: Deframer::new(protocol),
+            deadline: Deadline::new(deadline),
+            latest: None,
+            frozen_frames: 0,
+        }
+    }
+
+    /// Returns the next frame of `input`, as [`Deframer::read`] does; `now` is when the bytes arrived.
+    ///
+    /// Frames that only repeat the one before (see [`Protocol::is_new`]) are returned too, but do not keep the link
+    /// alive.
+    #[must_use]
+    pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<P::Frame> {
+        let frame = self.decoder.read(input)?;
+        let protocol = self.decoder.protocol();
+        if self.latest.is_none_or(|previous| protocol.is_new(&previous, &frame)) {
+            self.deadline.meet(now);
+        } else {
+            self.frozen_frames = self.frozen_frames.saturating_add(1);
+        }
+        self.latest = Some(frame);
+        Some(frame)
+    }
+
+    /// Gives up a frame that was begun and not finished; see [`Deframer::abandon`].
+    pub fn abandon(&mut self) {
+        self.decoder.abandon();
+    }
+
+    /// Returns the latest frame; `None` before the first and when the last new one is older than the deadline.
+    #[must_use]
+    pub fn latest(&self, now: Instant) -> Option<P::Frame> {
+        self.latest.filter(|_| self.deadline.is_live(now))
+    }
+
+    /// Returns the oldest change between heard and lost that was not fetched yet.
+    #[must_use]
+    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+        self.deadline.edge(now)
+    }
+
+    /// Returns how often the other side was lost. Saturates.
+    #[must_use]
+    pub const fn losses(&self) -> u32 {
+        self.deadline.losses()
+    }
+
+    /// Returns how many frames only repeated the one before. Saturates.
+    #[must_use]
+    pub const fn frozen_frames(&self) -> u32 {
+        self.frozen_frames
+    }
+
+    /// Returns how many frames were found, and what was thrown away.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.decoder.counts()
+    }
+}

@@ -1,0 +1,302 @@
+//! The golden vectors of `data/wire/vectors.json`, through the public face.
+
+#![cfg(test)]
+
+use drivetrain::time::Instant;
+use drivetrain::units::Angle;
+use drivetrain::wire::dbus::{Dbus, Key, Switch};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Sts, register};
+use drivetrain::wire::hipnuc::{self, EulerOrder, HipNuc, Imu};
+use drivetrain::wire::host_link::{
+    ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
+    Telemetry, TelemetryFormat, TelemetryHeader,
+};
+use drivetrain::wire::{Counts, Deframer, Protocol};
+use serde_json::Value;
+
+fn vector(id: &str) -> Value {
+    let file: Value = serde_json::from_str(include_str!("data/wire/vectors.json")).unwrap();
+    let vectors = file["vectors"].as_array().unwrap();
+    let found = vectors.iter().find(|vector| vector["id"] == id);
+    found.unwrap_or_else(|| panic!("no vector {id}")).clone()
+}
+
+fn hex(text: &Value) -> Vec<u8> {
+    let bytes = text.as_str().unwrap().split_whitespace();
+    bytes.map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
+}
+
+fn integers<T: TryFrom<i64>>(list: &Value) -> Vec<T> {
+    let numbers = list.as_array().unwrap().iter().map(|number| number.as_i64().unwrap());
+    numbers.map(|number| T::try_from(number).ok().unwrap()).collect()
+}
+
+fn close(actual: &[f32], expected: &Value, tolerance: f64) {
+    let expected: Vec<f64> = match expected {
+        Value::Array(list) => list.iter().map(|number| number.as_f64().unwrap()).collect(),
+        number => vec![number.as_f64().unwrap()],
+    };
+    assert_eq!(actual.len(), expected.len());
+    for (actual, expected) in actual.iter().zip(expected) {
+        assert!((f64::from(*actual) - expected).abs() <= tolerance, "{actual} {expected}");
+    }
+}
+
+/// Reads all frames of `bytes`.
+fn frames<P: Protocol, const N: usize>(protocol: P, bytes: &[u8]) -> (Vec<P::Frame>, Counts) {
+    let mut decoder = Deframer::<P, N>::new(protocol);
+    let mut input = bytes;
+    let mut frames = Vec::new();
+    while let Some(frame) = decoder.read(&mut input) {
+        frames.push(frame);
+    }
+    (frames, decoder.counts())
+}
+
+fn imu(id: &str) -> Imu {
+    let (frames, counts) = frames::<_, 128>(HipNuc, &hex(&vector(id)["input"]["frame"]));
+    assert_eq!((frames.len(), counts.skipped_bytes), (1, 0), "{id}");
+    frames[0]
+}
+
+fn compare(imu: &Imu, expect: &Value) {
+    let status = expect["main_status"].as_str().unwrap();
+    assert_eq!(format!("0x{:04X}", imu.status), status);
+    assert_eq!(i64::from(imu.temperature_c), expect["temperature_c"]);
+    close(&imu.magnetic_field_ut, &expect["mag_ut"], 1e-4);
+    close(&imu.angular_velocity.map(|rate| rate.as_degrees_per_s()), &expect["gyr_dps"], 1e-4);
+    close(&[imu.roll.as_degrees()], &expect["roll_deg"], 1e-4);
+    close(&[imu.pitch.as_degrees()], &expect["pitch_deg"], 1e-4);
+    close(&[imu.yaw.as_degrees()], &expect["yaw_deg"], 1e-4);
+}
+
+#[test]
+fn hipnuc_91_frames_of_both_manuals() {
+    for id in ["hipnuc.hi91.manual_7_34", "hipnuc.hi91.ch0x0_manual_6_3_1"] {
+        let (imu, expect) = (imu(id), &vector(id)["expect"]);
+        compare(&imu, expect);
+        close(&imu.acceleration_m_s2.map(|a| a / 9.806_65), &expect["acc_g"], 1e-5);
+        close(&imu.attitude.as_array(), &expect["quat_wxyz"], 1e-5);
+        close(&[imu.pressure_pa], &expect["pressure_pa"], 0.01);
+        assert_eq!(imu.time_ms.map(i64::from), expect["system_time_ms"].as_i64());
+    }
+}
+
+#[test]
+fn hipnuc_92_frame() {
+    let (imu, expect) = (imu("hipnuc.hi92"), &vector("hipnuc.hi92")["expect"]);
+    compare(&imu, expect);
+    close(&imu.acceleration_m_s2, &expect["acc_ms2"], 1e-5);
+    close(&[imu.pressure_pa], &expect["pressure_pa_python_reading"], 0.01);
+    close(&imu.attitude.as_array(), &expect["quat"], 1e-4);
+    assert_eq!(imu.time_ms, None);
+}
+
+#[test]
+fn hipnuc_other_tags_are_skipped_and_counted() {
+    let frame = hex(&vector("hipnuc.hi81.crc")["input"]["frame"]);
+    let (frames, counts) = frames::<_, 128>(HipNuc, &frame);
+    assert!(frames.is_empty());
+    assert_eq!(counts, Counts { foreign_frames: 1, ..Counts::default() });
+}
+
+#[test]
+fn hipnuc_live_frame_passes_and_its_flipped_twin_does_not() {
+    // The frame is the live one; the vector is about the CRC that it must not have.
+    let live = imu("hipnuc.neg.payload_only_crc");
+    assert_eq!(live.temperature_c, 29);
+    let norm: f32 = live.attitude.as_array().iter().map(|part| part * part).sum();
+    assert!((norm - 1.0).abs() < 1e-6, "sent as 0.99904");
+    let flipped = hex(&vector("hipnuc.neg.flip")["input"]["frame"]);
+    let (frames, counts) = frames::<_, 128>(HipNuc, &flipped);
+    assert_eq!((frames.len(), counts.checksum_errors), (0, 1));
+}
+
+#[test]
+fn hipnuc_finds_the_good_frame_in_the_public_resync_stream() {
+    let vector = vector("hipnuc.resync");
+    let (frames, counts) = frames::<_, 518>(HipNuc, &hex(&vector["input"]["stream"]));
+    let expect = &vector["expect"];
+    assert_eq!(frames.len() as u64, expect["valid_frames"].as_u64().unwrap());
+    assert_eq!(i64::from(counts.length_errors), expect["length_errors"]);
+    assert_eq!(i64::from(counts.checksum_errors), expect["crc_errors"]);
+}
+
+#[test]
+fn hipnuc_euler_angles_of_the_quaternion_are_those_of_the_firmware() {
+    let off = |imu: &Imu, order| {
+        let (roll, pitch, yaw) = imu.attitude.euler(order);
+        let difference = |a: Angle, b: Angle| (a.as_degrees() - b.as_degrees()).abs();
+        difference(roll, imu.roll).max(difference(pitch, imu.pitch)).max(difference(yaw, imu.yaw))
+    };
+    // 0.01 degrees: the integers of the `92` frame and the length of the live quaternion. micromath is 0.3 off.
+    let tolerance = if cfg!(feature = "micromath") { 1.0 } else { 0.02 };
+    for (id, order, other) in [
+        ("hipnuc.hi91.manual_7_34", EulerOrder::PitchX, EulerOrder::RollX),
+        ("hipnuc.neg.payload_only_crc", EulerOrder::PitchX, EulerOrder::RollX),
+        ("hipnuc.hi92", EulerOrder::PitchX, EulerOrder::RollX),
+        ("hipnuc.hi91.ch0x0_manual_6_3_1", EulerOrder::RollX, EulerOrder::PitchX),
+    ] {
+        let imu = imu(id);
+        let (right, wrong) = (off(&imu, order), off(&imu, other));
+        assert!(right < tolerance, "{id}: {right}");
+        assert!(wrong > right, "{id}: {wrong}");
+    }
+    assert_eq!(hipnuc::MAX_FRAME, 128);
+}
+
+fn command(input: &Value) -> Command {
+    let speeds = integers::<u8>(&input["speeds_rpm_u8"]);
+    let positions = integers::<i32>(&input["positions_i32"]);
+    let mut command = Command::default();
+    for ((joint, speed_rpm), position_pulses) in
+        command.joints.iter_mut().zip(speeds).zip(positions)
+    {
+        *joint = JointTarget { speed_rpm, position_pulses };
+    }
+    let number = |name: &str| i16::try_from(input[name].as_i64().unwrap()).unwrap();
+    command.gm6020_position = number("gm6020");
+    command.c610_position = number("c610");
+    command.sts3032_degrees = number("sts3032");
+    command.reset = Reset::from_raw(u8::try_from(number("reset")).unwrap());
+    command
+}
+
+#[test]
+fn host_link_commands_in_both_directions() {
+    for id in ["snake.cmd.ramp", "snake.cmd.zero"] {
+        let vector = vector(id);
+        let (command, frame) = (command(&vector["input"]), hex(&vector["expect"]["frame"]));
+        assert_eq!(command.encode(&mut [0; COMMAND_LENGTH]).unwrap(), frame);
+        let (frames, counts) = frames::<_, COMMAND_LENGTH>(CommandFormat, &frame);
+        assert_eq!((frames, counts.skipped_bytes), (vec![command], 0));
+    }
+    let first = command(&vector("snake.cmd.ramp")["input"]).joints[0];
+    let expected = &vector("snake.cmd.ramp")["expect"]["speed_pulse_per_s_of_first"];
+    assert_eq!(i64::from(first.speed_pulses_per_s()), *expected);
+}
+
+#[test]
+fn host_link_refuses_the_byte_order_of_modbus_in_the_crc() {
+    let frame = hex(&vector("snake.cmd.neg.crc_swapped")["input"]["frame"]);
+    let (frames, counts) = frames::<_, COMMAND_LENGTH>(CommandFormat, &frame);
+    assert_eq!((frames.len(), counts.checksum_errors), (0, 1));
+}
+
+#[test]
+fn host_link_telemetry_with_both_headers_in_both_directions() {
+    for (id, header) in [
+        ("snake.telemetry.seed_AA55", TelemetryHeader::Document),
+        ("snake.telemetry.code_BB66", TelemetryHeader::Firmware),
+    ] {
+        let vector = vector(id);
+        let (frame, expect) = (hex(&vector["input"]["frame"]), &vector["expect"]);
+        let format = TelemetryFormat::new().with_header(header);
+        let (frames, counts) = frames::<_, TELEMETRY_LENGTH>(format, &frame);
+        assert_eq!((frames.len(), counts.skipped_bytes), (1, 0), "{id}");
+        let telemetry: Telemetry = frames[0];
+        assert_eq!(telemetry.positions_pulses[..], integers::<i32>(&expect["positions"]));
+        assert_eq!(telemetry.speeds_rpm[..], integers::<i8>(&expect["speeds"]));
+        assert_eq!(i64::from(telemetry.gm6020_position), expect["gm6020"]);
+        assert_eq!(i64::from(telemetry.c610_position), expect["c610"]);
+        for (angles, expected) in telemetry
+            .imu_angles_deg
+            .iter()
+            .zip(expect["imu_triplets_wire_order"].as_array().unwrap())
+        {
+            close(angles, expected, 0.0);
+        }
+        assert_eq!(format.encode(&telemetry, &mut [0; 121]).unwrap(), frame);
+
+        let big = format.with_floats(ByteOrder::Big);
+        let mut buffer = [0; TELEMETRY_LENGTH];
+        let swapped = big.encode(&telemetry, &mut buffer).unwrap();
+        assert_ne!(swapped, frame);
+        assert_eq!(self::frames::<_, TELEMETRY_LENGTH>(big, swapped).0, [telemetry]);
+    }
+    assert_eq!(TelemetryFormat::default(), TelemetryFormat::new());
+}
+
+#[test]
+fn feetech_instructions_of_the_manual() {
+    let expected = |id: &str| hex(&vector(id)["expect"]["frame"]);
+    let mut buffer = [0; 64];
+    let out = &mut buffer;
+    let one = ServoId::ONE;
+    assert_eq!(feetech::ping(one, out).unwrap(), [0xFF, 0xFF, 1, 2, 1, 0xFB]);
+    assert_eq!(feetech::reset(one, out).unwrap(), expected("feetech.reset"));
+    let read = feetech::read(one, register::PRESENT_POSITION, 2, out).unwrap();
+    assert_eq!(read, expected("feetech.read_pos"));
+    let goal = [0x00, 0x08, 0x00, 0x00, 0xE8, 0x03];
+    let write = feetech::write(one, register::GOAL_POSITION, &goal, out).unwrap();
+    assert_eq!(write, expected("feetech.write_goal"));
+    let four = [1, 2, 3, 4].map(|id| (ServoId::new(id).unwrap(), goal));
+    let sync = feetech::sync_write(register::GOAL_POSITION, &four, out).unwrap();
+    assert_eq!(sync, expected("feetech.sync_write"));
+    for (id, goal) in [
+        ("feetech.write_pos_ex", Goal { acceleration: 50, position: 4095, time: 0, speed: 2250 }),
+        ("feetech.wheel_neg", Goal { acceleration: 50, position: 0, time: 0, speed: -1000 }),
+    ] {
+        let write = feetech::write(one, Goal::ADDRESS, &goal.to_bytes(), out).unwrap();
+        assert_eq!(write, expected(id));
+    }
+}
+
+#[test]
+fn feetech_status_frames_of_the_manual() {
+    for (id, position) in [("feetech.status.block1", 2048), ("feetech.status.block2", 2047)] {
+        let vector = vector(id);
+        let (frames, _) = frames::<_, 64>(Sts, &hex(&vector["input"]["frame"]));
+        let (status, expect) = (&frames[0], &vector["expect"]);
+        assert_eq!(i64::from(status.id()), expect["id"]);
+        assert!(status.errors().is_empty());
+        let present = Present::from_status(status).unwrap();
+        assert_eq!(present.position, position);
+        close(&[present.voltage_v()], &expect["voltage_v"], 1e-5);
+        assert_eq!(i64::from(present.temperature_c), expect["temperature_c"]);
+    }
+    let (acknowledged, _) =
+        frames::<_, 64>(Sts, &hex(&vector("feetech.status.ok")["input"]["frame"]));
+    assert_eq!((acknowledged[0].id(), acknowledged[0].parameters()), (1, &[][..]));
+    assert_eq!(Present::from_status(&acknowledged[0]), None);
+    let bad = hex(&vector("feetech.neg.checksum")["input"]["frame"]);
+    let (none, counts) = frames::<_, 64>(Sts, &bad);
+    assert_eq!((none.len(), counts.checksum_errors), (0, 1));
+}
+
+#[test]
+fn dbus_frames() {
+    let read = |id: &str| {
+        let mut dbus = Dbus::new();
+        let bytes = hex(&vector(id)["input"]["frame"]);
+        let remote = dbus.read(&mut &bytes[..], Instant::START);
+        assert_eq!(dbus.counts().implausible == 0, remote.is_some());
+        remote
+    };
+    let all = read("dbus.extremes").unwrap();
+    let expect = &vector("dbus.extremes")["expect"];
+    close(&[all.right.x, all.right.y, all.left.x, all.left.y], &expect["normalised_660"], 0.0);
+    assert_eq!([all.mouse.x, all.mouse.y, all.mouse.z][..], integers::<i16>(&expect["mouse"]));
+    assert!(all.mouse.left && all.mouse.right);
+    assert!(all.keys.is_pressed(Key::W) && all.keys.is_pressed(Key::B) && all.keys.0 == 0xFFFF);
+    assert!((all.dial - 1.0).abs() < 1e-6);
+
+    let rest = read("dbus.capture").unwrap();
+    close(
+        &[rest.right.x, rest.right.y, rest.left.x, rest.left.y],
+        &serde_json::json!([0, 0, 0, 0]),
+        0.0,
+    );
+    assert_eq!((rest.right_switch, rest.left_switch), (Switch::Middle, Switch::Up));
+    close(&[rest.dial], &serde_json::json!(0), 0.0);
+}
+
+#[test]
+fn f62_dbus_frames_with_impossible_values_are_refused() {
+    for id in ["dbus.out_of_range", "dbus.switch_zero"] {
+        let mut dbus = Dbus::new();
+        let bytes = hex(&vector(id)["input"]["frame"]);
+        assert_eq!(dbus.read(&mut &bytes[..], Instant::START), None, "{id}");
+        assert_eq!(dbus.counts().implausible, 1, "{id}");
+    }
+}
