@@ -9,6 +9,7 @@
 //! | [`OmniThree`], [`OmniFour`] | [`OmniThreeWheels`], [`OmniFourWheels`] | positive rolls counter-clockwise |
 //! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
 //! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
+//! | [`Swerve`] | an array, as given | [`SwerveSteering`] finds the shorter way and holds the angles |
 //!
 //! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
@@ -20,6 +21,8 @@ mod kinematics;
 mod least_squares;
 mod mecanum;
 mod omni;
+mod steering;
+mod swerve;
 mod wheels;
 
 pub use differential::{Differential, DifferentialGeometry};
@@ -27,4 +30,6 @@ pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use mecanum::{Mecanum, MecanumGeometry, RollerMounting};
 pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
+pub use steering::{SteeringConfig, SwerveSteering};
+pub use swerve::{ModuleState, Swerve};
 pub use wheels::{DifferentialWheels, MecanumWheels, OmniFourWheels, OmniThreeWheels};
