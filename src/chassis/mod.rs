@@ -1,20 +1,35 @@
 //! From a motion of the body to wheel speeds and back, for every wheel layout.
 //!
 //! Axes, signs and units are those drawn in [`geometry`](crate::geometry): x forward, y left, counter-clockwise
-//! positive. A positive wheel velocity rolls forward.
+//! positive. A positive wheel velocity rolls forward; on an omni wheel, along the direction it was given.
 //!
-//! | layout | wheels | inverse, forward |
+//! | layout | wheels | remarks |
 //! |---|---|---|
 //! | [`Mecanum`] | [`MecanumWheels`] | both roller mountings |
+//! | [`OmniThree`], [`OmniFour`] | [`OmniThreeWheels`], [`OmniFourWheels`] | positive rolls counter-clockwise |
+//! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
+//! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
+//! | [`Swerve`] | an array, as given | [`SwerveSteering`] finds the shorter way and holds the angles |
 //!
 //! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
+//! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
+//! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
 
+mod differential;
 mod error;
 mod kinematics;
+mod least_squares;
 mod mecanum;
+mod omni;
+mod steering;
+mod swerve;
 mod wheels;
 
+pub use differential::{Differential, DifferentialGeometry};
 pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use mecanum::{Mecanum, MecanumGeometry, RollerMounting};
-pub use wheels::MecanumWheels;
+pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
+pub use steering::{SteeringConfig, SwerveSteering};
+pub use swerve::{ModuleState, Swerve};
+pub use wheels::{DifferentialWheels, MecanumWheels, OmniFourWheels, OmniThreeWheels};

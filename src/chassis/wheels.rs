@@ -123,3 +123,39 @@ named_wheels! {
         rear_right
     }
 }
+
+named_wheels! {
+    /// One value for each wheel of [`OmniThree`](super::OmniThree).
+    OmniThreeWheels, 3 {
+        /// Front left, at 60 degrees.
+        front_left,
+        /// Front right, at -60 degrees.
+        front_right,
+        /// Rear, at 180 degrees.
+        rear
+    }
+}
+
+named_wheels! {
+    /// One value for each wheel of [`OmniFour`](super::OmniFour).
+    OmniFourWheels, 4 {
+        /// Front left, at 45 degrees.
+        front_left,
+        /// Front right, at -45 degrees.
+        front_right,
+        /// Rear left, at 135 degrees.
+        rear_left,
+        /// Rear right, at -135 degrees.
+        rear_right
+    }
+}
+
+named_wheels! {
+    /// One value for each side of a [`Differential`](super::Differential) chassis.
+    DifferentialWheels, 2 {
+        /// All wheels of the left side, +y.
+        left,
+        /// All wheels of the right side, -y.
+        right
+    }
+}
