@@ -12,8 +12,8 @@ use crate::math;
 /// A step of the input is followed to 4 % after `5 / r` seconds.
 ///
 /// # Edge behaviour
-/// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes. `dt_s` above the
-/// maximum: counts as the maximum. Starts from zero at rest; see [`reset_to`](Self::reset_to).
+/// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
+/// [`rejected`](Self::rejected) grows. `dt_s` above the maximum: counts as the maximum. Starts from zero at rest; see [`reset_to`](Self::reset_to).
 ///
 /// # Examples
 /// ```
@@ -34,6 +34,7 @@ pub struct LinearDifferentiator {
     max_step_s: f32,
     value: f32,
     rate: f32,
+    rejected: u16,
 }
 
 impl LinearDifferentiator {
@@ -47,7 +48,7 @@ impl LinearDifferentiator {
         if r * max_step_s > 1.0 {
             return Err(ConfigError::new("r", ConfigFault::Unstable));
         }
-        Ok(Self { r, max_step_s, value: 0.0, rate: 0.0 })
+        Ok(Self { r, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
     }
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
@@ -63,6 +64,8 @@ impl LinearDifferentiator {
             let pull = finite(self.r * finite(self.r * error + 2.0 * self.rate));
             self.value = finite(self.value + dt_s * self.rate);
             self.rate = finite(self.rate - dt_s * pull);
+        } else {
+            self.rejected = self.rejected.saturating_add(1);
         }
         self.value
     }
@@ -83,6 +86,12 @@ impl LinearDifferentiator {
     #[must_use]
     pub const fn rate(&self) -> f32 {
         self.rate
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
     }
 }
 
@@ -117,6 +126,7 @@ pub struct OptimalDifferentiator {
     max_step_s: f32,
     value: f32,
     rate: f32,
+    rejected: u16,
 }
 
 impl OptimalDifferentiator {
@@ -132,7 +142,7 @@ impl OptimalDifferentiator {
         if h0_s < max_step_s {
             return Err(ConfigError::new("h0", ConfigFault::Unstable));
         }
-        Ok(Self { r, h0_s, max_step_s, value: 0.0, rate: 0.0 })
+        Ok(Self { r, h0_s, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
     }
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
@@ -142,6 +152,8 @@ impl OptimalDifferentiator {
             let acceleration = fhan(finite(self.value - input), self.rate, self.r, self.h0_s);
             self.value = finite(self.value + step.dt_s * self.rate);
             self.rate = finite(self.rate + step.dt_s * acceleration);
+        } else {
+            self.rejected = self.rejected.saturating_add(1);
         }
         self.value
     }
@@ -162,6 +174,12 @@ impl OptimalDifferentiator {
     #[must_use]
     pub const fn rate(&self) -> f32 {
         self.rate
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
     }
 }
 
@@ -189,4 +207,151 @@ pub fn fhan(x1: f32, x2: f32, r: f32, h: f32) -> f32 {
         drift + (0.5 * (root - d)).copysign(y)
     };
     if a.abs() < d { -r * (a / d) } else { -r.copysign(a) }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const DT_S: f32 = 0.001;
+    const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+    #[test]
+    fn r_dt_from_a_tenth_to_three_never_overshoots_or_is_an_error() {
+        for tenths in 1..=30_u8 {
+            let r = f32::from(tenths) * 100.0;
+            match LinearDifferentiator::new(r, DT_S) {
+                Err(error) => {
+                    assert!(tenths > 10);
+                    assert_eq!((error.parameter(), error.fault()), ("r", ConfigFault::Unstable));
+                }
+                Ok(mut follow) => {
+                    assert!(tenths <= 10);
+                    for _ in 0..1000 {
+                        assert!((0.0..=1.000_001).contains(&follow.update(1.0, DT_S)));
+                    }
+                    assert!((follow.value() - 1.0).abs() < 1e-5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_parameter_that_cannot_be_is_named() {
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(LinearDifferentiator::new(bad, DT_S).unwrap_err().parameter(), "r");
+            assert_eq!(LinearDifferentiator::new(1.0, bad).unwrap_err().parameter(), "max_step");
+            assert_eq!(OptimalDifferentiator::new(bad, DT_S, DT_S).unwrap_err().parameter(), "r");
+            assert_eq!(OptimalDifferentiator::new(1.0, bad, DT_S).unwrap_err().parameter(), "h0");
+            assert_eq!(
+                OptimalDifferentiator::new(1.0, DT_S, bad).unwrap_err().parameter(),
+                "max_step"
+            );
+        }
+        let narrow = OptimalDifferentiator::new(1.0, 0.0005, DT_S).unwrap_err();
+        assert_eq!((narrow.parameter(), narrow.fault()), ("h0", ConfigFault::Unstable));
+    }
+
+    #[test]
+    fn bad_inputs_and_bad_times_change_nothing() {
+        let mut linear = LinearDifferentiator::new(100.0, DT_S).unwrap();
+        let mut optimal = OptimalDifferentiator::new(10.0, DT_S, DT_S).unwrap();
+        linear.update(1.0, DT_S);
+        optimal.update(1.0, DT_S);
+        let before = (linear, optimal);
+        for bad in BAD {
+            linear.update(bad, DT_S);
+            linear.update(1.0, bad);
+            optimal.update(bad, DT_S);
+            optimal.update(1.0, bad);
+        }
+        for no_time in [0.0, -DT_S] {
+            linear.update(1.0, no_time);
+            optimal.update(1.0, no_time);
+        }
+        assert_eq!((linear.rejected(), optimal.rejected()), (8, 8));
+        (linear.rejected, optimal.rejected) = (0, 0);
+        assert_eq!((linear, optimal), before);
+    }
+
+    #[test]
+    fn a_long_pause_counts_as_the_longest_step() {
+        let (mut paused, mut steady) = (
+            LinearDifferentiator::new(900.0, DT_S).unwrap(),
+            LinearDifferentiator::new(900.0, DT_S).unwrap(),
+        );
+        for _ in 0..20 {
+            assert_eq!(paused.update(1.0, 10.0), steady.update(1.0, DT_S));
+        }
+    }
+
+    #[test]
+    fn the_rate_of_a_ramp_is_its_slope() {
+        let mut linear = LinearDifferentiator::new(200.0, DT_S).unwrap();
+        let mut optimal = OptimalDifferentiator::new(1000.0, 0.005, DT_S).unwrap();
+        for sample in 0..1000_u16 {
+            let input = 3.0 * f32::from(sample) * DT_S;
+            linear.update(input, DT_S);
+            optimal.update(input, DT_S);
+        }
+        assert!((linear.rate() - 3.0).abs() < 0.01 && (optimal.rate() - 3.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn reset_to_is_at_rest() {
+        let mut linear = LinearDifferentiator::new(200.0, DT_S).unwrap();
+        linear.update(1.0, DT_S);
+        linear.reset_to(5.0);
+        assert_eq!((linear.update(5.0, DT_S), linear.rate()), (5.0, 0.0));
+        let mut optimal = OptimalDifferentiator::new(1000.0, 0.005, DT_S).unwrap();
+        optimal.reset_to(f32::NAN);
+        assert_eq!((optimal.value(), optimal.rate()), (0.0, 0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn linear_is_bounded_by_its_inputs_when_they_are_constant(
+            r in 1.0_f32..1000.0, target in -1e6_f32..1e6, steps in prop::collection::vec(1e-6_f32..1e-3, 1..200),
+        ) {
+            let mut follow = LinearDifferentiator::new(r, DT_S).unwrap();
+            for dt_s in steps {
+                let value = follow.update(target, dt_s);
+                prop_assert!(value * target >= 0.0 && value.abs() <= target.abs() * 1.000_01);
+            }
+        }
+
+        #[test]
+        fn optimal_arrives_without_overshoot_and_within_its_acceleration(
+            r in 0.1_f32..1000.0, target in -100.0_f32..100.0, width in 1.0_f32..5.0,
+        ) {
+            let mut follow = OptimalDifferentiator::new(r, width * DT_S, DT_S).unwrap();
+            let mut rate = 0.0;
+            for _ in 0..2000 {
+                let value = follow.update(target, DT_S);
+                prop_assert!((follow.rate() - rate).abs() <= r * DT_S * 1.001 + 1e-5);
+                // One step of smoothing either way.
+                prop_assert!(value.abs() <= target.abs() + r * (width * DT_S) * (width * DT_S) + 1e-4);
+                rate = follow.rate();
+            }
+        }
+
+        #[test]
+        fn fhan_is_odd_and_bounded(x1 in -1e9_f32..1e9, x2 in -1e6_f32..1e6, r in 1e-3_f32..1e6, h in 1e-5_f32..0.1) {
+            let pull = fhan(x1, x2, r, h);
+            prop_assert!(pull.abs() <= r * 1.000_001);
+            prop_assert_eq!(fhan(-x1, -x2, r, h), -pull);
+        }
+
+        #[test]
+        fn huge_values_stay_finite(samples in prop::collection::vec(-f32::MAX..f32::MAX, 1..20)) {
+            let mut linear = LinearDifferentiator::new(1000.0, DT_S).unwrap();
+            let mut optimal = OptimalDifferentiator::new(1e30, DT_S, DT_S).unwrap();
+            for input in samples {
+                prop_assert!(linear.update(input, DT_S).is_finite() && linear.rate().is_finite());
+                prop_assert!(optimal.update(input, DT_S).is_finite() && optimal.rate().is_finite());
+            }
+        }
+    }
 }

@@ -1,4 +1,40 @@
-//! Controllers, filters and profiles: `f32`, no heap, the time as an argument.
+//! Controllers, filters and profiles for the loops of a robot: `f32`, no heap, the time as an argument.
+//!
+//! # Which one?
+//! | loop or task | use | start with |
+//! |---|---|---|
+//! | wheel or shooter speed | [`SpeedActuator`], or [`Pid`] alone | PI, output and integral limit, `with_feed_forward` |
+//! | speed, and the setpoint jumps | [`IncrementalPid`] | `with_tracking` |
+//! | arm or lift position | [`PositionActuator`] | P over PI, the angle loop's output limit is the speed limit |
+//! | gimbal or swerve angle | [`PositionActuator`] | `with_period(360.0)`: the shortest way round |
+//! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
+//! | a target from a stick or another computer | [`SlewLimiter`], [`OptimalDifferentiator`] | the acceleration the mechanism can take |
+//! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
+//! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
+//! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
+//! | single wrong samples | [`Median`] of 3 | |
+//! | the rate of a noisy signal | [`LinearDifferentiator`], [`OptimalDifferentiator`] | |
+//! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
+//!
+//! # What they all do
+//! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. What a
+//!   very long one does is said at each type; for the controllers see [`TimeStep`].
+//! * A setpoint or measurement that is NaN or infinite changes nothing: the last output is returned, the sample is counted, and
+//!   the next good one works as if the bad one had not been.
+//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`] names the one that cannot work. What
+//!   needs arithmetic only is `const`, so that a bad constant does not compile.
+//! * Nothing panics, and what is stored is finite.
+//!
+//! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.
+//!
+//! ```
+//! use drivetrain::control::{Pid, PidConfig};
+//!
+//! let speed = PidConfig::new(0.1, 0.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
+//! let mut wheel = Pid::new(speed)?;
+//! assert_eq!(wheel.update(50.0, 10.0, 0.001), 4.0); // A for rad/s: 0.1 times 40
+//! # Ok::<(), drivetrain::control::ConfigError>(())
+//! ```
 
 mod actuator;
 mod differentiator;

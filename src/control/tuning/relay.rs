@@ -168,8 +168,8 @@ impl RelayTunerConfig {
 /// The mechanism moves while this runs: choose the amplitude so that it may, and keep the safety limits on.
 ///
 /// # Edge behaviour
-/// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned and
-/// nothing changes. `dt_s` above 0.1 s spoils the measurement: it starts anew. When done or out of time, the output is the bias.
+/// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned,
+/// nothing changes and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s spoils the measurement: it starts anew. When done or out of time, the output is the bias.
 ///
 /// # Examples
 /// ```
@@ -202,6 +202,7 @@ pub struct RelayTuner {
     sum_of_swings: f32,
     last_swing: f32,
     periods: u8,
+    rejected: u16,
     up: bool,
     state: State,
 }
@@ -235,6 +236,7 @@ impl RelayTuner {
             sum_of_swings: 0.0,
             last_swing: 0.0,
             periods: 0,
+            rejected: 0,
             up: true,
             state: State::Idle,
         })
@@ -244,7 +246,11 @@ impl RelayTuner {
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
         let step = TimeStep::new(dt_s, PidConfig::MAX_STEP_S);
         let error = setpoint - measurement;
-        if self.is_complete() || step.is_hold() || !error.is_finite() {
+        if step.is_hold() || !error.is_finite() {
+            self.rejected = self.rejected.saturating_add(1);
+            return self.output();
+        }
+        if self.is_complete() {
             return self.output();
         }
         self.passed_s += step.dt_s();
@@ -314,6 +320,12 @@ impl RelayTuner {
     #[must_use]
     pub fn is_complete(&self) -> bool {
         matches!(self.state, State::Done | State::OutOfTime)
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.rejected
     }
 
     /// Returns the result: `None` while it runs, when it ran out of time, and when the swing was not larger than the hysteresis.
@@ -440,7 +452,8 @@ mod tests {
             assert_eq!(tuner.update(1.0, bad, DT_S), 1.5);
             assert_eq!(tuner.update(1.0, 0.0, bad), 1.5);
         }
-        assert_eq!((tuner.update(1.0, 0.0, 0.0), tuner), (1.5, before));
+        assert_eq!(tuner.update(1.0, 0.0, 0.0), 1.5);
+        assert_eq!((tuner.rejected(), RelayTuner { rejected: 0, ..tuner }), (10, before));
     }
 
     #[test]
