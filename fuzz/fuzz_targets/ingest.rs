@@ -19,9 +19,8 @@ fuzz_target!(|data: &[u8]| {
     let limits = [(0x200, [16_384_u16, 10_000, 0, 0]), (0x2FF, [0, 0, 25_000, 0])];
 
     let mut now = 0_u64;
-    for step in data.chunks_exact(16) {
-        let [op, flags, id_high, id_low, length, time, _, _, payload @ ..] = *step else { return };
-        let payload: [u8; 8] = payload;
+    for step in data.as_chunks::<14>().0 {
+        let [op, flags, id_high, id_low, length, time, payload @ ..] = *step;
         now = now.wrapping_add(u64::from(time) << (flags & 31));
         let at = Instant::from_micros(now);
         let raw = u16::from_be_bytes([id_high, id_low]);
