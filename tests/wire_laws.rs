@@ -50,7 +50,7 @@ impl Subject for CommandFormat {
             *joint =
                 JointTarget { speed_rpm: byte(), position_pulses: i32::from_be_bytes(position) };
         }
-        if seed % 3 == 0 {
+        if seed.is_multiple_of(3) {
             command.joints[5].position_pulses = i32::from_be_bytes([0, 0, 0xAA, 0x55]);
             command.joints[6] = JointTarget { speed_rpm: 1, position_pulses: 0x4B31_10AA };
         }

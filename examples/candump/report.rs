@@ -1,0 +1,134 @@
+//! Prints what a log says: one row a motor, or one row a frame.
+
+use std::io::{self, BufRead, Read, Write};
+
+use drivetrain::dji::State;
+use drivetrain::time::Instant;
+use drivetrain::wire::candump::{Expected, Record};
+
+use super::options::Options;
+use super::replay::{Account, Replay};
+
+/// Longer lines are cut, and then reported as wrong: no log of candump has them.
+const LONGEST_LINE: u64 = 4096;
+
+/// Reads all of `input`. Bad lines are reported to `complaints` and skipped.
+pub(crate) fn run(
+    options: &Options,
+    mut input: impl BufRead,
+    output: &mut impl Write,
+    complaints: &mut impl Write,
+) -> io::Result<()> {
+    let mut replay = Replay::new(options).map_err(io::Error::other)?;
+    if options.csv {
+        writeln!(output, "time_s,motor,turns,rpm,amperes,temperature_c,error,rotor_counts")?;
+    }
+    let (mut line, mut number, mut bad) = (Vec::new(), 0_u64, 0_u64);
+    loop {
+        line.clear();
+        if input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line)? == 0 {
+            break;
+        }
+        number += 1;
+        match Record::parse(&line) {
+            Ok(record) => match replay.take(&record) {
+                Some((now, state)) if options.csv => row_of_frame(output, now, &state)?,
+                _ => {}
+            },
+            Err(error) if error.expected == Expected::Line => {}
+            Err(error) => {
+                bad += 1;
+                writeln!(complaints, "line {number}: {error}; skipped")?;
+            }
+        }
+    }
+    if !options.csv {
+        table(options, &replay, output)?;
+    }
+    notes(&replay, bad, complaints)
+}
+
+fn row_of_frame(output: &mut impl Write, now: Instant, state: &State) -> io::Result<()> {
+    let micros = now.as_micros();
+    write!(output, "{}.{:06},{},", micros / 1_000_000, micros % 1_000_000, state.motor)?;
+    let turns = state.position.turns() as f64 + f64::from(state.position.angle().as_turns());
+    write!(output, "{turns:.6},{:.3},", state.velocity.as_rpm())?;
+    write!(output, "{:.4},{},", state.current.as_amperes(), or_nothing(state.temperature_c))?;
+    writeln!(output, "{},{}", or_nothing(state.error), state.rotor_counts)
+}
+
+fn or_nothing(value: Option<impl ToString>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
+fn table(options: &Options, replay: &Replay, output: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        output,
+        "{:<20} {:>8} {:>8} {:>11} {:>8} {:>8} {:>4} {:>5} {:>10}  error",
+        "motor", "frames", "rate/Hz", "turns", "rpm", "A", "°C", "gaps", "longest/ms"
+    )?;
+    for account in &replay.accounts {
+        match &account.latest {
+            Some((_, state)) => row_of_motor(output, account, state, replay.has_times)?,
+            None if options.show_silent => {
+                writeln!(output, "{:<20} {:>8}  not heard", account.name.to_string(), 0)?;
+            }
+            None => {}
+        }
+    }
+    Ok(())
+}
+
+fn row_of_motor(
+    output: &mut impl Write,
+    account: &Account,
+    state: &State,
+    has_times: bool,
+) -> io::Result<()> {
+    let timed = |text: String| if has_times { text } else { "-".to_owned() };
+    let rate = account.rate_hz().map_or("-".to_owned(), |hz| format!("{hz:.1}"));
+    let longest_ms = account.longest_silence.as_micros() as f64 / 1e3;
+    let temperature = state.temperature_c.map_or("-".to_owned(), |degrees| degrees.to_string());
+    let error = state.error.map_or("-".to_owned(), |error| error.to_string());
+    writeln!(
+        output,
+        "{:<20} {:>8} {:>8} {:>11.4} {:>8.2} {:>8.3} {temperature:>4} {:>5} {:>10}  {error}",
+        account.name.to_string(),
+        account.frames,
+        timed(rate),
+        account.turns().unwrap_or(0.0),
+        state.velocity.as_rpm(),
+        state.current.as_amperes(),
+        timed(account.gaps.to_string()),
+        timed(format!("{longest_ms:.3}")),
+    )
+}
+
+fn notes(replay: &Replay, bad: u64, complaints: &mut impl Write) -> io::Result<()> {
+    for account in &replay.accounts {
+        if account.malformed > 0 {
+            let (name, count) = (account.name, account.malformed);
+            writeln!(complaints, "{name}: {count} frames with its id are not its feedback")?;
+        }
+        if let Some((_, state)) = account.latest.filter(|(_, state)| state.ambiguous_gaps > 0) {
+            let (name, count) = (account.name, state.ambiguous_gaps);
+            writeln!(
+                complaints,
+                "{name}: after {count} gaps its turns are a guess from its speed"
+            )?;
+        }
+    }
+    for (count, what) in [
+        (replay.unrelated, "frames of nobody asked for"),
+        (replay.other_interfaces, "frames of other interfaces; choose with --interface"),
+        (bad, "lines skipped"),
+    ] {
+        if count > 0 {
+            writeln!(complaints, "{count} {what}")?;
+        }
+    }
+    if !replay.has_times && replay.accounts.iter().any(|account| account.frames > 0) {
+        writeln!(complaints, "no times in the log: record it with candump -ta or -L")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,232 @@
+//! The candump example on real input: its logic from text to table, and its program from arguments to exit code.
+
+#![cfg(test)]
+
+#[path = "../examples/candump/options.rs"]
+mod options;
+#[path = "../examples/candump/replay.rs"]
+mod replay;
+#[path = "../examples/candump/report.rs"]
+mod report;
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::motor::Ingest;
+use drivetrain::time::Instant;
+use drivetrain::wire::candump::Record;
+use options::{Asked, Options};
+
+const REST: &str = include_str!("data/candump/c620_rest.log");
+
+fn options(arguments: &str) -> Options {
+    match options::parse(arguments.split_whitespace().map(str::to_owned)) {
+        Ok(Asked::Run(options)) => options,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Returns what goes to standard output and to standard error.
+fn run(arguments: &str, log: &str) -> (String, String) {
+    let (mut output, mut complaints) = (Vec::new(), Vec::new());
+    report::run(&options(arguments), log.as_bytes(), &mut output, &mut complaints).unwrap();
+    (String::from_utf8(output).unwrap(), String::from_utf8(complaints).unwrap())
+}
+
+/// The words of the row of a motor, its name left out.
+fn row<'a>(table: &'a str, motor: &str) -> Vec<&'a str> {
+    let row = table.lines().find_map(|line| line.strip_prefix(motor));
+    row.unwrap_or_else(|| panic!("no {motor} in\n{table}")).split_whitespace().collect()
+}
+
+#[test]
+fn the_real_capture_decodes_to_the_values_worked_out_by_hand() {
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let raw_currents = [-3_i16, -66, 61];
+    for ((line, raw), ms) in REST.lines().zip(raw_currents).zip(0..) {
+        let record = Record::parse(line.as_bytes()).unwrap();
+        assert_eq!((record.time, record.interface), (None, "can0"));
+        assert_eq!(bus.ingest(&record.frame, Instant::from_micros(1_000 * ms)), Ingest::Taken);
+        let state = bus.state(motor).unwrap();
+        assert_eq!((state.feedback.angle(), state.feedback.rpm()), (3606, 0));
+        assert_eq!(state.rotor_counts, 3606);
+        let amperes = f32::from(raw) * 20.0 / 16384.0;
+        assert!((state.current.as_amperes() - amperes).abs() < 1e-6);
+        assert_eq!((state.temperature_c, state.error), (Some(33), None));
+        // 3606 of 8192 counts of the rotor, behind 3591:187
+        let degrees = 3606.0 / 8192.0 * 360.0 * 187.0 / 3591.0;
+        assert!((state.position.angle().as_degrees() - degrees).abs() < 1e-4);
+    }
+    assert_eq!(REST.lines().count(), raw_currents.len());
+}
+
+#[test]
+fn the_real_capture_makes_one_row() {
+    let (table, complaints) = run("", REST);
+    assert_eq!(table.lines().count(), 2, "{table}");
+    let expected = ["3", "-", "0.0000", "0.00", "0.074", "33", "-", "-", "-"];
+    assert_eq!(row(&table, "M3508 #1"), expected);
+    assert!(complaints.contains("no times in the log"), "{complaints}");
+}
+
+#[test]
+fn both_text_forms_give_the_same_rows() {
+    let mut log = String::new();
+    let mut columns = String::new();
+    for line in REST.lines() {
+        let record = Record::parse(line.as_bytes()).unwrap();
+        let time = Some(Instant::from_micros(1_788_189_998_242_396));
+        let record = Record { time, ..record };
+        log.push_str(&format!("{record}\n"));
+        columns.push_str(&format!("{record:#}\r\n"));
+    }
+    for arguments in ["", "--csv", "--motors m3508:1-4"] {
+        assert_eq!(run(arguments, &log), run(arguments, &columns));
+    }
+    let (csv, _) = run("--csv", &log);
+    assert_eq!(
+        csv.lines().nth(1),
+        Some("1788189998.242396,M3508 #1,0.022923,0.000,-0.0037,33,,3606")
+    );
+}
+
+#[test]
+fn a_bad_line_is_reported_with_its_number_and_skipped() {
+    let log = "(1.000) can0 201#0E160000FFFD2100\n\n(1.001) can0 201#0E16zz\n\u{fffd}\n\
+        (1.002) can0 201#0E160000FFFD2100\n(1.003) can0 201##100";
+    let (table, complaints) = run("", log);
+    assert_eq!(row(&table, "M3508 #1")[0], "2");
+    let complaints: Vec<_> = complaints.lines().collect();
+    assert_eq!(complaints[0], "line 3: column 22: expected two hexadecimal digits; skipped");
+    assert!(complaints[1].starts_with("line 4: column 1: expected the name of an interface"));
+    assert!(complaints[2].starts_with("line 6: column 18: expected a classic CAN frame"));
+    assert_eq!(complaints[3], "3 lines skipped");
+}
+
+#[test]
+fn rate_gaps_turns_and_errors_are_those_of_the_log() {
+    // 1 kHz for 101 frames, 20 ms of silence, 100 more; the rotor turns by 1000 counts a frame.
+    let mut log = String::new();
+    let (mut angle, mut us) = (0_i64, 5_000_000_u64);
+    for frame in 0..201 {
+        let bytes = angle.rem_euclid(8192) << 16 | 7324;
+        log.push_str(&format!(
+            "({}.{:06}) can0 202#{bytes:08X}20002502\n",
+            us / 1_000_000,
+            us % 1_000_000
+        ));
+        angle += if frame == 100 { 20_000 } else { 1_000 };
+        us += if frame == 100 { 20_000 } else { 1_000 };
+    }
+    let (table, _) = run("--motors m3508:1-2,gm6020:1", &log);
+    let expected_turns = (angle - 1_000) as f64 / 8192.0 * 187.0 / 3591.0;
+    let row_2 = row(&table, "M3508 #2");
+    assert_eq!(row_2[..2], ["201", "913.2"]); // 200 intervals in 219 ms
+    assert!((row_2[2].parse::<f64>().unwrap() - expected_turns).abs() < 1e-4, "{row_2:?}");
+    assert_eq!(row_2[3..8], ["381.39", "10.000", "37", "1", "20.000"]); // 7324 rpm / 19.2032
+    assert_eq!(row_2[8..].join(" "), "supply voltage too high");
+    assert_eq!(row(&table, "M3508 #1"), ["0", "not", "heard"]);
+    assert_eq!(row(&table, "GM6020 (voltage) #1"), ["0", "not", "heard"]);
+    assert_eq!(row(&run("--gap 25", &log).0, "M3508 #2")[6], "0");
+}
+
+#[test]
+fn frames_of_others_are_counted_not_decoded() {
+    let log = "can1 201#0E160000FFFD2100\ncan0 201#0E160000FFFD2100\ncan1 200#0000000000000000\n\
+        can1 201#0E16\ncan1 00000201#0E160000FFFD2100\ncan1 201#R8\n";
+    let (table, complaints) = run("", log);
+    assert_eq!(row(&table, "M3508 #1")[0], "1");
+    assert!(complaints.contains("1 frames of other interfaces"), "{complaints}");
+    let (table, _) = run("--interface can0", log);
+    assert_eq!(row(&table, "M3508 #1")[0], "1");
+    assert_eq!(run("--interface can2", log).0.lines().count(), 1);
+}
+
+#[test]
+fn wrong_options_say_what_is_wrong() {
+    for (arguments, message) in [
+        (
+            "--motors m3508:5,gm6020-current:1",
+            "GM6020 (current) #1 collides with M3508 #5 on 0x205",
+        ),
+        ("--motors m3508:9", "1..=8"),
+        ("--motors m3508:4-1", "4-1 is no id or range of ids"),
+        ("--motors m3508", "not model:ids"),
+        ("--motors servo:1", "no model servo"),
+        ("--motors", "--motors needs a value"),
+        ("--gap soon", "not a number of milliseconds"),
+        ("--gap 0", "not a number of milliseconds"),
+        ("--fast", "no option --fast"),
+        ("a.log b.log", "what is b.log?"),
+    ] {
+        let parsed = options::parse(arguments.split_whitespace().map(str::to_owned));
+        let error = parsed.map(|_| ()).unwrap_err();
+        assert!(error.contains(message), "{arguments}: {error}");
+    }
+    assert!(matches!(options::parse(["--help".to_owned()].into_iter()), Ok(Asked::Help)));
+    assert!(options::HELP.contains("--motors"));
+}
+
+/// The program, which `cargo test` builds beside the tests.
+fn program() -> Command {
+    let tests = std::env::current_exe().unwrap();
+    let path: PathBuf = tests.parent().unwrap().with_file_name("examples").join("candump");
+    let path = path.with_extension(std::env::consts::EXE_EXTENSION);
+    assert!(path.exists(), "build it first: cargo build --example candump");
+    Command::new(path)
+}
+
+fn fed(arguments: &[&str], input: &[u8]) -> Output {
+    let mut child = program()
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(input).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn the_program_reads_standard_input_and_files() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/candump/c620_rest.log");
+    let (from_input, from_dash) = (fed(&[], REST.as_bytes()), fed(&["-"], REST.as_bytes()));
+    let from_file = program().arg(file).output().unwrap();
+    for output in [&from_input, &from_dash, &from_file] {
+        assert!(output.status.success());
+        assert_eq!(String::from_utf8_lossy(&output.stdout), run("", REST).0);
+    }
+}
+
+#[test]
+fn the_program_says_no_with_an_exit_code() {
+    let wrong = fed(&["--nope"], b"");
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("no option --nope"));
+    let missing = fed(&["no/such/file.log"], b"");
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("no/such/file.log"));
+    assert!(fed(&["--help"], b"").status.success());
+    assert!(fed(&[], b"\xFF\xFE bad\n").status.success(), "bad lines are not fatal");
+}
+
+#[test]
+fn a_closed_pipe_is_the_end_and_no_panic() {
+    let mut child = program()
+        .arg("--csv")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let log = REST.repeat(10_000);
+    let _ = child.stdin.take().unwrap().write_all(log.as_bytes());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(!String::from_utf8_lossy(&output.stderr).contains("panicked"));
+}
