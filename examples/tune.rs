@@ -54,8 +54,7 @@ const YAW: Plan<Gm6020Voltage> = Plan {
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
     relay: RelayTunerConfig::new(8.0, 0.15).with_bias(6.0),
     guessed: Gains { kp: 0.2, ki: 4.0, kd: 0.0 },
-    // In voltage mode the back-EMF damps the motor: it takes the sharper rule.
-    rule: TuningRule::ZieglerNicholsPi,
+    rule: TuningRule::TyreusLuybenPi,
     step_to: 12.0,
     effort: |bus, motor, volts| _ = bus.set_voltage(motor, Voltage::from_volts(volts)),
 };
@@ -140,7 +139,7 @@ fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
 fn report(title: &str, gains: Gains, measures: &StepMeasures) {
     let ms = |time_s: Option<f32>| time_s.map_or("never".into(), |s| format!("{:.0} ms", 1e3 * s));
     println!(
-        "  {title:<16} kp {:.3}  ki {:.2}   rise {}, overshoot {:.1} %, settled (5 %) {}, steady error {:+.3} rad/s",
+        "  {title:<15} kp {:.3}  ki {:.2}   rise {}, overshoot {:.1} %, settled (5 %) {}, steady error {:+.3} rad/s",
         gains.kp,
         gains.ki,
         ms(measures.rise_time_s),
@@ -161,7 +160,7 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
             .margin(8)
             .x_label_area_size(24)
             .y_label_area_size(40)
-            .build_cartesian_2d(0.0_f32..0.6, 0.0..1.5 * motor.target)?;
+            .build_cartesian_2d(0.0_f32..0.6, 0.0..1.6 * motor.target)?;
         chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
         let target = [(0.0, motor.target), (0.6, motor.target)];
         chart.draw_series(LineSeries::new(target, &RGBColor(150, 150, 150)))?;
