@@ -1,6 +1,7 @@
 use super::{COUNTS_PER_TURN, GearRatio, Position};
 use crate::units::Angle;
 use core::f32::consts::TAU;
+use core::num::NonZeroI16;
 
 /// Turns and phase of an output shaft, advanced by rotor counts.
 ///
@@ -31,7 +32,7 @@ pub struct Shaft {
     /// 8192 of these are the fine counts of a turn.
     rotor: u16,
     /// Fine counts of a rotor count, negative for a reversed shaft.
-    fine_per_count: i16,
+    fine_per_count: NonZeroI16,
 }
 
 /// Whole turns in 64 bits, in two halves: a struct that holds it needs no alignment to 8 bytes.
@@ -68,7 +69,10 @@ impl Shaft {
             phase: 0,
             radians_per_fine: TAU / (COUNTS_PER_TURN as f32 * gear.rotor() as f32),
             rotor: gear.rotor(),
-            fine_per_count: if reversed { -output } else { output },
+            fine_per_count: match NonZeroI16::new(if reversed { -output } else { output }) {
+                Some(fine) => fine,
+                None => NonZeroI16::MAX, // no gear has zero output turns
+            },
         }
     }
 
@@ -83,7 +87,7 @@ impl Shaft {
     pub const fn seed(&mut self, rotor_angle: u16) {
         self.set_zero();
         let angle = rotor_angle as i32 % COUNTS_PER_TURN as i32;
-        let reversed = self.fine_per_count < 0 && angle != 0;
+        let reversed = self.fine_per_count.is_negative() && angle != 0;
         self.advance_far(if reversed { angle - COUNTS_PER_TURN as i32 } else { angle });
         self.turns = Turns::new(0);
     }
@@ -102,7 +106,7 @@ impl Shaft {
     /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`](super::shortest) gives.
     #[inline]
     pub const fn advance(&mut self, counts: i32) {
-        let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count as i32));
+        let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count.get() as i32));
         if next < 0 {
             self.phase = next.wrapping_add(self.fine_per_turn());
             self.turns = self.turns.add(-1);
@@ -152,8 +156,8 @@ impl Shaft {
             .get()
             .wrapping_mul(self.fine_per_turn() as i64)
             .wrapping_add(self.phase as i64);
-        let counts =
-            divide(fine.unsigned_abs(), self.fine_per_count.unsigned_abs() as u32).cast_signed();
+        let divisor = self.fine_per_count.unsigned_abs().get() as u32;
+        let counts = divide(fine.unsigned_abs(), divisor).cast_signed();
         if fine < 0 { counts.wrapping_neg() } else { counts }
     }
 

@@ -68,8 +68,11 @@ impl FrameSender<'_> {
     /// Puts a frame that arrived at `now` into the queue; `false` when it was full, or the frame had more than
     /// 8 bytes, and was dropped.
     pub fn push(&mut self, frame: &impl Frame, now: Instant) -> bool {
-        let kept =
-            CanFrame::copy_of(frame).is_some_and(|frame| self.frames.enqueue((frame, now)).is_ok());
+        // Always holds: says that the length of the queue, by which heapless divides, is not zero.
+        let divisible = self.frames.capacity() != usize::MAX;
+        let kept = divisible
+            && CanFrame::copy_of(frame)
+                .is_some_and(|frame| self.frames.enqueue((frame, now)).is_ok());
         if !kept {
             // Only this end writes, so a load and a store are enough: there are cores without more.
             let dropped = self.dropped.load(Ordering::Relaxed);

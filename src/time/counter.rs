@@ -1,4 +1,5 @@
 use super::Instant;
+use core::num::NonZeroU32;
 
 /// Extends a free-running 16- or 32-bit hardware counter to an [`Instant`] that never wraps.
 ///
@@ -24,7 +25,7 @@ pub struct ExtendedCounter {
     remainder: u32,
     mask: u32,
     numerator: u32,
-    denominator: u32,
+    denominator: NonZeroU32,
 }
 
 /// The frequency of a counter that cannot be extended without loss.
@@ -71,7 +72,8 @@ impl ExtendedCounter {
             (divisor, rest) = (rest, divisor % rest);
         }
         let (numerator, denominator) = (1_000_000 / divisor, ticks_per_second / divisor);
-        if denominator == 0 || numerator.checked_mul(denominator).is_none() {
+        let Some(denominator) = NonZeroU32::new(denominator) else { return Err(error) };
+        if numerator.checked_mul(denominator.get()).is_none() {
             return Err(error);
         }
         Ok(Self { micros: 0, last: 0, remainder: 0, mask, numerator, denominator })
@@ -81,10 +83,11 @@ impl ExtendedCounter {
     pub const fn extend(&mut self, raw: u32) -> Instant {
         let ticks = raw.wrapping_sub(self.last) & self.mask;
         self.last = raw;
-        let (whole, rest) = (ticks / self.denominator, ticks % self.denominator);
+        let denominator = self.denominator.get();
+        let (whole, rest) = (ticks / denominator, ticks % denominator);
         let part = rest * self.numerator + self.remainder;
-        self.remainder = part % self.denominator;
-        self.micros += whole as u64 * self.numerator as u64 + (part / self.denominator) as u64;
+        self.remainder = part % denominator;
+        self.micros += whole as u64 * self.numerator as u64 + (part / denominator) as u64;
         Instant::from_micros(self.micros)
     }
 }

@@ -1,4 +1,5 @@
 use super::{Duration, Instant};
+use core::num::NonZeroU32;
 
 /// One step of the control loop: when it takes place, and the time since the one before.
 ///
@@ -53,7 +54,7 @@ impl Tick {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Ticker {
-    period_us: u32,
+    period_us: NonZeroU32,
     next: Option<Instant>,
     last: Instant,
     overruns: u32,
@@ -64,9 +65,11 @@ impl Ticker {
     #[must_use]
     pub const fn new(period: Duration) -> Self {
         let period_us = match period.micros_u32() {
-            Some(0) => 1,
-            Some(micros) => micros,
-            None => u32::MAX,
+            Some(micros) => match NonZeroU32::new(micros) {
+                Some(micros) => micros,
+                None => NonZeroU32::MIN,
+            },
+            None => NonZeroU32::MAX,
         };
         Self { period_us, next: None, last: Instant::START, overruns: 0 }
     }
@@ -88,7 +91,8 @@ impl Ticker {
                 let skipped = late_us / self.period_us;
                 self.overruns = self.overruns.saturating_add(skipped);
                 let steps = u64::from(skipped) + 1;
-                self.next = Some(next + Duration::from_micros(steps * u64::from(self.period_us)));
+                self.next =
+                    Some(next + Duration::from_micros(steps * u64::from(self.period_us.get())));
             }
             None => {
                 self.overruns = u32::MAX;
@@ -109,7 +113,7 @@ impl Ticker {
     /// Returns the period.
     #[must_use]
     pub const fn period(&self) -> Duration {
-        Duration::from_micros(self.period_us as u64)
+        Duration::from_micros(self.period_us.get() as u64)
     }
 }
 

@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""Links drivetrain-nopanic for four targets at three levels: it links only when no public function can panic.
+
+Then looks for what a control loop on a small core must not call, and for public functions that the list lacks.
+When an image does not link, names the functions that lead to a panic.
+"""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import image  # noqa: E402
+
+TARGETS = ["thumbv6m-none-eabi", "thumbv7m-none-eabi", "thumbv7em-none-eabihf", "thumbv8m.main-none-eabihf"]
+PROFILES = ["release", "o2", "os"]
+SOURCES = HERE.parent.parent / "src"
+END = "a_function_of_drivetrain_can_panic"
+
+# Double precision, 64-bit division, and the functions of libm that compute in double precision.
+FORBIDDEN = re.compile(
+    r"__aeabi_(d\w+|[a-z0-9]+2d|l?uldivmod|ldivmod)|__\w*df\w*|__u?(div|mod|divmod)[dt]i\w*|sinf|cosf|sincosf|tanf"
+)
+
+# Not callable on these targets: with `std` or for the host only.
+SKIPPED = {"StdClock"}
+SKIPPED_FOLDERS = {"sim"}
+
+
+def public_functions():
+    """Every public function outside tests as (type or "", name)."""
+    found = set()
+    for path in sorted(SOURCES.rglob("*.rs")):
+        if path.name == "tests.rs" or path.relative_to(SOURCES).parts[0] in SKIPPED_FOLDERS:
+            continue
+        owner = ""
+        for line in path.read_text().splitlines():
+            if line.startswith("#[cfg(test)]"):
+                break
+            if head := re.match(r"\s*impl(?:<.*?>)? (?:.* for )?\$?(\w+)", line):
+                owner = head[1]
+            elif line == "}":
+                owner = ""
+            elif name := re.match(r"\s*pub (?:const )?fn (\w+)", line):
+                if owner not in SKIPPED:
+                    found.add((owner if line.startswith(" ") else "", name[1]))
+    return found
+
+
+def missing():
+    listed = (HERE / "src" / "functions.rs").read_text()
+    generic = r"(?:::<[^;]*?>)?"
+    names = []
+    for owner, name in sorted(public_functions()):
+        if owner == "quantity":
+            pattern = rf"\$quantity::{name}\b"
+        elif owner:
+            owners = "Shell" if owner == "Runner" else owner
+            pattern = rf"\b({owner}|{owners}){generic}::{name}\b"
+        else:
+            pattern = rf"\b{name}{generic}(\.call|\()"
+        if not re.search(pattern, listed):
+            names.append(f"{owner}::{name}" if owner else name)
+    return names
+
+
+def link(target, profile, *more):
+    command = ["cargo", "build", "--quiet", "--target", target, "--profile", profile, *more]
+    environment = {**os.environ, "CARGO_TERM_COLOR": "never"}
+    done = subprocess.run(command, cwd=HERE, env=environment, capture_output=True, text=True)
+    return done.returncode == 0, done.stderr
+
+
+def culprits(target, profile):
+    """The functions of the list that lead to a panic."""
+    folder = HERE.parent / "target" / "show"
+    flags = f'target.{target}.rustflags=["-C", "symbol-mangling-version=v0"]'
+    linked, errors = link(target, profile, "--features=show", "--config", flags, "--target-dir", str(folder))
+    if not linked:
+        return [errors]
+    graph, _ = image.calls(str(folder / target / profile / "drivetrain-nopanic"))
+    callers = {}
+    for function, callees in graph.items():
+        for callee in callees:
+            callers.setdefault(callee, set()).add(function)
+    leading = image.reachable(callers, [END])
+    return sorted(f"{a} -> {b}" for a in leading for b in graph.get(a, ()) if b in leading)
+
+
+def main():
+    if names := missing():
+        image.fail("nopanic/src/functions.rs lacks " + ", ".join(names))
+    for target in TARGETS:
+        for profile in PROFILES:
+            linked, errors = link(target, profile)
+            if not linked and END not in errors:
+                image.fail(errors)
+            if not linked:
+                image.fail(f"{target}, {profile}: a panic path\n" + "\n".join(culprits(target, profile)))
+            elf = str(HERE.parent / "target" / target / profile / "drivetrain-nopanic")
+            helpers = sorted(name for name in image.symbols(elf) if FORBIDDEN.fullmatch(name))
+            if helpers:
+                image.fail(f"{target}, {profile}: the image calls {', '.join(helpers)}")
+            print(f"{target:26} {profile:8} links, no helper of double precision or 64-bit division")
+
+
+main()

@@ -1,0 +1,415 @@
+//! The list: one line a public function. `link.py` says which are missing.
+
+use crate::opaque::{Function, any};
+use core::hint::black_box;
+use drivetrain::control::{
+    ConfigError, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, OptimalDifferentiator,
+    Pid, PidConfig, TimeStep, fhan,
+};
+use drivetrain::dji::{
+    AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
+    Gm6020Voltage, Handle, M2006, M3508, Message,
+};
+use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
+use drivetrain::frame::CanFrame;
+use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
+use drivetrain::motor::{CanDevice, Claim, Missing, MotorName, Role, Timeouts, VelocityDrive};
+use drivetrain::runner::{
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
+};
+use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
+use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
+use embedded_can::{ErrorKind, Frame, Id};
+
+pub fn call_all() {
+    units();
+    time();
+    math();
+    frame();
+    control();
+    encoder();
+    motor();
+    dji();
+    runner();
+}
+
+/// The linear functions that `units` gives to each quantity by a macro.
+macro_rules! linear {
+    ($($quantity:ident)*) => {
+        $(
+            $quantity::abs.call();
+            $quantity::is_finite.call();
+            (|a: $quantity, b: $quantity| a + b - -a).call();
+            (|a: $quantity, b: f32| a * b / b).call();
+            (|a: $quantity, b: $quantity| a / b).call();
+        )*
+    };
+}
+
+fn units() {
+    linear!(Angle AngularVelocity Current Voltage);
+    Angle::from_radians.call();
+    Angle::from_degrees.call();
+    Angle::from_turns.call();
+    Angle::from_counts.call();
+    Angle::as_radians.call();
+    Angle::as_degrees.call();
+    Angle::as_turns.call();
+    AngularVelocity::from_rad_per_s.call();
+    AngularVelocity::from_rpm.call();
+    AngularVelocity::from_degrees_per_s.call();
+    AngularVelocity::as_rad_per_s.call();
+    AngularVelocity::as_rpm.call();
+    AngularVelocity::as_degrees_per_s.call();
+    Current::from_amperes.call();
+    Current::from_milliamperes.call();
+    Current::as_amperes.call();
+    Current::as_milliamperes.call();
+    Voltage::from_volts.call();
+    Voltage::from_millivolts.call();
+    Voltage::as_volts.call();
+    Voltage::as_millivolts.call();
+}
+
+fn time() {
+    Instant::from_micros.call();
+    Instant::as_micros.call();
+    Instant::since.call();
+    (|a: Instant, b: Duration| a + b).call();
+    (|a: Instant, b: Instant| a - b).call();
+    Duration::from_micros.call();
+    Duration::from_millis.call();
+    Duration::from_secs.call();
+    Duration::from_secs_f32.call();
+    Duration::as_micros.call();
+    Duration::as_secs_f32.call();
+    Duration::saturating_add.call();
+    (|a: Duration, b: Duration| a + b).call();
+    (|a: core::time::Duration| Duration::from(a)).call();
+    ExtendedCounter::new_16_bit.call();
+    ExtendedCounter::new_32_bit.call();
+    ExtendedCounter::extend.call();
+    ManualClock::new.call();
+    ManualClock::now.call();
+    ManualClock::advance.call();
+    ManualClock::set.call();
+    Tick::new.call();
+    Tick::now.call();
+    Tick::dt_s.call();
+    Ticker::new.call();
+    Ticker::due.call();
+    Ticker::overruns.call();
+    Ticker::period.call();
+}
+
+fn math() {
+    sin_cos.call();
+    atan2.call();
+    sqrt.call();
+    wrap.call();
+    wrap_pi.call();
+    wrap_positive.call();
+    wrap_tau.call();
+}
+
+fn frame() {
+    CanFrame::standard.call();
+    (|frame: &CanFrame| CanFrame::copy_of(frame)).call();
+    (|frame: &CanFrame| CanFrame::convert::<CanFrame>(frame)).call();
+    CanFrame::header.call();
+    CanFrame::bytes.call();
+    CanFrame::length.call();
+    (|id: Id, data: &[u8]| <CanFrame as Frame>::new(id, data)).call();
+    (|id: Id, dlc: usize| <CanFrame as Frame>::new_remote(id, dlc)).call();
+    (|frame: &CanFrame| (frame.id(), frame.dlc(), frame.is_extended())).call();
+    (|frame: &CanFrame| frame.data().len()).call();
+}
+
+fn control() {
+    TimeStep::new.call();
+    TimeStep::dt_s.call();
+    TimeStep::is_hold.call();
+    TimeStep::is_frozen.call();
+    ConfigError::parameter.call();
+    ConfigError::fault.call();
+    PidConfig::new.call();
+    PidConfig::with_output_limit.call();
+    PidConfig::with_output_range.call();
+    PidConfig::with_integral_limit.call();
+    PidConfig::with_integral_separation.call();
+    PidConfig::with_variable_integral.call();
+    PidConfig::with_back_calculation.call();
+    PidConfig::without_anti_windup.call();
+    PidConfig::with_dead_band.call();
+    PidConfig::with_feed_forward.call();
+    PidConfig::with_slew_limit.call();
+    PidConfig::with_period.call();
+    PidConfig::with_derivative_filter.call();
+    PidConfig::with_derivative_on_error.call();
+    PidConfig::with_max_step.call();
+    PidConfig::with_gains.call();
+    PidConfig::gains.call();
+    PidConfig::output_range.call();
+    PidConfig::validate.call();
+    Pid::new.call();
+    Pid::update.call();
+    Pid::step.call();
+    Pid::step_error.call();
+    Pid::reset.call();
+    Pid::reset_to.call();
+    Pid::set_gains.call();
+    Pid::set_config.call();
+    Pid::terms.call();
+    Pid::output.call();
+    Pid::config.call();
+    Pid::rejected.call();
+    IncrementalPidConfig::new.call();
+    IncrementalPidConfig::with_output_limit.call();
+    IncrementalPidConfig::with_output_range.call();
+    IncrementalPidConfig::with_tracking.call();
+    IncrementalPidConfig::with_max_step.call();
+    IncrementalPidConfig::validate.call();
+    IncrementalPid::new.call();
+    IncrementalPid::update.call();
+    IncrementalPid::step.call();
+    IncrementalPid::reset.call();
+    IncrementalPid::reset_to.call();
+    IncrementalPid::set_gains.call();
+    IncrementalPid::output.call();
+    IncrementalPid::config.call();
+    IncrementalPid::rejected.call();
+    LinearDifferentiator::new.call();
+    LinearDifferentiator::update.call();
+    LinearDifferentiator::reset_to.call();
+    LinearDifferentiator::value.call();
+    LinearDifferentiator::rate.call();
+    OptimalDifferentiator::new.call();
+    OptimalDifferentiator::update.call();
+    OptimalDifferentiator::reset_to.call();
+    OptimalDifferentiator::value.call();
+    OptimalDifferentiator::rate.call();
+    fhan.call();
+}
+
+fn encoder() {
+    shortest.call();
+    Gap::resolve.call();
+    GearRatio::new.call();
+    GearRatio::rotor.call();
+    GearRatio::output.call();
+    GearRatio::as_f32.call();
+    Shaft::new.call();
+    Shaft::seed.call();
+    Shaft::set_zero.call();
+    Shaft::set_position.call();
+    Shaft::advance.call();
+    Shaft::advance_far.call();
+    Shaft::position.call();
+    Shaft::angle.call();
+    Shaft::rotor_counts.call();
+    Position::new.call();
+    Position::from_turns.call();
+    Position::from_angle.call();
+    Position::turns.call();
+    Position::angle.call();
+    Position::as_turns.call();
+    Position::as_angle.call();
+    Position::is_finite.call();
+    (|a: Position, b: Angle| a + b).call();
+    (|a: Position, b: Position| a - b).call();
+    Homing::is_known.call();
+}
+
+fn motor() {
+    (|names: [MotorName; 20]| Missing::collect(names.into_iter())).call();
+    (|missing: &Missing| Missing::names(missing).count()).call();
+    Missing::total.call();
+    (|id: Id, role: Role, motor: MotorName| Claim::new(id, role, motor)).call();
+    Claim::with_mask.call();
+    Claim::clashes_with.call();
+    Claim::id.call();
+    Claim::role.call();
+    Claim::motor.call();
+    Timeouts::new.call();
+    Timeouts::with_late.call();
+    Timeouts::with_offline.call();
+    Timeouts::with_command.call();
+    Timeouts::with_good_frames.call();
+    Timeouts::late.call();
+    Timeouts::offline.call();
+    Timeouts::command.call();
+    Timeouts::good_frames.call();
+    MotorName::new.call();
+    MotorName::model.call();
+    MotorName::id.call();
+    device::<[Bus; 3]>();
+    device::<(Bus, Bus)>();
+    device::<(Bus, Bus, Bus, Bus)>();
+}
+
+/// The trait that every device implements, and its combinations.
+fn device<D: CanDevice + 'static>() {
+    (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
+    (|device: &mut D, tick: Tick| device.update(tick)).call();
+    (|device: &mut D, turn: u32| device.next_frame(turn)).call();
+    (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
+    (|device: &D| device.claims().count()).call();
+    (|device: &D, now: Instant| device.missing(now).count()).call();
+    (|device: &mut D, now: Instant| device.engage(now)).call();
+    (|device: &mut D, now: Instant| device.arm(now)).call();
+    (|device: &D| device.clash()).call();
+    (|device: &mut D| device.disarm()).call();
+    (|device: &D| (device.is_armed(), device.is_stopped())).call();
+    (|device: &mut D| device.emergency_stop()).call();
+    (|device: &mut D| device.clear_emergency_stop()).call();
+}
+
+fn dji() {
+    Feedback::decode.call();
+    Feedback::encode.call();
+    Feedback::angle.call();
+    Feedback::rpm.call();
+    Feedback::current.call();
+    Feedback::temperature.call();
+    Feedback::error.call();
+    CommandFrame::id.call();
+    Facts::rotor_no_load_rpm.call();
+    Facts::place.call();
+    AttachError::message.call();
+    Message::as_str.call();
+    Config::<M3508>::new.call();
+    Config::<M3508>::reversed.call();
+    Config::<M3508>::speed_loop.call();
+    Config::<M3508>::position_loop.call();
+    Config::<M3508>::with_gear.call();
+    Config::<M3508>::with_torque_constant.call();
+    Config::<M3508>::with_recovery.call();
+    Config::<M3508>::id.call();
+    Config::<M2006>::with_current_limit.call();
+    Config::<Gm6020Voltage>::with_voltage_limit.call();
+    Config::<Gm6020Voltage>::with_nominal_voltage.call();
+    Config::<Gm6020Voltage>::with_legacy_full_scale.call();
+    Handle::<M3508>::erase.call();
+    Bus::new.call();
+    Bus::<u8>::branded.call();
+    Bus::<()>::with_timeouts.call();
+    Bus::<()>::with_keep_alive.call();
+    Bus::<()>::attach::<M3508>.call();
+    Bus::<()>::attach::<Gm6020Current>.call();
+    Bus::<()>::attach_all::<M3508, 4>.call();
+    (|bus: &mut Bus, motor: AnyHandle| Bus::detach(bus, motor)).call();
+    Bus::<()>::ingest.call();
+    Bus::<()>::ingest_raw.call();
+    Bus::<()>::update.call();
+    Bus::<()>::next_frame.call();
+    Bus::<()>::requeue.call();
+    (|bus: &Bus, motor: AnyHandle| Bus::state(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| Bus::link(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| Bus::is_motor_armed(bus, motor)).call();
+    (|bus: &Bus| Bus::motors(bus).for_each(|motor| drop(black_box(motor)))).call();
+    Bus::<()>::counters.call();
+    Bus::<()>::acceptance_filter.call();
+    Bus::<()>::set_current::<M3508>.call();
+    Bus::<()>::set_voltage::<Gm6020Voltage>.call();
+    (|bus: &mut Bus, motor: AnyHandle, raw: i16| Bus::set_raw(bus, motor, raw)).call();
+    (|bus: &mut Bus, motor: AnyHandle, to: AngularVelocity| Bus::set_velocity(bus, motor, to))
+        .call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Angle| Bus::set_angle(bus, motor, to)).call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_position(bus, motor, to)).call();
+    (|bus: &mut Bus, motor: AnyHandle| Bus::relax(bus, motor)).call();
+    (|bus: &mut Bus, motor: AnyHandle| Bus::zero(bus, motor)).call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_present_position(bus, motor, to))
+        .call();
+    (|bus: &mut Bus, motor: AnyHandle, pid: PidConfig| Bus::set_speed_loop(bus, motor, pid)).call();
+    (|bus: &mut Bus, motor: AnyHandle, pid: PidConfig| Bus::set_position_loop(bus, motor, pid))
+        .call();
+    (|bus: &Bus, motor: AnyHandle| VelocityDrive::velocity(bus, motor)).call();
+    device::<Bus>();
+}
+
+/// A driver that may answer anything.
+struct Can;
+
+impl embedded_can::nb::Can for Can {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+        black_box(frame);
+        any()
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+        any()
+    }
+}
+
+impl embedded_can::blocking::Can for Can {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), ErrorKind> {
+        black_box(frame);
+        any()
+    }
+
+    fn receive(&mut self) -> Result<CanFrame, ErrorKind> {
+        any()
+    }
+}
+
+struct AnyClock;
+
+impl Clock for AnyClock {
+    fn now(&mut self) -> Instant {
+        any()
+    }
+}
+
+fn runner() {
+    type Shell = Runner<Nb<Can>, AnyClock, Bus>;
+    type Sender = Runner<BlockingTx<Can>, AnyClock, Bus>;
+    (|bus: Bus| Runner::new(Nb(Can), AnyClock, bus)).call();
+    Shell::with_period.call();
+    Shell::with_emergency_stop.call();
+    Shell::poll.call();
+    (|runner: &mut Shell, budget: usize| {
+        Runner::poll_with(runner, budget, |frame| {
+            black_box(frame);
+        })
+    })
+    .call();
+    Shell::ingest.call();
+    Shell::due.call();
+    Shell::arm.call();
+    Shell::is_armed.call();
+    Shell::clear_emergency_stop.call();
+    Shell::tick.call();
+    Sender::tick.call();
+    (|runner: &mut Shell, tick: Tick| {
+        Runner::tick_with(runner, tick, |frame| {
+            black_box(frame);
+        })
+    })
+    .call();
+    Shell::statistics.call();
+    Shell::overruns.call();
+    Shell::is_bus_down.call();
+    Shell::device.call();
+    Shell::device_mut.call();
+    Shell::port_mut.call();
+    (|runner: Shell| drop(black_box(Runner::into_parts(runner).2))).call();
+    ErrorCounts::total.call();
+    EmergencyStop::new.call();
+    EmergencyStop::set.call();
+    EmergencyStop::clear.call();
+    EmergencyStop::is_set.call();
+    FrameQueue::<8>::new.call();
+    (|queue: &mut FrameQueue<8>| drop(black_box(FrameQueue::split(queue)))).call();
+    (|sender: &mut FrameSender<'_>, frame: &CanFrame, now: Instant| {
+        FrameSender::push(sender, frame, now)
+    })
+    .call();
+    FrameReceiver::pop.call();
+    FrameReceiver::dropped.call();
+}

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""Runs the bench under QEMU and compares its figures with budget.toml.
+
+figures.py ELF      the runner of `cargo run`: one level, compared
+figures.py          builds and runs the three levels, compares, and shows the static bound of the stack
+  --update          writes the figures into budget.toml
+  --json            prints them as JSON instead of a table
+  --markdown        prints the block for README from budget.toml, without a run
+"""
+
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tomllib
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import image  # noqa: E402
+
+BUDGET = HERE / "budget.toml"
+TARGET = "thumbv7em-none-eabihf"
+PROFILES = {"3": "release", "2": "o2", "s": "os"}
+LEVELS = list(PROFILES)
+QEMU = "qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial null".split()
+QEMU += ["-semihosting-config", "enable=on,target=native", "-kernel"]
+
+
+def measure(elf):
+    """Runs an image; returns its level, rows, sizes and stacks."""
+    try:
+        run = subprocess.run([*QEMU, elf], capture_output=True, text=True, timeout=300)
+    except FileNotFoundError:
+        image.fail("qemu-system-arm is not installed; run firmware/run, which installs it")
+    except subprocess.TimeoutExpired:
+        image.fail("the bench did not end within 300 s")
+    if run.returncode:
+        image.fail(f"the bench failed:\n{run.stdout}{run.stderr}")
+    found = {"rows": {}, "spread": {}, "sizes": {}, "stack": {}, "checks": {}}
+    for line in run.stdout.splitlines():
+        kind, *fields = line.split()
+        if kind == "level":
+            found["level"] = fields[0]
+        elif kind == "row":
+            found["rows"][fields[0]] = int(fields[1])
+            found["spread"][fields[0]] = [int(fields[2]), int(fields[3])]
+        elif kind == "check":
+            found["checks"][fields[0]] = fields[1]
+        else:
+            found[{"size": "sizes", "stack": "stack"}[kind]][fields[0]] = int(fields[1])
+    graph, _ = image.calls(elf)
+    code = image.code_sizes(elf)
+    roots = [name for name in graph if name.startswith("row_")]
+    found["text"] = {name: code.get(name, 0) for name in sorted(roots)}
+    found["rows"]["text"] = sum(code.get(name, 0) for name in image.reachable(graph, roots))
+    found["rows"]["stack_tick"] = found["stack"]["row_tick"]
+    found["rows"]["ram_bus"] = found["sizes"]["Bus"]
+    return found
+
+
+def compare(budget, found):
+    """Returns what is wrong with the figures of one level."""
+    level = LEVELS.index(found["level"])
+    wrong = []
+    for name, row in budget.items():
+        figure = found["rows"].get(name)
+        if figure is None:
+            wrong.append(f"{name} was not measured")
+        elif figure > row["budget"][level]:
+            wrong.append(f"{name} is {figure}, its budget {row['budget'][level]}")
+    for name, (least, most) in found["spread"].items():
+        if least != most:
+            wrong.append(f"{name} is not constant: {least} to {most}")
+    wrong += [f"{name}: {verdict}" for name, verdict in found["checks"].items() if verdict != "ok"]
+    return [f"opt-level {found['level']}: {text}" for text in wrong]
+
+
+def table(budget, runs):
+    names = list(budget) + [n for n in runs[0]["rows"] if n not in budget]
+    print(f"{'':22}{'goal':>6}" + "".join(f"{'O' + run['level']:>7}" for run in runs))
+    for name in names:
+        figures = "".join(f"{run['rows'].get(name, '-'):>7}" for run in runs)
+        row = budget.get(name, {})
+        print(f"{name:22}{row.get('goal', '-'):>6}{figures}  {row.get('peer', '')}")
+    for title in ("stack", "text", "sizes"):
+        for name in runs[0][title]:
+            figures = "".join(f"{run[title].get(name, '-'):>7}" for run in runs)
+            print(f"{title + ' ' + name:28}{figures}")
+
+
+def markdown(budget):
+    lines = ["| work | goal | O3 | O2 | Os | others |", "|---|--:|--:|--:|--:|---|"]
+    for row in budget.values():
+        figures = " | ".join(str(figure) for figure in row["last"])
+        lines.append(f"| {row['what']} | {row.get('goal', '')} | {figures} | {row.get('peer', '')} |")
+    return "\n".join(lines)
+
+
+def update(budget, runs):
+    text = BUDGET.read_text()
+    for name in budget:
+        figures = [run["rows"][name] for run in runs]
+        text = re.sub(rf"(?s)(\[{name}\]\n.*?\nlast = )\[[^]]*\]", rf"\g<1>{figures}", text, count=1)
+    BUDGET.write_text(text)
+
+
+def build(profile, *more):
+    subprocess.run(["cargo", *more, "--profile", profile, "--quiet"], cwd=HERE, check=True)
+
+
+def static_stack():
+    """Prints the bound that the compiler's own frame sizes give; needs a nightly."""
+    toolchains = image.output(["rustup", "toolchain", "list"])
+    installed = ""
+    if nightly := re.search(r"^nightly-\S+", toolchains, re.MULTILINE):
+        installed = image.output(["rustup", "target", "list", "--installed", "--toolchain", nightly[0]])
+    if TARGET not in installed:
+        print("static stack bound: skipped, there is no nightly with the target")
+        return
+    flags = f'target.{TARGET}.rustflags=["-Z", "emit-stack-sizes"]'
+    folder = HERE.parent / "target" / "stack"
+    build("release", f"+{nightly[0]}", "build", "--config", flags, "--target-dir", str(folder))
+    elf = str(folder / TARGET / "release" / "drivetrain-qemu")
+    (graph, indirect), sizes = image.calls(elf), image.frames(elf)
+    for root in ("row_decode", "row_update", "row_tick"):
+        bound, unknown = image.stack_bound(graph, sizes, root)
+        unknown |= image.reachable(graph, [root]) & indirect
+        note = f", without {', '.join(sorted(unknown))}" if unknown else ""
+        print(f"static stack bound of {root}: {bound} bytes{note}")
+
+
+def main():
+    options = [argument for argument in sys.argv[1:] if argument.startswith("--")]
+    elves = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
+    budget = tomllib.loads(BUDGET.read_text())
+    if "--markdown" in options:
+        print(markdown(budget))
+        return
+    if not elves:
+        for profile in PROFILES.values():
+            build(profile, "build")
+        folder = HERE.parent / "target" / TARGET
+        elves = [str(folder / profile / "drivetrain-qemu") for profile in PROFILES.values()]
+    runs = [measure(elf) for elf in elves]
+    if "--json" in options:
+        print(json.dumps(runs, indent=1))
+    else:
+        table(budget, runs)
+        if len(runs) == len(LEVELS):
+            static_stack()
+    if "--update" in options:
+        if len(runs) != len(LEVELS):
+            image.fail("--update needs all levels")
+        update(budget, runs)
+    wrong = [text for run in runs for text in compare(budget, run)]
+    if wrong:
+        sys.exit("\n".join(["over budget:", *wrong]))
+
+
+main()

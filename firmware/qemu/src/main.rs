@@ -1,0 +1,52 @@
+//! Measures the crate on a simulated Cortex-M4F through its public API.
+//!
+//! Prints a line for each figure: `row <name> <mean> <least> <most>` in instructions, `stack <name> <bytes>`,
+//! `size <type> <bytes>`, and `same <name> yes|no` for what has to be equal. `figures.py` reads them.
+
+#![no_std]
+#![no_main]
+
+mod constant_time;
+mod meter;
+mod rows;
+mod wiring;
+
+use core::panic::PanicInfo;
+use cortex_m_semihosting::{debug, hprintln};
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    if let Some(mut peripherals) = cortex_m::Peripherals::take() {
+        meter::start(&mut peripherals.SYST);
+        hprintln!("level {}", env!("OPT_LEVEL"));
+        rows::motors();
+        rows::control();
+        rows::math();
+        constant_time::show();
+        rows::stack();
+        rows::sizes();
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+    fail()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    hprintln!("{}", info);
+    fail()
+}
+
+fn fail() -> ! {
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}
+
+/// Prints the mean of several figures, the least and the most.
+fn row(name: &str, figures: &[u32]) {
+    let count = figures.len() as u32;
+    let mean = (figures.iter().sum::<u32>() + count / 2) / count;
+    let (least, most) =
+        figures.iter().fold((u32::MAX, 0), |(least, most), x| (least.min(*x), most.max(*x)));
+    hprintln!("row {} {} {} {}", name, mean, least, most);
+}

@@ -1,0 +1,84 @@
+//! Counts instructions with the timer and bytes of stack with paint.
+
+use core::hint::black_box;
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+
+/// Calls in one measurement: the figure is their mean.
+pub const CALLS: u32 = 1_000;
+
+/// QEMU's `-icount shift=0` takes one ns an instruction, and the timer of this board runs at 25 MHz.
+const INSTRUCTIONS_A_TICK: u32 = 40;
+
+core::arch::global_asm!(
+    ".section .text.returns_at_once",
+    ".global returns_at_once",
+    ".type returns_at_once, %function",
+    ".thumb_func",
+    "returns_at_once: bx lr",
+);
+
+unsafe extern "C" {
+    fn returns_at_once();
+}
+
+pub fn start(timer: &mut SYST) {
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload(0xFF_FFFF);
+    timer.clear_current();
+    timer.enable_counter();
+}
+
+/// Returns the instructions of one call of `function`, a function pointer: `each` calls what it is given, once with
+/// `function` and once with one that returns at once, and the difference is the figure.
+pub fn instructions<F: Copy>(function: F, mut each: impl FnMut(F, u32)) -> u32 {
+    const { assert!(size_of::<F>() == size_of::<unsafe extern "C" fn()>()) };
+    // SAFETY: `F` is a function pointer; the callee touches nothing, and no caller looks at its result.
+    let nothing: F =
+        unsafe { core::mem::transmute_copy::<unsafe extern "C" fn(), F>(&(returns_at_once as _)) };
+    let taken = ticks(function, &mut each);
+    let overhead = ticks(nothing, &mut each);
+    (taken.saturating_sub(overhead) * INSTRUCTIONS_A_TICK + CALLS / 2) / CALLS
+}
+
+#[inline(never)]
+fn ticks<F: Copy>(function: F, each: &mut impl FnMut(F, u32)) -> u32 {
+    let function = black_box(function);
+    let start = SYST::get_current();
+    for call in 0..CALLS {
+        each(function, call);
+    }
+    start.wrapping_sub(SYST::get_current()) & 0xFF_FFFF
+}
+
+/// Returns the bytes of stack that `work` uses beyond those of a call that does nothing.
+pub fn stack(work: impl FnOnce()) -> usize {
+    let nothing = painted(|| {
+        black_box(());
+    });
+    painted(work).saturating_sub(nothing)
+}
+
+#[inline(never)]
+fn painted(work: impl FnOnce()) -> usize {
+    const PAINT: u32 = 0xC0FF_EE11;
+    const WORDS: usize = 4_096;
+    let bottom = stack_pointer().wrapping_sub(WORDS);
+    for word in 0..WORDS {
+        // SAFETY: below the frame of this function is memory that nobody uses: 4 MiB, and no interrupt runs.
+        unsafe { bottom.add(word).write_volatile(PAINT) };
+    }
+    work();
+    let kept = (0..WORDS).take_while(|word| {
+        // SAFETY: as above.
+        unsafe { bottom.add(*word).read_volatile() == PAINT }
+    });
+    (WORDS - kept.count()) * size_of::<u32>()
+}
+
+#[inline(always)]
+fn stack_pointer() -> *mut u32 {
+    let pointer: *mut u32;
+    // SAFETY: only reads the register.
+    unsafe { core::arch::asm!("mov {}, sp", out(reg) pointer, options(nomem, nostack)) };
+    pointer
+}

@@ -1,0 +1,235 @@
+//! The rows of the table: each measured function once, out of line, with arguments the optimiser cannot see.
+
+use crate::meter::{self, instructions};
+use crate::row;
+use crate::wiring::{Drive, Targets, feedback, row_tick};
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use drivetrain::control::{IncrementalPid, Pid, PidConfig, TimeStep};
+use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
+use drivetrain::encoder::{Position, Shaft};
+use drivetrain::frame::CanFrame;
+use drivetrain::math as maths;
+use drivetrain::motor::Ingest;
+use drivetrain::time::{Instant, Tick};
+
+pub const START: Instant = Instant::from_micros(1_000_000);
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+pub fn row_decode(bus: &mut Bus, frame: &CanFrame, now: Instant) -> Ingest {
+    bus.ingest(frame, now)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_update(bus: &mut Bus, tick: Tick) {
+    bus.update(tick);
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_pack(bus: &mut Bus) {
+    while let Some(frame) = bus.next_frame() {
+        black_box(&frame);
+    }
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_pid_step(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+    pid.step(setpoint, measurement, step)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_pid_update(pid: &mut Pid, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
+    pid.update(setpoint, measurement, dt_s)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_sin_cos(x: f32) -> (f32, f32) {
+    maths::sin_cos(x)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_atan2(y: f32, x: f32) -> f32 {
+    maths::atan2(y, x)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_sqrt(x: f32) -> f32 {
+    maths::sqrt(x)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn row_wrap_pi(x: f32) -> f32 {
+    maths::wrap_pi(x)
+}
+
+/// Feedback, command frames and whole ticks.
+pub fn motors() {
+    row("decode", &core::array::from_fn::<u32, 8, _>(|index| decode(index as u16 + 1, 0, START)));
+    row("decode_wrap", &[decode_wrap()]);
+    let mut bus = Drive::new(Targets::Speed, 0, START).bus;
+    let unknown = feedback(0x100, 0, 0);
+    row(
+        "unknown",
+        &[instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, _| {
+            _ = decode(&mut bus, black_box(&unknown), START);
+        })],
+    );
+    row("pack", &[pack()]);
+    row("tick_speed", &[tick(Targets::Speed, 0, START)]);
+    row("tick_speed_limit", &[tick(Targets::HighSpeed, 0, START)]);
+    row("tick_cascade", &[tick(Targets::Position, 0, START)]);
+    row("tick_cascade_limit", &[tick(Targets::FarPosition, 0, START)]);
+}
+
+/// One frame of motor `id`, whose output shaft is at `turns` at the time `start`.
+pub fn decode(id: u16, turns: i64, start: Instant) -> u32 {
+    let Drive { mut bus, mut now, .. } = Drive::new(Targets::Speed, turns, start);
+    let mut angle = 126;
+    instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, _| {
+        angle += 3;
+        now = now + drivetrain::time::Duration::from_micros(1_000);
+        _ = decode(&mut bus, &feedback(id, angle % 8192, 191), now);
+    })
+}
+
+/// Every frame takes the output shaft across its zero.
+fn decode_wrap() -> u32 {
+    let Drive { mut bus, now, .. } = Drive::new(Targets::Speed, 0, START);
+    instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, call| {
+        _ = decode(&mut bus, &feedback(1, 126 - (call as u16 + 1) % 2, 0), now);
+    })
+}
+
+fn pack() -> u32 {
+    let mut drive = Drive::new(Targets::Speed, 0, START);
+    instructions(row_pack as fn(&mut Bus), |pack, _| {
+        drive.advance();
+        drive.hear();
+        drive.bus.update(Tick::new(drive.now, 0.001));
+        pack(&mut drive.bus);
+    })
+}
+
+pub fn tick(targets: Targets, turns: i64, start: Instant) -> u32 {
+    let mut drive = Drive::new(targets, turns, start);
+    instructions(row_tick as fn(&mut Bus, &[CanFrame; 8], Tick), |whole_tick, _| {
+        drive.advance();
+        let (bus, frames, tick) = drive.parts();
+        whole_tick(bus, frames, tick);
+    })
+}
+
+/// Controllers on their own.
+pub fn control() {
+    let plain = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0).with_integral_limit(10.0);
+    let all = plain
+        .with_output_range(-20.0, 19.0)
+        .with_integral_separation(50.0)
+        .with_variable_integral(1.0, 40.0)
+        .with_dead_band(0.01)
+        .with_feed_forward(0.1, 0.01)
+        .with_slew_limit(1e5)
+        .with_derivative_filter(100.0)
+        .with_back_calculation(0.1);
+    row("pid_step", &[pid_step(plain)]);
+    row("pid_update", &[pid_update(plain)]);
+    row("pid_limit", &[pid_step(plain.with_output_limit(0.1))]);
+    row("pid_options_step", &[pid_step(all)]);
+    row("pid_options_update", &[pid_update(all)]);
+}
+
+fn swinging(call: u32) -> f32 {
+    [0.5, 1.25, 0.75, 1.5][call as usize % 4]
+}
+
+fn pid_step(config: PidConfig) -> u32 {
+    let mut pid = Pid::new(black_box(config)).unwrap();
+    let step = TimeStep::new(0.001, 0.1);
+    pid.step(1.0, 0.5, &step);
+    instructions(row_pid_step as fn(&mut Pid, f32, f32, &TimeStep) -> f32, |pid_step, call| {
+        pid_step(&mut pid, 1.0, swinging(call), &step);
+    })
+}
+
+fn pid_update(config: PidConfig) -> u32 {
+    let mut pid = Pid::new(black_box(config)).unwrap();
+    pid.update(1.0, 0.5, 0.001);
+    instructions(row_pid_update as fn(&mut Pid, f32, f32, f32) -> f32, |pid_update, call| {
+        pid_update(&mut pid, 1.0, swinging(call), 0.001);
+    })
+}
+
+/// Elementary functions, over the turn.
+pub fn math() {
+    let angle = |call: u32| (call as f32 - 500.0) * (core::f32::consts::PI / 500.0);
+    row(
+        "sin_cos",
+        &[instructions(row_sin_cos as fn(f32) -> (f32, f32), |sin_cos, call| {
+            _ = sin_cos(angle(call));
+        })],
+    );
+    row(
+        "atan2",
+        &[instructions(row_atan2 as fn(f32, f32) -> f32, |atan2, call| {
+            _ = atan2(angle(call), 1.0);
+        })],
+    );
+    row(
+        "sqrt",
+        &[instructions(row_sqrt as fn(f32) -> f32, |sqrt, call| {
+            _ = sqrt(call as f32);
+        })],
+    );
+    row(
+        "wrap_pi",
+        &[instructions(row_wrap_pi as fn(f32) -> f32, |wrap, call| {
+            _ = wrap(angle(call) * 10.0);
+        })],
+    );
+}
+
+/// Bytes of stack, by paint.
+pub fn stack() {
+    let mut drive = Drive::new(Targets::Position, 0, START);
+    let frame = feedback(1, 200, 0);
+    let (bus, _, tick) = drive.parts();
+    let decode = meter::stack(|| {
+        _ = row_decode(bus, &frame, tick.now());
+    });
+    drive.advance();
+    let (bus, _, tick) = drive.parts();
+    let update = meter::stack(|| row_update(bus, tick));
+    drive.advance();
+    let (bus, frames, tick) = drive.parts();
+    let whole = meter::stack(|| row_tick(bus, frames, tick));
+    let mut drive = Drive::new(Targets::FarPosition, 0, START);
+    drive.advance();
+    let (bus, frames, tick) = drive.parts();
+    let limited = meter::stack(|| row_tick(bus, frames, tick));
+    hprintln!("stack row_decode {}", decode);
+    hprintln!("stack row_update {}", update);
+    hprintln!("stack row_tick {}", whole.max(limited));
+}
+
+/// Bytes of the public types.
+pub fn sizes() {
+    macro_rules! sizes {
+        ($($name:literal $type:ty),* $(,)?) => {
+            $(hprintln!("size {} {}", $name, size_of::<$type>());)*
+        };
+    }
+    sizes!(
+        "Bus" Bus, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
+        "Pid" Pid, "PidConfig" PidConfig, "IncrementalPid" IncrementalPid,
+        "Shaft" Shaft, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
+    );
+}
