@@ -54,7 +54,7 @@ pub(crate) fn table(run: &Run) -> String {
         statistics.refused,
         statistics.send_errors.total(),
         statistics.evicted,
-        run.overruns
+        statistics.overruns
     );
     if let Some((trouble, from, until)) = run.trouble {
         _ = writeln!(

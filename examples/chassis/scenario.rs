@@ -92,7 +92,6 @@ pub(crate) struct Run {
     pub(crate) settled_error: f32,
     pub(crate) traffic: Traffic,
     pub(crate) statistics: Statistics,
-    pub(crate) overruns: u32,
     pub(crate) refused_to_arm: u32,
     pub(crate) trouble: Option<(Trouble, f32, f32)>,
 }
@@ -122,7 +121,6 @@ impl Scenario {
             settled_error: 0.0,
             traffic: Traffic::default(),
             statistics: Statistics::default(),
-            overruns: 0,
             refused_to_arm: 0,
             trouble,
         };
@@ -150,7 +148,6 @@ impl Scenario {
         progress(1.0);
         run.traffic = world.traffic(Line::Can1);
         run.statistics = robot.statistics();
-        run.overruns = robot.overruns();
         Ok(run)
     }
 }

@@ -176,9 +176,9 @@ impl Outbox {
             self.kept_alive = now;
             due |= self.in_use;
         }
-        self.mark(due);
         self.dirty |= self.returned;
         self.returned = 0;
+        self.mark(due);
     }
 
     #[inline]

@@ -25,6 +25,10 @@ impl<B> CanDevice for Bus<B> {
         Self::requeue(self, frame)
     }
 
+    fn superseded(&self) -> u32 {
+        self.outbox.superseded
+    }
+
     fn claims(&self) -> impl Iterator<Item = Claim> {
         let attached = || {
             self.slots

@@ -301,6 +301,19 @@ mod receiving {
     }
 
     #[test]
+    fn frames_of_one_motor_are_handled_in_order() {
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        // 64 frames at once, after a stall of the loop: half a turn back and forth, and on.
+        for step in 0..64_u16 {
+            let angle = if step % 2 == 0 { step } else { step + 4000 };
+            assert_eq!(bus.ingest(&feedback(0x201, angle, 0), at_ms(70)), Ingest::Taken);
+        }
+        let state = bus.state(wheel).unwrap();
+        assert_eq!((state.rotor_counts, state.feedback.angle()), (4063, 4063));
+    }
+
+    #[test]
     fn two_buses_share_no_state() {
         let (mut left, [wheel]) = armed([Config::<M3508>::new(1)]);
         let (mut right, [other]) = armed([Config::<M3508>::new(1)]);

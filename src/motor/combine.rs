@@ -18,6 +18,9 @@ impl<D: CanDevice> CanDevice for &mut D {
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         (**self).requeue(frame)
     }
+    fn superseded(&self) -> u32 {
+        (**self).superseded()
+    }
     fn claims(&self) -> impl Iterator<Item = Claim> {
         (**self).claims()
     }
@@ -61,6 +64,9 @@ impl<D: CanDevice, const N: usize> CanDevice for [D; N] {
     }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         self.iter_mut().any(|device| device.requeue(frame))
+    }
+    fn superseded(&self) -> u32 {
+        self.iter().fold(0, |sum, device| sum.wrapping_add(device.superseded()))
     }
     fn claims(&self) -> impl Iterator<Item = Claim> {
         self.iter().flat_map(CanDevice::claims)
@@ -113,6 +119,9 @@ macro_rules! tuple {
             fn requeue(&mut self, frame: &CanFrame) -> bool {
                 $(self.$index.requeue(frame))||+
             }
+            fn superseded(&self) -> u32 {
+                0_u32$(.wrapping_add(self.$index.superseded()))+
+            }
             fn claims(&self) -> impl Iterator<Item = Claim> {
                 core::iter::empty()$(.chain(self.$index.claims()))+
             }
@@ -144,3 +153,90 @@ macro_rules! tuple {
 tuple!(2: A 0, B 1);
 tuple!(3: A 0, B 1, C 2);
 tuple!(4: A 0, B 1, C 2, D 3);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dji::{Bus, Config, Gm6020Voltage, M2006, M3508};
+    use crate::motor::ArmError;
+    use std::vec::Vec;
+
+    fn bus<M: crate::dji::Model>(id: u8) -> Bus {
+        let mut bus = Bus::new();
+        bus.attach(Config::<M>::new(id)).unwrap();
+        bus
+    }
+
+    fn at(micros: u64) -> Instant {
+        Instant::from_micros(micros)
+    }
+
+    fn hear(device: &mut impl CanDevice, id: u16, now: Instant) -> Ingest {
+        device.ingest(&CanFrame::standard(id, [0; 8]).unwrap(), now)
+    }
+
+    fn drain(device: &mut impl CanDevice, turn: u32) -> Vec<u32> {
+        core::iter::from_fn(|| device.next_frame(turn)).map(|frame| frame.header()).collect()
+    }
+
+    #[test]
+    fn a_frame_goes_to_the_part_that_knows_it() {
+        let mut both = (bus::<M3508>(1), bus::<Gm6020Voltage>(7));
+        assert_eq!(hear(&mut both, 0x201, at(1)), Ingest::Taken);
+        assert_eq!(hear(&mut both, 0x20B, at(1)), Ingest::Taken);
+        assert_eq!(hear(&mut both, 0x205, at(1)), Ingest::Unrelated);
+        assert!(both.requeue(&CanFrame::standard(0x2FF, [0; 8]).unwrap()));
+        assert!(!both.requeue(&CanFrame::standard(0x1FE, [0; 8]).unwrap()));
+    }
+
+    #[test]
+    fn each_turn_another_part_sends_first() {
+        let mut tuple = (bus::<M3508>(1), bus::<M3508>(5), bus::<Gm6020Voltage>(7));
+        let mut array = [bus::<M3508>(1), bus::<M3508>(5), bus::<Gm6020Voltage>(7)];
+        for turn in 0..6 {
+            let tick = Tick::new(at(u64::from(turn) * 20_000), 0.001);
+            tuple.update(tick);
+            array.update(tick);
+            let mut expected = std::vec![0x200, 0x1FF, 0x2FF];
+            expected.rotate_left(turn as usize % 3);
+            assert_eq!(drain(&mut tuple, turn), expected);
+            assert_eq!(drain(&mut array, turn), expected);
+        }
+    }
+
+    #[test]
+    fn two_parts_that_claim_one_id_are_not_armed() {
+        let mut both = [bus::<M3508>(5), bus::<M2006>(5)];
+        for device in &mut both {
+            assert_eq!(hear(device, 0x205, at(1)), Ingest::Taken);
+        }
+        let Err(ArmError::Clash(one, other)) = both.arm(at(1)) else {
+            panic!("armed in spite of a clash")
+        };
+        assert_eq!((one.motor().model(), other.motor().model()), ("M3508", "M2006"));
+        assert!(!both.is_armed());
+    }
+
+    #[test]
+    fn all_parts_are_armed_or_none() {
+        let (mut first, mut second) = (bus::<M3508>(1), bus::<Gm6020Voltage>(7));
+        let mut both = (&mut first, &mut second);
+        assert_eq!(hear(&mut both, 0x201, at(1)), Ingest::Taken);
+        let missing = both.arm(at(1)).unwrap_err();
+        assert!(
+            std::format!("{missing}") == "no feedback from GM6020 (voltage) #7"
+                && !both.0.is_armed()
+        );
+        assert_eq!(hear(&mut both, 0x20B, at(1)), Ingest::Taken);
+        assert_eq!(both.arm(at(1)), Ok(()));
+        both.emergency_stop();
+        assert!(first.is_stopped() && second.is_stopped());
+    }
+
+    #[test]
+    fn an_array_of_nothing_is_never_armed() {
+        let mut none: [Bus; 0] = [];
+        assert_eq!(none.arm(at(1)), Err(ArmError::NoMotors));
+        assert!(!none.is_armed() && none.next_frame(3).is_none());
+    }
+}

@@ -63,6 +63,12 @@ pub trait CanDevice {
     /// It is not offered again before the next update, and then with the newest values.
     fn requeue(&mut self, frame: &CanFrame) -> bool;
 
+    /// Returns how many frames were replaced by newer ones before they were taken, wrapping; 0 for a device that does
+    /// not count.
+    fn superseded(&self) -> u32 {
+        0
+    }
+
     /// Lists the CAN ids that this device sends and expects.
     fn claims(&self) -> impl Iterator<Item = Claim>;
 

@@ -105,6 +105,8 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
                 send_errors: NO_ERRORS,
                 evicted: 0,
                 evicted_unrelated: 0,
+                superseded: 0,
+                overruns: 0,
                 bus_losses: 0,
             },
             stop: None,
@@ -268,14 +270,12 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
 
     /// Returns what was counted.
     #[must_use]
-    pub const fn statistics(&self) -> Statistics {
-        self.statistics
-    }
-
-    /// Returns the number of periods without a tick, saturating.
-    #[must_use]
-    pub const fn overruns(&self) -> u32 {
-        self.ticker.overruns()
+    pub fn statistics(&self) -> Statistics {
+        Statistics {
+            superseded: self.device.superseded(),
+            overruns: self.ticker.overruns(),
+            ..self.statistics
+        }
     }
 
     /// Tells whether no frame could be sent for 100 ms; the next one that the driver takes ends it.

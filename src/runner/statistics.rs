@@ -30,6 +30,11 @@ pub struct Statistics {
     pub evicted: u32,
     /// Frames of others that the driver gave back for ours, handed back.
     pub evicted_unrelated: u32,
+    /// Command frames that newer ones replaced before the driver took them; wraps. See
+    /// [`CanDevice::superseded`](crate::motor::CanDevice::superseded).
+    pub superseded: u32,
+    /// Periods without a tick.
+    pub overruns: u32,
     /// Times that no frame could be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
 }

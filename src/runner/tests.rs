@@ -90,6 +90,7 @@ fn a_driver_that_would_block_for_ever_does_not_hold_the_loop() {
     set(&mut runner, wheels, 77);
     runner.tick(Tick::new(clock.now(), 0.001));
     let mut sent = offered(&mut runner);
+    assert_eq!(runner.statistics().superseded, 96, "two frames in each of 48 ticks");
     sent.sort_unstable();
     assert_eq!(sent, [(0x1FF, 77), (0x200, 77)], "the newest values, both frames");
 }
