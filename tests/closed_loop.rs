@@ -148,7 +148,7 @@ fn a_geared_joint_holds_a_multi_turn_position() {
     let mut zeroed = false;
     let work = |bus: &mut Bus, _| {
         if !zeroed && bus.is_armed() {
-            bus.zero(joint);
+            bus.zero(joint).unwrap();
             zeroed = true;
         }
         _ = bus.set_position(joint, goal);

@@ -183,8 +183,7 @@ fn drive(
     targets: MecanumWheels<AngularVelocity>,
     tick: Tick,
 ) -> bool {
-    let all_armed = wheels.into_array().iter().all(|wheel| robot.device().is_motor_armed(*wheel));
-    let armed = all_armed || robot.arm(tick).is_ok();
+    let armed = robot.is_armed() || robot.arm(tick).is_ok();
     let targets = if armed { targets } else { MecanumWheels::splat(AngularVelocity::ZERO) };
     _ = robot.device_mut().drive(wheels.zip(targets).into_array());
     robot.tick(tick);
@@ -206,7 +205,7 @@ fn observe(
         target_rpm: targets.map(AngularVelocity::as_rpm),
         measured_rpm: wheels
             .map(|wheel| bus.state(wheel).map_or(0.0, |state| state.velocity.as_rpm())),
-        armed: wheels.into_array().iter().all(|wheel| bus.is_motor_armed(*wheel)),
+        armed: robot.is_armed(),
         position_m: state.map_or((0.0, 0.0), |state| (narrow(state.x_m), narrow(state.y_m))),
         planned_m,
         heading_rad: state.map_or(0.0, |state| narrow(state.heading_rad)),

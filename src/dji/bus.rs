@@ -53,7 +53,6 @@ pub struct Bus<B = ()> {
     rejects: Rejects,
     held_steps: u8,
     turn: u8,
-    pub(super) armed: bool,
     pub(super) stopped: bool,
     brand: PhantomData<fn() -> B>,
 }
@@ -127,7 +126,6 @@ impl<B> Bus<B> {
             rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
             held_steps: 0,
             turn: 0,
-            armed: false,
             stopped: false,
             brand: PhantomData,
         }

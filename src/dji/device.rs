@@ -3,7 +3,7 @@
 use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Ingest, Link, MotorName, Role};
+use crate::motor::{ArmError, CanDevice, Claim, Ingest, Link, Missing, MotorName, Role};
 use crate::time::{Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_can::StandardId;
@@ -50,19 +50,21 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn engage(&mut self, now: Instant) {
-        self.now = now.stamp();
-        self.slots.iter_mut().for_each(|slot| slot.engage(now.stamp()));
-        self.armed = true;
+        if !self.stopped {
+            self.now = now.stamp();
+            let timeouts = self.timeouts;
+            self.slots.iter_mut().for_each(|slot| slot.engage(now.stamp(), &timeouts));
+        }
     }
 
     fn disarm(&mut self) {
         self.slots.iter_mut().for_each(Slot::disarm);
         self.outbox.clear();
-        self.armed = false;
     }
 
     fn is_armed(&self) -> bool {
-        self.armed
+        let mut attached = self.slots.iter().filter(|slot| slot.facts().is_some()).peekable();
+        attached.peek().is_some() && attached.all(Slot::is_armed)
     }
 
     fn emergency_stop(&mut self) {
@@ -80,6 +82,50 @@ impl<B> CanDevice for Bus<B> {
 }
 
 impl<B> Bus<B> {
+    /// Arms these motors only, whatever the others do.
+    ///
+    /// # Errors
+    /// As [`CanDevice::arm`], which arms all: names those of `motors` that are not heard.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::CanDevice;
+    /// use drivetrain::time::Instant;
+    ///
+    /// let mut bus = Bus::new();
+    /// let [left, right] = bus.attach_all([1, 2].map(Config::<M3508>::new))?;
+    /// let now = Instant::from_micros(1_000);
+    /// bus.ingest(&CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?, now);
+    /// bus.arm_only(&[left.erase()], now)?;
+    /// assert!(bus.is_motor_armed(left) && !bus.is_motor_armed(right));
+    /// assert!(!bus.is_armed()); // not all of them
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
+    pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
+        if self.stopped {
+            return Err(ArmError::Stopped);
+        }
+        let chosen = || motors.iter().filter_map(|motor| self.slot(*motor));
+        if chosen().next().is_none() {
+            return Err(ArmError::NoMotors);
+        }
+        let missing = chosen().filter(|slot| slot.is_missing(now.stamp(), &self.timeouts));
+        if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
+            return Err(ArmError::Missing(missing));
+        }
+        self.now = now.stamp();
+        let timeouts = self.timeouts;
+        for motor in motors {
+            if let Some(slot) = self.slot_mut(*motor) {
+                slot.engage(now.stamp(), &timeouts);
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the measured velocity of a motor that is online.
     pub(super) fn fresh_velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
         let slot = self.slot(motor)?;

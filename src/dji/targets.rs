@@ -95,15 +95,23 @@ impl<B> Bus<B> {
     /// Makes the present position of a motor zero: from then on its angle is known.
     ///
     /// A motor that holds an angle or position is relaxed, because its target was given in the old terms.
-    pub fn zero(&mut self, motor: impl Into<AnyHandle<B>>) {
-        self.set_present_position(motor, Position::ZERO);
+    ///
+    /// # Errors
+    /// When the motor is detached, or not heard: where it is now is not known then.
+    pub fn zero(&mut self, motor: impl Into<AnyHandle<B>>) -> Result<(), TargetError> {
+        self.set_present_position(motor, Position::ZERO)
     }
 
     /// Calls the present position of a motor `position`; see [`zero`](Self::zero).
-    pub fn set_present_position(&mut self, motor: impl Into<AnyHandle<B>>, position: Position) {
-        if let Some(slot) = self.slot_mut(motor.into()) {
-            slot.set_present_position(position);
-        }
+    ///
+    /// # Errors
+    /// As [`zero`](Self::zero); also for NaN or infinity.
+    pub fn set_present_position(
+        &mut self,
+        motor: impl Into<AnyHandle<B>>,
+        position: Position,
+    ) -> Result<(), TargetError> {
+        self.set(motor.into(), |slot, _| slot.set_present_position(position))
     }
 
     /// Changes the speed loop of a motor while it runs, without a jump of its output.

@@ -293,7 +293,7 @@ mod receiving {
         let mut bus = Bus::new();
         let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
         assert_eq!(bus.ingest(&feedback(0x201, 0, 9000), at_ms(1)), Ingest::Taken);
-        bus.zero(wheel);
+        bus.zero(wheel).unwrap();
         assert_eq!(bus.state(wheel).unwrap().homing, Homing::Homed);
         assert_eq!(bus.ingest(&feedback(0x201, 17, 9000), at_ms(81)), Ingest::Taken);
         let state = bus.state(wheel).unwrap();
@@ -442,7 +442,7 @@ mod commanding {
             Config::<Gm6020Voltage>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
         let (mut bus, [yaw]) = armed([config]);
         let mut towards = |from: f32, to: f32| {
-            bus.set_present_position(yaw, Position::from_angle(Angle::from_degrees(from)));
+            bus.set_present_position(yaw, Position::from_angle(Angle::from_degrees(from))).unwrap();
             bus.set_angle(yaw, Angle::from_degrees(to)).unwrap();
             step(&mut bus, 2);
             f32::from(sent(&mut bus)[0].1[0]) * 24.0 / 25_000.0
@@ -457,7 +457,7 @@ mod commanding {
         let (mut bus, [joint]) = armed([config]);
         assert_eq!(bus.set_angle(joint, Angle::ZERO), Err(TargetError::NotHomed));
         assert_eq!(bus.set_position(joint, Position::from_turns(2)), Ok(()));
-        bus.zero(joint);
+        bus.zero(joint).unwrap();
         step(&mut bus, 2);
         assert_eq!(sent(&mut bus), [(0x200, [0; 4])], "the old target is gone");
         assert_eq!(bus.set_angle(joint, Angle::ZERO), Ok(()));
@@ -492,6 +492,49 @@ mod commanding {
 
 mod safety {
     use super::*;
+
+    #[test]
+    fn arming_again_does_not_disturb_the_motors_that_run() {
+        let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
+        for ms in 2..150 {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+            bus.set_raw(first, 500).unwrap();
+            step(&mut bus, ms);
+        }
+        assert!(!bus.is_armed() && bus.is_motor_armed(first) && !bus.is_motor_armed(second));
+        for ms in 150..160 {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+            assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(ms)), Ingest::Taken);
+        }
+        bus.arm(at_ms(160)).unwrap();
+        step(&mut bus, 160);
+        assert_eq!(sent(&mut bus)[0], (0x200, [500, 0, 0, 0]), "the first keeps its target");
+        assert!(bus.is_armed());
+    }
+
+    #[test]
+    fn engaging_arms_neither_the_unheard_nor_under_an_emergency_stop() {
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        bus.engage(at_ms(1));
+        assert!(!bus.is_motor_armed(wheel));
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
+        bus.emergency_stop();
+        bus.engage(at_ms(1));
+        assert!(!bus.is_motor_armed(wheel));
+    }
+
+    #[test]
+    fn a_position_is_zeroed_only_while_the_motor_is_heard() {
+        let mut bus = Bus::new();
+        let joint = bus.attach(Config::<M3508>::new(1)).unwrap();
+        assert_eq!(bus.zero(joint), Err(TargetError::NoFeedback));
+        assert_eq!(bus.ingest(&feedback(0x201, 5000, 0), at_ms(1)), Ingest::Taken);
+        assert_eq!(bus.zero(joint), Ok(()));
+        let nan = Position::from_angle(Angle::from_radians(f32::NAN));
+        assert_eq!(bus.set_present_position(joint, nan), Err(TargetError::NotFinite));
+        assert_eq!(bus.state(joint).unwrap().rotor_counts, 0);
+    }
 
     #[test]
     fn nothing_moves_before_it_is_armed_and_the_missing_are_named() {

@@ -75,13 +75,16 @@ pub trait CanDevice {
     /// Lists the motors without fresh feedback at `now`.
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
-    /// Lets targets through from now on. Called by [`arm`](Self::arm) when all of its conditions hold.
+    /// Lets targets through from now on, for the motors that are heard; one that takes them already goes on
+    /// undisturbed. Called by [`arm`](Self::arm) when all of its conditions hold; without effect while the emergency
+    /// stop is set.
     fn engage(&mut self, now: Instant);
 
     /// Relaxes every motor and refuses targets until armed again.
     fn disarm(&mut self);
 
-    /// Tells whether targets are taken.
+    /// Tells whether every motor takes targets: false as long as one of them waits to be armed, at the start and after
+    /// a fault that relaxed it.
     fn is_armed(&self) -> bool;
 
     /// Relaxes every motor at once: from the next frame on, all commands are zero until it is cleared and armed.

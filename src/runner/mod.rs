@@ -194,7 +194,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self.device.arm(tick.now())
     }
 
-    /// Tells whether the device takes targets.
+    /// Tells whether every motor takes targets; see [`CanDevice::is_armed`].
     #[must_use]
     pub fn is_armed(&self) -> bool {
         self.device.is_armed()

@@ -9,8 +9,12 @@ impl Slot {
         self.facts.is_some() && !fresh
     }
 
-    /// Takes targets from now on, starting from rest.
-    pub(in crate::dji) fn engage(&mut self, now: u32) {
+    /// Takes targets from now on, starting from rest, if the motor is heard. One that takes them already goes on
+    /// undisturbed.
+    pub(in crate::dji) fn engage(&mut self, now: u32, timeouts: &Timeouts) {
+        if self.is_armed() || self.is_missing(now, timeouts) {
+            return;
+        }
         self.relax();
         self.armed = self.facts.is_some();
         self.latched = false;

@@ -11,7 +11,7 @@ use super::handle::Key;
 use super::{AttachError, CommandFrame, Facts, Feedback, State};
 use crate::control::{Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, Turns};
-use crate::motor::{Link, MotorName, Recovery};
+use crate::motor::{Link, MotorName, Recovery, TargetError};
 use crate::units::{AngularVelocity, Current};
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
@@ -214,12 +214,19 @@ impl Slot {
 
     /// Calls the present position `position`. A motor that holds an angle or position is relaxed: its target
     /// was given in the old terms.
-    pub(super) fn set_present_position(&mut self, position: Position) {
+    pub(super) fn set_present_position(&mut self, position: Position) -> Result<(), TargetError> {
+        if self.link != Link::Online {
+            return Err(TargetError::NoFeedback);
+        }
+        if !position.is_finite() {
+            return Err(TargetError::NotFinite);
+        }
         if matches!(self.target, Target::Angle(_) | Target::Position(..)) {
             self.relax();
         }
         self.shaft.set_position(position);
         self.homing = Homing::Homed;
+        Ok(())
     }
 
     fn direction(&self) -> f32 {
