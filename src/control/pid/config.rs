@@ -238,6 +238,15 @@ impl PidConfig {
         positive("max_step", self.max_step_s)
     }
 
+    /// Returns the error up to which the integral works at full rate.
+    pub(super) const fn full_weight_to(&self) -> f32 {
+        if self.integral_separation < self.full_rate_below {
+            self.integral_separation
+        } else {
+            self.full_rate_below
+        }
+    }
+
     /// Returns the options that are in use; gains, limits that are symmetric, and anti-windup are none.
     pub(super) const fn options(&self) -> u8 {
         let mut options = 0;

@@ -61,7 +61,7 @@ pub struct Pid {
     measurement: f32,
     rate: f32,
     output: f32,
-    setpoint: f32,
+    full_weight_to: f32,
     rejected: u16,
     track_output: bool,
     options: u8,
@@ -100,7 +100,7 @@ impl Pid {
             measurement: UNKNOWN,
             rate: 0.0,
             output: 0.0,
-            setpoint: 0.0,
+            full_weight_to: 0.0,
             rejected: 0,
             track_output: false,
             options: 0,
@@ -128,7 +128,8 @@ impl Pid {
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         let error = setpoint - measurement;
         let rate = (measurement - self.measurement) * step.per_dt;
-        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let growth = self.growth(error, step);
+        let integral = self.integral + growth;
         let output = self.config.kp * error + integral - self.config.kd * rate;
         // Options, limits, a step that is not normal, NaN and overflow: none of them passes both gates.
         if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
@@ -139,7 +140,10 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.step_with_options(setpoint, measurement, step)
+        if self.has(CIRCLE | DERIVATIVE_ON_ERROR) {
+            return self.step_with_options(setpoint, measurement, step);
+        }
+        self.try_work(setpoint, measurement, error, rate, growth, step)
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
@@ -148,7 +152,8 @@ impl Pid {
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let growth = self.growth(error, step);
+        let integral = self.integral + growth;
         let output = self.config.kp * error + integral - self.config.kd * rate;
         if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
             self.integral = integral;
@@ -158,7 +163,7 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.try_work(0.0, UNKNOWN, error, rate, step)
+        self.try_work(0.0, UNKNOWN, error, rate, growth, step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -168,7 +173,6 @@ impl Pid {
         self.measurement = UNKNOWN;
         self.rate = 0.0;
         self.output = 0.0;
-        self.setpoint = 0.0;
         self.track_output = false;
     }
 
@@ -225,7 +229,7 @@ impl Pid {
             p: config.kp * error,
             i: self.integral,
             d: -(config.kd * self.rate),
-            feed_forward: self.feed_forward(self.setpoint),
+            feed_forward: self.feed_forward(self.setpoint()),
         }
     }
 
@@ -250,17 +254,13 @@ impl Pid {
     const fn configure(&mut self, config: PidConfig) {
         self.config = config;
         self.options = config.options();
+        self.full_weight_to = config.full_weight_to();
         let plain = self.options == 0;
         self.integral_gate = if plain { gate(config.integral_limit) } else { CLOSED };
         self.output_gate = if plain { gate(config.output_upper) } else { CLOSED };
     }
 
     fn change(&mut self, config: PidConfig) {
-        if self.output_gate != CLOSED {
-            // The plain path does not store its setpoint.
-            let known = self.measurement != UNKNOWN;
-            self.setpoint = if known { self.error + self.measurement } else { 0.0 };
-        }
         let before = self.terms();
         self.configure(config);
         let after = self.terms();
@@ -275,9 +275,17 @@ impl Pid {
         };
     }
 
+    /// The last setpoint, to rounding; zero when the error was formed elsewhere.
+    const fn setpoint(&self) -> f32 {
+        let known = self.error != UNKNOWN && self.measurement != UNKNOWN;
+        if known { self.error + self.measurement } else { 0.0 }
+    }
+
     const fn feed_forward(&self, setpoint: f32) -> f32 {
-        let along = self.config.velocity_gain * setpoint;
-        if setpoint == 0.0 { along } else { along + self.config.static_gain.copysign(setpoint) }
+        if setpoint == 0.0 {
+            return 0.0;
+        }
+        self.config.velocity_gain * setpoint + self.config.static_gain.copysign(setpoint)
     }
 
     #[inline(never)]
@@ -292,7 +300,8 @@ impl Pid {
             let period = self.config.period;
             (error, travel) = (math::near(error, period), math::near(travel, period));
         }
-        self.try_work(setpoint, measurement, error, travel * step.per_dt, step)
+        let growth = self.growth(error, step);
+        self.try_work(setpoint, measurement, error, travel * step.per_dt, growth, step)
     }
 
     #[inline(never)]
@@ -302,9 +311,10 @@ impl Pid {
         measurement: f32,
         error: f32,
         rate: f32,
+        growth: f32,
         step: &TimeStep,
     ) -> f32 {
-        match self.work::<false>(setpoint, error, rate, step) {
+        match self.work::<false>(setpoint, error, rate, growth, step) {
             Some(output) => {
                 self.measurement = measurement;
                 output
@@ -344,12 +354,13 @@ impl Pid {
             (rate, step.half_dt_s) = (self.rate, 0.0);
         }
         if self.track_output {
-            self.take_over(setpoint, error, self.filtered(rate, &step));
+            self.take_over(error, self.filtered(rate, &step));
         }
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
-        self.work::<true>(setpoint, error, rate, &step).unwrap_or(self.output)
+        let growth = self.growth(error, &step);
+        self.work::<true>(setpoint, error, rate, growth, &step).unwrap_or(self.output)
     }
 
     /// Error and rate by way of sums that are finite and angles that are exact.
@@ -368,8 +379,8 @@ impl Pid {
     }
 
     /// Lets the integral make up what the other terms lack to the output that was set.
-    fn take_over(&mut self, setpoint: f32, error: f32, rate: f32) {
-        let next = Self { setpoint, error, rate, ..*self };
+    fn take_over(&mut self, error: f32, rate: f32) {
+        let next = Self { error, rate, ..*self };
         let Terms { p, d, feed_forward, .. } = next.terms();
         self.track_output = false;
         if self.config.ki > 0.0 {
@@ -384,33 +395,60 @@ impl Pid {
         setpoint: f32,
         error: f32,
         rate: f32,
+        growth: f32,
         step: &TimeStep,
     ) -> Option<f32> {
         let finite = |value| if CAREFUL { finite(value) } else { value };
         let config = &self.config;
         let rate = finite(self.filtered(rate, step));
         let mut proportional = finite(config.kp * error);
-        let mut growth = finite(config.ki * step.half_dt_s * (error + self.error));
-        let evidence = growth;
-        if self.has(INTEGRAL_WEIGHT) {
+        let mut growth = finite(growth);
+        if self.has(INTEGRAL_WEIGHT) && error.abs() > self.full_weight_to {
             growth *= self.weight(error);
         }
         if self.has(DEAD_BAND) && error.abs() < config.dead_band {
             proportional = 0.0;
-            if growth * self.integral >= 0.0 {
-                growth = 0.0;
+            let shrinks = growth * self.integral < 0.0;
+            if !shrinks {
+                growth *= 0.0; // and not simply zero: what is not finite must show below
             }
         }
         let mut others = finite(proportional - finite(config.kd * rate));
         if self.has(FEED_FORWARD) {
             others = finite(others + self.feed_forward(setpoint));
         }
-        let limit = config.integral_limit;
-        let mut integral = limited(finite(self.integral + growth), -limit, limit);
-        let wanted = others + integral;
-        if !CAREFUL && !passes(wanted + evidence + rate, gate(f32::MAX)) {
-            return None;
+        let mut integral = finite(self.integral + growth);
+        let mut wanted = others + integral;
+        if integral.abs() > config.integral_limit {
+            if !CAREFUL && !integral.is_finite() {
+                return None;
+            }
+            integral = config.integral_limit.copysign(integral);
+            wanted = others + integral;
         }
+        let mut output = wanted;
+        // Written so that NaN is not free, nor is what is infinite.
+        let free = wanted <= config.output_upper
+            && wanted >= config.output_lower
+            && !(self.has(SLEW_LIMIT)
+                && (wanted - self.output).abs() > config.slew_per_s * step.dt_s);
+        if !free {
+            if !CAREFUL && !wanted.is_finite() {
+                return None;
+            }
+            (output, integral) = self.saturated(wanted, integral, growth, step);
+        }
+        self.error = error;
+        self.rate = rate;
+        self.integral = integral;
+        self.output = output;
+        Some(output)
+    }
+
+    /// The output within its limits, and the integral after anti-windup.
+    #[inline]
+    fn saturated(&self, wanted: f32, integral: f32, growth: f32, step: &TimeStep) -> (f32, f32) {
+        let config = &self.config;
         let mut output = wanted;
         if self.has(SLEW_LIMIT) {
             let reach = config.slew_per_s * step.dt_s;
@@ -418,20 +456,18 @@ impl Pid {
         }
         output = limited(output, config.output_lower, config.output_upper);
         let excess = wanted - output;
-        if excess != 0.0 {
-            if config.tracking_time_s > 0.0 {
-                let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
-                integral = limited(finite(integral - finite(excess) * part), -limit, limit);
-            } else if excess * growth > 0.0 && !config.wind_up {
-                integral = self.integral;
-            }
+        if config.tracking_time_s > 0.0 {
+            let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
+            let drained = finite(integral - finite(excess) * part);
+            return (output, limited(drained, -config.integral_limit, config.integral_limit));
         }
-        self.setpoint = setpoint;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
-        self.output = output;
-        Some(output)
+        let outward = excess * growth > 0.0;
+        (output, if outward && !config.wind_up { self.integral } else { integral })
+    }
+
+    #[inline]
+    fn growth(&self, error: f32, step: &TimeStep) -> f32 {
+        self.config.ki * step.half_dt_s * (error + self.error)
     }
 
     #[inline]
