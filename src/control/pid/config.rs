@@ -238,6 +238,15 @@ impl PidConfig {
         positive("max_step", self.max_step_s)
     }
 
+    /// Returns the error up to which the integral works at full rate.
+    pub(super) const fn full_weight_to(&self) -> f32 {
+        if self.integral_separation < self.full_rate_below {
+            self.integral_separation
+        } else {
+            self.full_rate_below
+        }
+    }
+
     /// Returns the options that are in use; gains, limits that are symmetric, and anti-windup are none.
     pub(super) const fn options(&self) -> u8 {
         let mut options = 0;
@@ -266,5 +275,25 @@ impl PidConfig {
             options |= DERIVATIVE_ON_ERROR;
         }
         options
+    }
+}
+
+#[cfg(all(test, feature = "serde"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_survives_a_file_and_is_checked_when_used() {
+        let config = PidConfig::new(2.0, 0.5, 0.01).with_output_limit(20.0).with_period(360.0);
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(serde_json::from_str::<PidConfig>(&text).unwrap(), config);
+        let plain = serde_json::to_string(&PidConfig::new(1.0, 0.0, 0.0)).unwrap();
+        assert_eq!(
+            serde_json::from_str::<PidConfig>(&plain).unwrap(),
+            PidConfig::new(1.0, 0.0, 0.0)
+        );
+        let spoiled = text.replace("\"kp\":2.0", "\"kp\":-2.0");
+        let spoiled: PidConfig = serde_json::from_str(&spoiled).unwrap();
+        assert_eq!(spoiled.validate().unwrap_err().parameter(), "kp");
     }
 }

@@ -1,10 +1,8 @@
+use super::work::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
 use crate::control::error::{ConfigError, check, not_negative, ordered, positive};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
-
-/// Marks a stored error or measurement as unknown.
-const UNKNOWN: f32 = f32::INFINITY;
 
 /// What an [`IncrementalPid`] is made from. Units of the gains as for [`PidConfig`](super::PidConfig).
 ///

@@ -3,6 +3,7 @@
 mod config;
 mod incremental;
 mod positional;
+mod work;
 
 pub use config::PidConfig;
 pub use incremental::{IncrementalPid, IncrementalPidConfig};

@@ -1,15 +1,9 @@
 use super::PidConfig;
-use super::config::{
-    CIRCLE, DEAD_BAND, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, INTEGRAL_WEIGHT,
-    SLEW_LIMIT,
-};
+use super::config::{CIRCLE, DERIVATIVE_ON_ERROR};
+use super::work::{CLOSED, UNKNOWN, gate, passes};
 use crate::control::error::{ConfigError, not_negative};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
-use crate::math;
-
-/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
-const UNKNOWN: f32 = f32::INFINITY;
 
 /// A positional PID controller.
 ///
@@ -53,18 +47,18 @@ const UNKNOWN: f32 = f32::INFINITY;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pid {
-    config: PidConfig,
-    integral_gate: u32,
-    output_gate: u32,
-    integral: f32,
-    error: f32,
-    measurement: f32,
-    rate: f32,
-    output: f32,
-    setpoint: f32,
-    rejected: u16,
-    track_output: bool,
-    options: u8,
+    pub(super) config: PidConfig,
+    pub(super) integral_gate: u32,
+    pub(super) output_gate: u32,
+    pub(super) integral: f32,
+    pub(super) error: f32,
+    pub(super) measurement: f32,
+    pub(super) rate: f32,
+    pub(super) output: f32,
+    pub(super) full_weight_to: f32,
+    pub(super) rejected: u16,
+    pub(super) track_output: bool,
+    pub(super) options: u8,
 }
 
 /// The parts of an output, in its unit. Their sum is the output before limits.
@@ -100,7 +94,7 @@ impl Pid {
             measurement: UNKNOWN,
             rate: 0.0,
             output: 0.0,
-            setpoint: 0.0,
+            full_weight_to: 0.0,
             rejected: 0,
             track_output: false,
             options: 0,
@@ -128,7 +122,8 @@ impl Pid {
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         let error = setpoint - measurement;
         let rate = (measurement - self.measurement) * step.per_dt;
-        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let growth = self.growth(error, step);
+        let integral = self.integral + growth;
         let output = self.config.kp * error + integral - self.config.kd * rate;
         // Options, limits, a step that is not normal, NaN and overflow: none of them passes both gates.
         if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
@@ -139,7 +134,10 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.step_with_options(setpoint, measurement, step)
+        if self.has(CIRCLE | DERIVATIVE_ON_ERROR) {
+            return self.step_with_options(setpoint, measurement, step);
+        }
+        self.try_work(setpoint, measurement, error, rate, growth, step)
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
@@ -148,7 +146,8 @@ impl Pid {
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let integral = self.integral + self.config.ki * step.half_dt_s * (error + self.error);
+        let growth = self.growth(error, step);
+        let integral = self.integral + growth;
         let output = self.config.kp * error + integral - self.config.kd * rate;
         if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
             self.integral = integral;
@@ -158,7 +157,7 @@ impl Pid {
             self.output = output;
             return output;
         }
-        self.try_work(0.0, UNKNOWN, error, rate, step)
+        self.try_work(0.0, UNKNOWN, error, rate, growth, step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -168,7 +167,6 @@ impl Pid {
         self.measurement = UNKNOWN;
         self.rate = 0.0;
         self.output = 0.0;
-        self.setpoint = 0.0;
         self.track_output = false;
     }
 
@@ -225,7 +223,7 @@ impl Pid {
             p: config.kp * error,
             i: self.integral,
             d: -(config.kd * self.rate),
-            feed_forward: self.feed_forward(self.setpoint),
+            feed_forward: self.feed_forward(self.setpoint()),
         }
     }
 
@@ -250,17 +248,13 @@ impl Pid {
     const fn configure(&mut self, config: PidConfig) {
         self.config = config;
         self.options = config.options();
+        self.full_weight_to = config.full_weight_to();
         let plain = self.options == 0;
         self.integral_gate = if plain { gate(config.integral_limit) } else { CLOSED };
         self.output_gate = if plain { gate(config.output_upper) } else { CLOSED };
     }
 
     fn change(&mut self, config: PidConfig) {
-        if self.output_gate != CLOSED {
-            // The plain path does not store its setpoint.
-            let known = self.measurement != UNKNOWN;
-            self.setpoint = if known { self.error + self.measurement } else { 0.0 };
-        }
         let before = self.terms();
         self.configure(config);
         let after = self.terms();
@@ -275,206 +269,18 @@ impl Pid {
         };
     }
 
-    const fn feed_forward(&self, setpoint: f32) -> f32 {
-        let along = self.config.velocity_gain * setpoint;
-        if setpoint == 0.0 { along } else { along + self.config.static_gain.copysign(setpoint) }
+    /// The last setpoint, to rounding; zero when the error was formed elsewhere.
+    const fn setpoint(&self) -> f32 {
+        let known = self.error != UNKNOWN && self.measurement != UNKNOWN;
+        if known { self.error + self.measurement } else { 0.0 }
     }
 
-    #[inline(never)]
-    fn step_with_options(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let mut error = setpoint - measurement;
-        let mut travel = if self.has(DERIVATIVE_ON_ERROR) {
-            self.error - error
-        } else {
-            measurement - self.measurement
-        };
-        if self.has(CIRCLE) {
-            let period = self.config.period;
-            (error, travel) = (math::near(error, period), math::near(travel, period));
+    pub(super) const fn feed_forward(&self, setpoint: f32) -> f32 {
+        if setpoint == 0.0 {
+            return 0.0;
         }
-        self.try_work(setpoint, measurement, error, travel * step.per_dt, step)
+        self.config.velocity_gain * setpoint + self.config.static_gain.copysign(setpoint)
     }
-
-    #[inline(never)]
-    fn try_work(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
-        match self.work::<false>(setpoint, error, rate, step) {
-            Some(output) => {
-                self.measurement = measurement;
-                output
-            }
-            None => self.work_carefully(setpoint, measurement, error, rate, step),
-        }
-    }
-
-    /// What happens seldom: bad arguments, the first call, a step that is frozen, half a turn, values that overflow.
-    #[cold]
-    #[inline(never)]
-    fn work_carefully(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
-        // `step_error` passes no measurement, and an error and a rate that may be used as they are.
-        let formed = measurement == UNKNOWN;
-        let usable = if formed {
-            error.is_finite() && rate.is_finite()
-        } else {
-            setpoint.is_finite() && measurement.is_finite()
-        };
-        if step.is_hold() || !usable {
-            self.rejected = self.rejected.saturating_add(1);
-            return self.output;
-        }
-        let (mut error, mut rate, mut step) = (error, rate, *step);
-        if !formed {
-            (error, rate) = self.error_and_rate(setpoint, measurement, &step);
-        }
-        self.measurement = measurement;
-        if step.is_frozen() {
-            (rate, step.half_dt_s) = (self.rate, 0.0);
-        }
-        if self.track_output {
-            self.take_over(setpoint, error, self.filtered(rate, &step));
-        }
-        if self.error == UNKNOWN {
-            self.error = -error; // no interval yet: a mean of zero
-        }
-        self.work::<true>(setpoint, error, rate, &step).unwrap_or(self.output)
-    }
-
-    /// Error and rate by way of sums that are finite and angles that are exact.
-    fn error_and_rate(&self, setpoint: f32, measurement: f32, step: &TimeStep) -> (f32, f32) {
-        let shortest = |way: f32| {
-            finite(if self.has(CIRCLE) { math::wrap(way, self.config.period) } else { way })
-        };
-        let error = shortest(setpoint - measurement);
-        let (known, travel) = if self.has(DERIVATIVE_ON_ERROR) {
-            (self.error, self.error - error)
-        } else {
-            (self.measurement, measurement - self.measurement)
-        };
-        let rate = if known == UNKNOWN { 0.0 } else { finite(shortest(travel) * step.per_dt) };
-        (error, rate)
-    }
-
-    /// Lets the integral make up what the other terms lack to the output that was set.
-    fn take_over(&mut self, setpoint: f32, error: f32, rate: f32) {
-        let next = Self { setpoint, error, rate, ..*self };
-        let Terms { p, d, feed_forward, .. } = next.terms();
-        self.track_output = false;
-        if self.config.ki > 0.0 {
-            self.integral = finite(self.output - finite(p + d + feed_forward));
-        }
-    }
-
-    /// The whole controller. Unless `CAREFUL`, `None` says that something was not finite, and nothing has changed.
-    #[inline]
-    fn work<const CAREFUL: bool>(
-        &mut self,
-        setpoint: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> Option<f32> {
-        let finite = |value| if CAREFUL { finite(value) } else { value };
-        let config = &self.config;
-        let rate = finite(self.filtered(rate, step));
-        let mut proportional = finite(config.kp * error);
-        let mut growth = finite(config.ki * step.half_dt_s * (error + self.error));
-        let evidence = growth;
-        if self.has(INTEGRAL_WEIGHT) {
-            growth *= self.weight(error);
-        }
-        if self.has(DEAD_BAND) && error.abs() < config.dead_band {
-            proportional = 0.0;
-            if growth * self.integral >= 0.0 {
-                growth = 0.0;
-            }
-        }
-        let mut others = finite(proportional - finite(config.kd * rate));
-        if self.has(FEED_FORWARD) {
-            others = finite(others + self.feed_forward(setpoint));
-        }
-        let limit = config.integral_limit;
-        let mut integral = limited(finite(self.integral + growth), -limit, limit);
-        let wanted = others + integral;
-        if !CAREFUL && !passes(wanted + evidence + rate, gate(f32::MAX)) {
-            return None;
-        }
-        let mut output = wanted;
-        if self.has(SLEW_LIMIT) {
-            let reach = config.slew_per_s * step.dt_s;
-            output = limited(output, self.output - reach, self.output + reach);
-        }
-        output = limited(output, config.output_lower, config.output_upper);
-        let excess = wanted - output;
-        if excess != 0.0 {
-            if config.tracking_time_s > 0.0 {
-                let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
-                integral = limited(finite(integral - finite(excess) * part), -limit, limit);
-            } else if excess * growth > 0.0 && !config.wind_up {
-                integral = self.integral;
-            }
-        }
-        self.setpoint = setpoint;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
-        self.output = output;
-        Some(output)
-    }
-
-    #[inline]
-    fn filtered(&self, rate: f32, step: &TimeStep) -> f32 {
-        if self.has(DERIVATIVE_FILTER) {
-            let gain = step.dt_s / (step.dt_s + self.config.derivative_time_s);
-            self.rate + gain * (rate - self.rate)
-        } else {
-            rate
-        }
-    }
-
-    /// The part of its rate at which the integral works at this error.
-    #[inline]
-    fn weight(&self, error: f32) -> f32 {
-        let config = &self.config;
-        let size = error.abs();
-        if size > config.integral_separation || size >= config.no_rate_above {
-            0.0
-        } else if size > config.full_rate_below {
-            (config.no_rate_above - size) / (config.no_rate_above - config.full_rate_below)
-        } else {
-            1.0
-        }
-    }
-
-    #[inline]
-    const fn has(&self, option: u8) -> bool {
-        self.options & option != 0
-    }
-}
-
-/// A gate that nothing passes.
-const CLOSED: u32 = 0;
-
-/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
-const fn gate(limit: f32) -> u32 {
-    (limit.to_bits() << 1) + 1
-}
-
-#[inline]
-const fn passes(value: f32, gate: u32) -> bool {
-    value.to_bits() << 1 < gate
 }
 
 #[cfg(test)]
