@@ -111,14 +111,21 @@ impl Fastest {
         }
     }
 
-    pub(super) fn limit<S: WheelSpeed>(&self, wheel: S, limit: AngularVelocity) -> S {
+    /// The factor for all wheels, 0..=1; zero when a wheel or the limit is broken.
+    pub(super) fn scale(&self, limit: AngularVelocity) -> f32 {
         let limit = limit.as_rad_per_s();
         if self.broken || limit.is_nan() || limit <= 0.0 {
-            wheel.stopped()
+            0.0
         } else if self.rad_per_s > limit {
-            wheel.scaled(limit / self.rad_per_s)
+            limit / self.rad_per_s
         } else {
-            wheel
+            1.0
         }
+    }
+
+    pub(super) fn limit<S: WheelSpeed>(&self, wheel: S, limit: AngularVelocity) -> S {
+        // Zero times NaN is NaN.
+        let scale = self.scale(limit);
+        if scale > 0.0 { wheel.scaled(scale) } else { wheel.stopped() }
     }
 }

@@ -47,6 +47,12 @@ impl<F> Twist<F> {
         Vec2::new(self.vx_m_s, self.vy_m_s)
     }
 
+    /// Returns the same translation with another rotation, in rad/s.
+    #[must_use]
+    pub const fn with_wz(self, wz_rad_s: f32) -> Self {
+        Self::new(self.vx_m_s, self.vy_m_s, wz_rad_s)
+    }
+
     /// Tells whether no part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {

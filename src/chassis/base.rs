@@ -1,0 +1,521 @@
+use super::kinematics::Fastest;
+use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
+use crate::geometry::{Body, Heading, Pose2, Twist, World};
+use crate::motor::{TargetError, VelocityDrive};
+use crate::time::Tick;
+use crate::units::AngularVelocity;
+
+/// A chassis of any layout: commands in, wheel speeds out, pose kept.
+///
+/// Once a tick: set a command, then [`drive`](Self::drive) the motors, or hand the measured wheel speeds to
+/// [`update`](Self::update) and take its targets where the wheels sit on several buses. In a tick:
+///
+/// 1. measured wheels and gyroscope move the [`Odometry`];
+/// 2. the command is brought into the world and approached within the acceleration limits: the same for every heading;
+/// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit.
+///
+/// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
+/// as zero. A `dt` that is zero, negative or NaN moves neither pose nor command; one over 0.1 s counts as 0.1 s for
+/// the acceleration, and one over 1 s moves no pose.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{Chassis, Mecanum, MecanumGeometry, MecanumWheels};
+/// use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
+///
+/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
+/// let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+/// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+/// let measured = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(10.0)));
+/// let targets = chassis.update(measured, Tick::new(Instant::from_micros(1_000), 0.001));
+/// assert!((targets.front_left.as_rad_per_s() - 10.0).abs() < 1e-5);
+/// assert!((chassis.pose().x_m - 0.001).abs() < 1e-9);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chassis<K> {
+    kinematics: K,
+    limits: ChassisLimits,
+    command: Command,
+    command_age_s: f32,
+    gyro: Option<Heading>,
+    reference: Twist<World>,
+    measured: Twist<Body>,
+    odometry: Odometry,
+    status: ChassisStatus,
+}
+
+/// What the driver wants, in the frame it was said in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Command {
+    Body(Twist<Body>),
+    World(Twist<World>),
+}
+
+/// Where the measured motion of the last tick comes from.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MotionSource {
+    /// From all wheels.
+    AllWheels,
+    /// From some wheels: the others gave no feedback, and the rest suffices.
+    SomeWheels,
+    /// From none: too few wheels gave feedback. The position stands still; a gyroscope's heading goes on.
+    #[default]
+    Unknown,
+}
+
+/// What went on in a chassis, besides the motion.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ChassisStatus {
+    /// How the motion of the last tick was measured.
+    pub source: MotionSource,
+    /// Wheels without feedback in the last tick.
+    pub lost_wheels: u8,
+    /// Seconds for which the position could not be followed, in all.
+    pub blind_s: f32,
+    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known.
+    pub slip_m_s: f32,
+    /// The last tick ran without a fresh command.
+    pub command_stale: bool,
+    /// The wheels' speed limit slowed the chassis in the last tick.
+    pub saturated: bool,
+    /// Commands that were NaN or infinite, in all.
+    pub rejected: u16,
+    /// Motors that refused their target in the last tick.
+    pub refused: u8,
+    /// Why the first of them did.
+    pub refusal: Option<TargetError>,
+}
+
+impl<K: Kinematics> Chassis<K> {
+    /// The longest step in seconds that the acceleration limit believes.
+    pub const MAX_STEP_S: f32 = 0.1;
+
+    /// Takes the layout. Nothing is limited; commands must be renewed every 0.1 s.
+    #[must_use]
+    pub const fn new(kinematics: K) -> Self {
+        Self {
+            kinematics,
+            limits: ChassisLimits::new(),
+            command: Command::Body(Twist::ZERO),
+            command_age_s: f32::MAX,
+            gyro: None,
+            reference: Twist::ZERO,
+            measured: Twist::ZERO,
+            odometry: Odometry::new(Pose2::ORIGIN),
+            status: ChassisStatus {
+                source: MotionSource::Unknown,
+                lost_wheels: 0,
+                blind_s: 0.0,
+                slip_m_s: 0.0,
+                command_stale: true,
+                saturated: false,
+                rejected: 0,
+                refused: 0,
+                refusal: None,
+            },
+        }
+    }
+
+    /// Sets the limits; they hold from the next tick on.
+    ///
+    /// # Errors
+    /// Names the value that is not above zero. The limits then stay as they were.
+    pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), LimitError> {
+        limits.validate()?;
+        self.limits = limits;
+        Ok(())
+    }
+
+    /// Commands a motion in the frame of the body.
+    pub fn set_body(&mut self, twist: Twist<Body>) {
+        self.set_command(Command::Body(twist), twist.is_finite());
+    }
+
+    /// Commands a motion in the frame of the world, and gives the gyroscope's heading for this tick.
+    pub fn set_world(&mut self, twist: Twist<World>, heading: Heading) {
+        self.set_command(Command::World(twist), twist.is_finite());
+        self.set_heading(heading);
+    }
+
+    /// Gives the gyroscope's heading for the next tick. In ticks without one, the wheels keep the heading.
+    pub const fn set_heading(&mut self, heading: Heading) {
+        self.gyro = Some(heading);
+    }
+
+    /// Commands standing still: the chassis comes to a stop within its limits.
+    pub fn stop(&mut self) {
+        self.set_body(Twist::ZERO);
+    }
+
+    /// Starts over from the measured motion: call it when the motors were relaxed, so that they take over without a jump.
+    pub fn restart(&mut self) {
+        self.command = Command::Body(Twist::ZERO);
+        self.reference = self.measured.to_world(self.odometry.heading());
+    }
+
+    fn set_command(&mut self, command: Command, finite: bool) {
+        if finite {
+            self.command = command;
+        } else {
+            self.command = Command::Body(Twist::ZERO);
+            self.status.rejected = self.status.rejected.saturating_add(1);
+        }
+        self.command_age_s = 0.0;
+    }
+
+    /// Takes the measured speed of each wheel, `None` where there is no fresh feedback, and returns the speed it shall have.
+    pub fn update(
+        &mut self,
+        measured: K::Wheels<Option<K::Speed>>,
+        tick: Tick,
+    ) -> K::Wheels<K::Speed> {
+        let dt_s = if tick.dt_s() > 0.0 { tick.dt_s() } else { 0.0 };
+        self.measure(measured, dt_s);
+        let heading = self.odometry.heading();
+        let target = self.target(dt_s).to_world(heading);
+        let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
+        self.reference = self.limits.approach(self.reference, target, step_s);
+        let twist = self.reference.to_body(heading).discretized(step_s);
+        let wheels = self.kinematics.inverse(twist);
+        let mut fastest = Fastest::default();
+        let _: K::Wheels<()> = K::map(wheels, |wheel| fastest.see(wheel.velocity()));
+        let limit = self.limits.wheel_speed();
+        let scale = fastest.scale(limit);
+        // What the wheels cannot do must not wind up: the next step starts from what they do.
+        self.reference = if scale > 0.0 { self.reference * scale } else { Twist::ZERO };
+        self.status.saturated = scale < 1.0;
+        K::map(wheels, |wheel| fastest.limit(wheel, limit))
+    }
+
+    fn measure(&mut self, wheels: K::Wheels<Option<K::Speed>>, dt_s: f32) {
+        let wheels = K::map(wheels, |wheel| wheel.filter(|speed| speed.velocity().is_finite()));
+        let (mut lost, mut any) = (0_u8, None);
+        let _: K::Wheels<()> = K::map(wheels, |wheel| {
+            lost = lost.saturating_add(u8::from(wheel.is_none()));
+            any = any.or(wheel);
+        });
+        self.status.lost_wheels = lost;
+        self.status.slip_m_s = 0.0;
+        let motion = match any {
+            Some(any) if lost == 0 => {
+                let all = K::map(wheels, |wheel| wheel.unwrap_or(any));
+                self.status.slip_m_s = self.kinematics.slip_m_s(all);
+                Some(self.kinematics.forward(all))
+            }
+            _ => self.kinematics.forward_partial(wheels),
+        };
+        let motion = motion.filter(|twist| twist.is_finite());
+        self.status.source = match motion {
+            Some(_) if lost == 0 => MotionSource::AllWheels,
+            Some(_) => MotionSource::SomeWheels,
+            None => MotionSource::Unknown,
+        };
+        self.measured = motion.unwrap_or(Twist::ZERO);
+        let (before, had_gyro) = (self.odometry.heading(), self.odometry.has_gyro());
+        let counted = self.odometry.advance(self.measured, self.gyro.take(), dt_s);
+        if motion.is_none() || !counted {
+            self.status.blind_s += dt_s;
+        }
+        if self.odometry.has_gyro() && !had_gyro {
+            // The heading jumped to the gyroscope's; the robot did not.
+            let now = self.odometry.heading();
+            self.reference = self.reference.to_body(before).to_world(now);
+        }
+    }
+
+    fn target(&mut self, dt_s: f32) -> Twist<Body> {
+        self.status.command_stale = self.command_age_s > self.limits.command_timeout_s();
+        self.command_age_s += dt_s;
+        match self.command {
+            _ if self.status.command_stale => Twist::ZERO,
+            Command::Body(twist) => twist,
+            Command::World(twist) => twist.to_body(self.odometry.heading()),
+        }
+    }
+
+    /// Returns the measured motion of the last tick; zero while it is unknown.
+    #[must_use]
+    pub const fn measured(&self) -> Twist<Body> {
+        self.measured
+    }
+
+    /// Returns the motion that the wheels are told to make: the command within the limits.
+    #[must_use]
+    pub const fn reference(&self) -> Twist<Body> {
+        self.reference.to_body(self.odometry.heading())
+    }
+
+    /// Returns where the chassis is, from its start or from where it was put.
+    #[must_use]
+    pub const fn pose(&self) -> Pose2<World> {
+        self.odometry.pose()
+    }
+
+    /// Puts the chassis at a pose; the motion goes on.
+    pub fn set_pose(&mut self, pose: Pose2<World>) {
+        let body = self.reference();
+        self.odometry = Odometry::new(pose);
+        self.reference = body.to_world(self.odometry.heading());
+    }
+
+    /// Returns what went on in the last tick.
+    #[must_use]
+    pub const fn status(&self) -> &ChassisStatus {
+        &self.status
+    }
+
+    /// Returns the layout.
+    #[must_use]
+    pub const fn kinematics(&self) -> &K {
+        &self.kinematics
+    }
+}
+
+impl<K: Kinematics<Speed = AngularVelocity>> Chassis<K> {
+    /// Reads the motors of the wheels, and gives each the speed it shall have.
+    ///
+    /// What a motor refuses is in [`status`](Self::status); the others are driven all the same.
+    pub fn drive<H: Copy, D: VelocityDrive<H> + ?Sized>(
+        &mut self,
+        owner: &mut D,
+        wheels: K::Wheels<H>,
+        tick: Tick,
+    ) {
+        let measured = K::map(wheels, |wheel| owner.velocity(wheel));
+        let targets = self.update(measured, tick);
+        (self.status.refused, self.status.refusal) = (0, None);
+        let status = &mut self.status;
+        let _: K::Wheels<()> = K::map(K::zip(wheels, targets), |(wheel, target)| {
+            if let Err(error) = owner.set_velocity(wheel, target) {
+                status.refused = status.refused.saturating_add(1);
+                status.refusal = status.refusal.or(Some(error));
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+    use crate::geometry::Vec2;
+    use crate::time::Instant;
+    use crate::units::Angle;
+    use proptest::prelude::*;
+
+    const TICK: Tick = Tick::new(Instant::START, 0.001);
+    const NONE: MecanumWheels<Option<AngularVelocity>> =
+        MecanumWheels { front_left: None, front_right: None, rear_left: None, rear_right: None };
+
+    fn mecanum() -> Mecanum {
+        let geometry =
+            MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
+        Mecanum::new(geometry).unwrap()
+    }
+
+    fn limited(limits: ChassisLimits) -> Chassis<Mecanum> {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_limits(limits).unwrap();
+        chassis
+    }
+
+    fn facing(degrees: f32) -> Heading {
+        Heading::new(Angle::from_degrees(degrees))
+    }
+
+    #[test]
+    fn facing_left_a_world_command_forward_strafes_right() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_world(Twist::new(1.0, 0.0, 0.0), facing(90.0));
+        let wheels = chassis.update(NONE, TICK);
+        assert!(wheels.front_left.as_rad_per_s() > 9.9 && wheels.front_right.as_rad_per_s() < -9.9);
+    }
+
+    #[test]
+    fn the_acceleration_is_the_same_for_every_heading_and_keeps_the_direction() {
+        let limits = ChassisLimits::new().with_acceleration(2.0, 100.0);
+        for degrees in [0.0, 30.0, 45.0, 90.0, 200.0] {
+            let mut chassis = limited(limits);
+            for _ in 0..100 {
+                chassis.set_world(Twist::new(3.0, 4.0, 0.0), facing(degrees));
+                chassis.update(NONE, TICK);
+            }
+            let world = chassis.reference().to_world(facing(degrees)).linear();
+            assert!((world.norm() - 0.2).abs() < 1e-4, "{degrees}: {world:?}");
+            assert!(world.cross(Vec2::new(3.0, 4.0)).abs() < 1e-4, "{degrees}: {world:?}");
+        }
+    }
+
+    #[test]
+    fn yaw_is_limited_together_with_the_translation() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1000.0, 10.0));
+        chassis.set_body(Twist::new(1.0, 0.0, 2.0));
+        chassis.update(NONE, TICK);
+        let reference = chassis.reference();
+        assert!((reference.wz_rad_s - 0.01).abs() < 1e-6, "{reference:?}");
+        assert!((reference.vx_m_s - 0.005).abs() < 1e-6, "{reference:?}");
+    }
+
+    #[test]
+    fn a_spinning_chassis_follows_a_world_command_without_lag() {
+        // Limited in the body frame, the turning command would never be reached.
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(2.0, 1000.0));
+        let mut degrees = 0.0;
+        for _ in 0..2000 {
+            degrees += 0.6; // 10 rad/s
+            chassis.set_world(Twist::new(1.0, 0.0, 10.0), facing(degrees));
+            chassis.update(NONE, TICK);
+        }
+        let world = chassis.reference().to_world(facing(degrees));
+        assert!((world - Twist::new(1.0, 0.0, 10.0)).linear().norm() < 1e-3, "{world:?}");
+    }
+
+    // The first seed's base limits the wheels and throws the result away.
+    #[test]
+    fn the_wheel_speed_limit_is_applied_and_does_not_wind_up() {
+        let limit = AngularVelocity::from_rad_per_s(20.0);
+        let limits = ChassisLimits::new().with_acceleration(10.0, 1000.0).with_wheel_speed(limit);
+        let mut chassis = limited(limits);
+        for _ in 0..1000 {
+            chassis.set_body(Twist::new(6.0, 2.0, 0.0));
+            for wheel in chassis.update(NONE, TICK) {
+                assert!(wheel.as_rad_per_s().abs() <= 20.001);
+            }
+        }
+        let reference = chassis.reference();
+        assert!(chassis.status().saturated);
+        assert!(
+            (reference.vx_m_s - 1.5).abs() < 0.02 && (reference.vy_m_s - 0.5).abs() < 0.01,
+            "{reference:?}"
+        );
+        chassis.set_body(Twist::ZERO);
+        chassis.update(NONE, TICK);
+        assert!(chassis.reference().vx_m_s < reference.vx_m_s);
+    }
+
+    #[test]
+    fn a_command_that_is_not_renewed_brings_the_chassis_to_a_stop() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        for _ in 0..100 {
+            chassis.update(NONE, TICK);
+        }
+        assert!(chassis.reference().vx_m_s > 0.9 && !chassis.status().command_stale);
+        chassis.update(NONE, TICK);
+        chassis.update(NONE, TICK);
+        assert!(chassis.status().command_stale);
+        assert_eq!(chassis.reference(), Twist::ZERO);
+    }
+
+    #[test]
+    fn a_command_of_nan_stops_and_is_counted() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_body(Twist::new(f32::NAN, 0.0, 0.0));
+        let wheels = chassis.update(NONE, TICK);
+        assert_eq!(wheels, MecanumWheels::splat(AngularVelocity::ZERO));
+        chassis.set_world(Twist::new(1.0, f32::INFINITY, 0.0), facing(f32::NAN));
+        let wheels = chassis.update(NONE, TICK);
+        assert_eq!(wheels, MecanumWheels::splat(AngularVelocity::ZERO));
+        assert_eq!(chassis.status().rejected, 2);
+    }
+
+    #[test]
+    fn one_lost_wheel_is_flagged_and_the_pose_goes_on_two_hold_it() {
+        let mut chassis = Chassis::new(mecanum());
+        let rolling = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        chassis.update(MecanumWheels { rear_left: None, ..rolling }, TICK);
+        assert_eq!(chassis.status().source, MotionSource::SomeWheels);
+        assert_eq!(chassis.status().lost_wheels, 1);
+        assert!((chassis.pose().x_m - 0.001).abs() < 1e-7);
+        let nan = Some(AngularVelocity::from_rad_per_s(f32::NAN));
+        chassis.update(MecanumWheels { rear_left: None, front_left: nan, ..rolling }, TICK);
+        assert_eq!(chassis.status().source, MotionSource::Unknown);
+        assert_eq!(chassis.status().lost_wheels, 2);
+        assert!((chassis.pose().x_m - 0.001).abs() < 1e-7);
+        assert!((chassis.status().blind_s - 0.001).abs() < 1e-7);
+    }
+
+    #[test]
+    fn the_first_heading_of_the_gyroscope_does_not_turn_the_motion() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        for _ in 0..500 {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            chassis.update(NONE, TICK);
+        }
+        let before = chassis.reference();
+        chassis.set_heading(facing(120.0));
+        chassis.update(NONE, TICK);
+        assert!((chassis.reference() - before).linear().norm() < 2e-3);
+    }
+
+    #[test]
+    fn a_step_of_nan_or_zero_changes_no_pose_and_no_limited_command() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        let rolling = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        for dt in [f32::NAN, 0.0, -1.0] {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            chassis.update(rolling, Tick::new(Instant::START, dt));
+        }
+        assert_eq!((chassis.pose(), chassis.reference()), (Pose2::ORIGIN, Twist::ZERO));
+    }
+
+    struct Bench {
+        speeds: [AngularVelocity; 4],
+        broken: usize,
+    }
+
+    impl VelocityDrive<usize> for Bench {
+        fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
+            (motor != self.broken).then(|| self.speeds[motor])
+        }
+
+        fn set_velocity(
+            &mut self,
+            motor: usize,
+            target: AngularVelocity,
+        ) -> Result<(), TargetError> {
+            if motor == self.broken {
+                return Err(TargetError::NoFeedback);
+            }
+            self.speeds[motor] = target;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn driving_motors_closes_the_circle_and_reports_the_broken_one() {
+        let mut bench = Bench { speeds: [AngularVelocity::ZERO; 4], broken: 3 };
+        let wheels = MecanumWheels::from_array([0, 1, 2, 3]);
+        let mut chassis = Chassis::new(mecanum());
+        for _ in 0..1001 {
+            chassis.set_body(Twist::new(0.5, 0.0, 0.0));
+            chassis.drive(&mut bench, wheels, TICK);
+        }
+        assert!((chassis.pose().x_m - 0.5).abs() < 1e-4, "{:?}", chassis.pose());
+        assert_eq!(chassis.status().refused, 1);
+        assert_eq!(chassis.status().refusal, Some(TargetError::NoFeedback));
+    }
+
+    proptest! {
+        #[test]
+        fn no_step_exceeds_the_acceleration(
+            vx in -5.0_f32..5.0, vy in -5.0_f32..5.0, wz in -20.0_f32..20.0, degrees in -720.0_f32..720.0
+        ) {
+            let mut chassis = limited(ChassisLimits::new().with_acceleration(3.0, 30.0));
+            let mut last = Twist::<World>::ZERO;
+            for step in 0..50 {
+                let side = if step % 20 < 10 { 1.0 } else { -1.0 };
+                let heading = facing(degrees + step as f32);
+                chassis.set_world(Twist::new(vx, vy, wz) * side, heading);
+                chassis.update(NONE, TICK);
+                let now = chassis.reference().to_world(heading);
+                prop_assert!((now - last).linear().norm() <= 3.001e-3 + 2e-6);
+                prop_assert!((now - last).wz_rad_s.abs() <= 30.001e-3 + 2e-6);
+                last = now;
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+use crate::geometry::{Body, Heading, Pose2, Twist, Vec2, World};
+use crate::math::wrap_pi;
+use crate::units::Angle;
+
+/// Adds measured motion up to a pose.
+///
+/// Each step is an exact arc: the twist is taken as constant over the step. The turn of the step comes from the
+/// gyroscope's heading when there is one, otherwise from the wheels. Rounding is carried along (Kahan), so that
+/// 10^6 steps of a millimetre lose nothing.
+///
+/// Where the gyroscope returns after a gap, its heading is taken as it is. The first one sets the heading.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::Odometry, geometry::Twist};
+/// use core::f32::consts::FRAC_PI_2;
+///
+/// let mut odometry = Odometry::default();
+/// odometry.advance(Twist::new(FRAC_PI_2, 0.0, FRAC_PI_2), None, 1.0); // a quarter of a circle of 1 m
+/// let pose = odometry.pose();
+/// assert!((pose.x_m - 1.0).abs() < 1e-6 && (pose.y_m - 1.0).abs() < 1e-6);
+/// assert!((pose.angle.as_degrees() - 90.0).abs() < 1e-4);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Odometry {
+    x_m: Sum,
+    y_m: Sum,
+    angle_rad: Sum,
+    heading: Heading,
+    gyro: Option<Heading>,
+}
+
+impl Odometry {
+    /// The longest step in seconds that is integrated.
+    pub const MAX_STEP_S: f32 = 1.0;
+
+    /// Takes the pose to start from.
+    #[must_use]
+    pub const fn new(pose: Pose2<World>) -> Self {
+        Self {
+            x_m: Sum::new(pose.x_m),
+            y_m: Sum::new(pose.y_m),
+            angle_rad: Sum::new(wrap_pi(pose.angle.as_radians())),
+            heading: Heading::new(pose.angle),
+            gyro: None,
+        }
+    }
+
+    /// Adds a step of `dt_s` seconds at the measured `twist`, with the gyroscope's heading at its end.
+    ///
+    /// A heading that is not finite counts as none. A twist that is not finite adds no way and no turn; neither does a
+    /// step that is not above zero, NaN, or longer than [`MAX_STEP_S`](Self::MAX_STEP_S): the result is then `false`.
+    pub fn advance(&mut self, twist: Twist<Body>, gyro: Option<Heading>, dt_s: f32) -> bool {
+        let gyro = gyro.filter(|heading| heading.is_finite());
+        let counts = dt_s > 0.0 && dt_s <= Self::MAX_STEP_S && twist.is_finite();
+        let wheels = if counts { twist.over(dt_s) } else { Twist::ZERO.over(0.0) };
+        let mut arc = wheels;
+        if let (Some(now), Some(before)) = (gyro, self.gyro) {
+            arc.theta_rad = wrap_pi(now.angle().as_radians() - before.angle().as_radians());
+        }
+        if counts {
+            // The heading at the start is the one the sum has: the gyroscope's of the step before.
+            let way = self.heading.rotation().apply(arc.chord().0);
+            self.x_m.add(way.x);
+            self.y_m.add(way.y);
+        }
+        match gyro {
+            Some(now) => {
+                self.angle_rad = Sum::new(wrap_pi(now.angle().as_radians()));
+                self.heading = now;
+            }
+            None if counts => {
+                self.angle_rad.add(arc.theta_rad);
+                self.angle_rad.value = wrap_pi(self.angle_rad.value);
+                self.heading = Heading::new(Angle::from_radians(self.angle_rad.value));
+            }
+            None => {}
+        }
+        self.gyro = gyro;
+        counts
+    }
+
+    /// Returns the pose; the angle is in -π..π.
+    #[must_use]
+    pub const fn pose(&self) -> Pose2<World> {
+        Pose2::new(self.x_m.value, self.y_m.value, Angle::from_radians(self.angle_rad.value))
+    }
+
+    /// Returns the heading with its sine and cosine.
+    #[must_use]
+    pub const fn heading(&self) -> Heading {
+        self.heading
+    }
+
+    pub(super) const fn has_gyro(&self) -> bool {
+        self.gyro.is_some()
+    }
+
+    /// Sets the position and keeps the heading.
+    pub const fn set_position_m(&mut self, position_m: Vec2) {
+        self.x_m = Sum::new(position_m.x);
+        self.y_m = Sum::new(position_m.y);
+    }
+}
+
+impl Default for Odometry {
+    fn default() -> Self {
+        Self::new(Pose2::ORIGIN)
+    }
+}
+
+/// A sum that keeps what rounding would lose for the next addition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Sum {
+    value: f32,
+    rest: f32,
+}
+
+impl Sum {
+    const fn new(value: f32) -> Self {
+        Self { value, rest: 0.0 }
+    }
+
+    const fn add(&mut self, term: f32) {
+        let term = term + self.rest;
+        let sum = self.value + term;
+        self.rest = term - (sum - self.value);
+        self.value = sum;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f32::consts::TAU;
+    use proptest::prelude::*;
+
+    fn degrees(angle: f32) -> Option<Heading> {
+        Some(Heading::new(Angle::from_degrees(angle)))
+    }
+
+    fn near(odometry: &Odometry, x: f32, y: f32, tolerance: f32) {
+        let pose = odometry.pose();
+        let error = Vec2::new(pose.x_m - x, pose.y_m - y).norm();
+        assert!(error < tolerance, "{pose:?}, expected ({x}, {y})");
+    }
+
+    #[test]
+    fn facing_left_forward_is_along_world_y() {
+        let mut odometry = Odometry::new(Pose2::new(1.0, 2.0, Angle::from_degrees(90.0)));
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.5);
+        near(&odometry, 1.0, 2.5, 1e-6);
+        odometry.advance(Twist::new(0.0, 1.0, 0.0), None, 0.5);
+        near(&odometry, 0.5, 2.5, 1e-6);
+    }
+
+    #[test]
+    fn the_gyroscope_is_believed_before_the_wheels() {
+        let mut odometry = Odometry::default();
+        odometry.advance(Twist::ZERO, degrees(0.0), 0.001);
+        odometry.advance(Twist::new(1.0, 0.0, 3.0), degrees(0.0), 0.5); // the wheels slip: no turn
+        near(&odometry, 0.5, 0.0, 1e-6);
+        assert_eq!(odometry.pose().angle, Angle::ZERO);
+    }
+
+    #[test]
+    fn the_seam_of_the_gyroscope_is_no_turn() {
+        let mut odometry = Odometry::default();
+        odometry.advance(Twist::ZERO, degrees(179.9), 0.001);
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(-179.9), 0.5);
+        near(&odometry, -0.5, 0.0, 1e-3);
+    }
+
+    #[test]
+    fn the_gyroscopes_return_after_a_gap_bends_no_arc() {
+        let mut odometry = Odometry::default();
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.5);
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(90.0), 0.5);
+        near(&odometry, 1.0, 0.0, 1e-6);
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.5);
+        near(&odometry, 1.0, 0.5, 1e-6);
+    }
+
+    #[test]
+    fn a_step_of_nan_zero_or_minutes_adds_nothing() {
+        let mut odometry = Odometry::default();
+        for dt in [f32::NAN, 0.0, -0.1, 60.0, f32::INFINITY] {
+            assert!(!odometry.advance(Twist::new(1.0, 0.0, 1.0), None, dt));
+        }
+        assert!(!odometry.advance(Twist::new(f32::NAN, 0.0, 1.0), None, 0.001));
+        assert_eq!(odometry, Odometry::default());
+    }
+
+    #[test]
+    fn a_circle_in_a_million_steps_ends_where_it_began() {
+        let mut odometry = Odometry::default();
+        for _ in 0..1_000_000 {
+            odometry.advance(Twist::new(TAU, 0.0, TAU), None, 1e-6);
+        }
+        near(&odometry, 0.0, 0.0, 1e-4);
+        assert!(odometry.pose().angle.as_radians().abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_kilometre_in_millimetres_loses_none() {
+        let mut odometry = Odometry::default();
+        for _ in 0..1_000_000 {
+            odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.001);
+        }
+        near(&odometry, 1000.0, 0.0, 1e-4);
+    }
+
+    proptest! {
+        #[test]
+        fn a_closed_path_returns_to_the_start(
+            vx in -3.0_f32..3.0, vy in -3.0_f32..3.0, turns in 3_u8..12, side in any::<bool>()
+        ) {
+            // A polygon: the same straight leg after each turn in place by a whole part of the circle.
+            let mut odometry = Odometry::default();
+            let turn = if side { TAU } else { -TAU } / f32::from(turns);
+            for _ in 0..turns {
+                for _ in 0..100 {
+                    odometry.advance(Twist::new(vx, vy, 0.0), None, 0.01);
+                }
+                for _ in 0..100 {
+                    odometry.advance(Twist::new(0.0, 0.0, turn), None, 0.01);
+                }
+            }
+            near(&odometry, 0.0, 0.0, 1e-4);
+            let angle = odometry.pose().angle.as_radians().abs();
+            prop_assert!(angle < 1e-4 || (angle - TAU).abs() < 1e-4);
+        }
+    }
+}

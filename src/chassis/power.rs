@@ -1,0 +1,262 @@
+use crate::math::sqrt;
+
+/// What one wheel is asked for: torque at its shaft, and the speed it turns at.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WheelLoad {
+    /// Torque in N m, or any measure in proportion to it that the model was fitted with, such as a current in A.
+    pub torque: f32,
+    /// Speed in rad/s. Of the same sign as the torque when driving, of the other when braking.
+    pub speed_rad_s: f32,
+}
+
+/// The electric power of a motor: `P = k0 + k1 torque speed + k2 torque^2 + k3 speed^2`, in W.
+///
+/// With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
+/// winding, `k3` the friction and iron loss, `k0` what the electronics take. Fit them for your motors, by
+/// [`PowerFit`](super::PowerFit) if you like.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{PowerModel, WheelLoad};
+///
+/// let model = PowerModel::new(1.0, 1.0, 2.0, 0.001)?;
+/// let load = WheelLoad { torque: 2.0, speed_rad_s: 10.0 };
+/// assert!((model.power_w(load) - (1.0 + 20.0 + 8.0 + 0.1)).abs() < 1e-5);
+/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PowerModel {
+    pub(super) k0: f32,
+    pub(super) k1: f32,
+    pub(super) k2: f32,
+    pub(super) k3: f32,
+}
+
+/// Why a power model or buffer cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum PowerError {
+    /// The named value must be finite and zero or more.
+    Negative(&'static str),
+}
+
+impl core::fmt::Display for PowerError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Negative(name) => write!(f, "{name} must be finite and zero or more"),
+        }
+    }
+}
+
+impl core::error::Error for PowerError {}
+
+pub(super) fn not_negative(value: f32, name: &'static str) -> Result<f32, PowerError> {
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(PowerError::Negative(name)) }
+}
+
+/// How the torques are to be cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PowerCut {
+    /// The factor for the torque of every wheel, 0..=1.
+    pub scale: f32,
+    /// What the model expects all wheels to take then, in W.
+    pub power_w: f32,
+    /// Whether that is within the limit. It is not when the losses alone are above it; the power is then the least possible.
+    pub within: bool,
+}
+
+impl PowerModel {
+    /// Takes the four coefficients, in W, W per torque and rad/s, W per torque squared, W per (rad/s)².
+    ///
+    /// # Errors
+    /// Names the coefficient that is not finite and zero or more.
+    pub fn new(k0: f32, k1: f32, k2: f32, k3: f32) -> Result<Self, PowerError> {
+        Ok(Self {
+            k0: not_negative(k0, "k0")?,
+            k1: not_negative(k1, "k1")?,
+            k2: not_negative(k2, "k2")?,
+            k3: not_negative(k3, "k3")?,
+        })
+    }
+
+    /// Returns the power of one wheel in W; negative when it feeds back more than it loses.
+    #[must_use]
+    pub const fn power_w(&self, load: WheelLoad) -> f32 {
+        let WheelLoad { torque, speed_rad_s } = load;
+        self.k0
+            + self.k1 * torque * speed_rad_s
+            + self.k2 * torque * torque
+            + self.k3 * speed_rad_s * speed_rad_s
+    }
+
+    /// Returns the largest common factor of all torques, at most 1, with which the total stays within `limit_w`.
+    ///
+    /// The total is a parabola in the factor, and this is its exact root. Equal wheels stay equal, and a braking
+    /// wheel's power counts for the others. A limit below zero or NaN counts as zero. If a load is NaN or infinite,
+    /// the factor is zero.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::chassis::{PowerModel, WheelLoad};
+    ///
+    /// let model = PowerModel::new(0.0, 1.0, 2.0, 0.0)?;
+    /// let wheel = WheelLoad { torque: 2.0, speed_rad_s: 6.0 }; // 12 W and 8 W of heat
+    /// let cut = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
+    /// assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within);
+    /// # Ok::<(), drivetrain::chassis::PowerError>(())
+    /// ```
+    #[must_use]
+    pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> PowerCut {
+        let limit_w = if limit_w > 0.0 { limit_w } else { 0.0 };
+        let (mut square, mut linear, mut fixed) = (0.0_f32, 0.0_f32, 0.0_f32);
+        for WheelLoad { torque, speed_rad_s } in wheels {
+            square += self.k2 * torque * torque;
+            linear += self.k1 * torque * speed_rad_s;
+            fixed += self.k0 + self.k3 * speed_rad_s * speed_rad_s;
+        }
+        let total = |scale: f32| fixed + scale * (linear + scale * square);
+        if !total(1.0).is_finite() {
+            return PowerCut { scale: 0.0, power_w: fixed, within: fixed <= limit_w };
+        }
+        let scale =
+            if total(1.0) <= limit_w { 1.0 } else { largest_root(square, linear, fixed - limit_w) };
+        let power_w = total(scale);
+        // The root is exact to rounding.
+        let rounding = 1e-5 * (fixed + linear.abs() + square);
+        PowerCut { scale, power_w, within: power_w <= limit_w + rounding }
+    }
+}
+
+/// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given that it is above zero at 1; without any, the
+/// `s` of the least value. `square` is zero or more.
+fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
+    let discriminant = linear * linear - 4.0 * square * rest;
+    let scale = if rest > 0.0 && (linear >= 0.0 || discriminant < 0.0) {
+        // Never low enough: the bottom of the parabola, which lies at or below zero when nothing is fed back.
+        if linear < 0.0 && square > 0.0 { -0.5 * linear / square } else { 0.0 }
+    } else if linear > 0.0 {
+        // The usual formula would cancel.
+        -2.0 * rest / (linear + sqrt(discriminant))
+    } else if square > 0.0 {
+        (-linear + sqrt(discriminant)) / (2.0 * square)
+    } else {
+        1.0
+    };
+    // Written so that NaN becomes zero.
+    if scale >= 1.0 {
+        1.0
+    } else if scale > 0.0 {
+        scale
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "zero and one are exact")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn model() -> PowerModel {
+        PowerModel::new(1.0, 1.0, 2.0, 0.001).unwrap()
+    }
+
+    fn load(torque: f32, speed_rad_s: f32) -> WheelLoad {
+        WheelLoad { torque, speed_rad_s }
+    }
+
+    #[test]
+    fn enough_power_cuts_nothing() {
+        let cut = model().cut([load(1.0, 10.0); 4], 100.0);
+        assert_eq!(cut.scale, 1.0);
+        assert!(cut.within && (cut.power_w - 4.0 * 13.1).abs() < 1e-3);
+    }
+
+    #[test]
+    fn too_little_power_is_used_to_the_limit() {
+        let cut =
+            model().cut([load(3.0, 40.0), load(2.5, 41.0), load(3.0, 39.0), load(2.0, 44.0)], 80.0);
+        assert!(cut.within && (cut.power_w - 80.0).abs() < 1e-3, "{cut:?}");
+    }
+
+    // XRobot scales each wheel by its own root: equal wheels come out unequal. One factor cannot.
+    #[test]
+    fn at_limit_zero_and_standing_still_everything_is_finite() {
+        for wheels in
+            [[load(3.0, 0.0); 4], [load(0.0, 0.0); 4], [load(-3.0, 50.0); 4], [load(3.0, 50.0); 4]]
+        {
+            for limit in [0.0, -5.0, f32::NAN] {
+                let cut = model().cut(wheels, limit);
+                assert!((0.0..=1.0).contains(&cut.scale) && cut.power_w.is_finite(), "{cut:?}");
+            }
+        }
+        assert_eq!(model().cut([load(3.0, 0.0); 4], 0.0).scale, 0.0);
+        assert_eq!(model().cut([load(3.0, 0.0); 4], 4.0).scale, 0.0); // the electronics take it all
+    }
+
+    #[test]
+    fn a_negative_discriminant_gives_the_least_power() {
+        // 4 W electronics, braking by 2 W, 8 W heat: 4 - 2 s + 8 s^2 is never 0; the bottom lies at 1/8.
+        let model = PowerModel::new(4.0, 1.0, 8.0, 0.0).unwrap();
+        let cut = model.cut([load(1.0, -2.0)], 0.0);
+        assert!((cut.scale - 0.125).abs() < 1e-6 && !cut.within, "{cut:?}");
+    }
+
+    #[test]
+    fn braking_pays_for_losses_that_are_above_the_limit() {
+        // 10 W electronics, limit 8 W, braking by 6 W, 1 W heat: 10 - 6 s + s^2 <= 8 from 0.354 on.
+        let model = PowerModel::new(10.0, 1.0, 1.0, 0.0).unwrap();
+        assert_eq!(model.cut([load(1.0, -6.0)], 8.0).scale, 1.0);
+        // With 16 W of heat too much of it is as bad as too little: 10 - 12 s + 16 s^2 <= 8 up to 0.5.
+        let model = PowerModel::new(10.0, 1.0, 16.0, 0.0).unwrap();
+        let cut = model.cut([load(1.0, -12.0)], 8.0);
+        assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within, "{cut:?}");
+    }
+
+    #[test]
+    fn a_load_of_nan_cuts_everything() {
+        assert_eq!(model().cut([load(f32::NAN, 1.0), load(1.0, 1.0)], 50.0).scale, 0.0);
+        assert_eq!(model().cut([load(1.0, f32::INFINITY)], 50.0).scale, 0.0);
+        assert_eq!(model().cut([load(1e30, 1.0)], 50.0).scale, 0.0);
+    }
+
+    #[test]
+    fn a_coefficient_that_is_negative_or_nan_is_named() {
+        assert_eq!(PowerModel::new(0.0, 1.0, -1.0, 0.0), Err(PowerError::Negative("k2")));
+        assert_eq!(PowerModel::new(f32::NAN, 1.0, 1.0, 0.0), Err(PowerError::Negative("k0")));
+    }
+
+    proptest! {
+        #[test]
+        fn the_power_after_cutting_is_within_the_limit_and_no_more_is_cut_than_needed(
+            loads in proptest::collection::vec((-5.0_f32..5.0, -60.0_f32..60.0), 1..9), limit in 0.0_f32..300.0
+        ) {
+            let loads = loads.into_iter().map(|(torque, speed)| load(torque, speed));
+            let cut = model().cut(loads.clone(), limit);
+            let total = |scale: f32| -> f64 {
+                loads.clone().map(|wheel| {
+                    let (t, w) = (f64::from(wheel.torque * scale), f64::from(wheel.speed_rad_s));
+                    1.0 + t * w + 2.0 * t * t + 0.001 * w * w
+                }).sum()
+            };
+            let limit = f64::from(limit);
+            if cut.within {
+                prop_assert!(total(cut.scale) <= limit + 0.05, "{cut:?} {}", total(cut.scale));
+                if cut.scale < 0.999 {
+                    prop_assert!(total(cut.scale + 1e-3) > limit - 0.05);
+                }
+            } else {
+                for step in 0..=100_u8 {
+                    prop_assert!(total(f32::from(step) * 0.01) >= total(cut.scale) - 0.05);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+use super::power::{PowerError, not_negative};
+use crate::control::{ConfigError, Pid, PidConfig};
+
+/// Spends an energy buffer down to a reserve, and lets it fill up again: the power to allow from its charge.
+///
+/// The referee's buffer (60 J) drains by what the chassis takes above its limit, and fills by what it leaves. The
+/// allowance is `limit + pid(energy - reserve)`: with a proportional gain `kp` in W/J the charge nears the reserve with the
+/// time constant `1/kp` and never falls below it, as far as the power model is right; an integral gain takes care
+/// of what it has wrong. Without a reading only `blind_share` of the limit is allowed.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::PowerBuffer, control::PidConfig};
+///
+/// let mut buffer = PowerBuffer::new(20.0, PidConfig::new(2.0, 0.0, 0.0).with_output_limit(120.0))?;
+/// assert_eq!(buffer.allowance_w(80.0, Some(60.0), 0.01), 160.0); // 40 J to spend
+/// assert_eq!(buffer.allowance_w(80.0, Some(20.0), 0.01), 80.0); // at the reserve
+/// assert_eq!(buffer.allowance_w(80.0, Some(0.0), 0.01), 40.0); // to fill up
+/// assert_eq!(buffer.allowance_w(80.0, None, 0.01), 72.0);
+/// # Ok::<(), drivetrain::chassis::BufferError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PowerBuffer {
+    pid: Pid,
+    reserve_j: f32,
+    blind_share: f32,
+}
+
+/// Why a buffer controller cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum BufferError {
+    /// The loop's parameters.
+    Pid(ConfigError),
+    /// The reserve or the blind share.
+    Value(PowerError),
+}
+
+impl core::fmt::Display for BufferError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Pid(error) => write!(f, "the buffer's loop: {error}"),
+            Self::Value(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for BufferError {}
+
+impl PowerBuffer {
+    /// Takes the charge to keep in J, and the loop from J to W.
+    ///
+    /// # Errors
+    /// Names the value that cannot be used.
+    pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, BufferError> {
+        Ok(Self {
+            pid: Pid::new(pid).map_err(BufferError::Pid)?,
+            reserve_j: not_negative(reserve_j, "reserve_j").map_err(BufferError::Value)?,
+            blind_share: 0.9,
+        })
+    }
+
+    /// Sets the share of the limit that is allowed without a reading: zero or more.
+    ///
+    /// # Errors
+    /// [`BufferError::Value`] when it is negative or not finite.
+    pub fn with_blind_share(self, share: f32) -> Result<Self, BufferError> {
+        let blind_share = not_negative(share, "blind_share").map_err(BufferError::Value)?;
+        Ok(Self { blind_share, ..self })
+    }
+
+    /// Returns the power in W to allow now, zero or more, from the limit in W and the charge in J.
+    ///
+    /// A charge that is NaN or infinite counts as none; the loop then starts anew. A limit that is negative, NaN
+    /// or infinite counts as zero.
+    pub fn allowance_w(&mut self, limit_w: f32, energy_j: Option<f32>, dt_s: f32) -> f32 {
+        let limit_w = not_negative(limit_w, "limit_w").unwrap_or(0.0);
+        let Some(energy_j) = energy_j.filter(|energy| energy.is_finite()) else {
+            self.pid.reset();
+            return limit_w * self.blind_share;
+        };
+        // The buffer is the measurement: above the reserve the loop's output is negative.
+        let allowance_w = limit_w - self.pid.update(self.reserve_j, energy_j, dt_s);
+        if allowance_w > 0.0 { allowance_w } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "zero and one are exact")]
+mod tests {
+    use super::*;
+
+    fn buffer() -> PowerBuffer {
+        PowerBuffer::new(15.0, PidConfig::new(3.0, 0.0, 0.0)).unwrap()
+    }
+
+    #[test]
+    fn full_throttle_drains_to_the_reserve_and_not_below() {
+        let (mut buffer, mut energy_j, mut lowest) = (buffer(), 60.0_f32, 60.0_f32);
+        for _ in 0..10_000 {
+            let power_w = buffer.allowance_w(80.0, Some(energy_j), 0.001);
+            energy_j += (80.0 - power_w) * 0.001;
+            lowest = lowest.min(energy_j);
+        }
+        assert!(lowest >= 14.99 && energy_j < 15.1, "{lowest} {energy_j}");
+    }
+
+    #[test]
+    fn with_a_model_that_is_wrong_by_a_tenth_the_buffer_never_empties() {
+        let (mut buffer, mut energy_j) = (buffer(), 60.0_f32);
+        for _ in 0..10_000 {
+            let power_w = buffer.allowance_w(80.0, Some(energy_j), 0.001) * 1.1;
+            energy_j += (80.0 - power_w) * 0.001;
+            assert!(energy_j > 10.0, "{energy_j}");
+        }
+    }
+
+    #[test]
+    fn readings_and_limits_that_are_no_numbers_are_safe() {
+        for limit in [f32::NAN, f32::INFINITY, -10.0] {
+            assert!(buffer().allowance_w(limit, Some(15.0), 0.001).abs() < 1e-6);
+        }
+        assert!((buffer().allowance_w(80.0, Some(f32::NAN), 0.001) - 72.0).abs() < 1e-4);
+        assert_eq!(buffer().allowance_w(10.0, Some(0.0), 0.001), 0.0);
+    }
+
+    #[test]
+    fn values_that_cannot_work_are_named() {
+        let reserve = PowerBuffer::new(-1.0, PidConfig::new(1.0, 0.0, 0.0));
+        assert_eq!(reserve, Err(BufferError::Value(PowerError::Negative("reserve_j"))));
+        assert!(matches!(
+            PowerBuffer::new(1.0, PidConfig::new(f32::NAN, 0.0, 0.0)),
+            Err(BufferError::Pid(_))
+        ));
+    }
+}
