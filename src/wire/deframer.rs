@@ -242,11 +242,14 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
 
     /// Takes `count` bytes off the front of the buffer.
     fn discard(&mut self, count: usize) {
-        let used = self.buffer.get_mut(..self.length).unwrap_or_default();
-        let count = count.min(used.len());
-        used.copy_within(count.., 0);
-        self.length = used.len() - count;
         self.wanted = P::PREFIX;
+        let used = self.buffer.get_mut(..self.length).unwrap_or_default();
+        if count < used.len() {
+            used.copy_within(count.., 0);
+            self.length = used.len() - count;
+        } else {
+            self.length = 0; // a frame that came whole: nothing to move
+        }
     }
 }
 
