@@ -12,7 +12,8 @@ fuzz_target!(|data: &[u8]| {
         let Some((pause, mut bytes)) = piece.split_first() else { return };
         now = now + Duration::from_micros(u64::from(*pause) * 100);
         while let Some(remote) = dbus.read(&mut bytes, now) {
-            let values = [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
+            let values =
+                [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
             assert!(values.iter().all(|value| value.abs() <= 1.0));
             assert!(remote.left_switch != Switch::Absent && remote.right_switch != Switch::Absent);
         }

@@ -10,7 +10,9 @@ fuzz_target!(|data: &[u8]| {
     any_split_gives_the_same(JustFloat::<3>, data);
     let mut reader = Deframer::<JustFloat<3>, 16>::new(JustFloat);
     for values in data.chunks_exact(12) {
-        let value = |at: usize| f32::from_le_bytes([values[at], values[at + 1], values[at + 2], values[at + 3]]);
+        let value = |at: usize| {
+            f32::from_le_bytes([values[at], values[at + 1], values[at + 2], values[at + 3]])
+        };
         let mut buffer = [0; 16];
         let mut bytes = justfloat(&[value(0), value(4), value(8)], &mut buffer).expect("16 bytes");
         assert!(reader.read(&mut bytes).is_some());
