@@ -1,8 +1,8 @@
-use super::command::{Outbox, Place};
-use super::config::PlainConfig;
+use super::budget::Budget;
+use super::command::Outbox;
 use super::handle::Key;
 use super::slot::{Cycle, Slot};
-use super::{AnyHandle, AttachError, Collision, Config, Facts, Feedback, Handle, Model, State};
+use super::{AnyHandle, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
@@ -10,7 +10,7 @@ use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
 /// The lowest feedback id, and how many there are: 0x201..=0x20B.
-const FIRST_FEEDBACK_ID: u32 = 0x201;
+pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
 const SLOTS: usize = 11;
 
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
@@ -49,6 +49,7 @@ pub struct Bus<B = ()> {
     pub(super) outbox: Outbox,
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
+    pub(super) budget: Budget,
     updated: Option<Instant>,
     rejects: Rejects,
     held_steps: u8,
@@ -122,6 +123,7 @@ impl<B> Bus<B> {
             outbox: Outbox::new(),
             now: 0,
             timeouts: Timeouts::new(),
+            budget: Budget::new(),
             updated: None,
             rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
             held_steps: 0,
@@ -146,92 +148,6 @@ impl<B> Bus<B> {
             _ => 10_000_000,
         });
         self
-    }
-
-    /// Attaches a motor.
-    ///
-    /// # Errors
-    /// When its id is out of range, another motor uses its feedback id or command slot, or a parameter of the
-    /// configuration is not usable. The bus is then as it was.
-    pub const fn attach<M: Model>(
-        &mut self,
-        config: Config<M>,
-    ) -> Result<Handle<M, B>, AttachError> {
-        match self.attach_plain(M::FACTS, &config.plain) {
-            Ok(key) => Ok(Handle::new(key)),
-            Err(error) => Err(error),
-        }
-    }
-
-    const fn attach_plain(
-        &mut self,
-        facts: &'static Facts,
-        config: &PlainConfig,
-    ) -> Result<Key, AttachError> {
-        let motor = MotorName::new(facts.name, config.id);
-        let Some((frame, slot)) = facts.place(config.id) else {
-            return Err(AttachError::Id { motor, highest: facts.ids });
-        };
-        let feedback_id = facts.feedback_base + config.id as u16;
-        let index = feedback_id as usize - FIRST_FEEDBACK_ID as usize;
-        let Some((_, [here, ..])) = self.slots.split_at_mut_checked(index) else {
-            return Err(AttachError::Id { motor, highest: facts.ids });
-        };
-        let place = Place::new(frame, slot);
-        if let Some(with) = here.name() {
-            let slot = if here.place.same_as(place) { Some((frame, slot)) } else { None };
-            return Err(AttachError::Collision(Collision { motor, with, feedback_id, slot }));
-        }
-        let Some(generation) = here.next_generation() else {
-            return Err(AttachError::WornOut { motor });
-        };
-        match Slot::new(facts, config, place, generation) {
-            Ok(slot) => *here = slot,
-            Err(error) => return Err(error),
-        }
-        self.outbox.open(frame);
-        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
-        let index = index as u8;
-        Ok(Key::new(index, generation))
-    }
-
-    /// Attaches several motors of one model.
-    ///
-    /// # Errors
-    /// The first error; no motor of the array is attached then.
-    pub fn attach_all<M: Model, const N: usize>(
-        &mut self,
-        configs: [Config<M>; N],
-    ) -> Result<[Handle<M, B>; N], AttachError> {
-        let mut failed = None;
-        let handles = configs.map(|config| {
-            self.attach(config).unwrap_or_else(|error| {
-                failed.get_or_insert(error);
-                Handle::new(Key::NONE)
-            })
-        });
-        match failed {
-            None => Ok(handles),
-            Some(error) => {
-                handles.into_iter().for_each(|handle| self.detach(handle));
-                Err(error)
-            }
-        }
-    }
-
-    /// Detaches a motor. Its command slot is sent as zero once more, then the frame stops when nobody else uses it.
-    pub fn detach(&mut self, motor: impl Into<AnyHandle<B>>) {
-        let Some(slot) = self.slot_mut(motor.into()) else { return };
-        let place = slot.place;
-        slot.free();
-        self.outbox.put(place, 0);
-        let shared = self
-            .slots
-            .iter()
-            .any(|slot| slot.facts().is_some() && slot.place.frame() == place.frame());
-        if !shared {
-            self.outbox.close(place.frame());
-        }
     }
 
     /// Takes a received frame that arrived at `now`. Constant time.

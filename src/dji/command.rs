@@ -133,6 +133,15 @@ impl Outbox {
         self.keep_alive_us = period_us;
     }
 
+    pub(super) const fn frames_in_use(&self) -> u16 {
+        self.in_use.count_ones() as u16
+    }
+
+    /// Returns how many frames are in use when this one is as well.
+    pub(super) const fn frames_in_use_with(&self, frame: CommandFrame) -> u16 {
+        (self.in_use | frame.bit()).count_ones() as u16
+    }
+
     /// Sends this frame from now on: the first time with the next update, whatever its words are.
     pub(super) const fn open(&mut self, frame: CommandFrame) {
         self.in_use |= frame.bit();

@@ -1,5 +1,5 @@
 use super::CommandFrame;
-use crate::motor::MotorName;
+use crate::motor::{BusLoad, MotorName};
 
 /// Why a motor was not attached. The bus is as it was before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +20,17 @@ pub enum AttachError {
         motor: MotorName,
         /// The name of the parameter.
         parameter: &'static str,
+    },
+    /// The bus would be loaded beyond its ceiling: lower the rate of the feedback, or use a second bus.
+    Load {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The load with it.
+        load: BusLoad,
+        /// The ceiling, in percent.
+        ceiling_percent: u16,
+        /// The highest feedback rate of all motors that stays below it, in Hz; 0 when the commands alone do not.
+        feedback_hz: u32,
     },
     /// This place was attached and detached 16 times; a further handle could be confused with an old one.
     WornOut {
@@ -48,7 +59,7 @@ impl AttachError {
         let message = Message::new();
         match self {
             Self::Id { motor, highest } => {
-                message.name(*motor).text(": the id is not within 1..=").number(*highest)
+                message.name(*motor).text(": the id is not within 1..=").number(*highest as u32)
             }
             Self::Collision(Collision { motor, with, feedback_id, slot }) => {
                 let message = message
@@ -58,14 +69,31 @@ impl AttachError {
                     .text(" on ")
                     .hex(*feedback_id);
                 match slot {
-                    Some((frame, slot)) => {
-                        message.text(" and on slot ").number(*slot).text(" of ").hex(frame.id())
-                    }
+                    Some((frame, slot)) => message
+                        .text(" and on slot ")
+                        .number(*slot as u32)
+                        .text(" of ")
+                        .hex(frame.id()),
                     None => message,
                 }
             }
             Self::Parameter { motor, parameter } => {
                 message.name(*motor).text(": ").text(parameter).text(" is not usable")
+            }
+            Self::Load { motor, load, ceiling_percent, feedback_hz } => {
+                let message = message
+                    .name(*motor)
+                    .text(": the bus load of up to ")
+                    .number(load.worst_percent())
+                    .text(" % is above its ceiling of ")
+                    .number(*ceiling_percent as u32)
+                    .text(" %; ");
+                match feedback_hz {
+                    0 => message.text("use a second bus"),
+                    hz => {
+                        message.text("feedback at ").number(*hz).text(" Hz fits, or a second bus")
+                    }
+                }
             }
             Self::WornOut { motor } => {
                 message.name(*motor).text(": attached and detached too often on this bus")
@@ -90,7 +118,7 @@ pub struct Message {
 }
 
 impl Message {
-    const CAPACITY: usize = 112;
+    const CAPACITY: usize = 144;
 
     const fn new() -> Self {
         Self { text: [0; Self::CAPACITY], length: 0 }
@@ -129,10 +157,16 @@ impl Message {
         self
     }
 
-    const fn number(self, number: u8) -> Self {
-        let message = if number >= 100 { self.byte(b'0' + number / 100) } else { self };
-        let message = if number >= 10 { message.byte(b'0' + number / 10 % 10) } else { message };
-        message.byte(b'0' + number % 10)
+    const fn number(self, number: u32) -> Self {
+        let mut message = self;
+        let mut unit = 1_000_000_000;
+        while unit > 0 {
+            if number >= unit || unit == 1 {
+                message = message.byte(b'0' + (number / unit % 10) as u8);
+            }
+            unit /= 10;
+        }
+        message
     }
 
     const fn hex(self, number: u16) -> Self {
@@ -147,7 +181,7 @@ impl Message {
     }
 
     const fn name(self, motor: MotorName) -> Self {
-        self.text(motor.model()).text(" #").number(motor.id())
+        self.text(motor.model()).text(" #").number(motor.id() as u32)
     }
 }
 
@@ -190,6 +224,21 @@ mod tests {
         assert_eq!(id.to_string(), "M2006 #109: the id is not within 1..=8");
         let parameter = AttachError::Parameter { motor: M3508, parameter: "kp" };
         assert_eq!(parameter.to_string(), "M3508 #5: kp is not usable");
+    }
+
+    #[test]
+    fn an_overload_names_motor_load_ceiling_and_what_to_change() {
+        let load = BusLoad::new(1_000_000).with_frames(8, 1_000);
+        let motor = MotorName::new("GM6020 (voltage)", 7);
+        let error = |feedback_hz| {
+            AttachError::Load { motor, load, ceiling_percent: 90, feedback_hz }.to_string()
+        };
+        let why = "GM6020 (voltage) #7: the bus load of up to 108 % is above its ceiling of 90 %; ";
+        assert_eq!(error(0), std::format!("{why}use a second bus"));
+        assert_eq!(
+            error(100_000),
+            std::format!("{why}feedback at 100000 Hz fits, or a second bus")
+        );
     }
 
     #[test]

@@ -52,11 +52,18 @@
 //! let bus = BUS;
 //! ```
 //!
+//! # What starves on a full bus
+//! [`Bus::load`] says how full it is: at 1 kHz five motors fit, six do not in the worst case. The lowest id wins, so
+//! **0x2FE and 0x2FF lose arbitration to all feedback** while 0x1FE, 0x1FF and 0x200 win: on an overloaded bus
+//! GM6020 #5..=7 are the first to miss their commands, and the highest feedback ids are lost next.
+//!
 //! # Sources
 //! DJI C610 user guide V1.0 (2019.03) pages 8 and 9 for layout, ids, scale and rate of C610; for C620 and GM6020,
 //! whose manuals were not at hand, what independent public drivers agree on (taproot, librm, HNU's framework, IFR). They differ on the GM6020 voltage limit: 25000 is today's, 30000 that of old motors
 //! ([`Config::with_legacy_full_scale`]). The volts behind it are nominal: sources say 24 V or 25.2 V.
 
+mod attach;
+mod budget;
 mod bus;
 mod command;
 mod config;

@@ -16,6 +16,7 @@
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
+//! | [`BusLoad`] | how full the bus is |
 //!
 //! A user's own device joins by implementing [`CanDevice`]; devices are combined by tuples, arrays and
 //! `&mut`, so an own struct needs only to forward to a tuple of its fields.
@@ -26,6 +27,7 @@ mod combine;
 mod device;
 mod drive;
 mod link;
+mod load;
 mod name;
 
 pub use arming::{ArmError, Missing};
@@ -33,4 +35,5 @@ pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
 pub use link::{Link, Recovery, Timeouts};
+pub use load::BusLoad;
 pub use name::MotorName;

@@ -1,0 +1,159 @@
+/// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
+///
+/// Counts standard data frames of 8 bytes, the only ones that DJI motors use, each with the pause of three bits after
+/// it:
+///
+/// | | bits | |
+/// |---|---|---|
+/// | nominal | 111 | 34 stuffable bits around 64 of data, 13 that are never stuffed: `47 + 8 * 8` |
+/// | worst case | 135 | and a stuff bit after the first five, then after every fourth: `(34 + 64 - 1) / 4` = 24 |
+///
+/// The load is `bits * frames a second / bit rate`. What a bus carries lies between the two, and depends on the
+/// content. Above 1 the frames of lowest priority, those with the highest ids, do not get through.
+///
+/// Sources: Bosch CAN specification 2.0 (1991), part B, chapters 3.1 and 5; for the worst case T. Nolte, H. Hansson,
+/// C. Norström, "Minimizing CAN response-time jitter by message manipulation" (2002), equation 1.
+///
+/// # Examples
+/// Feedback at 1 kHz from four to eight motors, and a command frame for every four at the same rate:
+/// ```
+/// use drivetrain::motor::BusLoad;
+///
+/// const fn load(motors: u16) -> BusLoad {
+///     BusLoad::new(1_000_000).with_frames(motors, 1_000).with_frames(motors.div_ceil(4), 1_000)
+/// }
+/// // motors              4         5         6          7          8
+/// let nominal =    [  55.5,     77.7,     88.8,      99.9,     111.0];
+/// let worst_case = [  67.5,     94.5,    108.0,     121.5,     135.0];
+/// for (motors, (nominal, worst_case)) in (4..).zip(nominal.into_iter().zip(worst_case)) {
+///     assert!((load(motors).nominal() * 100.0 - nominal).abs() < 1e-3);
+///     assert!((load(motors).worst_case() * 100.0 - worst_case).abs() < 1e-3);
+/// }
+/// const SIX: BusLoad = load(6); // in a `const` too
+/// assert_eq!(SIX.to_string(), "89 % to 108 %");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BusLoad {
+    frames_per_s: u32,
+    bit_rate: u32,
+}
+
+impl BusLoad {
+    /// Bits of a standard data frame of 8 bytes without stuff bits, with the pause after it.
+    pub const NOMINAL_BITS: u32 = 111;
+
+    /// Bits of a standard data frame of 8 bytes with as many stuff bits as can be, with the pause after it.
+    pub const WORST_CASE_BITS: u32 = 135;
+
+    /// Takes the bit rate of a bus, in bits a second: 1 000 000 for DJI motors. 0 counts as 1.
+    #[must_use]
+    pub const fn new(bit_rate: u32) -> Self {
+        Self { frames_per_s: 0, bit_rate: if bit_rate == 0 { 1 } else { bit_rate } }
+    }
+
+    /// Adds a number of frames, each at a rate in frames a second; saturates.
+    #[must_use]
+    pub const fn with_frames(self, frames: u16, rate_hz: u32) -> Self {
+        let more = rate_hz.saturating_mul(frames as u32);
+        Self { frames_per_s: self.frames_per_s.saturating_add(more), ..self }
+    }
+
+    /// Returns the number of frames a second.
+    #[must_use]
+    pub const fn frames_per_s(&self) -> u32 {
+        self.frames_per_s
+    }
+
+    /// Returns the bit rate, in bits a second.
+    #[must_use]
+    pub const fn bit_rate(&self) -> u32 {
+        self.bit_rate
+    }
+
+    /// Returns the load without stuff bits; 1 is a full bus.
+    #[must_use]
+    pub const fn nominal(&self) -> f32 {
+        self.share(Self::NOMINAL_BITS)
+    }
+
+    /// Returns the load with as many stuff bits as can be; 1 is a full bus.
+    #[must_use]
+    pub const fn worst_case(&self) -> f32 {
+        self.share(Self::WORST_CASE_BITS)
+    }
+
+    /// Returns how many frames a second fit below a ceiling of the worst case, rounded down. A ceiling that is NaN or
+    /// negative counts as 0.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::BusLoad;
+    ///
+    /// assert_eq!(BusLoad::new(1_000_000).frames_within(0.9), 6_666); // of 135 bits
+    /// ```
+    #[must_use]
+    pub const fn frames_within(&self, ceiling: f32) -> u32 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, NaN gives 0"
+        )]
+        let frames = (ceiling * self.bit_rate as f32 / Self::WORST_CASE_BITS as f32) as u32;
+        frames
+    }
+
+    /// Returns the worst case in percent, rounded up.
+    pub(crate) const fn worst_percent(&self) -> u32 {
+        self.percent(Self::WORST_CASE_BITS, self.bit_rate as u64 - 1)
+    }
+
+    const fn share(&self, bits: u32) -> f32 {
+        self.frames_per_s as f32 * bits as f32 / self.bit_rate as f32
+    }
+
+    const fn percent(&self, bits: u32, addend: u64) -> u32 {
+        let bits_per_s = self.frames_per_s as u64 * bits as u64;
+        let percent = (bits_per_s * 100 + addend) / self.bit_rate as u64;
+        #[expect(clippy::cast_possible_truncation, reason = "checked right here")]
+        let percent = if percent > u32::MAX as u64 { u32::MAX } else { percent as u32 };
+        percent
+    }
+}
+
+/// Writes both loads in percent, rounded up.
+impl core::fmt::Display for BusLoad {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let up = u64::from(self.bit_rate) - 1;
+        write!(f, "{} % to {} %", self.percent(Self::NOMINAL_BITS, up), self.worst_percent())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absurd_numbers_saturate() {
+        let load = BusLoad::new(0).with_frames(u16::MAX, u32::MAX).with_frames(1, 1);
+        assert_eq!(
+            (load.frames_per_s(), load.bit_rate(), load.worst_percent()),
+            (u32::MAX, 1, u32::MAX)
+        );
+        assert!(load.nominal().is_finite() && load.nominal() < load.worst_case());
+        for ceiling in [f32::NAN, -1.0, 0.0] {
+            assert_eq!(load.frames_within(ceiling), 0);
+        }
+    }
+
+    #[test]
+    fn what_fits_below_a_ceiling_does_not_exceed_it() {
+        for bit_rate in [125_000, 500_000, 1_000_000] {
+            let empty = BusLoad::new(bit_rate);
+            let fits = empty.frames_within(0.8);
+            assert!(empty.with_frames(1, fits).worst_case() <= 0.8);
+            assert!(empty.with_frames(1, fits + 1).worst_case() > 0.8);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The load that is reckoned against the load that the simulated bus carries.
+
+#![cfg(test)]
+
+use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{BusLoad, CanDevice};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{
+    Line, Model, MotorConfig, Sender, World, frame_bits, nominal_bits, worst_case_bits,
+};
+use drivetrain::time::Duration;
+use proptest::prelude::*;
+
+proptest! {
+    /// Law: whatever the content, a frame is as long as the nominal one at least and the worst case at most.
+    #[test]
+    fn every_frame_lies_between_nominal_and_worst_case(id in 0_u16..0x800, data: [u8; 8]) {
+        let exact = frame_bits(&CanFrame::standard(id, data).unwrap());
+        prop_assert!((BusLoad::NOMINAL_BITS..=BusLoad::WORST_CASE_BITS).contains(&exact));
+    }
+}
+
+#[test]
+fn the_bounds_are_those_of_the_simulator() {
+    assert_eq!(BusLoad::NOMINAL_BITS, nominal_bits(false, 8));
+    assert_eq!(BusLoad::WORST_CASE_BITS, worst_case_bits(false, 8));
+}
+
+/// Runs motors with raw commands for a second; returns the reckoned and the measured load.
+fn measured(ids: impl Iterator<Item = u8>, raw: i16) -> (BusLoad, f32) {
+    let world = World::new(5);
+    let mut bus = Bus::new();
+    let wheels: Vec<_> = ids
+        .map(|id| {
+            world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+            bus.attach(Config::<M3508>::new(id)).unwrap()
+        })
+        .collect();
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let mut before = world.traffic(Line::Can1);
+    for step in 0..10_500 {
+        world.advance(Duration::from_micros(100));
+        runner.poll(16);
+        if step == 500 {
+            before = world.traffic(Line::Can1);
+        }
+        if let Some(tick) = runner.due() {
+            _ = runner.is_armed() || runner.arm(tick).is_ok();
+            for wheel in &wheels {
+                _ = runner.device_mut().set_raw(*wheel, raw);
+            }
+            runner.tick(tick);
+        }
+    }
+    (runner.device().load(), world.traffic(Line::Can1).since(&before).load())
+}
+
+#[test]
+fn the_measured_load_lies_between_nominal_and_worst_case() {
+    for motors in 1..=5 {
+        for raw in [1, -1, 500] {
+            let (load, measured) = measured(1..=motors, raw);
+            // The clocks of the ESCs are up to 100 ppm off.
+            let (low, high) = (load.nominal() * 0.9995, load.worst_case() * 1.0005);
+            assert!((low..=high).contains(&measured), "{motors} motors: {measured} not in {load}");
+        }
+    }
+}
+
+#[test]
+fn more_than_the_bus_carries_fills_it() {
+    let (load, measured) = measured(1..=8, 500);
+    assert!(load.nominal() > 1.0 && measured > 0.99, "{load}: {measured}");
+}
+
+#[test]
+fn commands_0x2ff_and_0x2fe_starve_on_a_full_bus_and_0x200_does_not() {
+    let world = World::new(5);
+    let mut bus = Bus::new();
+    for id in 1..=8 {
+        world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        bus.attach(Config::<M3508>::new(id)).unwrap();
+    }
+    world.attach(MotorConfig::new(Model::Gm6020Voltage, 5)).unwrap();
+    world.attach(MotorConfig::new(Model::Gm6020Current, 6)).unwrap();
+    bus.attach(Config::<Gm6020Voltage>::new(5)).unwrap();
+    bus.attach(Config::<Gm6020Current>::new(6)).unwrap();
+    let bus = bus.with_keep_alive(Duration::from_millis(1)); // as if all moved
+    assert_eq!(bus.load().to_string(), "156 % to 189 %");
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let mut sent = [0_u32; 0x800];
+    for _ in 0..10_000 {
+        world.advance_with(Duration::from_micros(100), |record| {
+            if record.sender == Sender::Controller {
+                sent[usize::try_from(record.frame.header()).unwrap()] += 1;
+            }
+        });
+        runner.poll(16);
+        if let Some(tick) = runner.due() {
+            runner.tick(tick);
+        }
+    }
+    assert!(sent[0x200] > 900 && sent[0x1FF] > 900, "{} {}", sent[0x200], sent[0x1FF]);
+    assert!(sent[0x2FF] < 100 && sent[0x2FE] < 100, "{} {}", sent[0x2FF], sent[0x2FE]);
+}
+
+#[test]
+fn a_refused_motor_leaves_the_bus_as_it_was_and_fits_at_a_lower_rate() {
+    let mut bus = Bus::new().with_load_ceiling(0.9);
+    bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new)).unwrap();
+    let before = bus.load();
+    let Err(AttachError::Load { load, feedback_hz, .. }) = bus.attach(Config::<M3508>::new(5))
+    else {
+        panic!("not refused");
+    };
+    assert_eq!((bus.load(), bus.motors().count(), bus.claims().count()), (before, 4, 5));
+    assert_eq!(load.frames_per_s(), 7_000);
+    let mut bus = bus.with_feedback_rate(feedback_hz);
+    bus.attach(Config::<M3508>::new(5)).unwrap();
+    assert!(bus.load().worst_case() <= 0.9);
+    // A ceiling is kept when a motor leaves and another one comes.
+    let first = bus.motors().next().unwrap().0;
+    bus.detach(first);
+    bus.attach(Config::<M3508>::new(1)).unwrap();
+    assert!(bus.attach(Config::<M3508>::new(6)).is_err());
+}
+
+#[test]
+fn a_ceiling_holds_at_compile_time_too() {
+    const REFUSED: bool = {
+        let mut bus = Bus::new().with_load_ceiling(0.2);
+        bus.attach(Config::<M3508>::new(1)).is_err()
+    };
+    const { assert!(REFUSED) };
+}
