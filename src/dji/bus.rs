@@ -5,7 +5,7 @@ use super::slot::{Cycle, Slot};
 use super::{AnyHandle, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::motor::{Ingest, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
@@ -15,6 +15,9 @@ const SLOTS: usize = 11;
 
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
+
+/// Stamps of 32 bits cannot tell how long ago a frame was heard when there was no update for longer than this.
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -50,9 +53,9 @@ pub struct Bus<B = ()> {
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
     pub(super) budget: Budget,
-    updated: Option<Instant>,
-    rejects: Rejects,
-    held_steps: u8,
+    lost_after: Instant,
+    pub(super) rejects: Rejects,
+    pub(super) held_steps: u8,
     turn: u8,
     pub(super) stopped: bool,
     brand: PhantomData<fn() -> B>,
@@ -81,11 +84,11 @@ pub struct Counters {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Rejects {
-    bad_length: u32,
-    bad_field: u32,
-    unattached: u32,
-    bad_steps: u32,
+pub(super) struct Rejects {
+    pub(super) bad_length: u32,
+    pub(super) bad_field: u32,
+    pub(super) unattached: u32,
+    pub(super) bad_steps: u32,
 }
 
 impl Bus {
@@ -124,7 +127,7 @@ impl<B> Bus<B> {
             now: 0,
             timeouts: Timeouts::new(),
             budget: Budget::new(),
-            updated: None,
+            lost_after: Instant::from_micros(u64::MAX),
             rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
             held_steps: 0,
             turn: 0,
@@ -155,23 +158,11 @@ impl<B> Bus<B> {
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
-        if slot.facts().is_none() {
-            self.rejects.unattached = self.rejects.unattached.saturating_add(1);
-            return Ingest::Unrelated;
-        }
-        if frame.length() != 8 {
-            self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
-            return Ingest::Malformed(Malformed::Length(frame.length()));
-        }
         match Feedback::decode(frame.bytes()) {
-            Ok(feedback) => {
-                slot.receive(feedback, now.stamp(), &self.timeouts);
+            Ok(feedback) if frame.length() == 8 && slot.receive(feedback, now.stamp()) => {
                 Ingest::Taken
             }
-            Err(_) => {
-                self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
-                Ingest::Malformed(Malformed::Field)
-            }
+            _ => self.ingest_unusual(frame, now),
         }
     }
 
@@ -190,22 +181,14 @@ impl<B> Bus<B> {
     pub fn update(&mut self, tick: Tick) {
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         self.now = tick.now().stamp();
-        let before = self.updated.replace(tick.now());
-        let paused =
-            before.is_some_and(|before| tick.now().since(before) > Duration::from_secs(60));
+        let paused = tick.now() > self.lost_after;
+        self.lost_after = tick.now() + LONGEST_PAUSE;
         if step.is_hold() {
-            self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
-            self.held_steps = self.held_steps.saturating_add(1);
-            if self.held_steps >= 2 {
-                self.outbox.clear();
-            }
-            self.outbox.finish_update(self.now);
-            return;
+            return self.hold();
         }
         self.held_steps = 0;
         if paused {
-            // Stamps of 32 bits cannot tell how long ago a frame was heard.
-            self.slots.iter_mut().for_each(Slot::lose);
+            self.lose_all();
         }
         let cycle = Cycle { now: self.now, step, timeouts: self.timeouts };
         for slot in &mut self.slots {

@@ -34,6 +34,12 @@ impl CommandFrame {
         }
     }
 
+    /// The ids in the order of the index.
+    const IDS: [u16; 5] = {
+        let [a, b, c, d, e] = Self::ALL;
+        [a.id(), b.id(), c.id(), d.id(), e.id()]
+    };
+
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -43,6 +49,12 @@ impl CommandFrame {
     }
 }
 
+/// Swaps the bytes of two words at once.
+#[inline]
+const fn swapped(words: [u8; 4]) -> [u8; 4] {
+    u32::from_le_bytes(words).swap_bytes().rotate_left(16).to_le_bytes()
+}
+
 /// Converts a command to the wire: to the nearest, saturated at ±`limit`, NaN to 0.
 ///
 /// Odd-symmetric: `to_raw(-x) == -to_raw(x)` for every `x` that is not NaN.
@@ -50,22 +62,40 @@ impl CommandFrame {
 pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     let scaled = value * raw_per_unit;
     #[expect(clippy::cast_possible_truncation, reason = "saturates, NaN gives 0")]
-    let nearest = (scaled + 0.5_f32.copysign(scaled)) as i32;
-    saturate(nearest, limit)
+    let halves = (scaled + scaled) as i32;
+    // Half of it, ties away from zero: the shift rounds down, which is away for what is negative.
+    saturate((halves >> 1) + (halves & !(halves >> 31) & 1), limit)
 }
 
 /// Limits a raw command to ±`limit`, which is not negative.
 #[inline]
 pub(super) const fn saturate(raw: i32, limit: i16) -> i16 {
-    if raw > limit as i32 {
-        limit
-    } else if raw < -(limit as i32) {
-        -limit
+    let limit = limit as i32;
+    // One comparison for both ends: below -limit is far above, unsigned.
+    let within = raw.wrapping_add(limit).cast_unsigned() <= 2 * limit.cast_unsigned();
+    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+    if within {
+        raw as i16
+    } else if raw < 0 {
+        -limit as i16
     } else {
-        #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
-        let raw = raw as i16;
-        raw
+        limit as i16
     }
+}
+
+/// Counts the frames in a set; a Cortex-M has no instruction for it.
+fn ones(frames: u8) -> u32 {
+    const ONES: [u8; 32] = [
+        0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4, //
+        1, 2, 2, 3, 2, 3, 3, 4, 2, 3, 3, 4, 3, 4, 4, 5,
+    ];
+    ONES.get(usize::from(frames & 31)).map_or(0, |ones| u32::from(*ones))
+}
+
+/// Counts the frames in a set, at most 8.
+#[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+const fn count(frames: u8) -> u16 {
+    frames.count_ones() as u16
 }
 
 /// Where a motor's word stands: one of four slots in one of five frames.
@@ -93,13 +123,24 @@ impl Place {
     }
 }
 
-/// The command words as they go out, and which frames wait.
+/// The command words, each with its low byte first, aligned to be read as 32-bit words.
+///
+/// The rows above the five frames are nobody's: they let five bits of a [`Place`] be an index.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(4))]
+struct Words([[[u8; 2]; 4]; 8]);
+
+impl Words {
+    const ZERO: Self = Self([[[0; 2]; 4]; 8]);
+}
+
+/// The command words, and which frames wait.
 ///
 /// A frame waits (is *dirty*) after an update that left it a non-zero word, or that turned its last one to zero;
 /// a frame of zeros is repeated only as a keep-alive. The newest words replace older ones that were not sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outbox {
-    words: [[[u8; 2]; 4]; 5],
+    words: Words,
     in_use: u8,
     ever_used: u8,
     active: u8,
@@ -115,7 +156,7 @@ pub(super) struct Outbox {
 impl Outbox {
     pub(super) const fn new() -> Self {
         Self {
-            words: [[[0; 2]; 4]; 5],
+            words: Words::ZERO,
             in_use: 0,
             ever_used: 0,
             active: 0,
@@ -134,12 +175,12 @@ impl Outbox {
     }
 
     pub(super) const fn frames_in_use(&self) -> u16 {
-        self.in_use.count_ones() as u16
+        count(self.in_use)
     }
 
     /// Returns how many frames are in use when this one is as well.
     pub(super) const fn frames_in_use_with(&self, frame: CommandFrame) -> u16 {
-        (self.in_use | frame.bit()).count_ones() as u16
+        count(self.in_use | frame.bit())
     }
 
     /// Sends this frame from now on: the first time with the next update, whatever its words are.
@@ -158,14 +199,14 @@ impl Outbox {
 
     #[inline]
     pub(super) fn put(&mut self, place: Place, raw: i16) {
-        if let Some(word) = self.words.as_flattened_mut().get_mut(usize::from(place.0)) {
-            *word = raw.to_be_bytes();
+        if let Some(word) = self.words.0.as_flattened_mut().get_mut(usize::from(place.0 & 31)) {
+            *word = raw.to_le_bytes();
         }
     }
 
     /// Sets every word to zero, and has every frame in use sent.
     pub(super) fn clear(&mut self) {
-        self.words = [[[0; 2]; 4]; 5];
+        self.words = Words::ZERO;
         self.active = 0;
         self.mark(self.in_use);
     }
@@ -174,7 +215,7 @@ impl Outbox {
     #[inline]
     pub(super) fn finish_update(&mut self, now: u32) {
         let mut active = 0;
-        for (frame, words) in CommandFrame::ALL.iter().zip(&self.words) {
+        for (frame, words) in CommandFrame::ALL.iter().zip(&self.words.0) {
             if *words != [[0; 2]; 4] {
                 active |= frame.bit();
             }
@@ -192,8 +233,10 @@ impl Outbox {
 
     #[inline]
     fn mark(&mut self, frames: u8) {
-        self.packed = self.packed.wrapping_add(frames.count_ones());
-        self.superseded = self.superseded.wrapping_add((frames & self.dirty).count_ones());
+        self.packed = self.packed.wrapping_add(ones(frames));
+        if frames & self.dirty != 0 {
+            self.superseded = self.superseded.wrapping_add(ones(frames & self.dirty));
+        }
         self.dirty |= frames;
     }
 
@@ -203,15 +246,20 @@ impl Outbox {
         if self.dirty == 0 {
             return None;
         }
-        let ahead = self.dirty & (u8::MAX << self.first);
-        let candidates = if ahead == 0 { self.dirty } else { ahead };
-        let index = candidates.trailing_zeros();
-        let frame = *CommandFrame::ALL.get(index as usize)?;
-        let words = self.words.get(index as usize)?;
-        self.dirty &= !frame.bit();
-        self.first = if frame as u8 == 4 { 0 } else { frame as u8 + 1 };
-        CanFrame::standard(frame.id(), *words.as_flattened().first_chunk()?)
+        let dirty = u32::from(self.dirty);
+        let ahead = dirty & (u32::MAX << (self.first & 7));
+        let index = if ahead == 0 { dirty } else { ahead }.trailing_zeros();
+        let (id, words) =
+            (*CommandFrame::IDS.get(index as usize)?, self.words.0.get(index as usize)?);
+        self.dirty &= !(1 << index);
+        #[expect(clippy::cast_possible_truncation, reason = "at most 5")]
+        let next = index as u8 + 1;
+        self.first = next;
+        let [[a, b], [c, d], [e, f], [g, h]] = *words;
+        let ([b, a, d, c], [f, e, h, g]) = (swapped([a, b, c, d]), swapped([e, f, g, h]));
+        CanFrame::standard(id, [b, a, d, c, f, e, h, g])
     }
+
     /// Takes back a frame that was refused or evicted. It waits for the next update, so that a caller's loop ends,
     /// and then goes first.
     pub(super) fn requeue(&mut self, header: u32) -> bool {

@@ -72,6 +72,7 @@ mod error;
 mod feedback;
 mod handle;
 mod model;
+mod rare;
 mod slot;
 mod state;
 mod targets;

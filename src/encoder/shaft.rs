@@ -106,15 +106,17 @@ impl Shaft {
     /// Moves by rotor counts: at most half a rotor turn (-4096 to 4096), as [`shortest`](super::shortest) gives.
     #[inline]
     pub const fn advance(&mut self, counts: i32) {
+        let turn = self.fine_per_turn();
         let next = self.phase.wrapping_add(counts.wrapping_mul(self.fine_per_count.get() as i32));
-        if next < 0 {
-            self.phase = next.wrapping_add(self.fine_per_turn());
-            self.turns = self.turns.add(-1);
-        } else if next >= self.fine_per_turn() {
-            self.phase = next.wrapping_sub(self.fine_per_turn());
-            self.turns = self.turns.add(1);
-        } else {
+        // One comparison for both ends: below zero is far above, unsigned.
+        if next.cast_unsigned() < turn.cast_unsigned() {
             self.phase = next;
+        } else if next < 0 {
+            self.phase = next.wrapping_add(turn);
+            self.turns = self.turns.add(-1);
+        } else {
+            self.phase = next.wrapping_sub(turn);
+            self.turns = self.turns.add(1);
         }
     }
 
@@ -178,13 +180,12 @@ impl Shaft {
     #[inline]
     pub(crate) const fn way_to(&self, turns: Turns, phase: i32) -> f32 {
         let whole = turns.get().wrapping_sub(self.turns.get());
-        #[expect(clippy::cast_possible_truncation, reason = "limited to 63")]
-        let whole = if whole > 63 {
-            63
-        } else if whole < -63 {
-            -63
+        #[expect(clippy::cast_possible_truncation, reason = "compared right after")]
+        let near = whole as i32;
+        let whole = if near as i64 == whole && near.wrapping_add(63).cast_unsigned() <= 126 {
+            near
         } else {
-            whole as i32
+            far(whole)
         };
         let fine =
             whole.wrapping_mul(self.fine_per_turn()).wrapping_add(phase.wrapping_sub(self.phase));
@@ -206,6 +207,13 @@ impl Shaft {
         };
         way as f32 * self.radians_per_fine
     }
+}
+
+/// Returns 63 turns in the direction of `way`; seldom, and so out of the line of [`Shaft::way_to`].
+#[cold]
+#[inline(never)]
+const fn far(way: i64) -> i32 {
+    if way < 0 { -63 } else { 63 }
 }
 
 /// Divides by a number of at most 16 bits with 32-bit divisions only; exact.

@@ -50,8 +50,8 @@ pub(super) struct Slot {
     ambiguous_gaps: u16,
     refused_targets: u16,
     forgotten_targets: u16,
-    speed: Option<Pid>,
-    position: Option<Pid>,
+    speed: Pid,
+    position: Pid,
     id: u8,
     generation: u8,
     pub(super) place: Place,
@@ -61,6 +61,12 @@ pub(super) struct Slot {
     armed: bool,
     latched: bool,
 }
+
+/// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
+const NO_LOOP: Pid = match Pid::new(PidConfig::new(0.0, 0.0, 0.0)) {
+    Ok(pid) => pid,
+    Err(_) => unreachable!(),
+};
 
 impl Slot {
     pub(super) const FREE: Self = Self {
@@ -81,8 +87,8 @@ impl Slot {
         ambiguous_gaps: 0,
         refused_targets: 0,
         forgotten_targets: 0,
-        speed: None,
-        position: None,
+        speed: NO_LOOP,
+        position: NO_LOOP,
         id: 0,
         generation: 0,
         place: Place::new(CommandFrame::X200, 0),
@@ -255,12 +261,17 @@ const fn no_load_velocity(facts: &Facts, rad_per_s_per_rpm: f32) -> f32 {
 }
 
 /// Makes a loop whose output stays within `limit`, or names the parameter that is not usable.
-const fn limited_loop(config: Option<PidConfig>, limit: f32) -> Result<Option<Pid>, &'static str> {
-    let Some(config) = config else { return Ok(None) };
+const fn limited_loop(config: Option<PidConfig>, limit: f32) -> Result<Pid, &'static str> {
+    let Some(config) = config else { return Ok(NO_LOOP) };
     match Pid::new(within(config, limit)) {
-        Ok(pid) => Ok(Some(pid)),
+        Ok(pid) => Ok(pid),
         Err(error) => Err(error.parameter()),
     }
+}
+
+/// Tells a loop from [`NO_LOOP`], the only one without limits.
+const fn is_loop(pid: &Pid) -> bool {
+    pid.config().output_range().1 < f32::MAX
 }
 
 /// Narrows the output of a loop to ±`limit`.

@@ -4,21 +4,21 @@ use crate::encoder::{Gap, Homing, shortest};
 use crate::motor::{Link, Timeouts};
 
 impl Slot {
-    /// Takes a feedback frame that arrived at `now`.
+    /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
+    /// returns `false`. A motor that is not online, and a free slot, trust no gap.
     #[inline]
-    pub(in crate::dji) fn receive(&mut self, feedback: Feedback, now: u32, timeouts: &Timeouts) {
-        if now.wrapping_sub(self.heard) < self.trusted_gap_us {
+    pub(in crate::dji) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
+        let in_time = now.wrapping_sub(self.heard) < self.trusted_gap_us;
+        if in_time {
             self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
-        } else if let Some(facts) = self.facts {
-            self.receive_after_gap(facts, feedback, now, timeouts);
+            self.feedback = feedback;
+            self.heard = now;
         }
-        self.feedback = feedback;
-        self.heard = now;
+        in_time
     }
 
-    #[cold]
-    #[inline(never)]
-    fn receive_after_gap(
+    /// Takes a feedback frame that arrived at `now`, whenever the one before came.
+    pub(in crate::dji) fn receive_after_gap(
         &mut self,
         facts: &Facts,
         feedback: Feedback,
@@ -58,6 +58,8 @@ impl Slot {
                 self.finish_recovery(facts, timeouts);
             }
         }
+        self.feedback = feedback;
+        self.heard = now;
     }
 
     /// Follows the angle without counting turns that nobody saw.

@@ -1,4 +1,4 @@
-use super::{Slot, Target};
+use super::{Slot, Target, is_loop};
 use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
 use crate::dji::command::to_raw;
@@ -9,8 +9,8 @@ impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.target = Target::Relax;
-        self.speed.iter_mut().for_each(Pid::reset);
-        self.position.iter_mut().for_each(Pid::reset);
+        self.speed.reset();
+        self.position.reset();
     }
 
     /// Takes a value in the unit of the command: amperes or volts.
@@ -35,7 +35,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
-        self.needs(self.speed.is_some())?;
+        needs(&self.speed)?;
         if !matches!(self.target, Target::Velocity(_)) {
             self.enter_speed_loop();
         }
@@ -50,7 +50,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
-        self.needs(self.position.is_some())?;
+        needs(&self.position)?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -67,7 +67,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
-        self.needs(self.position.is_some())?;
+        needs(&self.position)?;
         let (turns, phase) = self.shaft.locate(position);
         self.enter_position_loop();
         self.start(Target::Position(turns, phase), now);
@@ -106,10 +106,6 @@ impl Slot {
         Ok(())
     }
 
-    fn needs(&self, has_loop: bool) -> Result<(), TargetError> {
-        if has_loop { Ok(()) } else { Err(TargetError::NoLoop) }
-    }
-
     fn start(&mut self, target: Target, now: u32) {
         self.target = target;
         self.commanded = now;
@@ -117,8 +113,8 @@ impl Slot {
 
     /// The speed loop takes over from a direct command where that was: no jump of the output.
     fn enter_speed_loop(&mut self) {
-        if let (Target::Raw(raw), Some(speed)) = (self.target, &mut self.speed) {
-            speed.reset_to(f32::from(raw) / self.raw_per_unit);
+        if let Target::Raw(raw) = self.target {
+            self.speed.reset_to(f32::from(raw) / self.raw_per_unit);
         }
     }
 
@@ -130,17 +126,20 @@ impl Slot {
         self.enter_speed_loop();
         let moving = matches!(self.target, Target::Velocity(_) | Target::Raw(_));
         let velocity = self.velocity().as_rad_per_s();
-        if let Some(position) = self.position.as_mut().filter(|_| moving) {
-            position.reset_to(velocity);
+        if moving {
+            self.position.reset_to(velocity);
         }
     }
 }
 
-fn replace(pid: &mut Option<Pid>, config: PidConfig, limit: f32) -> Result<(), LoopError> {
-    match pid {
-        Some(pid) => pid
-            .set_config(super::within(config, limit))
-            .map_err(|error| LoopError::Parameter(error.parameter())),
-        None => Err(LoopError::NoLoop),
+fn needs(pid: &Pid) -> Result<(), TargetError> {
+    if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
+}
+
+fn replace(pid: &mut Pid, config: PidConfig, limit: f32) -> Result<(), LoopError> {
+    if !is_loop(pid) {
+        return Err(LoopError::NoLoop);
     }
+    pid.set_config(super::within(config, limit))
+        .map_err(|error| LoopError::Parameter(error.parameter()))
 }

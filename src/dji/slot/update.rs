@@ -15,48 +15,39 @@ impl Slot {
     /// Runs the loops of this motor and returns its raw command: 0 whenever something is in doubt.
     #[inline]
     pub(in crate::dji) fn update(&mut self, cycle: &Cycle) -> i16 {
-        if cycle.now.wrapping_sub(self.heard) > cycle.timeouts.late_us() {
-            self.age(cycle);
+        if cycle.now.wrapping_sub(self.heard) > cycle.timeouts.late_us()
+            || cycle.now.wrapping_sub(self.commanded) > cycle.timeouts.command_us()
+        {
+            self.rest(cycle);
             return 0;
         }
-        if self.target == Target::Relax {
-            return 0;
-        }
-        if cycle.now.wrapping_sub(self.commanded) > cycle.timeouts.command_us() {
-            self.forget_target();
-            return 0;
-        }
-        let goal = match self.target {
-            Target::Relax => return 0,
-            Target::Raw(raw) => return saturate(i32::from(raw), self.limit),
-            Target::Velocity(rad_per_s) => rad_per_s,
-            Target::Angle(phase) => self.follow(self.shaft.shortest_way_to(phase), &cycle.step),
-            Target::Position(turns, phase) => {
-                self.follow(self.shaft.way_to(turns, phase), &cycle.step)
-            }
-        };
         let velocity = self.velocity().as_rad_per_s();
-        match &mut self.speed {
-            Some(speed) => {
-                to_raw(speed.step(goal, velocity, &cycle.step), self.raw_per_unit, self.limit)
-            }
-            None => 0,
-        }
+        let goal = if let Target::Velocity(rad_per_s) = self.target {
+            rad_per_s
+        } else {
+            let way = match self.target {
+                Target::Position(turns, phase) => self.shaft.way_to(turns, phase),
+                Target::Angle(phase) => self.shaft.shortest_way_to(phase),
+                Target::Raw(raw) => return saturate(i32::from(raw), self.limit),
+                Target::Relax | Target::Velocity(_) => return 0,
+            };
+            self.position.step_error(way, velocity, &cycle.step)
+        };
+        to_raw(self.speed.step(goal, velocity, &cycle.step), self.raw_per_unit, self.limit)
     }
 
-    /// Runs the position loop: radians to go in, the velocity for the speed loop out.
-    #[inline]
-    fn follow(&mut self, way: f32, step: &TimeStep) -> f32 {
-        let velocity = self.velocity().as_rad_per_s();
-        match &mut self.position {
-            Some(position) => position.step_error(way, velocity, step),
-            None => 0.0,
+    /// The last feedback is late, or the last target.
+    #[cold]
+    #[inline(never)]
+    fn rest(&mut self, cycle: &Cycle) {
+        if cycle.now.wrapping_sub(self.heard) > cycle.timeouts.late_us() {
+            self.age(cycle);
+        } else if self.target != Target::Relax {
+            self.forget_target();
         }
     }
 
     /// The last feedback is late; its age decides how far that goes.
-    #[cold]
-    #[inline(never)]
     fn age(&mut self, cycle: &Cycle) {
         let age = cycle.now.wrapping_sub(self.heard);
         match self.link {
@@ -68,8 +59,6 @@ impl Slot {
     }
 
     /// The application has not set a target for too long.
-    #[cold]
-    #[inline(never)]
     fn forget_target(&mut self) {
         self.relax();
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
