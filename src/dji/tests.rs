@@ -494,6 +494,57 @@ mod safety {
     use super::*;
 
     #[test]
+    fn a_clock_that_goes_back_neither_latches_nor_revives_a_motor() {
+        let (mut bus, [heard, silent]) = armed([1, 2].map(Config::<M3508>::new));
+        let hear = |bus: &mut Bus, id, ms| {
+            assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(ms)), Ingest::Taken)
+        };
+        for ms in 2..2_005 {
+            hear(&mut bus, 0x201, ms);
+            hear(&mut bus, 0x202, ms);
+            step(&mut bus, ms);
+        }
+        // One second back: the old stamps lie ahead, which is not fresh.
+        step(&mut bus, 1_000);
+        assert_eq!((bus.link(heard), bus.link(silent)), (Some(Link::Late), Some(Link::Late)));
+        for ms in 1_001..1_300 {
+            hear(&mut bus, 0x201, ms);
+            bus.set_raw(heard, 300).unwrap();
+            assert_eq!(bus.set_raw(silent, 300), Err(TargetError::NoFeedback));
+            step(&mut bus, ms);
+            assert_eq!(sent(&mut bus).last(), Some(&(0x200, [300, 0, 0, 0])));
+        }
+        assert_eq!(bus.state(heard).unwrap().ambiguous_gaps, 0);
+    }
+
+    #[test]
+    fn a_frame_stamped_after_the_tick_read_its_clock_is_fresh() {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+        let at = Instant::from_micros;
+        for us in (2_000..50_000).step_by(1_000) {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(us + 300)), Ingest::Taken);
+            bus.set_raw(wheel, 300).unwrap();
+            bus.update(Tick::new(at(us), 0.001));
+            assert_eq!(sent(&mut bus), [(0x200, [300, 0, 0, 0])]);
+        }
+    }
+
+    #[test]
+    fn feedback_that_returns_after_being_late_makes_no_derivative_spike() {
+        let config = Config::<M3508>::new(1).speed_loop(PidConfig::new(0.0, 0.0, 0.05));
+        let (mut bus, [wheel]) = armed([config]);
+        let turning = |ms: u64| feedback(0x201, 0, if ms < 40 { 0 } else { 9_000 });
+        for ms in 2..60 {
+            if !(10..40).contains(&ms) {
+                assert_eq!(bus.ingest(&turning(ms), at_ms(ms)), Ingest::Taken);
+            }
+            _ = bus.set_velocity(wheel, AngularVelocity::ZERO);
+            step(&mut bus, ms);
+            assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "at {ms} ms");
+        }
+    }
+
+    #[test]
     fn arming_again_does_not_disturb_the_motors_that_run() {
         let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
         for ms in 2..150 {

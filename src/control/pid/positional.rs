@@ -170,6 +170,27 @@ impl Pid {
         self.track_output = false;
     }
 
+    /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
+    /// measurements. The next step gives P, the integral as it was, and feed-forward.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig};
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(0.0, 1.0, 0.5))?;
+    /// for _ in 0..=1000 {
+    ///     pid.update(1.0, 0.0, 0.001);
+    /// }
+    /// pid.interrupt();
+    /// assert!((pid.update(1.0, 0.7, 0.001) - 1.0).abs() < 1e-3); // no kick of D for the step of 0.7
+    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// ```
+    pub const fn interrupt(&mut self) {
+        self.error = UNKNOWN;
+        self.measurement = UNKNOWN;
+        self.rate = 0.0;
+    }
+
     /// Resets, and lets the first call return `output`, within the limits, whatever its error: for taking over from
     /// another controller without a jump.
     ///

@@ -1,11 +1,11 @@
-use super::Slot;
+use super::{Slot, is_near};
 use crate::dji::command::to_raw;
 use crate::motor::{Link, Timeouts};
 
 impl Slot {
     /// Tells whether the motor is online with feedback that is fresh at `now`. A free slot is not missing.
     pub(in crate::dji) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
-        let fresh = self.link == Link::Online && now.wrapping_sub(self.heard) <= timeouts.late_us();
+        let fresh = self.link == Link::Online && is_near(now, self.heard, timeouts.late_us());
         self.facts.is_some() && !fresh
     }
 

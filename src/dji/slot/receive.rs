@@ -1,4 +1,4 @@
-use super::Slot;
+use super::{Slot, age, is_near};
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{Gap, Homing, shortest};
 use crate::motor::{Link, Timeouts};
@@ -35,7 +35,7 @@ impl Slot {
                 let gap = Gap::resolve(
                     (before.angle(), before.rpm()),
                     (after.angle(), after.rpm()),
-                    now.wrapping_sub(self.heard),
+                    age(now, self.heard),
                     facts.rotor_no_load_rpm(),
                 );
                 self.shaft.advance_far(gap.counts);
@@ -53,7 +53,7 @@ impl Slot {
             }
             Link::Recovering => {
                 self.move_shortest(feedback);
-                let in_a_row = now.wrapping_sub(self.heard) <= timeouts.late_us();
+                let in_a_row = is_near(now, self.heard, timeouts.late_us());
                 self.good_frames = if in_a_row { self.good_frames.saturating_add(1) } else { 1 };
                 self.finish_recovery(facts, timeouts);
             }
@@ -91,6 +91,8 @@ impl Slot {
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
         self.trusted_gap_us = 0;
+        self.speed.interrupt();
+        self.position.interrupt();
     }
 
     /// Nobody knows any more when the motor was heard.

@@ -1,4 +1,4 @@
-use super::{Slot, Target};
+use super::{Slot, Target, age, is_near};
 use crate::control::TimeStep;
 use crate::dji::command::{saturate, to_raw};
 use crate::motor::{Link, Timeouts};
@@ -15,7 +15,7 @@ impl Slot {
     /// Runs the loops of this motor and returns its raw command: 0 whenever something is in doubt.
     #[inline]
     pub(in crate::dji) fn update(&mut self, cycle: &Cycle) -> i16 {
-        if cycle.now.wrapping_sub(self.heard) > cycle.timeouts.late_us()
+        if !is_near(cycle.now, self.heard, cycle.timeouts.late_us())
             || cycle.now.wrapping_sub(self.commanded) > cycle.timeouts.command_us()
         {
             self.rest(cycle);
@@ -40,19 +40,18 @@ impl Slot {
     #[cold]
     #[inline(never)]
     fn rest(&mut self, cycle: &Cycle) {
-        if cycle.now.wrapping_sub(self.heard) > cycle.timeouts.late_us() {
-            self.age(cycle);
+        if !is_near(cycle.now, self.heard, cycle.timeouts.late_us()) {
+            self.grow_old(cycle);
         } else if self.target != Target::Relax {
             self.forget_target();
         }
     }
 
     /// The last feedback is late; its age decides how far that goes.
-    fn age(&mut self, cycle: &Cycle) {
-        let age = cycle.now.wrapping_sub(self.heard);
+    fn grow_old(&mut self, cycle: &Cycle) {
         match self.link {
             Link::Unheard | Link::Offline => {}
-            _ if age > cycle.timeouts.offline_us() => self.set_offline(),
+            _ if age(cycle.now, self.heard) > cycle.timeouts.offline_us() => self.set_offline(),
             Link::Online | Link::Late => self.set_late(),
             Link::Recovering => {}
         }
