@@ -182,12 +182,17 @@ impl IncrementalPid {
         } else if step.is_frozen() {
             config.kp * (error - self.error)
         } else {
-            let rate = finite((measurement - self.measurement) * step.per_dt);
-            let damping = config.kd * (rate - self.rate);
-            self.rate = rate;
-            let proportional = finite(config.kp * (error - self.error));
-            let integral = finite(config.ki * step.half_dt_s * (error + self.error));
-            proportional + integral - finite(damping)
+            let rate = (measurement - self.measurement) * step.per_dt;
+            let change = self.change::<false>(error, rate, step);
+            if (change + rate).is_finite() {
+                self.rate = rate;
+                change
+            } else {
+                let rate = finite(rate);
+                let change = self.change::<true>(error, rate, step);
+                self.rate = rate;
+                change
+            }
         };
         self.track_output = false;
         self.error = error;
@@ -195,6 +200,16 @@ impl IncrementalPid {
         let wanted = self.output + finite(change);
         self.output = limited(wanted, config.output_lower, config.output_upper);
         self.output
+    }
+
+    /// What a normal step adds to the output.
+    #[inline]
+    fn change<const CAREFUL: bool>(&self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let finite = |value| if CAREFUL { finite(value) } else { value };
+        let config = &self.config;
+        let proportional = finite(config.kp * (error - self.error));
+        let integral = finite(config.ki * step.half_dt_s * (error + self.error));
+        finite(proportional + integral) - finite(config.kd * (rate - self.rate))
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
