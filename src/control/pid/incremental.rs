@@ -1,6 +1,6 @@
 use super::work::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
-use crate::control::error::{ConfigError, check, not_negative, ordered, positive};
+use crate::control::error::{ConfigError, check, not_negative, output_ends, positive};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
@@ -81,7 +81,7 @@ impl IncrementalPidConfig {
         check!(not_negative("kp", self.kp));
         check!(not_negative("ki", self.ki));
         check!(not_negative("kd", self.kd));
-        check!(ordered("output_range", self.output_lower, self.output_upper));
+        check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("max_step", self.max_step_s));
         if let Some(r) = self.tracking_r {
             check!(LinearDifferentiator::new(r, self.max_step_s));
@@ -327,7 +327,7 @@ mod tests {
             (IncrementalPidConfig::new(f32::NAN, 0.0, 0.0), "kp", ConfigFault::Negative),
             (IncrementalPidConfig::new(0.0, -1.0, 0.0), "ki", ConfigFault::Negative),
             (IncrementalPidConfig::new(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
-            (new.with_output_limit(0.0), "output_range", ConfigFault::Reversed),
+            (new.with_output_limit(0.0), "output_limit", ConfigFault::NotPositive),
             (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
             (new.with_max_step(-0.1), "max_step", ConfigFault::NotPositive),
             (new.with_tracking(0.0), "r", ConfigFault::NotPositive),
