@@ -6,7 +6,7 @@ use core::fmt;
 /// ```
 /// use drivetrain::control::{Pid, PidConfig};
 ///
-/// let reversed = PidConfig::new(1.0, 0.0, 0.0).with_output_range(5.0, -5.0);
+/// let reversed = PidConfig::new(1.0, 0.0, 0.0).with_output_range(5.0, -4.0);
 /// let error = Pid::new(reversed).unwrap_err();
 /// assert_eq!(error.parameter(), "output_range");
 /// assert_eq!(error.to_string(), "output_range: the lower end must lie below the upper one");
@@ -96,6 +96,15 @@ pub(crate) const fn ordered(
         Ok(())
     } else {
         Err(ConfigError::new(parameter, ConfigFault::Reversed))
+    }
+}
+
+/// Refuses the ends of an output, and calls them what they were called: one limit, or a range.
+pub(crate) const fn output_ends(lower: f32, upper: f32) -> Result<(), ConfigError> {
+    if (-lower).to_bits() == upper.to_bits() {
+        positive("output_limit", upper)
+    } else {
+        ordered("output_range", lower, upper)
     }
 }
 

@@ -1,4 +1,4 @@
-use crate::control::error::{ConfigError, check, not_negative, ordered, positive};
+use crate::control::error::{ConfigError, check, not_negative, ordered, output_ends, positive};
 
 /// An option that is a threshold or a rate, and off.
 const OFF: f32 = f32::MAX;
@@ -219,7 +219,7 @@ impl PidConfig {
         check!(not_negative("kp", self.kp));
         check!(not_negative("ki", self.ki));
         check!(not_negative("kd", self.kd));
-        check!(ordered("output_range", self.output_lower, self.output_upper));
+        check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("integral_limit", self.integral_limit));
         check!(positive("integral_separation", self.integral_separation));
         check!(not_negative("variable_integral", self.full_rate_below));

@@ -1,6 +1,6 @@
 use super::work::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
-use crate::control::error::{ConfigError, check, not_negative, ordered, positive};
+use crate::control::error::{ConfigError, check, not_negative, output_ends, positive};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
@@ -81,7 +81,7 @@ impl IncrementalPidConfig {
         check!(not_negative("kp", self.kp));
         check!(not_negative("ki", self.ki));
         check!(not_negative("kd", self.kd));
-        check!(ordered("output_range", self.output_lower, self.output_upper));
+        check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("max_step", self.max_step_s));
         if let Some(r) = self.tracking_r {
             check!(LinearDifferentiator::new(r, self.max_step_s));
@@ -182,12 +182,17 @@ impl IncrementalPid {
         } else if step.is_frozen() {
             config.kp * (error - self.error)
         } else {
-            let rate = finite((measurement - self.measurement) * step.per_dt);
-            let damping = config.kd * (rate - self.rate);
-            self.rate = rate;
-            let proportional = finite(config.kp * (error - self.error));
-            let integral = finite(config.ki * step.half_dt_s * (error + self.error));
-            proportional + integral - finite(damping)
+            let rate = (measurement - self.measurement) * step.per_dt;
+            let change = self.change::<false>(error, rate, step);
+            if (change + rate).is_finite() {
+                self.rate = rate;
+                change
+            } else {
+                let rate = finite(rate);
+                let change = self.change::<true>(error, rate, step);
+                self.rate = rate;
+                change
+            }
         };
         self.track_output = false;
         self.error = error;
@@ -195,6 +200,16 @@ impl IncrementalPid {
         let wanted = self.output + finite(change);
         self.output = limited(wanted, config.output_lower, config.output_upper);
         self.output
+    }
+
+    /// What a normal step adds to the output.
+    #[inline]
+    fn change<const CAREFUL: bool>(&self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        let finite = |value| if CAREFUL { finite(value) } else { value };
+        let config = &self.config;
+        let proportional = finite(config.kp * (error - self.error));
+        let integral = finite(config.ki * step.half_dt_s * (error + self.error));
+        finite(proportional + integral) - finite(config.kd * (rate - self.rate))
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -312,7 +327,7 @@ mod tests {
             (IncrementalPidConfig::new(f32::NAN, 0.0, 0.0), "kp", ConfigFault::Negative),
             (IncrementalPidConfig::new(0.0, -1.0, 0.0), "ki", ConfigFault::Negative),
             (IncrementalPidConfig::new(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
-            (new.with_output_limit(0.0), "output_range", ConfigFault::Reversed),
+            (new.with_output_limit(0.0), "output_limit", ConfigFault::NotPositive),
             (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
             (new.with_max_step(-0.1), "max_step", ConfigFault::NotPositive),
             (new.with_tracking(0.0), "r", ConfigFault::NotPositive),
