@@ -1,4 +1,4 @@
-use super::kinematics::Fastest;
+use super::kinematics::{Fastest, slowed};
 use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::motor::{TargetError, VelocityDrive};
@@ -182,12 +182,11 @@ impl<K: Kinematics> Chassis<K> {
         let wheels = self.kinematics.inverse(twist);
         let mut fastest = Fastest::default();
         let _: K::Wheels<()> = K::map(wheels, |wheel| fastest.see(wheel.velocity()));
-        let limit = self.limits.wheel_speed();
-        let scale = fastest.scale(limit);
+        let scale = fastest.scale(self.limits.wheel_speed());
         // What the wheels cannot do must not wind up: the next step starts from what they do.
         self.reference = if scale > 0.0 { self.reference * scale } else { Twist::ZERO };
         self.status.saturated = scale < 1.0;
-        K::map(wheels, |wheel| fastest.limit(wheel, limit))
+        K::map(wheels, |wheel| slowed(wheel, scale))
     }
 
     fn measure(&mut self, wheels: K::Wheels<Option<K::Speed>>, dt_s: f32) {

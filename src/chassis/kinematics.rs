@@ -40,7 +40,8 @@ pub trait Kinematics {
     ) -> Self::Wheels<Self::Speed> {
         let mut fastest = Fastest::default();
         let _: Self::Wheels<()> = Self::map(wheels, |wheel| fastest.see(wheel.velocity()));
-        Self::map(wheels, |wheel| fastest.limit(wheel, limit))
+        let scale = fastest.scale(limit);
+        Self::map(wheels, |wheel| slowed(wheel, scale))
     }
 
     /// Returns the largest difference in m/s between a wheel and the rigid motion that fits best.
@@ -122,10 +123,9 @@ impl Fastest {
             1.0
         }
     }
+}
 
-    pub(super) fn limit<S: WheelSpeed>(&self, wheel: S, limit: AngularVelocity) -> S {
-        // Zero times NaN is NaN.
-        let scale = self.scale(limit);
-        if scale > 0.0 { wheel.scaled(scale) } else { wheel.stopped() }
-    }
+/// Zero stops a wheel even if it is NaN.
+pub(super) fn slowed<S: WheelSpeed>(wheel: S, scale: f32) -> S {
+    if scale > 0.0 { wheel.scaled(scale) } else { wheel.stopped() }
 }

@@ -2,6 +2,7 @@ use super::error::positive;
 use super::{GeometryError, Kinematics, MecanumWheels};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
+use core::marker::PhantomData;
 
 /// The dimensions of a mecanum chassis: all in m, above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,17 +17,36 @@ pub struct MecanumGeometry {
     pub half_track_m: f32,
 }
 
-/// How the rollers of the four wheels lie.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+/// How the rollers of the four wheels lie: [`FloorO`] or [`FloorX`].
+pub trait RollerMounting: sealed::Sealed {}
+
+mod sealed {
+    pub trait Sealed {
+        /// The sign of the sideways part, and of the half wheelbase in the lever arm.
+        const SIDE: f32;
+    }
+}
+
+/// The rollers that touch the floor form an O: the usual mounting. From above the visible rollers form an X.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum RollerMounting {
-    /// The rollers that touch the floor form an O: the usual one. From above the visible rollers form an X.
-    #[default]
-    FloorO,
-    /// The rollers that touch the floor form an X. The lever arm for turning is the difference of half track and
-    /// half wheelbase, so a square chassis cannot turn.
-    FloorX,
+pub enum FloorO {}
+
+/// The rollers that touch the floor form an X. The lever arm for turning is the difference of half track and half
+/// wheelbase, so a square chassis cannot turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum FloorX {}
+
+impl RollerMounting for FloorO {}
+impl RollerMounting for FloorX {}
+
+impl sealed::Sealed for FloorO {
+    const SIDE: f32 = 1.0;
+}
+
+impl sealed::Sealed for FloorX {
+    const SIDE: f32 = -1.0;
 }
 
 /// The kinematics of four mecanum wheels.
@@ -55,16 +75,15 @@ pub enum RollerMounting {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Mecanum {
-    /// Wheel velocity for 1 m/s forward, 1 m/s to the left, 1 rad/s.
-    per_x: f32,
-    per_y: f32,
+pub struct Mecanum<M = FloorO> {
+    /// Wheel velocity for 1 m/s in any direction, and for 1 rad/s.
+    per_linear: f32,
     per_yaw: f32,
     /// The same the other way, a quarter for each wheel.
-    x_per: f32,
-    y_per: f32,
+    linear_per: f32,
     yaw_per: f32,
     wheel_radius_m: f32,
+    mounting: PhantomData<M>,
 }
 
 impl Mecanum {
@@ -73,18 +92,28 @@ impl Mecanum {
     /// # Errors
     /// Names the length that is not above zero and finite.
     pub const fn new(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
-        Self::with_rollers(geometry, RollerMounting::FloorO)
+        Self::with_rollers(geometry)
     }
+}
 
-    /// Takes the dimensions and the mounting of the rollers.
+impl<M: RollerMounting> Mecanum<M> {
+    /// Takes the dimensions, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for
-    /// [`RollerMounting::FloorX`] when half track and half wheelbase differ by less than 1 %.
-    pub const fn with_rollers(
-        geometry: MecanumGeometry,
-        mounting: RollerMounting,
-    ) -> Result<Self, GeometryError> {
+    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for [`FloorX`] when half
+    /// track and half wheelbase differ by less than 1 % of their sum.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::chassis::{FloorX, Mecanum, MecanumGeometry};
+    /// use drivetrain::geometry::Twist;
+    ///
+    /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.1, half_track_m: 0.3 };
+    /// let wheels = Mecanum::<FloorX>::with_rollers(geometry)?.inverse(Twist::new(0.0, 1.0, 0.0));
+    /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-5); // to the left, the other way round
+    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// ```
+    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
         let MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m } = geometry;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
@@ -95,20 +124,16 @@ impl Mecanum {
         if let Err(error) = positive(half_track_m, "half_track_m") {
             return Err(error);
         }
-        let (arm_m, side) = match mounting {
-            RollerMounting::FloorO => (half_track_m + half_wheelbase_m, 1.0),
-            RollerMounting::FloorX => (half_track_m - half_wheelbase_m, -1.0),
-        };
+        let arm_m = half_track_m + M::SIDE * half_wheelbase_m;
         if arm_m.abs() < 0.01 * (half_track_m + half_wheelbase_m) {
             return Err(GeometryError::Singular("rotation: the chassis is square"));
         }
         Ok(Self {
-            per_x: 1.0 / wheel_radius_m,
-            per_y: side / wheel_radius_m,
+            per_linear: 1.0 / wheel_radius_m,
             per_yaw: arm_m / wheel_radius_m,
-            x_per: 0.25 * wheel_radius_m,
-            y_per: 0.25 * side * wheel_radius_m,
+            linear_per: 0.25 * wheel_radius_m,
             yaw_per: 0.25 * wheel_radius_m / arm_m,
+            mounting: PhantomData,
             wheel_radius_m,
         })
     }
@@ -117,8 +142,8 @@ impl Mecanum {
     #[must_use]
     #[inline]
     pub const fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
-        let x = twist.vx_m_s * self.per_x;
-        let y = twist.vy_m_s * self.per_y;
+        let x = twist.vx_m_s * self.per_linear;
+        let y = M::SIDE * twist.vy_m_s * self.per_linear;
         let yaw = twist.wz_rad_s * self.per_yaw;
         let (falling, rising) = (x - y, x + y);
         MecanumWheels {
@@ -140,14 +165,14 @@ impl Mecanum {
         let (falling, rising) = (front_left + rear_right, front_right + rear_left);
         let (falling_yaw, rising_yaw) = (rear_right - front_left, front_right - rear_left);
         Twist::new(
-            (rising + falling) * self.x_per,
-            (rising - falling) * self.y_per,
+            (rising + falling) * self.linear_per,
+            M::SIDE * (rising - falling) * self.linear_per,
             (rising_yaw + falling_yaw) * self.yaw_per,
         )
     }
 }
 
-impl Kinematics for Mecanum {
+impl<M: RollerMounting> Kinematics for Mecanum<M> {
     type Wheels<T: Copy> = MecanumWheels<T>;
     type Speed = AngularVelocity;
 
@@ -200,7 +225,7 @@ mod tests {
     const OBLONG: MecanumGeometry =
         MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.5 };
 
-    fn wheels(mecanum: &Mecanum, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
+    fn wheels<M: RollerMounting>(mecanum: &Mecanum<M>, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
         mecanum.inverse(Twist::new(vx, vy, wz)).map(AngularVelocity::as_rad_per_s).into_array()
     }
 
@@ -251,14 +276,14 @@ mod tests {
 
     #[test]
     fn with_the_other_rollers_strafe_left_turns_front_left_forward() {
-        let other = Mecanum::with_rollers(OBLONG, RollerMounting::FloorX).unwrap();
+        let other = Mecanum::<FloorX>::with_rollers(OBLONG).unwrap();
         assert_eq!(wheels(&other, 0.0, 1.0, 0.0), [2.0, -2.0, -2.0, 2.0]);
         assert_eq!(wheels(&other, 0.0, 0.0, 4.0), [-2.0, 2.0, -2.0, 2.0]);
     }
 
     #[test]
     fn with_the_other_rollers_a_square_chassis_is_refused() {
-        let error = Mecanum::with_rollers(SQUARE, RollerMounting::FloorX);
+        let error = Mecanum::<FloorX>::with_rollers(SQUARE);
         assert!(matches!(error, Err(GeometryError::Singular(_))));
     }
 

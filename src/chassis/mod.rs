@@ -14,6 +14,36 @@
 //! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
+//!
+//! ```text
+//! Modes ──> Chassis: command ──> acceleration limit ──> inverse ──> wheel limit ──> wheel targets
+//!                    odometry <── forward <──────────────────────────────────────── wheel speeds
+//! ```
+//!
+//! | on top of a layout | what it does |
+//! |---|---|
+//! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels |
+//! | [`Modes`] | relax, follow the gimbal, rotor, independent |
+//! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
+//!
+//! References: K. Lynch, F. Park, *Modern Robotics* (2017), chapters 3 and 13.
+//!
+//! ```
+//! use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
+//! use drivetrain::{geometry::{Heading, Twist}, time::{Instant, Tick}, units::{Angle, AngularVelocity}};
+//!
+//! let geometry = MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+//! let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+//! chassis.set_limits(ChassisLimits::new().with_wheel_speed(AngularVelocity::from_rpm(450.0)))?;
+//!
+//! // Each millisecond:
+//! let facing_left = Heading::new(Angle::from_degrees(90.0));
+//! chassis.set_world(Twist::new(1.0, 0.0, 0.0), facing_left);
+//! let measured = MecanumWheels::splat(Some(AngularVelocity::ZERO));
+//! let targets = chassis.update(measured, Tick::new(Instant::from_micros(1_000), 0.001));
+//! assert!((targets.front_left.as_rad_per_s() - 1.0 / 0.076).abs() < 1e-3); // strafing to the right
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod base;
 mod differential;
@@ -37,7 +67,7 @@ pub use differential::{Differential, DifferentialGeometry};
 pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::{ChassisLimits, LimitError};
-pub use mecanum::{Mecanum, MecanumGeometry, RollerMounting};
+pub use mecanum::{FloorO, FloorX, Mecanum, MecanumGeometry, RollerMounting};
 pub use mode::{GimbalEdge, Mode, ModeConfig, ModeError, Modes, Spin, WithoutGimbal};
 pub use odometry::Odometry;
 pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};

@@ -1,4 +1,4 @@
-use super::kinematics::Fastest;
+use super::kinematics::{Fastest, slowed};
 use crate::units::AngularVelocity;
 
 /// Makes a struct with one value for each named wheel, and what can be done with all of them at once.
@@ -94,7 +94,8 @@ macro_rules! named_wheels {
             pub fn desaturate(self, limit: AngularVelocity) -> Self {
                 let mut fastest = Fastest::default();
                 $(fastest.see(self.$wheel);)+
-                self.map(|wheel| fastest.limit(wheel, limit))
+                let scale = fastest.scale(limit);
+                self.map(|wheel| slowed(wheel, scale))
             }
         }
     };

@@ -92,9 +92,13 @@ impl<From, To> Transform2<From, To> {
     #[must_use]
     #[inline]
     pub const fn inverse(self) -> Transform2<To, From> {
-        let back = self.rotation.inverse();
-        let origin = back.apply(self.translation_m);
-        Transform2::new(back, Vec2::new(-origin.x, -origin.y))
+        let (back, t) = (self.rotation.inverse(), self.translation_m);
+        // The turned translation with its sign changed, the minus taken into the products.
+        let origin = Vec2::new(
+            back.sin() * t.y - back.cos() * t.x,
+            self.rotation.sin() * t.x - back.cos() * t.y,
+        );
+        Transform2::new(back, origin)
     }
 
     /// Returns where `From` stands as seen from `base`, both given in `To`.

@@ -1,0 +1,134 @@
+//! Every layout against `data/chassis/golden.txt`, which `generate.py` beside it computes without the crate's formulas.
+
+use drivetrain::chassis::{
+    Differential, DifferentialGeometry, DifferentialWheels, FloorX, Mecanum, MecanumGeometry,
+    MecanumWheels, Omni, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels, OmniWheel, Swerve,
+};
+use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::units::{Angle, AngularVelocity};
+
+const GOLDEN: &str = include_str!("data/chassis/golden.txt");
+const CORNERS: [Vec2; 4] =
+    [Vec2::new(0.2, 0.18), Vec2::new(0.2, -0.18), Vec2::new(-0.2, 0.18), Vec2::new(-0.2, -0.18)];
+
+fn numbers(text: &str) -> Vec<f32> {
+    text.split_whitespace().map(|number| number.parse().unwrap()).collect()
+}
+
+/// The motions of a layout with the values of its wheels.
+fn cases(layout: &str) -> Vec<(Twist<Body>, Vec<f32>)> {
+    let cases: Vec<_> = GOLDEN
+        .lines()
+        .map(|line| line.split('|').map(str::trim).collect::<Vec<_>>())
+        .filter(|fields| fields[0] == layout)
+        .map(|fields| {
+            let motion = numbers(fields[1]);
+            (Twist::new(motion[0], motion[1], motion[2]), numbers(fields[2]))
+        })
+        .collect();
+    assert_eq!(cases.len(), 9, "{layout}");
+    cases
+}
+
+fn compare<const N: usize>(
+    layout: &str,
+    inverse: impl Fn(Twist<Body>) -> [AngularVelocity; N],
+    forward: impl Fn([AngularVelocity; N]) -> Twist<Body>,
+) {
+    for (motion, expected) in cases(layout) {
+        let wheels: [f32; N] = expected.try_into().unwrap();
+        for (is, should) in inverse(motion).iter().zip(wheels) {
+            let error = (is.as_rad_per_s() - should).abs();
+            assert!(
+                error < 2e-5 * (1.0 + should.abs()),
+                "{layout} {motion:?}: {is:?}, not {should}"
+            );
+        }
+        let back = forward(wheels.map(AngularVelocity::from_rad_per_s));
+        // The differential drive cannot move sideways.
+        let sideways = if N == 2 { motion.vy_m_s } else { 0.0 };
+        let error = back + Twist::new(0.0, sideways, 0.0) - motion;
+        assert!(
+            error.linear().norm() < 1e-5 && error.wz_rad_s.abs() < 3e-5,
+            "{layout} {motion:?}: {error:?}"
+        );
+    }
+}
+
+#[test]
+fn mecanum_with_both_roller_mountings() {
+    let geometry =
+        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+    let usual = Mecanum::new(geometry).unwrap();
+    compare(
+        "mecanum_o",
+        |twist| usual.inverse(twist).into_array(),
+        |wheels| usual.forward(MecanumWheels::from_array(wheels)),
+    );
+    let wide = MecanumGeometry { half_wheelbase_m: 0.1, half_track_m: 0.3, ..geometry };
+    let other = Mecanum::<FloorX>::with_rollers(wide).unwrap();
+    compare(
+        "mecanum_x",
+        |twist| other.inverse(twist).into_array(),
+        |wheels| other.forward(MecanumWheels::from_array(wheels)),
+    );
+}
+
+#[test]
+fn omni_with_three_four_and_scattered_wheels() {
+    let three = OmniThree::new(0.05, 0.2).unwrap();
+    compare(
+        "omni_three",
+        |twist| three.inverse(twist).into_array(),
+        |wheels| three.forward(OmniThreeWheels::from_array(wheels)),
+    );
+    let four = OmniFour::new(0.05, 0.25).unwrap();
+    compare(
+        "omni_four",
+        |twist| four.inverse(twist).into_array(),
+        |wheels| four.forward(OmniFourWheels::from_array(wheels)),
+    );
+    let wheel = |x, y, degrees| OmniWheel {
+        position_m: Vec2::new(x, y),
+        direction: Angle::from_degrees(degrees),
+    };
+    let scattered = [
+        wheel(0.3, 0.1, 100.0),
+        wheel(0.0, -0.2, 10.0),
+        wheel(-0.1, 0.3, 170.0),
+        wheel(-0.3, -0.2, -60.0),
+    ];
+    let scattered = Omni::new(0.06, scattered).unwrap();
+    compare(
+        "omni_off_centre",
+        |twist| scattered.inverse(twist),
+        |wheels| scattered.forward(wheels),
+    );
+}
+
+#[test]
+fn differential() {
+    let geometry = DifferentialGeometry { wheel_radius_m: 0.076, half_track_m: 0.18 };
+    let chassis = Differential::new(geometry).unwrap();
+    compare(
+        "differential",
+        |twist| chassis.inverse(twist).into_array(),
+        |wheels| chassis.forward(DifferentialWheels::from_array(wheels)),
+    );
+}
+
+#[test]
+fn swerve_speeds_and_angles() {
+    let swerve = Swerve::new(0.076, CORNERS).unwrap();
+    let coarse = if cfg!(feature = "micromath") { 0.3 } else { 1e-3 };
+    for (motion, expected) in cases("swerve") {
+        for (module, should) in swerve.inverse(motion).iter().zip(expected.chunks(2)) {
+            assert!((module.velocity.as_rad_per_s() - should[0]).abs() < 2e-5 * (1.0 + should[0]));
+            let turn = (module.angle.as_degrees() - should[1]).abs();
+            assert!(
+                turn.min((turn - 360.0).abs()) < coarse,
+                "{motion:?}: {module:?}, not {should:?}"
+            );
+        }
+    }
+}
