@@ -201,7 +201,7 @@ fn whole_frames_are_found<P: Subject>(protocol: P, parts: &[(&[u8], bool)]) -> T
     let (frames, counts) = read(protocol, &stream, &[]);
     prop_assert_eq!(counts.frames as usize, frames.len());
     let found: Vec<P::Frame> = found.into_iter().map(|(_, frame)| frame).collect();
-    prop_assert_eq!(frames, found);
+    prop_assert_eq!(format!("{frames:?}"), format!("{found:?}")); // as text: a flipped bit may make NaN
     Ok(())
 }
 
@@ -269,7 +269,7 @@ macro_rules! laws {
                 #[test]
                 fn f58_noise_loses_no_frame(
                     seeds in prop::collection::vec(any::<u64>(), 1..5),
-                    noise in prop::collection::vec(0_u8..0x7F, 0..200),
+                    noise in prop::collection::vec(any::<u8>(), 0..200),
                 ) {
                     noise_loses_no_frame($protocol, &seeds, &noise)?;
                 }
@@ -352,4 +352,14 @@ fn a_pause_frees_what_a_damaged_length_holds_back() {
     assert_eq!(decoder.read(&mut &held_back[..]), None);
     decoder.abandon();
     assert!(decoder.read(&mut &[][..]).is_some());
+}
+
+#[test]
+fn f58_a_checksum_that_fits_by_chance_hides_no_frame() {
+    // The first 69 bytes of one frame with the first 13 of the next have a CRC that fits, and no quaternion.
+    let seed = 17_266_557_442_579_749_602;
+    let truncated = &HipNuc.frame(seed ^ 2)[..69];
+    let (frames, counts) =
+        read(HipNuc, &[truncated, &HipNuc.frame(seed), &[0x11; 82]].concat(), &[]);
+    assert_eq!((frames.len(), counts.content_errors), (1, 1));
 }

@@ -53,8 +53,8 @@ pub trait Protocol {
     /// Checks a whole frame and reads it.
     ///
     /// # Errors
-    /// [`Reject`] says what is wrong with the frame. [`Reject::Foreign`] and [`Reject::Content`] are for frames that
-    /// passed the checksum; they are skipped as a whole. After any other the bytes of the frame are searched again.
+    /// [`Reject`] says what is wrong with the frame. After [`Reject::Foreign`] it is skipped as a whole, after any other its
+    /// bytes are searched again.
     fn parse(&self, frame: &[u8]) -> Result<Self::Frame, Reject>;
 }
 
@@ -68,9 +68,10 @@ pub enum Reject {
     Length,
     /// The checksum does not fit.
     Checksum,
-    /// A good frame, but of a kind that this decoder does not read.
+    /// The checksum fits, but this decoder does not read frames of this kind.
     Foreign,
-    /// A good frame with a value that its field cannot have.
+    /// The checksum fits, but a field has a value that it cannot have. One damaged frame in 65536 looks like this by
+    /// chance (16-bit checksum), with a good one inside.
     Content,
 }
 
@@ -87,7 +88,7 @@ pub struct Counts {
     pub checksum_errors: u32,
     /// Good frames of a kind that is not read.
     pub foreign_frames: u32,
-    /// Good frames with an impossible value.
+    /// Frames with a fitting checksum and an impossible value.
     pub content_errors: u32,
     /// Bytes that belonged to no good frame: noise, and what is left of damaged frames.
     pub skipped_bytes: u32,
@@ -230,8 +231,10 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
             Reject::Content => count(&mut self.counts.content_errors, 1),
         }
         match reject {
-            Reject::Foreign | Reject::Content => self.discard(total),
-            Reject::Unframed | Reject::Length | Reject::Checksum => self.give_up(1),
+            Reject::Foreign => self.discard(total),
+            Reject::Unframed | Reject::Length | Reject::Checksum | Reject::Content => {
+                self.give_up(1);
+            }
         }
     }
 

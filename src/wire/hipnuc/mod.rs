@@ -56,7 +56,7 @@ const OVERHEAD: usize = 6;
 
 static CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_XMODEM);
 
-/// One measurement of an IMU. All its numbers are finite.
+/// One measurement of an IMU. Its numbers are finite, but for pressure and magnetic field on sensors that have none.
 ///
 /// Axes are those printed on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ pub struct Imu {
     pub status: u16,
     /// Temperature of the sensor in degrees Celsius.
     pub temperature_c: i8,
-    /// Air pressure in pascals, as it came; meaningless on sensors without barometer.
+    /// Air pressure in pascals, as it came; anything, NaN included, on sensors without barometer.
     pub pressure_pa: f32,
     /// Milliseconds since the sensor started, wrapping; `None` in a `92` frame, whose sources disagree on it.
     pub time_ms: Option<u32>,
@@ -75,7 +75,7 @@ pub struct Imu {
     pub acceleration_m_s2: [f32; 3],
     /// Angular velocity around x, y, z; counter-clockwise is positive.
     pub angular_velocity: [AngularVelocity; 3],
-    /// Magnetic field along x, y, z in microtesla.
+    /// Magnetic field along x, y, z in microtesla, as it came.
     pub magnetic_field_ut: [f32; 3],
     /// Roll as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
     pub roll: Angle,
@@ -129,11 +129,10 @@ impl Protocol for HipNuc {
 }
 
 impl Imu {
+    /// Tells whether everything that motion is computed from is finite.
     fn is_finite(&self) -> bool {
-        let numbers = self.acceleration_m_s2.iter().chain(&self.magnetic_field_ut);
-        let angles = [self.roll, self.pitch, self.yaw];
-        numbers.chain([&self.pressure_pa]).all(|number| number.is_finite())
+        self.acceleration_m_s2.iter().all(|acceleration| acceleration.is_finite())
             && self.angular_velocity.iter().all(|rate| rate.is_finite())
-            && angles.iter().all(|angle| angle.is_finite())
+            && [self.roll, self.pitch, self.yaw].iter().all(|angle| angle.is_finite())
     }
 }
