@@ -17,7 +17,7 @@ use crate::time::Instant;
 /// use drivetrain::motor::{Guard, TargetError};
 /// use drivetrain::time::Instant;
 ///
-/// let at_ms = |ms| Instant::from_micros(ms * 1_000);
+/// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
 /// let mut guard = Guard::new();
 /// assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
 /// guard.hear(at_ms(1));
@@ -133,7 +133,7 @@ impl Guard {
                 self.forgotten_targets = self.forgotten_targets.saturating_add(1);
             }
         }
-        self.armed && !self.latched && self.link == Link::Online && self.commanded.is_some()
+        self.is_armed() && self.link == Link::Online && self.commanded.is_some()
     }
 
     fn age(&mut self, now: Instant) {
@@ -176,14 +176,17 @@ impl Guard {
         self.listens && !(self.link == Link::Online && self.heard.is_some_and(fresh))
     }
 
-    /// Lets targets through from now on, starting from none. Without effect while stopped.
-    pub fn engage(&mut self, now: Instant) {
-        if !self.stopped {
-            self.now = self.now.max(now);
-            self.commanded = None;
-            self.latched = false;
-            self.armed = true;
+    /// Lets targets through from now on, starting from none, if the motor is heard; one that takes them already goes
+    /// on undisturbed. Without effect while stopped. Returns whether it starts.
+    pub fn engage(&mut self, now: Instant) -> bool {
+        if self.stopped || self.is_armed() || self.is_missing(now) {
+            return false;
         }
+        self.now = self.now.max(now);
+        self.commanded = None;
+        self.latched = false;
+        self.armed = true;
+        true
     }
 
     /// Refuses targets until it is engaged again.
@@ -203,10 +206,10 @@ impl Guard {
         self.stopped = false;
     }
 
-    /// Tells whether targets are taken.
+    /// Tells whether targets are taken: armed, and not relaxed by a fault since.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
-        self.armed
+        self.armed && !self.latched
     }
 
     /// Tells whether the emergency stop is set.

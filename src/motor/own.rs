@@ -95,6 +95,7 @@ pub struct Own<M> {
     resting: bool,
     held_steps: u8,
     waits: bool,
+    superseded: u32,
 }
 
 impl<M: OwnMotor> Own<M> {
@@ -109,6 +110,7 @@ impl<M: OwnMotor> Own<M> {
             resting: true,
             held_steps: 0,
             waits: false,
+            superseded: 0,
         }
     }
 
@@ -159,7 +161,12 @@ impl<M: OwnMotor> Own<M> {
 
     fn stop(&mut self) {
         self.rest();
-        self.output = [0; 8];
+        self.offer([0; 8]);
+    }
+
+    fn offer(&mut self, output: [u8; 8]) {
+        self.output = output;
+        self.superseded = self.superseded.wrapping_add(u32::from(self.waits));
         self.waits = true;
     }
 }
@@ -179,8 +186,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 
     fn update(&mut self, tick: Tick) {
-        self.output = self.command(tick);
-        self.waits = true;
+        let output = self.command(tick);
+        self.offer(output);
     }
 
     fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
@@ -193,6 +200,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     /// Each update offers the newest command anyway.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         frame.id() == self.motor.command_id() && !frame.is_remote_frame()
+    }
+
+    fn superseded(&self) -> u32 {
+        self.superseded
     }
 
     fn claims(&self) -> impl Iterator<Item = Claim> {
@@ -209,8 +220,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 
     fn engage(&mut self, now: Instant) {
-        self.rest();
-        self.guard.engage(now);
+        if self.guard.engage(now) {
+            self.rest();
+        }
     }
 
     fn disarm(&mut self) {
