@@ -17,18 +17,18 @@ impl Budget {
         Self { bit_rate: 1_000_000, feedback_hz: 1_000, tick_hz: 1_000, ceiling_percent: None }
     }
 
-    const fn load(&self, motors: u16, commands: u16) -> BusLoad {
+    const fn load(&self, motors: u32, commands: u32) -> BusLoad {
         BusLoad::new(self.bit_rate)
             .with_frames(motors, self.feedback_hz)
             .with_frames(commands, self.tick_hz)
     }
 
     /// Returns the highest feedback rate that fits below a ceiling beside the commands.
-    const fn feedback_within(&self, percent: u16, motors: u16, commands: u16) -> u32 {
+    const fn feedback_within(&self, percent: u16, motors: u32, commands: u32) -> u32 {
         let fits = BusLoad::new(self.bit_rate).frames_within(percent as f32 / 100.0);
-        let left = fits.saturating_sub(self.tick_hz.saturating_mul(commands as u32));
+        let left = fits.saturating_sub(self.tick_hz.saturating_mul(commands));
         let motors = if motors == 0 { 1 } else { motors };
-        left / motors as u32
+        left / motors
     }
 }
 
@@ -124,7 +124,7 @@ impl<B> Bus<B> {
         Some((load, ceiling, self.budget.feedback_within(ceiling, motors, commands)))
     }
 
-    const fn motor_count(&self) -> u16 {
+    const fn motor_count(&self) -> u32 {
         let mut slots = self.slots.as_slice();
         let mut count = 0;
         while let [slot, rest @ ..] = slots {

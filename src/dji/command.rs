@@ -92,12 +92,6 @@ fn ones(frames: u8) -> u32 {
     ONES.get(usize::from(frames & 31)).map_or(0, |ones| u32::from(*ones))
 }
 
-/// Counts the frames in a set, at most 8.
-#[expect(clippy::cast_possible_truncation, reason = "at most 8")]
-const fn count(frames: u8) -> u16 {
-    frames.count_ones() as u16
-}
-
 /// Where a motor's word stands: one of four slots in one of five frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Place(u8);
@@ -174,13 +168,13 @@ impl Outbox {
         self.keep_alive_us = period_us;
     }
 
-    pub(super) const fn frames_in_use(&self) -> u16 {
-        count(self.in_use)
+    pub(super) const fn frames_in_use(&self) -> u32 {
+        self.in_use.count_ones()
     }
 
     /// Returns how many frames are in use when this one is as well.
-    pub(super) const fn frames_in_use_with(&self, frame: CommandFrame) -> u16 {
-        count(self.in_use | frame.bit())
+    pub(super) const fn frames_in_use_with(&self, frame: CommandFrame) -> u32 {
+        (self.in_use | frame.bit()).count_ones()
     }
 
     /// Sends this frame from now on: the first time with the next update, whatever its words are.

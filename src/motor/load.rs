@@ -19,7 +19,7 @@
 /// ```
 /// use drivetrain::motor::BusLoad;
 ///
-/// const fn load(motors: u16) -> BusLoad {
+/// const fn load(motors: u32) -> BusLoad {
 ///     BusLoad::new(1_000_000).with_frames(motors, 1_000).with_frames(motors.div_ceil(4), 1_000)
 /// }
 /// // motors              4         5         6          7          8
@@ -55,8 +55,8 @@ impl BusLoad {
 
     /// Adds a number of frames, each at a rate in frames a second; saturates.
     #[must_use]
-    pub const fn with_frames(self, frames: u16, rate_hz: u32) -> Self {
-        let more = rate_hz.saturating_mul(frames as u32);
+    pub const fn with_frames(self, frames: u32, rate_hz: u32) -> Self {
+        let more = rate_hz.saturating_mul(frames);
         Self { frames_per_s: self.frames_per_s.saturating_add(more), ..self }
     }
 
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn absurd_numbers_saturate() {
-        let load = BusLoad::new(0).with_frames(u16::MAX, u32::MAX).with_frames(1, 1);
+        let load = BusLoad::new(0).with_frames(u32::MAX, u32::MAX).with_frames(1, 1);
         assert_eq!(
             (load.frames_per_s(), load.bit_rate(), load.worst_percent()),
             (u32::MAX, 1, u32::MAX)

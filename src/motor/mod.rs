@@ -16,24 +16,30 @@
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
+//! | [`OwnMotor`], [`Own`], [`Guard`] | a motor of your own, and the rules that make it safe |
 //! | [`BusLoad`] | how full the bus is |
 //!
-//! A user's own device joins by implementing [`CanDevice`]; devices are combined by tuples, arrays and
-//! `&mut`, so an own struct needs only to forward to a tuple of its fields.
+//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. Whatever
+//! does not fit that implements [`CanDevice`] itself, with a [`Guard`] for each motor. Devices are combined by tuples,
+//! arrays and `&mut`, so an own struct needs only to forward to a tuple of its fields.
 
 mod arming;
 mod claim;
 mod combine;
 mod device;
 mod drive;
+mod guard;
 mod link;
 mod load;
 mod name;
+mod own;
 
 pub use arming::{ArmError, Missing};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
+pub use guard::Guard;
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
 pub use name::MotorName;
+pub use own::{Own, OwnMotor};

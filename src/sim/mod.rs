@@ -24,6 +24,7 @@
 //! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
 //! | [`Record`], [`Traffic`] | every frame with its time, as a line of candump; bus load and counters |
+//! | [`check_contract`], [`Subject`], [`Rule`] | whether a device, yours too, keeps what it promises |
 //! | [`frame_bits`], [`nominal_bits`], [`worst_case_bits`] | how long a frame is on the wire |
 //!
 //! ```
@@ -66,6 +67,7 @@
 mod bits;
 mod body;
 mod chassis;
+mod contract;
 mod controller;
 mod engine;
 mod error;
@@ -81,6 +83,7 @@ mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState};
+pub use contract::{Rule, Subject, Violation, check_contract};
 pub use controller::{Controller, ControllerError};
 pub use error::AttachError;
 pub use fault::{Fault, FaultsFull};

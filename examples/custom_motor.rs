@@ -1,0 +1,203 @@
+//! A motor of your own beside DJI motors, on one bus and one runner: the `MyMotor` of many a team's base class.
+//!
+//! Its motor has a gear of 27, an id of its own and frames of its own; everything else, from arming to the command
+//! deadline, it has from the crate. `cargo run --example custom_motor`
+
+use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Malformed, MotorName, Own, OwnMotor};
+use drivetrain::units::AngularVelocity;
+use embedded_can::{Frame, Id, StandardId};
+
+const GEAR: f32 = 27.0;
+/// A per rad/s and A per rad of the output shaft.
+const SPEED: PidConfig = PidConfig::new(0.4, 4.0, 0.0).with_output_limit(8.0);
+
+/// Command 0x120 + id: amperes as `f32`. Feedback 0x140 + id: rotor rpm as `i16`, temperature. Little-endian.
+#[derive(Debug)]
+pub(crate) struct MyMotor {
+    id: u8,
+    rotor_rpm: i16,
+    temperature_c: u8,
+    speed: Pid,
+}
+
+impl MyMotor {
+    pub(crate) fn new(id: u8) -> Result<Self, drivetrain::control::ConfigError> {
+        Ok(Self { id, rotor_rpm: 0, temperature_c: 0, speed: Pid::new(SPEED)? })
+    }
+
+    pub(crate) fn temperature_c(&self) -> u8 {
+        self.temperature_c
+    }
+}
+
+impl OwnMotor for MyMotor {
+    fn name(&self) -> MotorName {
+        MotorName::new("MyMotor", self.id)
+    }
+
+    fn command_id(&self) -> Id {
+        standard(0x120 + u16::from(self.id))
+    }
+
+    fn feedback_id(&self) -> Id {
+        standard(0x140 + u16::from(self.id))
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+        let [low, high, temperature_c] = *frame.data() else {
+            return Err(Malformed::Length(frame.length()));
+        };
+        (self.rotor_rpm, self.temperature_c) = (i16::from_le_bytes([low, high]), temperature_c);
+        Ok(())
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rpm(f32::from(self.rotor_rpm) / GEAR)
+    }
+
+    fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
+        let measured = self.velocity().as_rad_per_s();
+        let amperes = self.speed.step(target.as_rad_per_s(), measured, step);
+        let [a, b, c, d] = amperes.to_le_bytes();
+        [a, b, c, d, 0, 0, 0, 0]
+    }
+
+    fn reset(&mut self) {
+        self.speed.reset();
+    }
+}
+
+fn standard(raw: u16) -> Id {
+    StandardId::new(raw).unwrap_or(StandardId::MAX).into()
+}
+
+/// That is all of it. From here on: the simulator, with the part of the motor's own ESC played by hand.
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    simulation::clash()?;
+    simulation::drive()
+}
+
+mod simulation {
+    use super::*;
+    use drivetrain::motor::{ArmError, CanDevice, Claim, Role, VelocityDrive};
+    use drivetrain::runner::{Nb, Runner};
+    use drivetrain::sim::{Line, Model, MotorConfig, World};
+    use drivetrain::time::{Duration, Instant};
+    use std::error::Error;
+
+    /// The ESC and the shaft of `MyMotor`: 0.2 Nm for each ampere, 0.004 kg m² and some friction at the output.
+    struct Esc {
+        id: u8,
+        amperes: f32,
+        rad_per_s: f32,
+    }
+
+    impl Esc {
+        fn hear(&mut self, frame: &CanFrame) {
+            if frame.id() == standard(0x120 + u16::from(self.id)) {
+                let [a, b, c, d, ..] = *frame.bytes();
+                self.amperes = f32::from_le_bytes([a, b, c, d]);
+            }
+        }
+
+        fn step(&mut self, dt_s: f32) {
+            let torque_nm = 0.2 * self.amperes - 0.01 * self.rad_per_s;
+            self.rad_per_s += torque_nm / 4e-3 * dt_s;
+        }
+
+        fn feedback(&self) -> Option<CanFrame> {
+            let rotor_rpm = AngularVelocity::from_rad_per_s(self.rad_per_s).as_rpm() * GEAR;
+            #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+            let [low, high] = (rotor_rpm as i16).to_le_bytes();
+            CanFrame::new(standard(0x140 + u16::from(self.id)), &[low, high, 31])
+        }
+    }
+
+    pub(crate) fn drive() -> Result<(), Box<dyn Error>> {
+        let world = World::new(1);
+        world.attach(MotorConfig::new(Model::M3508, 1))?;
+        let mut esc = Esc { id: 3, amperes: 0.0, rad_per_s: 0.0 };
+
+        let mut bus = Bus::new();
+        let wheel =
+            bus.attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(0.6, 6.0, 0.0)))?;
+        let robot = (bus, Own::new(MyMotor::new(3)?)); // a tuple of devices is a device
+        let mut runner = Runner::new(Nb(world.controller()), world.clock(), robot);
+
+        let (rpm, mine_rpm) = (200.0, -150.0);
+        for ms in 0..1_000 {
+            world.advance_with(Duration::from_millis(1), |record| esc.hear(&record.frame));
+            esc.step(0.001);
+            if let Some(frame) = esc.feedback() {
+                let _full = world.inject(Line::Can1, frame);
+            }
+            runner.poll(16);
+            let Some(tick) = runner.due() else { continue };
+            let _not_yet = runner.is_armed() || runner.arm(tick).is_ok();
+            let (bus, mine) = runner.device_mut();
+            _ = bus.set_velocity(wheel, AngularVelocity::from_rpm(rpm)); // refused until armed
+            _ = mine.set_velocity((), AngularVelocity::from_rpm(mine_rpm));
+            runner.tick(tick);
+            if ms % 200 == 199 {
+                let (bus, mine) = runner.device();
+                let dji = bus.velocity(wheel).map_or(f32::NAN, AngularVelocity::as_rpm);
+                let own = mine.velocity(()).map_or(f32::NAN, AngularVelocity::as_rpm);
+                println!("{:>5} ms   M3508 {dji:7.1} rpm   MyMotor {own:7.1} rpm", ms + 1);
+            }
+        }
+        let (bus, mine) = runner.device();
+        let dji = bus.velocity(wheel).ok_or("M3508 was lost")?.as_rpm();
+        let own = mine.velocity(()).ok_or("MyMotor was lost")?.as_rpm();
+        if (dji - rpm).abs() > 4.0
+            || (own - mine_rpm).abs() > 3.0
+            || mine.motor().temperature_c() != 31
+        {
+            return Err(format!("{dji} and {own} rpm are not {rpm} and {mine_rpm}").into());
+        }
+        Ok(())
+    }
+
+    /// A Damiao motor in its speed mode, command 0x200 + id: a classic trap beside DJI motors.
+    struct DamiaoSpeed(MyMotor);
+
+    impl OwnMotor for DamiaoSpeed {
+        fn name(&self) -> MotorName {
+            MotorName::new("DM4310 (velocity)", self.0.id)
+        }
+        fn command_id(&self) -> Id {
+            standard(0x200 + u16::from(self.0.id))
+        }
+        fn feedback_id(&self) -> Id {
+            standard(0x010 + u16::from(self.0.id))
+        }
+        fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+            self.0.decode(frame)
+        }
+        fn velocity(&self) -> AngularVelocity {
+            self.0.velocity()
+        }
+        fn control(&mut self, target: AngularVelocity, _step: &TimeStep) -> [u8; 8] {
+            let [a, b, c, d] = target.as_rad_per_s().to_le_bytes();
+            [a, b, c, d, 0, 0, 0, 0]
+        }
+        fn reset(&mut self) {}
+    }
+
+    /// Both sides would send 0x201: refused when arming, before anything moves.
+    pub(crate) fn clash() -> Result<(), Box<dyn Error>> {
+        let mut bus = Bus::new();
+        bus.attach(Config::<M3508>::new(1))?;
+        let mut robot = (bus, Own::new(DamiaoSpeed(MyMotor::new(1)?)));
+        match robot.arm(Instant::START) {
+            Err(ArmError::Clash(one, other)) => {
+                println!("refused: {one} clashes with {other}");
+                let clash = [&one, &other].map(Claim::role) == [Role::Feedback, Role::Command];
+                if clash { Ok(()) } else { Err("the wrong clash".into()) }
+            }
+            outcome => Err(format!("expected a clash, got {outcome:?}").into()),
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! One robot on two CAN buses: front wheels on the first, rear wheels on the second.
+//!
+//! There are two runners that share nothing, and one application that holds wheel values by name. Each bus has its own
+//! brand, so that a handle of the one does not compile with the other. When one bus is down the application stops both,
+//! because half a chassis pulls sideways; that is its decision. `cargo run --example two_buses`
+
+use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{AttachError, Bus, Config, Handle, M3508};
+use drivetrain::geometry::Twist;
+use drivetrain::motor::{CanDevice, VelocityDrive};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{
+    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, SimClock, World,
+};
+use drivetrain::time::{Duration, Instant};
+use drivetrain::units::AngularVelocity;
+use std::error::Error;
+
+const GEOMETRY: MecanumGeometry =
+    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+/// A per rad/s and A per rad of the output shaft.
+const SPEED: PidConfig = PidConfig::new(4.0, 40.0, 0.0);
+
+struct Front;
+struct Rear;
+
+/// One bus with the wheels of one axle.
+struct Axle<'w, B> {
+    runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus<B>>,
+    left: Handle<M3508, B>,
+    right: Handle<M3508, B>,
+}
+
+impl<'w, B> Axle<'w, B> {
+    fn new(world: &'w World, line: Line) -> Result<Self, AttachError> {
+        let mut bus = Bus::<B>::branded();
+        let left = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED))?;
+        let right = bus.attach(Config::<M3508>::new(2).speed_loop(SPEED).reversed())?;
+        Ok(Self {
+            runner: Runner::new(Nb(world.controller_on(line)), world.clock(), bus),
+            left,
+            right,
+        })
+    }
+
+    /// Takes what was received; arms when that is possible.
+    fn poll(&mut self) {
+        self.runner.poll(16);
+    }
+
+    /// Runs one step if one is due. Without speeds it stays, or goes, unarmed.
+    fn tick(&mut self, speeds: Option<(AngularVelocity, AngularVelocity)>) {
+        let Some(tick) = self.runner.due() else { return };
+        match speeds {
+            Some((left, right)) => {
+                let _not_yet = self.runner.is_armed() || self.runner.arm(tick).is_ok();
+                _ = self.runner.device_mut().drive([(self.left, left), (self.right, right)]);
+            }
+            None => self.runner.device_mut().disarm(),
+        }
+        self.runner.tick(tick);
+    }
+
+    fn velocities(&self) -> Option<(AngularVelocity, AngularVelocity)> {
+        let bus = self.runner.device();
+        Some((bus.velocity(self.left)?, bus.velocity(self.right)?))
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let world = World::new(1);
+    let wheel = |id, line| world.attach(MotorConfig::new(Model::M3508, id).with_line(line));
+    let wheels = MecanumWheels {
+        front_left: wheel(1, Line::Can1)?,
+        front_right: wheel(2, Line::Can1)?,
+        rear_left: wheel(1, Line::Can2)?,
+        rear_right: wheel(2, Line::Can2)?,
+    };
+    world.attach_chassis(ChassisConfig::new(GEOMETRY), wheels)?;
+    let fault = Instant::from_micros(1_500_000)..Instant::from_micros(1_900_000);
+    world.fault(Fault::Unplugged(Line::Can2), fault)?;
+
+    let mecanum = Mecanum::new(GEOMETRY)?;
+    let mut front = Axle::<Front>::new(&world, Line::Can1)?;
+    let mut rear = Axle::<Rear>::new(&world, Line::Can2)?;
+    let (mut fastest, mut front_relaxed) = (0.0_f32, true);
+
+    for ms in 0..3_000 {
+        world.advance(Duration::from_millis(1));
+        front.poll();
+        rear.poll();
+        let measured = front.velocities().zip(rear.velocities());
+        let speeds = measured.map(|_| mecanum.inverse(Twist::new(0.8, 0.3, 0.0)));
+        front.tick(speeds.map(|wheels| (wheels.front_left, wheels.front_right)));
+        rear.tick(speeds.map(|wheels| (wheels.rear_left, wheels.rear_right)));
+
+        let truth = world.chassis().ok_or("no chassis")?.twist;
+        match ms {
+            1_000..1_500 => fastest = fastest.max(truth.vx_m_s),
+            1_520..1_900 => {
+                let commands = [wheels.front_left, wheels.front_right].map(|key| world.motor(key));
+                front_relaxed &= commands.iter().flatten().all(|motor| motor.command == 0);
+            }
+            _ => {}
+        }
+        if ms % 250 == 249 {
+            let odometry = measured.map(|((front_left, front_right), (rear_left, rear_right))| {
+                let wheels = MecanumWheels { front_left, front_right, rear_left, rear_right };
+                mecanum.forward(wheels).vx_m_s
+            });
+            let heard = odometry.map_or("a bus is down".into(), |vx| format!("{vx:5.2} m/s"));
+            println!("{:>5} ms   true {:5.2} m/s   odometry {heard}", ms + 1, truth.vx_m_s);
+        }
+    }
+    let back = world.chassis().ok_or("no chassis")?.twist;
+    println!(
+        "frames sent: {} in front, {} in the rear; buses lost: {} and {}",
+        front.runner.statistics().sent,
+        rear.runner.statistics().sent,
+        front.runner.statistics().bus_losses,
+        rear.runner.statistics().bus_losses
+    );
+    let good = (fastest - 0.8).abs() < 0.05 && (back.vx_m_s - 0.8).abs() < 0.05;
+    if !front_relaxed {
+        return Err("the front axle was driven while the rear bus was down".into());
+    }
+    if !good || front.runner.statistics().bus_losses != 0 {
+        return Err(format!("{fastest:.2} m/s before and {:.2} after, not 0.8", back.vx_m_s).into());
+    }
+    Ok(())
+}

@@ -1,0 +1,315 @@
+use super::{Link, TargetError, Timeouts};
+use crate::time::Instant;
+
+/// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
+///
+/// It keeps the rules that all motors here have in common, so that an own motor has them too: nothing before it is
+/// armed; feedback that is late or lost, a target that is old, NaN or infinite, and time that goes back give zero; an
+/// emergency stop stays until it is cleared and armed. Times do not wrap.
+///
+/// ```text
+/// feedback ──> hear(now)          target ──> admit(is_finite)?
+///                                 tick   ──> drives(now)?  then its output, otherwise zero and loops reset
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Guard, TargetError};
+/// use drivetrain::time::Instant;
+///
+/// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+/// let mut guard = Guard::new();
+/// assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
+/// guard.hear(at_ms(1));
+/// guard.engage(at_ms(1));
+/// assert_eq!(guard.admit(true), Ok(()));
+/// assert!(guard.drives(at_ms(11))); // heard 10 ms ago
+/// assert!(!guard.drives(at_ms(12))); // late: zero, until it is heard again
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Guard {
+    timeouts: Timeouts,
+    now: Instant,
+    heard: Option<Instant>,
+    commanded: Option<Instant>,
+    link: Link,
+    good_frames: u8,
+    listens: bool,
+    armed: bool,
+    latched: bool,
+    stopped: bool,
+    refused_targets: u16,
+    forgotten_targets: u16,
+    reversals: u16,
+}
+
+impl Guard {
+    /// Makes one for a motor with feedback: disarmed, not heard.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            timeouts: Timeouts::new(),
+            now: Instant::START,
+            heard: None,
+            commanded: None,
+            link: Link::Unheard,
+            good_frames: 0,
+            listens: true,
+            armed: false,
+            latched: false,
+            stopped: false,
+            refused_targets: 0,
+            forgotten_targets: 0,
+            reversals: 0,
+        }
+    }
+
+    /// Makes one for a motor that reports nothing, such as a servo: it counts as heard.
+    #[must_use]
+    pub const fn without_feedback() -> Self {
+        Self { listens: false, link: Link::Online, ..Self::new() }
+    }
+
+    /// Sets when feedback and commands count as lost.
+    #[must_use]
+    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { timeouts, ..self }
+    }
+
+    /// Notes valid feedback that arrived at `now`.
+    pub fn hear(&mut self, now: Instant) {
+        let in_a_row = self.heard.is_some_and(|heard| now.since(heard) <= self.timeouts.late());
+        self.heard = Some(self.heard.map_or(now, |heard| heard.max(now)));
+        self.link = match self.link {
+            Link::Unheard | Link::Online | Link::Late => Link::Online,
+            Link::Offline | Link::Recovering => {
+                let before =
+                    if self.link == Link::Recovering && in_a_row { self.good_frames } else { 0 };
+                self.good_frames = before.saturating_add(1);
+                let enough = self.good_frames >= self.timeouts.good_frames();
+                if enough { Link::Online } else { Link::Recovering }
+            }
+        };
+    }
+
+    /// Tells whether a new target may be taken, and notes its time when it is.
+    ///
+    /// # Errors
+    /// Says why not. A target that is not finite takes the present one away, and is counted.
+    pub const fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        if !self.armed {
+            return Err(TargetError::Disarmed);
+        }
+        if self.latched {
+            return Err(TargetError::Relaxed);
+        }
+        if !matches!(self.link, Link::Online) {
+            return Err(TargetError::NoFeedback);
+        }
+        if !is_finite {
+            self.refused_targets = self.refused_targets.saturating_add(1);
+            self.commanded = None;
+            return Err(TargetError::NotFinite);
+        }
+        self.commanded = Some(self.now);
+        Ok(())
+    }
+
+    /// Moves the time on to that of a tick and tells whether the motor may be driven in it. When it may not, send
+    /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
+    #[must_use]
+    pub fn drives(&mut self, now: Instant) -> bool {
+        if now < self.now {
+            // Ages cannot be told any more.
+            self.reversals = self.reversals.saturating_add(1);
+            self.heard = self.heard.map(|heard| heard.min(now));
+            self.lose();
+        }
+        self.now = now;
+        self.age(now);
+        if let Some(commanded) = self.commanded {
+            if now.since(commanded) > self.timeouts.command() {
+                self.commanded = None;
+                self.forgotten_targets = self.forgotten_targets.saturating_add(1);
+            }
+        }
+        self.is_armed() && self.link == Link::Online && self.commanded.is_some()
+    }
+
+    fn age(&mut self, now: Instant) {
+        if !self.listens {
+            return;
+        }
+        let Some(heard) = self.heard else { return };
+        let age = now.since(heard);
+        if age > self.timeouts.offline().max(self.timeouts.late()) {
+            self.lose();
+        } else if age > self.timeouts.late() && self.link == Link::Online {
+            self.link = Link::Late;
+        }
+    }
+
+    /// Takes the motor for lost: relaxed, and latched until it is armed again.
+    fn lose(&mut self) {
+        if matches!(self.link, Link::Online | Link::Late | Link::Recovering) && self.listens {
+            self.link = Link::Offline;
+        }
+        self.latched = true;
+        self.commanded = None;
+    }
+
+    /// Tells whether there is a target that still counts.
+    #[must_use]
+    pub const fn has_target(&self) -> bool {
+        self.commanded.is_some()
+    }
+
+    /// Takes the target away.
+    pub const fn relax(&mut self) {
+        self.commanded = None;
+    }
+
+    /// Tells whether feedback is missing for arming at `now`.
+    #[must_use]
+    pub fn is_missing(&self, now: Instant) -> bool {
+        let fresh = |heard| now.since(heard) <= self.timeouts.late();
+        self.listens && !(self.link == Link::Online && self.heard.is_some_and(fresh))
+    }
+
+    /// Lets targets through from now on, starting from none, if the motor is heard; one that takes them already goes
+    /// on undisturbed. Without effect while stopped. Returns whether it starts.
+    pub fn engage(&mut self, now: Instant) -> bool {
+        if self.stopped || self.is_armed() || self.is_missing(now) {
+            return false;
+        }
+        self.now = self.now.max(now);
+        self.commanded = None;
+        self.latched = false;
+        self.armed = true;
+        true
+    }
+
+    /// Refuses targets until it is engaged again.
+    pub const fn disarm(&mut self) {
+        self.armed = false;
+        self.commanded = None;
+    }
+
+    /// Disarms, and stays so until it is cleared and engaged.
+    pub const fn emergency_stop(&mut self) {
+        self.disarm();
+        self.stopped = true;
+    }
+
+    /// Takes the emergency stop back; the motor stays disarmed.
+    pub const fn clear_emergency_stop(&mut self) {
+        self.stopped = false;
+    }
+
+    /// Tells whether targets are taken: armed, and not relaxed by a fault since.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.armed && !self.latched
+    }
+
+    /// Tells whether the emergency stop is set.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+
+    /// Returns whether the motor is heard.
+    #[must_use]
+    pub const fn link(&self) -> Link {
+        self.link
+    }
+
+    /// Returns how often a target was NaN or infinite, saturating.
+    #[must_use]
+    pub const fn refused_targets(&self) -> u16 {
+        self.refused_targets
+    }
+
+    /// Returns how often no target came in time, saturating.
+    #[must_use]
+    pub const fn forgotten_targets(&self) -> u16 {
+        self.forgotten_targets
+    }
+
+    /// Returns how often time went back, saturating.
+    #[must_use]
+    pub const fn reversals(&self) -> u16 {
+        self.reversals
+    }
+}
+
+impl Default for Guard {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    fn at_ms(ms: u64) -> Instant {
+        Instant::START + Duration::from_millis(ms)
+    }
+
+    fn driving() -> Guard {
+        let mut guard = Guard::new();
+        guard.hear(at_ms(1));
+        guard.engage(at_ms(1));
+        guard.admit(true).unwrap();
+        guard
+    }
+
+    #[test]
+    fn an_offline_motor_needs_ten_frames_in_a_row_and_arming() {
+        let mut guard = driving();
+        assert!(!guard.drives(at_ms(102)));
+        assert_eq!((guard.link(), guard.admit(true)), (Link::Offline, Err(TargetError::Relaxed)));
+        for ms in (103..112).chain(130..139) {
+            guard.hear(at_ms(ms));
+            assert!(guard.link() == Link::Recovering && guard.is_missing(at_ms(ms)), "{ms}");
+        }
+        guard.hear(at_ms(139));
+        assert_eq!((guard.link(), guard.admit(true)), (Link::Online, Err(TargetError::Relaxed)));
+        guard.engage(at_ms(139));
+        assert_eq!(guard.admit(true), Ok(()));
+        assert!(guard.drives(at_ms(140)));
+    }
+
+    #[test]
+    fn targets_grow_old_are_counted_and_can_be_set_again() {
+        let mut guard = driving();
+        for ms in 2..=110 {
+            guard.hear(at_ms(ms));
+            assert_eq!(guard.drives(at_ms(ms)), ms <= 101, "{ms}");
+        }
+        assert_eq!((guard.forgotten_targets(), guard.has_target()), (1, false));
+        assert_eq!(guard.admit(false), Err(TargetError::NotFinite));
+        assert_eq!((guard.refused_targets(), guard.admit(true)), (1, Ok(())));
+    }
+
+    #[test]
+    fn time_that_goes_back_is_never_fresh_for_ever() {
+        for mut guard in [driving(), Guard { listens: false, ..driving() }] {
+            assert!(guard.drives(at_ms(5)));
+            assert!(!guard.drives(at_ms(4)));
+            assert_eq!((guard.reversals(), guard.admit(true)), (1, Err(TargetError::Relaxed)));
+        }
+    }
+
+    #[test]
+    fn an_emergency_stop_outlasts_engaging() {
+        let mut guard = driving();
+        guard.emergency_stop();
+        guard.engage(at_ms(2));
+        assert!(!guard.is_armed() && guard.is_stopped() && !guard.drives(at_ms(2)));
+        guard.clear_emergency_stop();
+        assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
+    }
+}

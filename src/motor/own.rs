@@ -1,0 +1,262 @@
+use super::{
+    CanDevice, Claim, Guard, Ingest, Malformed, MotorName, Role, TargetError, Timeouts,
+    VelocityDrive,
+};
+use crate::control::TimeStep;
+use crate::frame::CanFrame;
+use crate::time::{Instant, Tick};
+use crate::units::AngularVelocity;
+use embedded_can::{Frame, Id};
+
+/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
+const LONGEST_STEP_S: f32 = 0.02;
+
+/// What is special about a motor of your own: its ids, its frames and its loop.
+///
+/// [`Own`] makes a device of it, with everything that all motors have in common. The example `custom_motor` is a whole one.
+pub trait OwnMotor {
+    /// Returns how the motor is called in errors.
+    fn name(&self) -> MotorName;
+
+    /// Returns the id of its command frame.
+    fn command_id(&self) -> Id;
+
+    /// Returns the id of its feedback frame.
+    fn feedback_id(&self) -> Id;
+
+    /// Takes a data frame with its feedback id.
+    ///
+    /// # Errors
+    /// Says why it is not its feedback; it must have changed nothing then.
+    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed>;
+
+    /// Returns the measured velocity of the output shaft.
+    fn velocity(&self) -> AngularVelocity;
+
+    /// Runs the loop for one step and returns the data of the command frame. The target is finite, and the step is
+    /// never on hold.
+    fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8];
+
+    /// Brings the loop to rest: called before the motor is driven, and when it stops.
+    fn reset(&mut self);
+}
+
+/// A motor of your own as a device of the runner, beside all others.
+///
+/// Disarmed at start; late and lost feedback, an old target, one that is not finite, a bad time step and an emergency
+/// stop give a command of eight zero bytes: [`Guard`] has the rules. The command goes out with every update.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Pid, PidConfig, TimeStep};
+/// use drivetrain::motor::*;
+/// use drivetrain::time::{Instant, Tick};
+/// use drivetrain::units::AngularVelocity;
+/// use drivetrain::frame::CanFrame;
+/// use embedded_can::{Frame, Id, StandardId};
+///
+/// struct Mine { rpm: i16, speed: Pid }
+///
+/// impl OwnMotor for Mine {
+///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
+///     fn command_id(&self) -> Id { StandardId::new(0x123).unwrap_or(StandardId::ZERO).into() }
+///     fn feedback_id(&self) -> Id { StandardId::new(0x124).unwrap_or(StandardId::ZERO).into() }
+///     fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+///         let [high, low] = *frame.data() else { return Err(Malformed::Length(frame.length())) };
+///         self.rpm = i16::from_be_bytes([high, low]);
+///         Ok(())
+///     }
+///     fn velocity(&self) -> AngularVelocity { AngularVelocity::from_rpm(self.rpm.into()) }
+///     fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
+///         let output = self.speed.step(target.as_rpm(), self.velocity().as_rpm(), step);
+///         let [high, low] = (output as i16).to_be_bytes();
+///         [high, low, 0, 0, 0, 0, 0, 0]
+///     }
+///     fn reset(&mut self) { self.speed.reset() }
+/// }
+///
+/// let mut motor = Own::new(Mine { rpm: 0, speed: Pid::new(PidConfig::new(2.0, 0.0, 0.0))? });
+/// let now = Instant::from_micros(1_000);
+/// let feedback = CanFrame::new(motor.motor().feedback_id(), &[0, 50]).ok_or("length")?; // 50 rpm
+/// assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
+/// motor.arm(now)?;
+/// motor.set_velocity((), AngularVelocity::from_rpm(150.0))?;
+/// motor.update(Tick::new(now, 0.001));
+/// let frame = motor.next_frame(0).ok_or("nothing to send")?;
+/// assert_eq!(format!("{frame:?}"), "123 [8] 00 C8 00 00 00 00 00 00"); // 2 * (150 - 50)
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Own<M> {
+    motor: M,
+    guard: Guard,
+    target: AngularVelocity,
+    output: [u8; 8],
+    resting: bool,
+    held_steps: u8,
+    waits: bool,
+    superseded: u32,
+}
+
+impl<M: OwnMotor> Own<M> {
+    /// Takes the motor: disarmed.
+    #[must_use]
+    pub const fn new(motor: M) -> Self {
+        Self {
+            motor,
+            guard: Guard::new(),
+            target: AngularVelocity::ZERO,
+            output: [0; 8],
+            resting: true,
+            held_steps: 0,
+            waits: false,
+            superseded: 0,
+        }
+    }
+
+    /// Sets when feedback and commands count as lost.
+    #[must_use]
+    pub fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { guard: self.guard.with_timeouts(timeouts), ..self }
+    }
+
+    /// Returns the motor.
+    #[must_use]
+    pub const fn motor(&self) -> &M {
+        &self.motor
+    }
+
+    /// Returns what decides whether it may be driven.
+    #[must_use]
+    pub const fn guard(&self) -> &Guard {
+        &self.guard
+    }
+
+    /// Returns the command that this step asks for.
+    fn command(&mut self, tick: Tick) -> [u8; 8] {
+        let drives = self.guard.drives(tick.now());
+        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
+        if !drives {
+            // A late motor keeps its integral, one without a target starts afresh.
+            if !self.guard.has_target() {
+                self.rest();
+            }
+            return [0; 8];
+        }
+        if step.is_hold() {
+            self.held_steps = self.held_steps.saturating_add(1);
+            return if self.held_steps >= 2 { [0; 8] } else { self.output };
+        }
+        self.held_steps = 0;
+        self.resting = false;
+        self.motor.control(self.target, &step)
+    }
+
+    fn rest(&mut self) {
+        if !self.resting {
+            self.motor.reset();
+            self.resting = true;
+        }
+    }
+
+    fn stop(&mut self) {
+        self.rest();
+        self.offer([0; 8]);
+    }
+
+    fn offer(&mut self, output: [u8; 8]) {
+        self.output = output;
+        self.superseded = self.superseded.wrapping_add(u32::from(self.waits));
+        self.waits = true;
+    }
+}
+
+impl<M: OwnMotor> CanDevice for Own<M> {
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if frame.id() != self.motor.feedback_id() || frame.is_remote_frame() {
+            return Ingest::Unrelated;
+        }
+        match self.motor.decode(frame) {
+            Ok(()) => {
+                self.guard.hear(now);
+                Ingest::Taken
+            }
+            Err(why) => Ingest::Malformed(why),
+        }
+    }
+
+    fn update(&mut self, tick: Tick) {
+        let output = self.command(tick);
+        self.offer(output);
+    }
+
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        if !core::mem::take(&mut self.waits) {
+            return None;
+        }
+        CanFrame::new(self.motor.command_id(), &self.output)
+    }
+
+    /// Each update offers the newest command anyway.
+    fn requeue(&mut self, frame: &CanFrame) -> bool {
+        frame.id() == self.motor.command_id() && !frame.is_remote_frame()
+    }
+
+    fn superseded(&self) -> u32 {
+        self.superseded
+    }
+
+    fn claims(&self) -> impl Iterator<Item = Claim> {
+        let name = self.motor.name();
+        [
+            Claim::new(self.motor.feedback_id(), Role::Feedback, name),
+            Claim::new(self.motor.command_id(), Role::Command, name),
+        ]
+        .into_iter()
+    }
+
+    fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
+        self.guard.is_missing(now).then(|| self.motor.name()).into_iter()
+    }
+
+    fn engage(&mut self, now: Instant) {
+        if self.guard.engage(now) {
+            self.rest();
+        }
+    }
+
+    fn disarm(&mut self) {
+        self.guard.disarm();
+        self.stop();
+    }
+
+    fn is_armed(&self) -> bool {
+        self.guard.is_armed()
+    }
+
+    fn emergency_stop(&mut self) {
+        self.guard.emergency_stop();
+        self.stop();
+    }
+
+    fn clear_emergency_stop(&mut self) {
+        self.guard.clear_emergency_stop();
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.guard.is_stopped()
+    }
+}
+
+/// There is one motor, so its handle is `()`.
+impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        (self.guard.link() == super::Link::Online).then(|| self.motor.velocity())
+    }
+
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        self.guard.admit(target.as_rad_per_s().is_finite())?;
+        self.target = target;
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! Whether a device keeps what `CanDevice` promises.
+
+mod rules;
+mod run;
+
+use crate::frame::CanFrame;
+use crate::motor::{CanDevice, TargetError};
+
+/// What [`check_contract`] has to know of a device.
+pub trait Subject {
+    /// The device.
+    type Device: CanDevice;
+
+    /// Returns the device.
+    fn device(&mut self) -> &mut Self::Device;
+
+    /// Returns how many motors it has.
+    fn motors(&self) -> usize;
+
+    /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame, in which it stands still.
+    fn feedback(&self, motor: usize) -> Option<CanFrame>;
+
+    /// Sets the targets of all motors to this share of something that moves them, and so gives commands that are not
+    /// zero; NaN is passed on.
+    ///
+    /// # Errors
+    /// The first error.
+    fn drive(&mut self, share: f32) -> Result<(), TargetError>;
+
+    /// Tells whether a command frame asks for nothing: eight zeros, unless said otherwise.
+    fn is_zero(&self, command: &CanFrame) -> bool {
+        *command.bytes() == [0; 8]
+    }
+
+    /// Returns the milliseconds after which lost feedback has to be zero output, one tick included.
+    fn late_ms(&self) -> u64 {
+        11
+    }
+
+    /// Returns the milliseconds after which a target no longer counts, one tick included.
+    fn command_ms(&self) -> u64 {
+        101
+    }
+}
+
+/// What a device has to do.
+///
+/// Each rule is the invariant of that name in `docs/faults.md`, or a sentence of [`CanDevice`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Rule {
+    /// Its claims have the ids that its motors send, and no two of them clash.
+    ClaimsFeedback,
+    /// Each frame that it offers is a data frame with an id that it claims as a command (I3).
+    SendsWhatItClaims,
+    /// It offers no more than 64 frames between two updates.
+    IsBounded,
+    /// Disarmed, it asks for nothing and refuses targets.
+    DisarmedIsZero,
+    /// Arming fails as long as a motor is not heard, and the error counts the missing.
+    MissingAreNamed,
+    /// With all motors heard it can be armed, and a target then leads to a command.
+    ArmedDrives,
+    /// Foreign, remote and extended frames are handed back and change nothing (I5).
+    ForeignIsUnrelated,
+    /// Feedback that is too short is not taken and changes nothing (I5).
+    ShortIsNotTaken,
+    /// Frames that were not taken do not count as signs of life.
+    RejectedIsNotFresh,
+    /// Without feedback a motor's output is zero within a tick of the limit (I4).
+    LateIsZero,
+    /// One silent motor does not stop the others (I8).
+    OthersGoOn,
+    /// Without new targets the output is zero within a tick of the deadline (I4).
+    OldTargetsAreZero,
+    /// A target that is NaN is an error and gives zero.
+    NanIsZero,
+    /// A second bad time step in a row gives zero.
+    BadStepsAreZero,
+    /// A frame that is given back is taken, waits for the next update, and comes again with the newest values (I7).
+    RequeuedComesAgain,
+    /// A frame that is not its own is not taken back.
+    ForeignIsNotRequeued,
+    /// After an emergency stop all that comes is zero, and arming fails, until it is cleared and armed.
+    EmergencyStopStays,
+    /// After disarming, and after arming again, all that comes is zero until there is a target (I9).
+    StartsFromZero,
+    /// The same inputs give the same frames (I10).
+    IsDeterministic,
+}
+
+/// A rule that a device breaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Violation {
+    /// The rule.
+    pub rule: Rule,
+    /// When, in milliseconds since the device was made.
+    pub at_ms: u64,
+}
+
+impl core::fmt::Display for Violation {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:?} is broken after {} ms", self.rule, self.at_ms)
+    }
+}
+
+impl core::error::Error for Violation {}
+
+/// Checks a device against what [`CanDevice`] promises, yours too: makes fresh ones, plays their motors, and watches
+/// what they send.
+///
+/// # Examples
+/// ```
+/// use drivetrain::dji::{Bus, Config, Handle, M3508};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::TargetError;
+/// use drivetrain::sim::{Rule, Subject, check_contract};
+/// use drivetrain::units::Current;
+///
+/// struct OneWheel(Bus, Handle<M3508>);
+///
+/// impl Subject for OneWheel {
+///     type Device = Bus;
+///     fn device(&mut self) -> &mut Bus { &mut self.0 }
+///     fn motors(&self) -> usize { 1 }
+///     fn feedback(&self, _motor: usize) -> Option<CanFrame> { CanFrame::standard(0x201, [0; 8]) }
+///     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+///         self.0.set_current(self.1, Current::from_amperes(5.0 * share))
+///     }
+/// }
+///
+/// let make = || {
+///     let mut bus = Bus::new();
+///     let wheel = bus.attach(Config::new(1)).expect("a free id");
+///     OneWheel(bus, wheel)
+/// };
+/// assert_eq!(check_contract(make), Ok(19)); // rules
+/// ```
+///
+/// # Errors
+/// The first rule that the device breaks.
+pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, Violation> {
+    rules::check(&make)
+}

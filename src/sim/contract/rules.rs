@@ -1,0 +1,286 @@
+use super::run::{Output, Run};
+use super::{Rule, Subject, Violation};
+use crate::frame::CanFrame;
+use crate::motor::{ArmError, CanDevice, Claim, Ingest, Role, TargetError};
+use crate::time::Tick;
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+
+type Outcome = Result<(), Violation>;
+
+/// Checks every rule on devices of its own; returns how many there are.
+pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violation> {
+    claims(Run::new(make()))?;
+    disarmed(Run::new(make()))?;
+    missing(Run::new(make()))?;
+    armed(Run::driving(make())?)?;
+    rejected(Run::driving(make())?, Run::driving(make())?)?;
+    not_fresh(Run::driving(make())?)?;
+    late(Run::driving(make())?)?;
+    others(make)?;
+    old_target(Run::driving(make())?)?;
+    nan(Run::driving(make())?)?;
+    bad_steps(make)?;
+    requeue(Run::driving(make())?)?;
+    emergency_stop(Run::driving(make())?)?;
+    from_zero(Run::driving(make())?)?;
+    deterministic(Run::driving(make())?, Run::driving(make())?)?;
+    Ok(Rule::IsDeterministic as usize + 1)
+}
+
+fn claims<S: Subject>(mut run: Run<S>) -> Outcome {
+    let clash = run.subject.device().clash();
+    run.expect(clash.is_none(), Rule::ClaimsFeedback)?;
+    for motor in 0..run.subject.motors() {
+        let Some(frame) = run.subject.feedback(motor) else {
+            return run.expect(false, Rule::ClaimsFeedback);
+        };
+        let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.id() == frame.id();
+        let claimed = run.subject.device().claims().any(|claim| feedback(&claim));
+        run.expect(claimed, Rule::ClaimsFeedback)?;
+    }
+    Ok(())
+}
+
+fn disarmed<S: Subject>(mut run: Run<S>) -> Outcome {
+    for _ in 0..50 {
+        let output = run.step()?;
+        let refused = run.subject.drive(1.0) == Err(TargetError::Disarmed);
+        let armed = run.subject.device().is_armed();
+        run.expect(output.driving == 0 && refused && !armed, Rule::DisarmedIsZero)?;
+    }
+    Ok(())
+}
+
+fn missing<S: Subject>(mut run: Run<S>) -> Outcome {
+    for heard in 0..run.subject.motors() {
+        let now = run.now();
+        let total = run.subject.motors() - heard;
+        let outcome = run.subject.device().arm(now);
+        let named = match outcome {
+            Err(ArmError::Missing(missing)) => usize::from(missing.total()) == total,
+            _ => false,
+        };
+        let armed = run.subject.device().is_armed();
+        run.expect(named && !armed, Rule::MissingAreNamed)?;
+        run.hear(heard);
+    }
+    let now = run.now();
+    let armed = run.subject.device().arm(now).is_ok();
+    run.expect(armed, Rule::ArmedDrives)
+}
+
+fn armed<S: Subject>(mut run: Run<S>) -> Outcome {
+    let output = run.step()?;
+    let armed = run.subject.device().is_armed();
+    run.expect(armed && output.driving > 0, Rule::ArmedDrives)
+}
+
+/// Frames of others, or that only look like a motor's: on one device of two that must not differ.
+fn rejected<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
+    let count = run.subject.motors();
+    for round in 0..40 {
+        let now = run.now();
+        for frame in (0..count).filter_map(|motor| other.subject.feedback(motor)) {
+            for foreign in twins(&frame) {
+                let outcome = run.subject.device().ingest(&foreign, now);
+                run.expect(outcome == Ingest::Unrelated, Rule::ForeignIsUnrelated)?;
+            }
+            for short in shorter(&frame) {
+                let outcome = run.subject.device().ingest(&short, now);
+                run.expect(outcome != Ingest::Taken, Rule::ShortIsNotTaken)?;
+            }
+        }
+        if let Some(foreign) = unclaimed(run.subject.device()) {
+            let outcome = run.subject.device().ingest(&foreign, now);
+            run.expect(outcome == Ingest::Unrelated, Rule::ForeignIsUnrelated)?;
+        }
+        // With feedback and without: a motor that is late must stay so.
+        let (one, two) = if round < 20 {
+            (run.step()?, other.step()?)
+        } else {
+            (run.step_silent()?, other.step_silent()?)
+        };
+        run.expect(one == two, Rule::ShortIsNotTaken)?;
+    }
+    Ok(())
+}
+
+fn not_fresh<S: Subject>(mut run: Run<S>) -> Outcome {
+    for _ in 0..run.subject.late_ms() {
+        let now = run.now();
+        for motor in 0..run.subject.motors() {
+            let Some(frame) = run.subject.feedback(motor) else { continue };
+            for wrong in twins(&frame).chain(shorter(&frame)) {
+                _ = run.subject.device().ingest(&wrong, now);
+            }
+        }
+        _ = run.subject.drive(1.0);
+        run.step_silent()?;
+    }
+    let output = run.step_silent()?;
+    run.expect(output.driving == 0, Rule::RejectedIsNotFresh)
+}
+
+fn late<S: Subject>(mut run: Run<S>) -> Outcome {
+    run.step()?;
+    for ms in 0..200 {
+        _ = run.subject.drive(1.0);
+        let output = run.step_silent()?;
+        let limit = run.subject.late_ms();
+        run.expect(output.driving == 0 || ms + 1 < limit, Rule::LateIsZero)?;
+    }
+    Ok(())
+}
+
+/// One motor after the other falls silent; what waits for it is no other's fault.
+fn others<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    let motors = make().motors();
+    if motors < 2 {
+        return Ok(());
+    }
+    for silent in 0..motors {
+        let mut run = Run::driving(make())?;
+        for _ in 0..200 {
+            _ = run.subject.drive(1.0);
+            let output = run.step_without(silent)?;
+            run.expect(output.driving > 0, Rule::OthersGoOn)?;
+        }
+    }
+    Ok(())
+}
+
+fn old_target<S: Subject>(mut run: Run<S>) -> Outcome {
+    for ms in 0..run.subject.command_ms() + 50 {
+        let output = run.step()?;
+        run.expect(output.driving == 0 || ms < run.subject.command_ms(), Rule::OldTargetsAreZero)?;
+    }
+    let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
+    run.expect(again, Rule::OldTargetsAreZero)
+}
+
+fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
+    for share in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let before = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
+        run.expect(before, Rule::ArmedDrives)?;
+        let refused = run.subject.drive(share) == Err(TargetError::NotFinite);
+        let output = run.step()?;
+        run.expect(refused && output.driving == 0, Rule::NanIsZero)?;
+    }
+    Ok(())
+}
+
+fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    for dt_s in [0.0, -0.001, f32::NAN, f32::INFINITY] {
+        let mut run = Run::driving(make())?;
+        run.step()?;
+        run.update(dt_s)?;
+        let output = run.update(dt_s)?;
+        run.expect(output.driving == 0, Rule::BadStepsAreZero)?;
+        let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
+        run.expect(again, Rule::ArmedDrives)?;
+    }
+    Ok(())
+}
+
+fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
+    let Output { last: Some(frame), .. } = run.step()? else {
+        return run.expect(false, Rule::ArmedDrives);
+    };
+    let taken = run.subject.device().requeue(&frame);
+    let waiting = run.drain()?.frames;
+    run.expect(taken && waiting == 0, Rule::RequeuedComesAgain)?;
+    // The newest value is to relax: the old one must not come back.
+    run.subject.device().disarm();
+    run.drain()?;
+    run.subject.device().requeue(&frame);
+    let output = run.step()?;
+    run.expect(output.frames > 0 && output.driving == 0, Rule::RequeuedComesAgain)?;
+    let foreign = unclaimed(run.subject.device());
+    for foreign in foreign.into_iter().chain(twins(&frame)) {
+        let taken = run.subject.device().requeue(&foreign);
+        run.expect(!taken, Rule::ForeignIsNotRequeued)?;
+    }
+    Ok(())
+}
+
+fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::EmergencyStopStays;
+    let tick = Tick::new(run.now(), 0.001);
+    run.subject.device().update(tick);
+    // In the middle of a cycle: what waits now must be zero already.
+    run.subject.device().emergency_stop();
+    let output = run.drain()?;
+    run.expect(output.frames > 0 && output.driving == 0, rule)?;
+    for _ in 0..20 {
+        let now = run.now();
+        let refused = run.subject.device().arm(now) == Err(ArmError::Stopped);
+        let no_target = run.subject.drive(1.0) == Err(TargetError::Disarmed);
+        let zero = run.step()?.driving == 0;
+        let stopped = run.subject.device().is_stopped();
+        run.expect(refused && no_target && zero && stopped, rule)?;
+    }
+    run.subject.device().clear_emergency_stop();
+    let zero = run.step()?.driving == 0;
+    let disarmed = !run.subject.device().is_armed();
+    run.expect(zero && disarmed, rule)?;
+    let now = run.now();
+    let armed = run.subject.device().arm(now).is_ok();
+    run.expect(armed, rule)
+}
+
+fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
+    run.step()?;
+    run.subject.device().disarm();
+    let mut driving = run.drain()?.driving;
+    driving += run.step()?.driving;
+    let now = run.now();
+    let armed = run.subject.device().arm(now).is_ok();
+    for _ in 0..20 {
+        driving += run.step()?.driving;
+    }
+    run.expect(armed && driving == 0, Rule::StartsFromZero)
+}
+
+fn deterministic<S: Subject>(mut one: Run<S>, mut other: Run<S>) -> Outcome {
+    for ms in 0..100_u8 {
+        let share = f32::from(ms) / 100.0;
+        let targets = one.subject.drive(share) == other.subject.drive(share);
+        let (output, same) = (one.step()?, other.step()?);
+        one.expect(targets && output == same, Rule::IsDeterministic)?;
+    }
+    Ok(())
+}
+
+/// The remote and the extended frame of the same number.
+fn twins(frame: &CanFrame) -> impl Iterator<Item = CanFrame> {
+    let (remote, other) = match frame.id() {
+        Id::Standard(id) => (
+            CanFrame::new_remote(id, frame.dlc()),
+            ExtendedId::new(id.as_raw().into()).and_then(|id| CanFrame::new(id, frame.data())),
+        ),
+        Id::Extended(id) => {
+            let short = u16::try_from(id.as_raw()).ok().and_then(StandardId::new);
+            (
+                CanFrame::new_remote(id, frame.dlc()),
+                short.and_then(|id| CanFrame::new(id, frame.data())),
+            )
+        }
+    };
+    [remote, other].into_iter().flatten()
+}
+
+/// The same frame with fewer bytes.
+fn shorter(frame: &CanFrame) -> impl Iterator<Item = CanFrame> + '_ {
+    (0..frame.data().len())
+        .filter_map(|length| CanFrame::new(frame.id(), frame.data().get(..length)?))
+}
+
+/// A frame with an id that no motor has.
+fn unclaimed(device: &impl CanDevice) -> Option<CanFrame> {
+    let free = |id: &StandardId| {
+        let probe = Claim::new(*id, Role::Feedback, crate::motor::MotorName::new("foreign", 0));
+        !device.claims().any(|claim| claim.clashes_with(&probe))
+    };
+    let id = (1..0x7FF).filter_map(StandardId::new).find(free)?;
+    CanFrame::new(id, &[0xFF; 8])
+}
