@@ -5,6 +5,12 @@
 #[path = "../examples/chassis/scenario.rs"]
 mod scenario;
 
+#[path = "../examples/chassis/justfloat.rs"]
+mod justfloat;
+
+use drivetrain::wire::Deframer;
+use drivetrain::wire::vofa::JustFloat;
+
 use scenario::{Run, Sample, Scenario, Trouble};
 
 fn run(seed: u64, fault: Option<Trouble>) -> Run {
@@ -76,4 +82,18 @@ fn the_same_seed_gives_the_same_samples() {
         |run: Run| run.samples.iter().map(|sample| sample.position_m).collect::<Vec<_>>();
     assert!(positions(run(3, None)) == positions(run(3, None)));
     assert!(positions(run(3, None)) != positions(run(4, None)));
+}
+
+#[test]
+fn the_justfloat_stream_reads_back_as_the_samples() {
+    let run = run(1, None);
+    let bytes = justfloat::stream(&run.samples).unwrap();
+    let mut rest = &bytes[..];
+    let mut reader = Deframer::<JustFloat<{ justfloat::CHANNELS }>, 64>::new(JustFloat);
+    for sample in &run.samples {
+        let channels = reader.read(&mut rest).unwrap();
+        assert_eq!(&channels[..4], &sample.target_rpm.into_array());
+        assert_eq!(&channels[4..], &sample.measured_rpm.into_array());
+    }
+    assert_eq!((reader.read(&mut rest), run.samples.len()), (None, 10_000));
 }

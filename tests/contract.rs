@@ -130,10 +130,8 @@ fn tuples_and_arrays_of_buses_keep_the_contract() {
         device: [bus::<M3508>(&[1]), bus::<M2006>(&[6]), bus::<Gm6020Current>(&[7])],
         ids: vec![0x201, 0x206, 0x20B],
         drive: |buses, share| {
-            buses.iter_mut().fold(Ok(()), |outcome, bus| {
-                let driven = drive_all(bus, share);
-                outcome.and(driven)
-            })
+            let outcomes = buses.each_mut().map(|bus| drive_all(bus, share));
+            outcomes.into_iter().collect()
         },
     };
     assert_eq!(check_contract(array), Ok(RULES));

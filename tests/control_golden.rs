@@ -1,5 +1,7 @@
 //! Controllers against sequences that `tests/data/control/generate.py` computed independently, in double precision.
 
+#![cfg(test)]
+
 use drivetrain::control::{
     Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, MotionLimits,
     OptimalDifferentiator, Pid, PidConfig, Profile, fhan,

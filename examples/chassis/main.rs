@@ -1,10 +1,11 @@
 //! A 20 kg mecanum robot on four M3508 drives a square and spins, on the simulator, through the public API.
 //!
 //! ```text
-//! cargo run --release --example chassis -- [--seconds S] [--output FILE.svg] [--csv FILE] [--candump FILE]
-//!                                          [--seed N] [--fault silent-motor|lost-frames|bus-off]
+//! cargo run --release --example chassis -- [--seconds S] [--output FILE.svg] [--csv FILE] [--justfloat FILE]
+//!                                          [--candump FILE] [--seed N] [--fault silent-motor|lost-frames|bus-off]
 //! ```
 
+mod justfloat;
 mod log;
 mod options;
 mod plot;
@@ -58,6 +59,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     plot::write(&options.output, &run)?;
     if let Some(path) = &options.csv {
         report::write_csv(path, &run)?;
+    }
+    if let Some(path) = &options.justfloat {
+        std::fs::write(path, justfloat::stream(&run.samples)?)?;
     }
     print!("{}", report::table(&run));
     println!("plot: {}", options.output.display());

@@ -7,6 +7,7 @@ pub(crate) const USAGE: &str = "usage: chassis [options]
   --seconds S       simulated seconds, 2 to 600 (default 10)
   --output FILE     where the plot goes (default chassis.svg)
   --csv FILE        writes every sample as a row, too
+  --justfloat FILE  writes targets and speeds (rpm) as VOFA+ JustFloat frames of 8 channels, too
   --candump FILE    writes every frame on the bus as a line of candump, too
   --seed N          chooses phases and chances of the simulation (default 1)
   --fault NAME      silent-motor, lost-frames or bus-off
@@ -17,6 +18,7 @@ pub(crate) struct Options {
     pub(crate) seconds: f32,
     pub(crate) output: PathBuf,
     pub(crate) csv: Option<PathBuf>,
+    pub(crate) justfloat: Option<PathBuf>,
     pub(crate) candump: Option<PathBuf>,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
@@ -34,6 +36,7 @@ impl Options {
             seconds: 10.0,
             output: PathBuf::from("chassis.svg"),
             csv: None,
+            justfloat: None,
             candump: None,
             seed: 1,
             fault: None,
@@ -51,6 +54,7 @@ impl Options {
                 }
                 "--output" => options.output = value()?.into(),
                 "--csv" => options.csv = Some(value()?.into()),
+                "--justfloat" => options.justfloat = Some(value()?.into()),
                 "--candump" => options.candump = Some(value()?.into()),
                 "--seed" => {
                     let text = value()?;

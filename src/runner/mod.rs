@@ -67,7 +67,7 @@ const FRAMES_A_TICK: usize = 64;
 ///         runner.tick(tick);
 ///     }
 /// }
-/// assert_eq!(runner.statistics().sent, 2); // zeros as a keep-alive every 10 ms
+/// assert_eq!(runner.statistics().sent, 3); // zeros at first, and as a keep-alive every 10 ms
 /// # Ok::<(), drivetrain::dji::AttachError>(())
 /// ```
 #[derive(Debug)]
