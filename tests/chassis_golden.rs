@@ -1,5 +1,7 @@
 //! Every layout against `data/chassis/golden.txt`, which `generate.py` beside it computes without the crate's formulas.
 
+#![cfg(test)]
+
 use drivetrain::chassis::{
     Differential, DifferentialGeometry, DifferentialWheels, FloorX, Mecanum, MecanumGeometry,
     MecanumWheels, Omni, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels, OmniWheel, Swerve,
