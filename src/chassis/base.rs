@@ -3,7 +3,7 @@ use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::motor::{TargetError, VelocityDrive};
 use crate::time::Tick;
-use crate::units::AngularVelocity;
+use crate::units::{Angle, AngularVelocity};
 
 /// A chassis of any layout: commands in, wheel speeds out, pose kept.
 ///
@@ -219,9 +219,10 @@ impl<K: Kinematics> Chassis<K> {
             self.status.blind_s += dt_s;
         }
         if self.odometry.has_gyro() && !had_gyro {
-            // The heading jumped to the gyroscope's; the robot did not.
-            let now = self.odometry.heading();
-            self.reference = self.reference.to_body(before).to_world(now);
+            // The heading jumps from the wheels' to the gyroscope's; the robot does not.
+            let turned = before.angle().as_radians() + self.measured.wz_rad_s * dt_s;
+            let expected = Heading::new(Angle::from_radians(turned));
+            self.reference = self.reference.to_body(expected).to_world(self.odometry.heading());
         }
     }
 
@@ -301,8 +302,8 @@ mod tests {
     use super::*;
     use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
     use crate::geometry::Vec2;
+    use crate::math::wrap_pi;
     use crate::time::Instant;
-    use crate::units::Angle;
     use proptest::prelude::*;
 
     const TICK: Tick = Tick::new(Instant::START, 0.001);
@@ -370,6 +371,23 @@ mod tests {
         }
         let world = chassis.reference().to_world(facing(degrees));
         assert!((world - Twist::new(1.0, 0.0, 10.0)).linear().norm() < 1e-3, "{world:?}");
+    }
+
+    #[test]
+    fn a_gyroscope_slower_than_the_loop_makes_no_lag_either() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(2.0, 1000.0));
+        let spinning = mecanum().inverse(Twist::new(0.0, 0.0, 10.0)).map(Some);
+        for step in 1..=2000_u16 {
+            let heading = facing(f32::from(step) * 0.01_f32.to_degrees());
+            if step % 5 == 0 {
+                chassis.set_world(Twist::new(1.0, 0.0, 10.0), heading);
+            }
+            chassis.update(spinning, TICK);
+        }
+        let world = chassis.reference().to_world(chassis.pose().heading());
+        assert!((world - Twist::new(1.0, 0.0, 10.0)).linear().norm() < 1e-3, "{world:?}");
+        let turned = wrap_pi(chassis.pose().angle.as_radians() - 20.0);
+        assert!(turned.abs() < 1e-3, "{turned}");
     }
 
     // The first seed's base limits the wheels and throws the result away.

@@ -1,0 +1,128 @@
+//! The chassis over its motors, in the loop: command, CAN bus, simulated motors and floor, feedback, odometry.
+
+#![cfg(test)]
+#![cfg(feature = "sim")]
+
+use drivetrain::chassis::{
+    Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels, Mode, ModeConfig, Modes,
+    MotionSource,
+};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::geometry::{Heading, Twist};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{
+    ChassisConfig, ChassisState, Controller, Fault, Model, MotorConfig, SimClock, World,
+};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::Angle;
+
+const GEOMETRY: MecanumGeometry =
+    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
+const SPEED: PidConfig = PidConfig::new(4.0, 20.0, 0.0).with_output_limit(5.0);
+
+struct Robot<'w> {
+    world: &'w World,
+    runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>,
+    wheels: MecanumWheels<Handle<M3508>>,
+    chassis: Chassis<Mecanum>,
+}
+
+impl<'w> Robot<'w> {
+    /// With the fault, if any: the front left motor falls silent after two seconds.
+    fn new(world: &'w World, silent: bool) -> Self {
+        let ids = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
+        let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
+        let motors = ids.try_map(motor).unwrap();
+        world.attach_chassis(ChassisConfig::new(GEOMETRY), motors).unwrap();
+        if silent {
+            let from = Instant::START + Duration::from_millis(2_000);
+            let window = from..from + Duration::from_millis(8_000);
+            world.fault(Fault::Silent(motors.front_left), window).unwrap();
+        }
+        let mut bus = Bus::new();
+        let config = |id| Config::<M3508>::new(id).speed_loop(SPEED);
+        let wheels = MecanumWheels {
+            front_left: bus.attach(config(2)).unwrap(),
+            front_right: bus.attach(config(1).reversed()).unwrap(),
+            rear_left: bus.attach(config(3)).unwrap(),
+            rear_right: bus.attach(config(4).reversed()).unwrap(),
+        };
+        let mut chassis = Chassis::new(Mecanum::new(GEOMETRY).unwrap());
+        chassis.set_limits(ChassisLimits::new().with_acceleration(2.0, 10.0)).unwrap();
+        let runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+        Self { world, runner, wheels, chassis }
+    }
+
+    fn truth(&self) -> ChassisState {
+        self.world.chassis().unwrap()
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "some radians")]
+    fn heading(&self) -> Angle {
+        Angle::from_radians(self.truth().heading_rad as f32)
+    }
+
+    fn run(&mut self, seconds: f32, mut command: impl FnMut(&mut Self, Tick)) {
+        let end = self.world.now() + Duration::from_secs_f32(seconds).unwrap();
+        while self.world.now() < end {
+            self.world.advance(Duration::from_micros(100));
+            self.runner.poll(16);
+            let Some(tick) = self.runner.due() else { continue };
+            if !self.runner.is_armed() {
+                _ = self.runner.arm(tick);
+            }
+            command(self, tick);
+            self.chassis.drive(self.runner.device_mut(), self.wheels, tick);
+            self.runner.tick(tick);
+        }
+    }
+
+    fn error_m(&self) -> f64 {
+        let (pose, truth) = (self.chassis.pose(), self.truth());
+        (f64::from(pose.x_m) - truth.x_m).hypot(f64::from(pose.y_m) - truth.y_m)
+    }
+}
+
+#[test]
+fn spinning_while_driving_along_world_x_goes_straight_and_the_odometry_knows() {
+    let world = World::new(1);
+    let mut robot = Robot::new(&world, false);
+    robot.run(4.0, |robot, _| {
+        let heading = Heading::new(robot.heading());
+        robot.chassis.set_world(Twist::new(0.5, 0.0, 2.0), heading);
+    });
+    let truth = robot.truth();
+    assert!(truth.x_m > 1.6 && truth.y_m.abs() < 0.08, "{truth:?}");
+    assert!(robot.error_m() < 0.05, "{truth:?} {:?}", robot.chassis.pose());
+}
+
+#[test]
+fn the_chassis_follows_its_gimbal() {
+    let world = World::new(2);
+    let mut robot = Robot::new(&world, false);
+    let config = ModeConfig::new(PidConfig::new(4.0, 0.0, 0.0).with_output_limit(4.0));
+    let mut modes = Modes::new(config).unwrap();
+    modes.set_mode(Mode::FollowGimbal);
+    robot.run(4.0, |robot, tick| {
+        // The gimbal holds 60 degrees to the left in the world.
+        let yaw = Angle::from_degrees(60.0) - robot.heading();
+        match modes.update(Twist::ZERO, Some(yaw), tick.dt_s()) {
+            Some(twist) => robot.chassis.set_body(twist),
+            None => robot.chassis.stop(),
+        }
+    });
+    let degrees = robot.truth().heading_rad.to_degrees();
+    assert!((degrees - 60.0).abs() < 3.0, "{degrees}");
+}
+
+#[test]
+fn a_silent_wheel_is_flagged_and_refuses_and_the_position_is_followed_by_the_others() {
+    let world = World::new(3);
+    let mut robot = Robot::new(&world, true);
+    robot.run(3.0, |robot, _| robot.chassis.set_body(Twist::new(0.5, 0.0, 0.0)));
+    let status = *robot.chassis.status();
+    assert_eq!((status.source, status.lost_wheels), (MotionSource::SomeWheels, 1), "{status:?}");
+    assert!(status.refused >= 1 && status.refusal.is_some(), "{status:?}");
+    assert!(robot.error_m() < 0.1, "{:?} {:?}", robot.chassis.pose(), robot.truth());
+}
