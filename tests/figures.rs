@@ -1,8 +1,13 @@
 //! Figures stand in `firmware/qemu/budget.toml`, which a run of the bench writes; documents only quote them.
 //!
+//! The bench runs a closed loop on the simulator as well; here the same file runs on the host.
+//!
 //! Between `<!-- figures -->` and `<!-- /figures -->` stands what `firmware/qemu/figures.py --markdown` prints.
 
 #![cfg(test)]
+
+#[path = "../firmware/qemu/src/closed_loop.rs"]
+mod closed_loop;
 
 use std::fs;
 use std::path::Path;
@@ -55,9 +60,21 @@ fn wrong(document: &str, budget: &[Row]) -> Vec<String> {
     wrong
 }
 
-fn budget() -> Vec<Row> {
+fn text() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    measured(&fs::read_to_string(root.join("firmware/qemu/budget.toml")).unwrap())
+    fs::read_to_string(root.join("firmware/qemu/budget.toml")).unwrap()
+}
+
+fn budget() -> Vec<Row> {
+    measured(&text())
+}
+
+#[test]
+fn the_closed_loop_gives_the_same_bits_on_the_host_and_on_the_target() {
+    let (hash, frames) = closed_loop::run();
+    assert_eq!(closed_loop::run(), (hash, frames), "the same twice");
+    let line = format!("closed_loop = \"{hash:016x} {frames}\"");
+    assert!(text().lines().any(|found| found == line), "budget.toml has another line than {line}");
 }
 
 #[test]

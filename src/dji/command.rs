@@ -250,8 +250,9 @@ impl Outbox {
         let next = index as u8 + 1;
         self.first = next;
         let [[a, b], [c, d], [e, f], [g, h]] = *words;
-        let ([b, a, d, c], [f, e, h, g]) = (swapped([a, b, c, d]), swapped([e, f, g, h]));
-        CanFrame::standard(id, [b, a, d, c, f, e, h, g])
+        let [a, b, c, d] = swapped([a, b, c, d]);
+        let [e, f, g, h] = swapped([e, f, g, h]);
+        CanFrame::standard(id, [a, b, c, d, e, f, g, h])
     }
 
     /// Takes back a frame that was refused or evicted. It waits for the next update, so that a caller's loop ends,

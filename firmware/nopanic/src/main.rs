@@ -7,8 +7,12 @@
 #![no_std]
 #![no_main]
 
+mod chassis;
 mod functions;
+mod geometry;
 mod opaque;
+mod shaping;
+mod wire;
 
 use core::panic::PanicInfo;
 

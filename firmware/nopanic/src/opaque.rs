@@ -34,3 +34,4 @@ function!(A);
 function!(A, B);
 function!(A, B, C);
 function!(A, B, C, D);
+function!(A, B, C, D, E);

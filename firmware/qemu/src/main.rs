@@ -1,11 +1,12 @@
 //! Measures the crate on a simulated Cortex-M4F through its public API.
 //!
 //! Prints a line for each figure: `row <name> <mean> <least> <most>` in instructions, `stack <name> <bytes>`,
-//! `size <type> <bytes>`, and `same <name> yes|no` for what has to be equal. `figures.py` reads them.
+//! `size <type> <bytes>`, and `closed_loop <hash> <frames>`. `figures.py` reads them.
 
 #![no_std]
 #![no_main]
 
+mod closed_loop;
 mod constant_time;
 mod meter;
 mod rows;
@@ -19,9 +20,12 @@ fn main() -> ! {
     if let Some(mut peripherals) = cortex_m::Peripherals::take() {
         meter::start(&mut peripherals.SYST);
         hprintln!("level {}", env!("OPT_LEVEL"));
+        let (hash, frames) = closed_loop::run();
+        hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
         rows::control();
         rows::math();
+        rows::space();
         constant_time::show();
         rows::stack();
         rows::sizes();

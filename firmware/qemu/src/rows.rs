@@ -5,13 +5,19 @@ use crate::row;
 use crate::wiring::{Drive, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
+use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::{IncrementalPid, Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
 use drivetrain::encoder::{Position, Shaft};
 use drivetrain::frame::CanFrame;
+use drivetrain::geometry::{
+    Body, Gimbal, Point2, Point3, Rotation2, Rotation3, Transform2, Transform3, Twist, Vec2, Vec3,
+    World,
+};
 use drivetrain::math as maths;
 use drivetrain::motor::Ingest;
 use drivetrain::time::{Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
 
 pub const START: Instant = Instant::from_micros(1_000_000);
 
@@ -69,6 +75,68 @@ fn row_sqrt(x: f32) -> f32 {
 #[inline(never)]
 fn row_wrap_pi(x: f32) -> f32 {
     maths::wrap_pi(x)
+}
+
+/// Functions of one line, out of line.
+macro_rules! rows {
+    ($($name:ident($($argument:ident: $kind:ty),*) -> $result:ty = $body:expr;)*) => {
+        $(
+            #[unsafe(no_mangle)]
+            #[inline(never)]
+            fn $name($($argument: $kind),*) -> $result {
+                $body
+            }
+        )*
+    };
+}
+
+type Place2 = Transform2<Body, World>;
+type Place3 = Transform3<Body, World>;
+
+rows! {
+    row_mecanum_inverse(m: &Mecanum, twist: &Twist<Body>) -> MecanumWheels<AngularVelocity> = m.inverse(*twist);
+    row_mecanum_forward(m: &Mecanum, wheels: &MecanumWheels<AngularVelocity>) -> Twist<Body> = m.forward(*wheels);
+    row_apply_2d(place: &Place2, point: &Point2<Body>) -> Point2<World> = place.apply(*point);
+    row_compose_2d(place: &Place2, first: &Transform2<Gimbal, Body>) -> Transform2<Gimbal, World> = place.compose(*first);
+    row_inverse_2d(place: &Place2) -> Transform2<World, Body> = place.inverse();
+    row_apply_3d(place: &Place3, point: &Point3<Body>) -> Point3<World> = place.apply(*point);
+    row_compose_3d(place: &Place3, first: &Transform3<Gimbal, Body>) -> Transform3<Gimbal, World> = place.compose(*first);
+    row_inverse_3d(place: &Place3) -> Transform3<World, Body> = place.inverse();
+}
+
+/// Kinematics and transforms.
+pub fn space() {
+    let geometry =
+        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
+    let mecanum = black_box(Mecanum::new(geometry).unwrap());
+    let twist = black_box(Twist::<Body>::new(1.0, 0.5, 0.25));
+    let wheels = black_box(mecanum.inverse(twist));
+    let angle = black_box(Angle::from_degrees(30.0));
+    let place2 = black_box(Place2::new(Rotation2::new(angle), Vec2::new(1.0, 2.0)));
+    let first2 = black_box(Transform2::new(Rotation2::new(angle), Vec2::new(0.1, 0.2)));
+    let turn = Rotation3::from_quaternion(0.9, 0.1, 0.3, 0.2).unwrap();
+    let place3 = black_box(Place3::new(turn, Vec3::new(1.0, 2.0, 3.0)));
+    let first3 = black_box(Transform3::new(turn, Vec3::new(0.1, 0.2, 0.3)));
+    let (point2, point3) = (Point2::new(1.0, 2.0), Point3::new(1.0, 2.0, 3.0));
+    macro_rules! space {
+        ($($name:literal $function:ident($($argument:expr),*): $kind:ty;)*) => {
+            $(
+                row($name, &[instructions($function as $kind, |function, _| {
+                    _ = function($($argument),*);
+                })]);
+            )*
+        };
+    }
+    space! {
+        "mecanum_inverse" row_mecanum_inverse(&mecanum, &twist): fn(&Mecanum, &Twist<Body>) -> _;
+        "mecanum_forward" row_mecanum_forward(&mecanum, &wheels): fn(&Mecanum, &MecanumWheels<AngularVelocity>) -> _;
+        "apply_2d" row_apply_2d(&place2, &point2): fn(&Place2, &Point2<Body>) -> _;
+        "compose_2d" row_compose_2d(&place2, &first2): fn(&Place2, &Transform2<Gimbal, Body>) -> _;
+        "inverse_2d" row_inverse_2d(&place2): fn(&Place2) -> _;
+        "apply_3d" row_apply_3d(&place3, &point3): fn(&Place3, &Point3<Body>) -> _;
+        "compose_3d" row_compose_3d(&place3, &first3): fn(&Place3, &Transform3<Gimbal, Body>) -> _;
+        "inverse_3d" row_inverse_3d(&place3): fn(&Place3) -> _;
+    }
 }
 
 /// Feedback, command frames and whole ticks.
@@ -230,6 +298,6 @@ pub fn sizes() {
     sizes!(
         "Bus" Bus, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
         "Pid" Pid, "PidConfig" PidConfig, "IncrementalPid" IncrementalPid,
-        "Shaft" Shaft, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
+        "Shaft" Shaft, "Mecanum" Mecanum, "Transform2" Place2, "Transform3" Place3, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
     );
 }

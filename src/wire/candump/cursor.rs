@@ -58,9 +58,13 @@ impl<'a> Cursor<'a> {
         let (seconds, _) = self.decimal()?;
         self.require(b'.', Expected::Time)?;
         let (fraction, digits) = self.decimal()?;
+        // Up to nine digits fit 32 bits, whose division small cores have.
+        let short = u32::try_from(fraction).unwrap_or(u32::MAX);
         let micros = match digits {
             0..=6 => fraction * 10_u64.pow(6 - digits),
-            7..=9 => fraction / 10_u64.pow(digits - 6),
+            7 => u64::from(short / 10),
+            8 => u64::from(short / 100),
+            9 => u64::from(short / 1_000),
             _ => return Err(self.error(Expected::Time)),
         };
         let total = seconds.checked_mul(1_000_000).and_then(|total| total.checked_add(micros));
