@@ -29,12 +29,13 @@ impl AsyncCan<'_> {
         .await
     }
 
-    async fn send(&self, frame: &CanFrame) {
+    /// Waits for a place, and gives back a frame that had to make way.
+    async fn send(&self, frame: &CanFrame) -> Option<CanFrame> {
         poll_fn(|_| match embedded_can::nb::Can::transmit(&mut self.0.controller(), frame) {
-            Ok(_) => Poll::Ready(()),
+            Ok(evicted) => Poll::Ready(evicted),
             Err(_) => Poll::Pending,
         })
-        .await;
+        .await
     }
 
     async fn at(&self, time: Instant) {
@@ -64,11 +65,15 @@ async fn control(can: &AsyncCan<'_>, bus: &RefCell<Bus>, motor: Handle<M2006>) {
             _ = bus.set_velocity(motor, AngularVelocity::from_rpm(-100.0));
             bus.update(tick);
         }
-        // Never across an await: the borrow ends before the frame waits for its place.
+        // Never across an await: the borrow ends before the frame waits for its place. A bus that stands still holds
+        // the task here, and the frame grows old: give the wait a time limit on a board (`embassy_time::with_timeout`),
+        // and hand the frame to `requeue` when it is over.
         loop {
             let frame = bus.borrow_mut().next_frame();
             let Some(frame) = frame else { break };
-            can.send(&frame).await;
+            if let Some(evicted) = can.send(&frame).await {
+                bus.borrow_mut().requeue(&evicted);
+            }
         }
     }
 }

@@ -22,9 +22,10 @@ impl Driver<'_> {
         Some((id.as_raw(), frame.data().to_vec()))
     }
 
-    fn send(&mut self, frame: &CanFrame) -> bool {
+    /// Gives back what is still to be sent: the frame itself, or one that had to make way for it.
+    fn send(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         use embedded_can::nb::Can;
-        self.0.transmit(frame).is_ok()
+        self.0.transmit(frame).unwrap_or(Some(*frame))
     }
 }
 
@@ -72,9 +73,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn step(bus: &mut Bus, driver: &mut Driver<'_>, tick: Tick) {
     bus.update(tick);
     while let Some(frame) = bus.next_frame() {
-        if !driver.send(&frame) {
-            bus.requeue(&frame); // offered again after the next update, with newer values
-            break;
+        if let Some(left) = driver.send(&frame) {
+            bus.requeue(&left); // offered again after the next update, with newer values
+            if left == frame {
+                break; // no place now
+            }
         }
     }
 }

@@ -21,11 +21,13 @@ fuzz_target!(|data: &[u8]| {
     let mut now = 0_u64;
     for step in data.as_chunks::<14>().0 {
         let [op, flags, id_high, id_low, length, time, payload @ ..] = *step;
-        now = now.wrapping_add(u64::from(time) << (flags & 31));
+        // Forward, and sometimes back.
+        let jump = u64::from(time) << (flags & 31);
+        now = if flags & 32 == 0 { now.wrapping_add(jump) } else { now.saturating_sub(jump) };
         let at = Instant::from_micros(now);
         let raw = u16::from_be_bytes([id_high, id_low]);
         let value = f32::from_bits(u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]));
-        match op % 8 {
+        match op % 12 {
             0..=2 => {
                 let length = usize::from(length % 9);
                 let id = 0x1F0 + raw % 0x20;
@@ -43,6 +45,14 @@ fuzz_target!(|data: &[u8]| {
             4 => _ = bus.set_current(feeder, Current::from_amperes(value)),
             5 => _ = bus.set_angle(yaw, drivetrain::units::Angle::from_radians(value)),
             6 => _ = bus.arm(at),
+            7 => match flags & 3 {
+                0 => bus.emergency_stop(),
+                1 => bus.clear_emergency_stop(),
+                2 => bus.disarm(),
+                _ => bus.relax(wheel),
+            },
+            8 => _ = bus.zero(yaw),
+            9 => bus.detach(feeder),
             _ => {
                 let dt_s = if flags & 1 == 0 { 0.001 } else { value };
                 bus.update(Tick::new(at, dt_s));

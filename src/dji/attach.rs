@@ -66,11 +66,12 @@ impl<B> Bus<B> {
     /// Attaches several motors of one model.
     ///
     /// # Errors
-    /// The first error; no motor of the array is attached then.
+    /// The first error; the bus is then as it was.
     pub fn attach_all<M: Model, const N: usize>(
         &mut self,
         configs: [Config<M>; N],
     ) -> Result<[Handle<M, B>; N], AttachError> {
+        let outbox = self.outbox;
         let mut failed = None;
         let handles = configs.map(|config| {
             self.attach(config).unwrap_or_else(|error| {
@@ -81,7 +82,12 @@ impl<B> Bus<B> {
         match failed {
             None => Ok(handles),
             Some(error) => {
-                handles.into_iter().for_each(|handle| self.detach(handle));
+                for handle in handles {
+                    if let Some(slot) = self.slot_mut(handle.into()) {
+                        slot.withdraw();
+                    }
+                }
+                self.outbox = outbox;
                 Err(error)
             }
         }

@@ -17,7 +17,7 @@ const SLOTS: usize = 11;
 const LONGEST_STEP_S: f32 = 0.02;
 
 /// Stamps of 32 bits cannot tell how long ago a frame was heard when there was no update for longer than this.
-const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -53,7 +53,8 @@ pub struct Bus<B = ()> {
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
     pub(super) budget: Budget,
-    lost_after: Instant,
+    /// Without an update until then all stamps are void; at the start of the clock before the first one.
+    pub(super) lost_after: Instant,
     pub(super) rejects: Rejects,
     pub(super) held_steps: u8,
     turn: u8,
@@ -75,7 +76,7 @@ pub struct Counters {
     pub bad_field: u32,
     /// Frames with a feedback id of this family that no attached motor has: a wrong id switch shows here.
     pub unattached: u32,
-    /// Updates whose time step was zero, negative or NaN.
+    /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
     pub bad_steps: u32,
     /// Command frames that an update had ready; wraps.
     pub packed: u32,
@@ -109,7 +110,7 @@ impl<B> Bus<B> {
     /// Makes a bus without motors whose handles fit only a bus of the same brand.
     ///
     /// # Examples
-    /// ```compile_fail,E0308
+    /// ```compile_fail,E0277
     /// use drivetrain::dji::{Bus, Config, M3508};
     ///
     /// struct Left;
@@ -117,7 +118,7 @@ impl<B> Bus<B> {
     /// let mut left = Bus::<Left>::branded();
     /// let right = Bus::<Right>::branded();
     /// let wheel = left.attach(Config::<M3508>::new(1)).expect("a free id");
-    /// right.state(wheel); // expected `AnyHandle<Right>`, found `Handle<M3508, Left>`
+    /// right.state(wheel); // no `AnyHandle<Right>` from `Handle<M3508, Left>`
     /// ```
     #[must_use]
     pub const fn branded() -> Self {
@@ -127,7 +128,7 @@ impl<B> Bus<B> {
             now: 0,
             timeouts: Timeouts::new(),
             budget: Budget::new(),
-            lost_after: Instant::from_micros(u64::MAX),
+            lost_after: Instant::START,
             rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
             held_steps: 0,
             turn: 0,
@@ -176,19 +177,19 @@ impl<B> Bus<B> {
 
     /// Runs every loop once and encodes the commands.
     ///
-    /// A `dt_s` of zero, below zero, infinite or NaN changes nothing and leaves the last commands for one update;
-    /// a second one in a row sends zeros. Above 20 ms integrals and derivatives rest for the step.
+    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that does not move on, change nothing and leave the
+    /// last commands for one update; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         self.now = tick.now().stamp();
-        let paused = tick.now() > self.lost_after;
+        let before = self.lost_after;
         self.lost_after = tick.now() + LONGEST_PAUSE;
-        if step.is_hold() {
-            return self.hold();
+        if step.is_hold() || self.lost_after <= before {
+            return self.hold(before);
         }
         self.held_steps = 0;
-        if paused {
-            self.lose_all();
+        if tick.now() > before {
+            self.lose_all(before);
         }
         let cycle = Cycle { now: self.now, step, timeouts: self.timeouts };
         for slot in &mut self.slots {

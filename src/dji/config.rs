@@ -34,8 +34,10 @@ pub(super) struct PlainConfig {
     pub(super) gear: GearRatio,
     pub(super) command_raw: i16,
     pub(super) command_full_scale: f32,
-    pub(super) limit: f32,
-    pub(super) torque_constant_nm_per_a: f32,
+    /// Full scale unless set.
+    pub(super) limit: Option<f32>,
+    /// That of the model, behind the gearbox, unless set.
+    pub(super) torque_constant_nm_per_a: Option<f32>,
     pub(super) speed: Option<PidConfig>,
     pub(super) position: Option<PidConfig>,
     pub(super) recovery: Recovery,
@@ -55,8 +57,8 @@ impl<M: Model> Config<M> {
                 gear: facts.gear,
                 command_raw: facts.command_raw,
                 command_full_scale: facts.command_full_scale,
-                limit: facts.command_full_scale,
-                torque_constant_nm_per_a: facts.torque_constant_nm_per_a,
+                limit: None,
+                torque_constant_nm_per_a: None,
                 speed: None,
                 position: None,
                 recovery: Recovery::Rearm,
@@ -95,8 +97,6 @@ impl<M: Model> Config<M> {
     /// Replaces the gearbox. The torque constant follows, as long as it is not set itself.
     #[must_use]
     pub const fn with_gear(mut self, gear: GearRatio) -> Self {
-        let change = gear.as_f32() / self.plain.gear.as_f32();
-        self.plain.torque_constant_nm_per_a *= change;
         self.plain.gear = gear;
         self
     }
@@ -106,7 +106,7 @@ impl<M: Model> Config<M> {
     /// [`State::torque_nm`]: super::State::torque_nm
     #[must_use]
     pub const fn with_torque_constant(mut self, nm_per_a: f32) -> Self {
-        self.plain.torque_constant_nm_per_a = nm_per_a;
+        self.plain.torque_constant_nm_per_a = Some(nm_per_a);
         self
     }
 
@@ -129,7 +129,7 @@ impl<M: CurrentControlled> Config<M> {
     /// by `attach`.
     #[must_use]
     pub const fn with_current_limit(mut self, limit: Current) -> Self {
-        self.plain.limit = limit.as_amperes();
+        self.plain.limit = Some(limit.as_amperes());
         self
     }
 }
@@ -138,15 +138,14 @@ impl<M: VoltageControlled> Config<M> {
     /// Lowers the largest voltage, for loops and direct commands alike. More than full scale is refused by `attach`.
     #[must_use]
     pub const fn with_voltage_limit(mut self, limit: Voltage) -> Self {
-        self.plain.limit = limit.as_volts();
+        self.plain.limit = Some(limit.as_volts());
         self
     }
 
-    /// Sets the volts that full scale stands for; sources say 24 V or 25.2 V. The limit becomes full scale.
+    /// Sets the volts that full scale stands for; sources say 24 V or 25.2 V.
     #[must_use]
     pub const fn with_nominal_voltage(mut self, full_scale: Voltage) -> Self {
         self.plain.command_full_scale = full_scale.as_volts();
-        self.plain.limit = full_scale.as_volts();
         self
     }
 }

@@ -45,7 +45,8 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let missing = move |slot: &&Slot| slot.is_missing(now.stamp(), &self.timeouts);
+        let unwatched = self.lost_after != Instant::START && now > self.lost_after;
+        let missing = move |slot: &&Slot| unwatched || slot.is_missing(now.stamp(), &self.timeouts);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
@@ -68,8 +69,10 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn emergency_stop(&mut self) {
-        self.disarm();
-        self.stopped = true;
+        if !self.stopped {
+            self.disarm();
+            self.stopped = true;
+        }
     }
 
     fn clear_emergency_stop(&mut self) {

@@ -110,6 +110,13 @@ impl core::fmt::Display for AttachError {
 
 impl core::error::Error for AttachError {}
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for AttachError {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=str}", self.message().as_str());
+    }
+}
+
 /// A short text that is put together in `const` code.
 #[derive(Clone, Copy)]
 pub struct Message {

@@ -162,12 +162,15 @@ impl core::fmt::Display for ErrorCode {
 pub(crate) enum ErrorTable {
     C610,
     C620,
+    /// No list was found: every code is kept as it came.
+    None,
 }
 
 impl ErrorTable {
     pub(crate) const fn read(self, code: u8) -> Option<ErrorCode> {
         Some(match (code, self) {
             (0, _) => return None,
+            (code, Self::None) => ErrorCode::Unlisted(code),
             (1, Self::C620) => ErrorCode::MemoryChip,
             (2, _) => ErrorCode::SupplyVoltage,
             (3, _) => ErrorCode::PhaseLoss,

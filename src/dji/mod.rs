@@ -21,7 +21,7 @@
 //! | 2..=3 | rotor speed, `i16`, rpm |
 //! | 4..=5 | torque current, `i16`, in the scale of the current command |
 //! | 6 | motor temperature in °C; nothing on C610 |
-//! | 7 | error code ([`ErrorCode`]); 0 on old firmware |
+//! | 7 | error code ([`ErrorCode`]); 0 on old firmware. For GM6020 no list is known: codes are kept as they come |
 //!
 //! Positive is counter-clockwise looking at the shaft, for angle, speed, current and command alike.
 //!
@@ -56,6 +56,26 @@
 //! [`Bus::load`] says how full it is: at 1 kHz five motors fit, six do not in the worst case. The lowest id wins, so
 //! **0x2FE and 0x2FF lose arbitration to all feedback** while 0x1FE, 0x1FF and 0x200 win: on an overloaded bus
 //! GM6020 #5..=7 are the first to miss their commands, and the highest feedback ids are lost next.
+//!
+//! With the GM6020 on an id of its own the same compiles:
+//!
+//! ```
+//! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+//!
+//! const BUS: Bus = {
+//!     let mut bus = Bus::new();
+//!     match bus.attach(Config::<M3508>::new(5)) {
+//!         Ok(_) => {}
+//!         Err(error) => panic!("{}", error.message().as_str()),
+//!     }
+//!     match bus.attach(Config::<Gm6020Current>::new(2)) {
+//!         Ok(_) => {}
+//!         Err(error) => panic!("{}", error.message().as_str()),
+//!     }
+//!     bus
+//! };
+//! assert_eq!(BUS.motors().count(), 2);
+//! ```
 //!
 //! # Sources
 //! DJI C610 user guide V1.0 (2019.03) pages 8 and 9 for layout, ids, scale and rate of C610; for C620 and GM6020,

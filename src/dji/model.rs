@@ -117,7 +117,7 @@ static M3508_FACTS: Facts = Facts {
 };
 
 // Limit 25000: taproot and current manuals. Volts: nominal. Torque constant, no-load speed: hcs, devrm. No error
-// list was found: the C620's is what public drivers use.
+// list was found.
 static GM6020_VOLTAGE_FACTS: Facts = Facts {
     name: "GM6020 (voltage)",
     ids: 7,
@@ -132,7 +132,7 @@ static GM6020_VOLTAGE_FACTS: Facts = Facts {
     torque_constant_nm_per_a: 0.741,
     no_load_rpm: 320.0,
     has_temperature: true,
-    errors: ErrorTable::C620,
+    errors: ErrorTable::None,
 };
 
 // Frames and scale: hcs and one more public driver.

@@ -30,22 +30,25 @@ impl<B> Bus<B> {
         Ingest::Taken
     }
 
-    /// Ends an update whose time step is not usable: the last commands stay once, then zeros.
+    /// Ends an update whose time is not usable: the last commands stay once, then zeros.
     #[cold]
     #[inline(never)]
-    pub(super) fn hold(&mut self) {
+    pub(super) fn hold(&mut self, lost_after_before: Instant) {
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
-        if self.held_steps >= 2 {
+        let late = self.lost_after.since(lost_after_before) > self.timeouts.late();
+        if self.held_steps >= 2 || late {
             self.outbox.clear();
         }
         self.outbox.finish_update(self.now);
     }
 
-    /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
+    /// Takes every motor for lost, after a pause too long for stamps of 32 bits. The first update ends no pause.
     #[cold]
     #[inline(never)]
-    pub(super) fn lose_all(&mut self) {
-        self.slots.iter_mut().for_each(Slot::lose);
+    pub(super) fn lose_all(&mut self, lost_after_before: Instant) {
+        if lost_after_before != Instant::START {
+            self.slots.iter_mut().for_each(Slot::lose);
+        }
     }
 }

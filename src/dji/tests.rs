@@ -368,9 +368,11 @@ mod commanding {
     #[test]
     fn extreme_requests_on_a_reversed_motor_saturate_and_keep_their_sign() {
         let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).reversed()]);
+        let mut ms = 1;
         let mut request = |amperes: f32| {
+            ms += 1;
             let result = bus.set_current(wheel, Current::from_amperes(amperes));
-            step(&mut bus, 2);
+            step(&mut bus, ms);
             (result, sent(&mut bus).last().map_or(0, |frame| frame.1[0]))
         };
         assert_eq!(request(50.0), (Ok(()), -16_384));
@@ -379,7 +381,7 @@ mod commanding {
             assert_eq!(request(amperes), (Err(TargetError::NotFinite), 0));
         }
         bus.set_raw(wheel, i16::MIN).unwrap();
-        step(&mut bus, 2);
+        step(&mut bus, 9);
         assert_eq!(sent(&mut bus), [(0x200, [16_384, 0, 0, 0])]);
     }
 
@@ -441,10 +443,12 @@ mod commanding {
         let config =
             Config::<Gm6020Voltage>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
         let (mut bus, [yaw]) = armed([config]);
+        let mut ms = 1;
         let mut towards = |from: f32, to: f32| {
+            ms += 1;
             bus.set_present_position(yaw, Position::from_angle(Angle::from_degrees(from))).unwrap();
             bus.set_angle(yaw, Angle::from_degrees(to)).unwrap();
-            step(&mut bus, 2);
+            step(&mut bus, ms);
             f32::from(sent(&mut bus)[0].1[0]) * 24.0 / 25_000.0
         };
         assert!((towards(350.0, 10.0) - 20.0_f32.to_radians()).abs() < 2e-3);
@@ -504,7 +508,8 @@ mod safety {
             hear(&mut bus, 0x202, ms);
             step(&mut bus, ms);
         }
-        // One second back: the old stamps lie ahead, which is not fresh.
+        // One second back: that step is held, and the old stamps lie ahead, which is not fresh.
+        step(&mut bus, 999);
         step(&mut bus, 1_000);
         assert_eq!((bus.link(heard), bus.link(silent)), (Some(Link::Late), Some(Link::Late)));
         for ms in 1_001..1_300 {
@@ -743,13 +748,15 @@ mod safety {
     #[test]
     fn a_bad_time_step_holds_the_output_once_and_then_stops() {
         let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
-        for bad in [0.0, -0.001, f32::NAN, f32::INFINITY] {
+        let at = Instant::from_micros;
+        for (now, bad) in (1..).zip([0.0, -0.001, f32::NAN, f32::INFINITY]) {
+            let now = 2_000 + 100 * now;
             bus.set_raw(wheel, 9).unwrap();
-            step(&mut bus, 2);
+            bus.update(Tick::new(at(now), 0.001));
             assert_eq!(sent(&mut bus), [(0x200, [9, 0, 0, 0])]);
-            bus.update(Tick::new(at_ms(2), bad));
+            bus.update(Tick::new(at(now + 10), bad));
             assert_eq!(sent(&mut bus), [(0x200, [9, 0, 0, 0])]);
-            bus.update(Tick::new(at_ms(2), bad));
+            bus.update(Tick::new(at(now + 20), bad));
             assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
         }
         assert_eq!(bus.counters().bad_steps, 8);

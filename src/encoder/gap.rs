@@ -11,6 +11,10 @@ use super::{COUNTS_PER_TURN, shortest};
 /// v * 1 ms             the ESC took its samples up to a period before they arrived
 /// ```
 ///
+/// The frame may also have waited, in a queue or in a driver that was polled late, and stand for a moment soon after
+/// the one before. So a way with a turn less in the same direction must not fit either: at speed `v` a gap of up to
+/// about one rotor turn is sure, a longer one is not.
+///
 /// # Examples
 /// ```
 /// use drivetrain::encoder::Gap;
@@ -63,8 +67,15 @@ impl Gap {
         )]
         let expected_angle = (i32::from(angle) + estimate) as u16;
         let rest = shortest(expected_angle, next_angle);
-        Self { counts: estimate + rest, ambiguous: rest.unsigned_abs() as f32 > error + 1.0 }
+        let counts = estimate + rest;
+        let implausible = rest.unsigned_abs() as f32 > error + 1.0;
+        Self { counts, ambiguous: implausible || fits_an_earlier_frame(counts, error - fastest) }
     }
+}
+
+/// Tells whether one turn less, in the direction of the way, is a way that a frame from earlier could have seen.
+fn fits_an_earlier_frame(counts: i32, slack: f32) -> bool {
+    counts.unsigned_abs() as f32 + slack >= f32::from(COUNTS_PER_TURN)
 }
 
 #[cfg(test)]
@@ -105,6 +116,20 @@ mod tests {
             #[expect(clippy::cast_possible_truncation, reason = "0..8192")]
             let end = (i32::from(start) + moved).rem_euclid(8192) as u16;
             let gap = Gap::resolve((start, rpm), (end, next_rpm), elapsed_us, 9256);
+            prop_assert!(gap.ambiguous || gap.counts == moved, "{gap:?} moved {moved}");
+        }
+    }
+    proptest! {
+        /// Law: a frame that waited is resolved exactly or flagged, however long it waited.
+        #[test]
+        fn a_frame_that_waited_is_never_silently_wrong(
+            start in 0_u16..8192, rpm in -9256_i16..=9256, moved_us in 0_u32..30_000, waited_us in 0_u32..30_000,
+        ) {
+            #[expect(clippy::cast_possible_truncation, reason = "below 2^20")]
+            let moved = (f64::from(rpm) * 8192.0 / 60e6 * f64::from(moved_us)).round() as i32;
+            #[expect(clippy::cast_possible_truncation, reason = "0..8192")]
+            let end = (i32::from(start) + moved).rem_euclid(8192) as u16;
+            let gap = Gap::resolve((start, rpm), (end, rpm), moved_us + waited_us, 9256);
             prop_assert!(gap.ambiguous || gap.counts == moved, "{gap:?} moved {moved}");
         }
     }

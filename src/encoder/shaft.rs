@@ -81,6 +81,12 @@ impl Shaft {
         self.rotor as i32 * COUNTS_PER_TURN as i32
     }
 
+    /// Tells whether the encoder sits on the output shaft: then its angle is known whatever was missed.
+    #[must_use]
+    pub const fn is_direct(&self) -> bool {
+        self.rotor == 1 && self.fine_per_count.unsigned_abs().get() == 1
+    }
+
     /// Starts from the first angle of the rotor: within the first turn, no turn counted.
     ///
     /// A reversed shaft sees the angle `8192 - rotor_angle`.

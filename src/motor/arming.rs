@@ -2,6 +2,7 @@ use super::{Claim, MotorName};
 
 /// The motors whose feedback is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
@@ -49,6 +50,7 @@ impl core::fmt::Display for Missing {
 
 /// Why a device was not armed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[expect(clippy::large_enum_variant, reason = "no heap, and arming is rare")]
 pub enum ArmError {

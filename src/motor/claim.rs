@@ -89,3 +89,10 @@ impl core::fmt::Display for Claim {
         write!(f, "{} of {} on 0x{:X}", role, self.motor, raw(self.id).1)
     }
 }
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Claim {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{} of {} on {=u32:#x}", self.role, self.motor, raw(self.id).1);
+    }
+}

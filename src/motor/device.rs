@@ -49,6 +49,14 @@ pub trait CanDevice {
     /// Takes a received frame that arrived at `now`. Constant time, no I/O, no control.
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest;
 
+    /// Takes a received frame of any driver's own type. One of more than 8 bytes is nobody's here.
+    fn ingest_any(&mut self, frame: &impl embedded_can::Frame, now: Instant) -> Ingest
+    where
+        Self: Sized,
+    {
+        CanFrame::copy_of(frame).map_or(Ingest::Unrelated, |frame| self.ingest(&frame, now))
+    }
+
     /// Runs every control loop once and encodes the commands.
     fn update(&mut self, tick: Tick);
 
@@ -87,7 +95,7 @@ pub trait CanDevice {
     /// a fault that relaxed it.
     fn is_armed(&self) -> bool;
 
-    /// Relaxes every motor at once: from the next frame on, all commands are zero until it is cleared and armed.
+    /// Relaxes every motor at once; the runner repeats it in each tick while the stop is set. From the next frame on, all commands are zero until it is cleared and armed.
     fn emergency_stop(&mut self);
 
     /// Clears the emergency stop. The device stays disarmed.

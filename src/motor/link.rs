@@ -58,7 +58,8 @@ impl Timeouts {
         Self { offline_us: limited(offline), ..self }
     }
 
-    /// Sets the age from which a target no longer counts: at most 10 s.
+    /// Sets the age from which a target no longer counts: at most 10 s, and longer than the period of the updates,
+    /// because a target has the time of the update before it.
     #[must_use]
     pub const fn with_command(self, command: Duration) -> Self {
         Self { command_us: limited(command), ..self }
@@ -79,7 +80,7 @@ impl Timeouts {
     /// Returns the age from which a motor is offline.
     #[must_use]
     pub const fn offline(&self) -> Duration {
-        Duration::from_micros(self.offline_us as u64)
+        Duration::from_micros(self.offline_us() as u64)
     }
 
     /// Returns the age from which a target no longer counts.

@@ -215,7 +215,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
 
     /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`.
     pub fn tick_with(&mut self, tick: Tick, mut evicted: impl FnMut(&CanFrame)) {
-        if self.stop.is_some_and(EmergencyStop::is_set) && !self.device.is_stopped() {
+        if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
         self.device.update(tick);

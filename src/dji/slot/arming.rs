@@ -1,4 +1,4 @@
-use super::{Slot, is_near};
+use super::{Slot, age, is_near};
 use crate::dji::command::to_raw;
 use crate::motor::{Link, Timeouts};
 
@@ -45,7 +45,7 @@ impl Slot {
         if self.limit == self.full_limit {
             return;
         }
-        let elapsed_ms = now.wrapping_sub(self.ramp_started) / 1_000;
+        let elapsed_ms = age(now, self.ramp_started) / 1_000;
         self.limit = match self.ramp_ms.map(|time| u32::from(time.get())) {
             Some(time_ms) if elapsed_ms < time_ms => to_raw(
                 elapsed_ms as f32 / time_ms as f32,
@@ -54,5 +54,15 @@ impl Slot {
             ),
             _ => self.full_limit,
         };
+        self.hold_back();
+    }
+
+    /// Keeps the speed loop within the limit that rises: it knows only the full one, and would wind up.
+    fn hold_back(&mut self) {
+        let limit = f32::from(self.limit) / self.raw_per_unit.abs();
+        let output = self.speed.output();
+        if output.abs() > limit {
+            self.speed.reset_to(limit.copysign(output));
+        }
     }
 }

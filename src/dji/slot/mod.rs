@@ -116,18 +116,26 @@ impl Slot {
         if !(full_scale.is_finite() && full_scale > 0.0) {
             return Err(parameter!("nominal voltage"));
         }
-        if !(config.limit > 0.0 && config.limit <= full_scale) {
+        let limit = match config.limit {
+            Some(limit) => limit,
+            None => full_scale,
+        };
+        if !(limit > 0.0 && limit <= full_scale) {
             return Err(parameter!("command limit"));
         }
-        if !(config.torque_constant_nm_per_a.is_finite() && config.torque_constant_nm_per_a > 0.0) {
+        let nm_per_a = match config.torque_constant_nm_per_a {
+            Some(nm_per_a) => nm_per_a,
+            None => facts.torque_constant_nm_per_a * config.gear.as_f32() / facts.gear.as_f32(),
+        };
+        if !(nm_per_a.is_finite() && nm_per_a > 0.0) {
             return Err(parameter!("torque constant"));
         }
         let sign = if config.reversed { -1.0 } else { 1.0 };
         let raw_per_unit = config.command_raw as f32 / full_scale;
-        let limit = to_raw(config.limit, raw_per_unit, config.command_raw);
+        let limit_raw = to_raw(limit, raw_per_unit, config.command_raw);
         let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
         let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
-        let speed = match limited_loop(config.speed, config.limit) {
+        let speed = match limited_loop(config.speed, limit) {
             Ok(speed) => speed,
             Err(name) => return Err(parameter!(name)),
         };
@@ -141,9 +149,9 @@ impl Slot {
             shaft: Shaft::new(config.gear, config.reversed),
             rad_per_s_per_rpm,
             raw_per_unit: sign * raw_per_unit,
-            nm_per_a: config.torque_constant_nm_per_a,
-            limit,
-            full_limit: limit,
+            nm_per_a,
+            limit: limit_raw,
+            full_limit: limit_raw,
             ramp_ms: ramp_time(config.recovery),
             speed,
             position,
@@ -158,6 +166,11 @@ impl Slot {
     /// Frees the slot; handles of the motor find nothing from now on.
     pub(super) const fn free(&mut self) {
         *self = Self { generation: self.generation + 1, ..Self::FREE };
+    }
+
+    /// Frees a slot whose handle nobody was given.
+    pub(super) const fn withdraw(&mut self) {
+        *self = Self { generation: self.generation, ..Self::FREE };
     }
 
     /// Tells whether a handle's key names the motor that is here now.

@@ -69,7 +69,7 @@ impl Slot {
 
     fn doubt_position(&mut self) {
         self.ambiguous_gaps = self.ambiguous_gaps.saturating_add(1);
-        if self.homing == Homing::Homed {
+        if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
     }
@@ -83,8 +83,9 @@ impl Slot {
 
     fn set_online(&mut self, facts: &Facts) {
         self.link = Link::Online;
-        // Half a rotor turn at no-load speed: 30 s / rpm.
-        self.trusted_gap_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
+        // Half a rotor turn at no-load speed, 30 s / rpm, less what frames may be delayed by others on the bus.
+        let half_turn_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
+        self.trusted_gap_us = half_turn_us.saturating_sub(500);
     }
 
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.

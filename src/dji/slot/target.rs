@@ -87,8 +87,14 @@ impl Slot {
         replace(&mut self.position, config, limit)
     }
 
-    /// A value that cannot be followed takes the target away: zero output, integrators untouched.
+    /// A value that cannot be followed takes the target before it away: zero output, integrators untouched. An older
+    /// value must not act in its place when the feedback comes back.
     fn admit(&mut self, finite: bool) -> Result<(), TargetError> {
+        if !finite {
+            self.target = Target::Relax;
+            self.refused_targets = self.refused_targets.saturating_add(1);
+            return Err(TargetError::NotFinite);
+        }
         if !self.armed {
             return Err(TargetError::Disarmed);
         }
@@ -96,12 +102,8 @@ impl Slot {
             return Err(TargetError::Relaxed);
         }
         if self.link != Link::Online {
-            return Err(TargetError::NoFeedback);
-        }
-        if !finite {
             self.target = Target::Relax;
-            self.refused_targets = self.refused_targets.saturating_add(1);
-            return Err(TargetError::NotFinite);
+            return Err(TargetError::NoFeedback);
         }
         Ok(())
     }

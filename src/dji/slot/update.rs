@@ -16,7 +16,7 @@ impl Slot {
     #[inline]
     pub(in crate::dji) fn update(&mut self, cycle: &Cycle) -> i16 {
         if !is_near(cycle.now, self.heard, cycle.timeouts.late_us())
-            || cycle.now.wrapping_sub(self.commanded) > cycle.timeouts.command_us()
+            || !is_near(cycle.now, self.commanded, cycle.timeouts.command_us())
         {
             self.rest(cycle);
             return 0;

@@ -1,0 +1,309 @@
+//! Defects that a review of this crate found, each as a case of its own.
+
+#![cfg(test)]
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
+use drivetrain::encoder::GearRatio;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{CanDevice, Ingest, Recovery, TargetError, Timeouts};
+use drivetrain::runner::{EmergencyStop, Nb, Runner};
+use drivetrain::time::{Duration, Instant, ManualClock, Tick};
+use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
+use embedded_can::ErrorKind;
+
+fn us(micros: u64) -> Instant {
+    Instant::from_micros(micros)
+}
+
+fn feedback(id: u16, angle: u16, rpm: i16) -> CanFrame {
+    let ([a, b], [c, d]) = (angle.to_be_bytes(), rpm.to_be_bytes());
+    CanFrame::standard(id, [a, b, c, d, 0, 0, 25, 0]).unwrap()
+}
+
+fn hear(bus: &mut Bus, frame: CanFrame, micros: u64) {
+    assert_eq!(bus.ingest(&frame, us(micros)), Ingest::Taken);
+}
+
+fn step(bus: &mut Bus, micros: u64) {
+    bus.update(Tick::new(us(micros), 0.001));
+}
+
+fn sent(bus: &mut Bus) -> Vec<(u32, [i16; 4])> {
+    let word = |frame: &CanFrame, slot: usize| {
+        i16::from_be_bytes([frame.bytes()[2 * slot], frame.bytes()[2 * slot + 1]])
+    };
+    std::iter::from_fn(|| bus.next_frame())
+        .map(|frame| (frame.header(), [0, 1, 2, 3].map(|slot| word(&frame, slot))))
+        .collect()
+}
+
+fn armed(config: Config<M3508>) -> (Bus, Handle<M3508>) {
+    let mut bus = Bus::new();
+    let motor = bus.attach(config).unwrap();
+    hear(&mut bus, feedback(0x200 + u16::from(config.id()), 0, 0), 1_000);
+    bus.arm(us(1_000)).unwrap();
+    (bus, motor)
+}
+
+struct Recorder(Vec<CanFrame>);
+
+impl embedded_can::nb::Can for Recorder {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+        self.0.push(*frame);
+        Ok(None)
+    }
+    fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+        Err(nb::Error::WouldBlock)
+    }
+}
+
+#[test]
+fn the_emergency_stop_reaches_every_part_also_when_one_is_stopped_already() {
+    static STOP: EmergencyStop = EmergencyStop::new();
+    let clock = ManualClock::new(us(1_000));
+    let (mut left, mut right) = (Bus::new(), Bus::new());
+    left.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = right.attach(Config::<M3508>::new(5)).unwrap();
+    hear(&mut left, feedback(0x201, 0, 0), 1_000);
+    hear(&mut right, feedback(0x205, 0, 0), 1_000);
+    let mut runner =
+        Runner::new(Nb(Recorder(Vec::new())), &clock, (left, right)).with_emergency_stop(&STOP);
+    let tick = Tick::new(us(1_000), 0.001);
+    runner.arm(tick).unwrap();
+    runner.device_mut().0.emergency_stop();
+    runner.device_mut().1.set_raw(wheel, 9_000).unwrap();
+    STOP.set();
+    runner.tick(tick);
+    assert!(runner.port_mut().0.0.iter().all(|frame| *frame.bytes() == [0; 8]));
+}
+
+#[test]
+fn a_ramp_starts_at_zero_also_when_frames_are_stamped_after_the_tick() {
+    let config = Config::<M3508>::new(1)
+        .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
+        .with_recovery(Recovery::Ramp(Duration::from_secs(2)));
+    let (mut bus, motor) = armed(config);
+    for ms in 2..150 {
+        step(&mut bus, ms * 1_000);
+    }
+    for ms in 150..200_u64 {
+        hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000 + 300);
+        _ = bus.set_velocity(motor, AngularVelocity::from_rad_per_s(10.0));
+        step(&mut bus, ms * 1_000);
+        let most = sent(&mut bus).iter().map(|frame| frame.1[0]).max().unwrap_or(0);
+        assert!(most < 500, "{most} of 16384 at {ms} ms of a ramp of 2 s");
+    }
+}
+
+#[test]
+fn a_speed_loop_does_not_wind_up_behind_the_limit_of_a_ramp() {
+    let config = Config::<M3508>::new(1)
+        .speed_loop(PidConfig::new(0.1, 50.0, 0.0))
+        .with_recovery(Recovery::Ramp(Duration::from_secs(2)));
+    let (mut bus, motor) = armed(config);
+    for ms in 2..150 {
+        step(&mut bus, ms * 1_000);
+    }
+    let mut at_release = 0;
+    for ms in 150..3_000_u64 {
+        // Blocked for a second, then exactly at its target.
+        let rpm = if ms < 1_150 { 0 } else { 184 };
+        hear(&mut bus, feedback(0x201, 0, rpm), ms * 1_000);
+        _ = bus.set_velocity(motor, AngularVelocity::from_rad_per_s(1.0));
+        step(&mut bus, ms * 1_000);
+        let raw = sent(&mut bus).last().map_or(0, |frame| frame.1[0]);
+        if ms == 1_149 {
+            at_release = raw;
+        }
+        if ms > 1_170 {
+            assert!(raw <= at_release + 400, "{raw} at {ms} ms, {at_release} when it was released");
+        }
+    }
+    assert!((7_000..9_500).contains(&at_release), "{at_release}: half of the ramp");
+}
+
+#[test]
+fn a_target_refused_for_late_feedback_takes_the_older_one_away() {
+    let (mut bus, motor) = armed(Config::new(1));
+    bus.set_raw(motor, 5_000).unwrap();
+    for ms in 2..15 {
+        step(&mut bus, ms * 1_000);
+    }
+    assert_eq!(bus.set_raw(motor, 0), Err(TargetError::NoFeedback));
+    _ = sent(&mut bus);
+    hear(&mut bus, feedback(0x201, 0, 0), 15_000);
+    step(&mut bus, 15_000);
+    assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]));
+    let nan = Current::from_amperes(f32::NAN);
+    assert_eq!(bus.set_current(motor, nan), Err(TargetError::NotFinite));
+}
+
+#[test]
+fn frames_that_waited_for_a_stalled_loop_never_make_up_a_turn_silently() {
+    for stall_us in (1_000..40_000_u64).step_by(333) {
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        // 9000 rpm, one frame a millisecond, none lost; all of them are polled when the stall is over.
+        let counts = |ms: u64| i64::try_from(ms * 12_288 / 10).unwrap();
+        let frame = |ms| feedback(0x201, u16::try_from(counts(ms) % 8192).unwrap(), 9_000);
+        hear(&mut bus, frame(0), 10_000);
+        let frames = stall_us / 1_000;
+        for ms in 1..=frames {
+            hear(&mut bus, frame(ms), 10_000 + stall_us);
+        }
+        let state = bus.state(wheel).unwrap();
+        assert!(
+            state.rotor_counts == counts(frames) || state.ambiguous_gaps > 0,
+            "stalled for {stall_us} us"
+        );
+    }
+}
+
+#[test]
+fn frames_delayed_on_the_bus_are_not_followed_blindly() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 9_256), 10_000);
+    hear(&mut bus, feedback(0x201, 4_200, 9_256), 13_200); // 4200 counts take 3.32 ms
+    assert_eq!(bus.state(wheel).unwrap().rotor_counts, 4_200);
+}
+
+#[test]
+fn a_zeroed_gm6020_keeps_its_angle_through_a_dropout() {
+    let mut bus = Bus::new();
+    let gains = PidConfig::new(1.0, 0.0, 0.0);
+    let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(gains, gains)).unwrap();
+    hear(&mut bus, feedback(0x205, 1_000, 0), 1_000);
+    bus.zero(yaw).unwrap();
+    for ms in 2..150 {
+        step(&mut bus, ms * 1_000);
+    }
+    for ms in 150..170 {
+        hear(&mut bus, feedback(0x205, 1_000, 0), ms * 1_000);
+        step(&mut bus, ms * 1_000);
+    }
+    bus.arm(us(169_000)).unwrap();
+    assert_eq!(bus.set_angle(yaw, Angle::ZERO), Ok(()));
+}
+
+#[test]
+fn the_order_of_configuration_does_not_matter() {
+    let mut bus = Bus::new();
+    let direct = Config::<M3508>::new(1).with_torque_constant(0.5).with_gear(GearRatio::DIRECT);
+    let wheel = bus.attach(direct).unwrap();
+    let ten_amperes = CanFrame::standard(0x201, [0, 0, 0, 0, 0x20, 0, 0, 0]).unwrap();
+    hear(&mut bus, ten_amperes, 1_000);
+    assert!((bus.state(wheel).unwrap().torque_nm - 5.0).abs() < 1e-5);
+
+    let limited = Config::<Gm6020Voltage>::new(1).with_voltage_limit(Voltage::from_volts(6.0));
+    let yaw = bus.attach(limited.with_nominal_voltage(Voltage::from_volts(25.2))).unwrap();
+    hear(&mut bus, feedback(0x205, 0, 0), 1_000);
+    bus.arm(us(1_000)).unwrap();
+    bus.set_voltage(yaw, Voltage::from_volts(25.0)).unwrap();
+    step(&mut bus, 2_000);
+    let raw = sent(&mut bus).iter().find(|frame| frame.0 == 0x1FF).unwrap().1[0];
+    assert_eq!(raw, 5_952); // 6 V of 25.2 V
+}
+
+#[test]
+fn a_target_set_between_an_arming_and_an_earlier_tick_counts() {
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 0), 1_000);
+    bus.arm(us(1_003)).unwrap();
+    bus.set_raw(motor, 77).unwrap();
+    step(&mut bus, 1_000);
+    assert_eq!(sent(&mut bus), [(0x200, [77, 0, 0, 0])]);
+}
+
+#[test]
+fn a_clock_that_stands_still_stops_the_motors() {
+    let (mut bus, motor) = armed(Config::new(1));
+    bus.set_raw(motor, 100).unwrap();
+    for _ in 0..4 {
+        step(&mut bus, 1_500);
+    }
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+    assert_eq!(bus.counters().bad_steps, 3);
+}
+
+#[test]
+fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
+    let (mut bus, motor) = armed(Config::new(1));
+    bus.set_raw(motor, 100).unwrap();
+    step(&mut bus, 2_000);
+    assert_eq!(sent(&mut bus), [(0x200, [100, 0, 0, 0])]);
+    bus.update(Tick::new(us(5_000_000), 0.0));
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+}
+
+#[test]
+fn feedback_older_than_a_stamp_can_tell_does_not_arm() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::new(1)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 0), 1_000);
+    step(&mut bus, 1_000);
+    assert!(bus.arm(us(1_005 + (1 << 32))).is_err());
+}
+
+#[test]
+fn an_array_that_does_not_fit_leaves_no_trace() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<Gm6020Current>::new(3)).unwrap();
+    for _ in 0..40 {
+        assert!(bus.attach_all([1, 9].map(Config::<M3508>::new)).is_err());
+    }
+    step(&mut bus, 1_000);
+    assert_eq!(sent(&mut bus), [(0x1FE, [0; 4])], "no frame that nobody owns");
+    assert!(bus.attach(Config::<M3508>::new(1)).is_ok(), "no place is worn out");
+}
+
+#[test]
+fn the_offline_limit_is_the_one_in_force() {
+    let timeouts = Timeouts::new()
+        .with_late(Duration::from_millis(200))
+        .with_offline(Duration::from_millis(50));
+    assert_eq!(timeouts.offline(), Duration::from_millis(200));
+}
+
+#[test]
+fn frames_are_conserved_through_refusals_and_evictions() {
+    let (mut bus, first) = armed(Config::new(1));
+    let second = bus.attach(Config::<M3508>::new(5)).unwrap();
+    hear(&mut bus, feedback(0x205, 0, 0), 1_000);
+    bus.arm(us(1_000)).unwrap();
+    let (mut taken, mut evicted, mut seed) = (0_u32, 0_u32, 1_u32);
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        seed >> 30
+    };
+    for ms in 2..2_000 {
+        hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
+        hear(&mut bus, feedback(0x205, 0, 0), ms * 1_000);
+        bus.set_raw(first, if random() < 2 { 5 } else { 0 }).unwrap();
+        bus.set_raw(second, 6).unwrap();
+        step(&mut bus, ms * 1_000);
+        while let Some(frame) = bus.next_frame() {
+            match random() {
+                0 => {
+                    assert!(bus.requeue(&frame)); // refused
+                    break;
+                }
+                1 => {
+                    taken += 1;
+                    evicted += 1;
+                    assert!(bus.requeue(&frame));
+                }
+                _ => taken += 1,
+            }
+        }
+    }
+    // What is given back waits for the next update: one that marks nothing new brings it all out.
+    bus.update(Tick::new(us(1_999_000), 0.0));
+    let counters = bus.counters();
+    let waiting = u32::try_from(sent(&mut bus).len()).unwrap();
+    assert_eq!(counters.packed + evicted, taken + counters.superseded + waiting);
+}
