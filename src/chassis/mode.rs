@@ -286,9 +286,9 @@ impl Modes {
             (Mode::FollowGimbal, Some(yaw)) => {
                 // The chassis stands at minus the yaw on the gimbal's circle, and shall stand at zero.
                 let wz_rad_s = self.follow.update(0.0, -yaw.angle().as_radians(), dt_s);
-                command.to_body(yaw).with_wz(wz_rad_s)
+                command.to_body_by_yaw(yaw).with_wz(wz_rad_s)
             }
-            (Mode::Rotor, Some(yaw)) => command.to_body(yaw).with_wz(self.spin(dt_s)),
+            (Mode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),
             _ => Twist::new(command.vx_m_s, command.vy_m_s, command.wz_rad_s),
         };
         self.output = self.blend(wanted, dt_s);

@@ -82,7 +82,7 @@ impl Twist<World> {
 impl Twist<Gimbal> {
     /// Returns the same motion as the chassis sees it; `yaw` is the gimbal's turn against the chassis.
     #[must_use]
-    pub const fn to_body(self, yaw: Heading) -> Twist<Body> {
+    pub const fn to_body_by_yaw(self, yaw: Heading) -> Twist<Body> {
         self.turned(yaw.rotation())
     }
 }
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn gimbal_looking_left_its_forward_is_body_left() {
         let yaw = Heading::new(Angle::from_degrees(90.0));
-        close(Twist::<Gimbal>::new(1.0, 0.0, 0.0).to_body(yaw).linear(), 0.0, 1.0);
+        close(Twist::<Gimbal>::new(1.0, 0.0, 0.0).to_body_by_yaw(yaw).linear(), 0.0, 1.0);
     }
 
     #[test]
