@@ -38,6 +38,8 @@ pub fn call_all() {
     crate::chassis::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
+    #[cfg(feature = "panics")]
+    f32::clamp.call();
 }
 
 /// The linear functions that `units` gives to each quantity by a macro.
