@@ -17,6 +17,8 @@ import image  # noqa: E402
 
 TARGETS = ["thumbv6m-none-eabi", "thumbv7m-none-eabi", "thumbv7em-none-eabihf", "thumbv8m.main-none-eabihf"]
 PROFILES = ["release", "o2", "os"]
+# Whatever CARGO_TARGET_DIR says.
+BUILDS = HERE.parent / "target"
 SOURCES = HERE.parent.parent / "src"
 END = "a_function_of_drivetrain_can_panic"
 
@@ -71,8 +73,8 @@ def missing():
     return names
 
 
-def link(target, profile, *more):
-    command = ["cargo", "build", "--quiet", "--target", target, "--profile", profile, *more]
+def link(target, profile, folder, *more):
+    command = ["cargo", "build", "--quiet", "--target", target, "--profile", profile, "--target-dir", str(folder), *more]
     environment = {**os.environ, "CARGO_TERM_COLOR": "never"}
     done = subprocess.run(command, cwd=HERE, env=environment, capture_output=True, text=True)
     return done.returncode == 0, done.stderr
@@ -80,9 +82,9 @@ def link(target, profile, *more):
 
 def culprits(target, profile):
     """The functions of the list that lead to a panic."""
-    folder = HERE.parent / "target" / "show"
+    folder = BUILDS / "show"
     flags = f'target.{target}.rustflags=["-C", "symbol-mangling-version=v0"]'
-    linked, errors = link(target, profile, "--features=show", "--config", flags, "--target-dir", str(folder))
+    linked, errors = link(target, profile, folder, "--features=show", "--config", flags)
     if not linked:
         return [errors]
     graph, _ = image.calls(str(folder / target / profile / "drivetrain-nopanic"))
@@ -97,14 +99,17 @@ def culprits(target, profile):
 def main():
     if names := missing():
         image.fail("nopanic/src lacks " + ", ".join(names))
+    linked, errors = link(TARGETS[-2], PROFILES[0], BUILDS / "panics", "--features=panics")
+    if linked or END not in errors:
+        image.fail("f32::clamp, which can panic, was not found: the test would find nothing")
     for target in TARGETS:
         for profile in PROFILES:
-            linked, errors = link(target, profile)
+            linked, errors = link(target, profile, BUILDS)
             if not linked and END not in errors:
                 image.fail(errors)
             if not linked:
                 image.fail(f"{target}, {profile}: a panic path\n" + "\n".join(culprits(target, profile)))
-            elf = str(HERE.parent / "target" / target / profile / "drivetrain-nopanic")
+            elf = str(BUILDS / target / profile / "drivetrain-nopanic")
             helpers = sorted(name for name in image.symbols(elf) if FORBIDDEN.fullmatch(name))
             if helpers:
                 image.fail(f"{target}, {profile}: the image calls {', '.join(helpers)}")

@@ -20,6 +20,8 @@ sys.path.insert(0, str(HERE.parent))
 import image  # noqa: E402
 
 BUDGET = HERE / "budget.toml"
+# Whatever CARGO_TARGET_DIR says: these builds share nothing with those of the host.
+BUILDS = HERE.parent / "target"
 HOST = {}
 TARGET = "thumbv7em-none-eabihf"
 PROFILES = {"3": "release", "2": "o2", "s": "os"}
@@ -107,8 +109,11 @@ def update(budget, runs):
     BUDGET.write_text(text)
 
 
-def build(profile, *more):
-    subprocess.run(["cargo", *more, "--profile", profile, "--quiet"], cwd=HERE, check=True)
+def build(profile, folder, toolchain="", *more):
+    command = ["cargo", *toolchain.split(), "build", "--profile", profile, "--quiet", "--target-dir", str(folder)]
+    if subprocess.run([*command, *more], cwd=HERE).returncode:
+        image.fail(f"the bench does not build with the profile {profile}")
+    return str(folder / TARGET / profile / "drivetrain-qemu")
 
 
 def static_stack():
@@ -121,9 +126,7 @@ def static_stack():
         print("static stack bound: skipped, there is no nightly with the target")
         return
     flags = f'target.{TARGET}.rustflags=["-Z", "emit-stack-sizes"]'
-    folder = HERE.parent / "target" / "stack"
-    build("release", f"+{nightly[0]}", "build", "--config", flags, "--target-dir", str(folder))
-    elf = str(folder / TARGET / "release" / "drivetrain-qemu")
+    elf = build("release", BUILDS / "stack", f"+{nightly[0]}", "--config", flags)
     (graph, indirect), sizes = image.calls(elf), image.frames(elf)
     for root in ("row_decode", "row_update", "row_tick"):
         bound, unknown = image.stack_bound(graph, sizes, root)
@@ -141,10 +144,7 @@ def main():
         print(markdown(budget))
         return
     if not elves:
-        for profile in PROFILES.values():
-            build(profile, "build")
-        folder = HERE.parent / "target" / TARGET
-        elves = [str(folder / profile / "drivetrain-qemu") for profile in PROFILES.values()]
+        elves = [build(profile, BUILDS) for profile in PROFILES.values()]
     runs = [measure(elf) for elf in elves]
     if "--json" in options:
         print(json.dumps(runs, indent=1))

@@ -169,7 +169,9 @@ impl Message {
         let mut unit = 1_000_000_000;
         while unit > 0 {
             if number >= unit || unit == 1 {
-                message = message.byte(b'0' + (number / unit % 10) as u8);
+                // Never zero, which `/` would not believe.
+                let Some(leading) = number.checked_div(unit) else { break };
+                message = message.byte(b'0' + (leading % 10) as u8);
             }
             unit /= 10;
         }

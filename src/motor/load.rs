@@ -1,3 +1,5 @@
+use core::num::NonZeroU32;
+
 /// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
 ///
 /// Counts standard data frames of 8 bytes, the only ones that DJI motors use, each with the pause of three bits after
@@ -106,27 +108,34 @@ impl BusLoad {
 
     /// Returns the worst case in percent, rounded up.
     pub(crate) const fn worst_percent(&self) -> u32 {
-        self.percent(Self::WORST_CASE_BITS, self.bit_rate as u64 - 1)
+        self.percent(Self::WORST_CASE_BITS)
     }
 
     const fn share(&self, bits: u32) -> f32 {
         self.frames_per_s as f32 * bits as f32 / self.bit_rate as f32
     }
 
-    const fn percent(&self, bits: u32, addend: u64) -> u32 {
-        let bits_per_s = self.frames_per_s as u64 * bits as u64;
-        let percent = (bits_per_s * 100 + addend) / self.bit_rate as u64;
-        #[expect(clippy::cast_possible_truncation, reason = "checked right here")]
-        let percent = if percent > u32::MAX as u64 { u32::MAX } else { percent as u32 };
-        percent
+    /// Returns a load in percent, rounded up; saturates. With 32-bit divisions only, which small cores have.
+    const fn percent(&self, bits: u32) -> u32 {
+        let Some(rate) = NonZeroU32::new(self.bit_rate) else { return u32::MAX };
+        let bits_per_s = self.frames_per_s.saturating_mul(bits);
+        let (whole, rest) = (bits_per_s / rate.get(), bits_per_s % rate.get());
+        // A hundredth of the rate is exact enough where the rest in percent would not fit.
+        let part = match rest.checked_mul(100) {
+            Some(rest) => rest.div_ceil(rate.get()),
+            None => match rest.checked_div(rate.get() / 100) {
+                Some(percent) => percent.saturating_add(1),
+                None => 100,
+            },
+        };
+        whole.saturating_mul(100).saturating_add(part)
     }
 }
 
 /// Writes both loads in percent, rounded up.
 impl core::fmt::Display for BusLoad {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let up = u64::from(self.bit_rate) - 1;
-        write!(f, "{} % to {} %", self.percent(Self::NOMINAL_BITS, up), self.worst_percent())
+        write!(f, "{} % to {} %", self.percent(Self::NOMINAL_BITS), self.worst_percent())
     }
 }
 

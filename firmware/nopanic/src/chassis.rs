@@ -2,16 +2,18 @@
 
 use crate::opaque::Function;
 use drivetrain::chassis::*;
+use drivetrain::dji::{AnyHandle, Bus};
+use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
 
 pub fn call_all() {
     Differential::new.call();
     Differential::inverse.call();
     Differential::forward.call();
-    Mecanum::new.call();
-    Mecanum::with_rollers.call();
-    Mecanum::inverse.call();
-    Mecanum::forward.call();
+    Mecanum::<FloorO>::new.call();
+    Mecanum::<FloorO>::with_rollers.call();
+    Mecanum::<FloorO>::inverse.call();
+    Mecanum::<FloorX>::forward.call();
     OmniWheel::tangential.call();
     Omni::<4>::new.call();
     Omni::<4>::inverse.call();
@@ -34,6 +36,60 @@ pub fn call_all() {
     Swerve::<4>::positions_m.call();
     Swerve::<4>::inverse.call();
     Swerve::<4>::forward.call();
+    Chassis::<Mecanum>::new.call();
+    Chassis::<Mecanum>::set_limits.call();
+    Chassis::<Mecanum>::set_body.call();
+    Chassis::<Mecanum>::set_world.call();
+    Chassis::<Mecanum>::set_heading.call();
+    Chassis::<Mecanum>::stop.call();
+    Chassis::<Mecanum>::restart.call();
+    Chassis::<Mecanum>::update.call();
+    Chassis::<Mecanum>::measured.call();
+    Chassis::<Mecanum>::reference.call();
+    Chassis::<Mecanum>::pose.call();
+    Chassis::<Mecanum>::set_pose.call();
+    Chassis::<Mecanum>::status.call();
+    Chassis::<Mecanum>::kinematics.call();
+    (|chassis: &mut Chassis<Mecanum>,
+      bus: &mut Bus,
+      wheels: MecanumWheels<AnyHandle>,
+      tick: Tick| Chassis::drive(chassis, bus, wheels, tick))
+    .call();
+    ChassisLimits::new.call();
+    ChassisLimits::with_acceleration.call();
+    ChassisLimits::with_wheel_speed.call();
+    ChassisLimits::with_command_timeout.call();
+    ChassisLimits::validate.call();
+    ModeConfig::new.call();
+    ModeConfig::with_rotor.call();
+    ModeConfig::with_spin.call();
+    ModeConfig::with_gimbal_timeout.call();
+    ModeConfig::with_transition.call();
+    Modes::new.call();
+    Modes::set_mode.call();
+    Modes::mode.call();
+    Modes::acting.call();
+    Modes::take_edge.call();
+    Modes::update.call();
+    Odometry::new.call();
+    Odometry::advance.call();
+    Odometry::pose.call();
+    Odometry::heading.call();
+    Odometry::set_position_m.call();
+    PowerModel::new.call();
+    PowerModel::power_w.call();
+    (|model: &PowerModel, wheels: [WheelLoad; 4], limit_w: f32| {
+        PowerModel::cut(model, wheels, limit_w)
+    })
+    .call();
+    PowerBuffer::new.call();
+    PowerBuffer::with_blind_share.call();
+    PowerBuffer::allowance_w.call();
+    PowerFit::new.call();
+    PowerFit::model.call();
+    PowerFit::rejected.call();
+    (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
+        .call();
     wheels!(DifferentialWheels MecanumWheels OmniThreeWheels OmniFourWheels);
 }
 

@@ -13,7 +13,10 @@ use drivetrain::dji::{
 use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
-use drivetrain::motor::{CanDevice, Claim, Missing, MotorName, Role, Timeouts, VelocityDrive};
+use drivetrain::motor::{
+    BusLoad, CanDevice, Claim, Guard, Malformed, Missing, MotorName, Own, OwnMotor, Role, Timeouts,
+    VelocityDrive,
+};
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
 };
@@ -35,6 +38,8 @@ pub fn call_all() {
     crate::chassis::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
+    #[cfg(feature = "panics")]
+    f32::clamp.call();
 }
 
 /// The linear functions that `units` gives to each quantity by a macro.
@@ -243,6 +248,37 @@ fn motor() {
     Timeouts::offline.call();
     Timeouts::command.call();
     Timeouts::good_frames.call();
+    BusLoad::new.call();
+    BusLoad::with_frames.call();
+    BusLoad::frames_per_s.call();
+    BusLoad::bit_rate.call();
+    BusLoad::nominal.call();
+    BusLoad::worst_case.call();
+    BusLoad::frames_within.call();
+    Guard::new.call();
+    Guard::without_feedback.call();
+    Guard::with_timeouts.call();
+    Guard::hear.call();
+    Guard::admit.call();
+    Guard::drives.call();
+    Guard::has_target.call();
+    Guard::relax.call();
+    Guard::is_missing.call();
+    Guard::engage.call();
+    Guard::disarm.call();
+    Guard::emergency_stop.call();
+    Guard::clear_emergency_stop.call();
+    Guard::is_armed.call();
+    Guard::is_stopped.call();
+    Guard::link.call();
+    Guard::refused_targets.call();
+    Guard::forgotten_targets.call();
+    Guard::reversals.call();
+    Own::<AnyMotor>::new.call();
+    Own::<AnyMotor>::with_timeouts.call();
+    Own::<AnyMotor>::motor.call();
+    Own::<AnyMotor>::guard.call();
+    device::<Own<AnyMotor>>();
     MotorName::new.call();
     MotorName::model.call();
     MotorName::id.call();
@@ -302,6 +338,13 @@ fn dji() {
     Bus::<()>::attach::<Gm6020Current>.call();
     Bus::<()>::attach_all::<M3508, 4>.call();
     (|bus: &mut Bus, motor: AnyHandle| Bus::detach(bus, motor)).call();
+    Bus::<()>::load.call();
+    Bus::<()>::with_bit_rate.call();
+    Bus::<()>::with_feedback_rate.call();
+    Bus::<()>::with_load_ceiling.call();
+    Bus::<()>::with_tick_rate.call();
+    (|bus: &mut Bus, motors: &[AnyHandle], now: Instant| Bus::arm_only(bus, motors, now).is_ok())
+        .call();
     Bus::<()>::ingest.call();
     Bus::<()>::ingest_raw.call();
     Bus::<()>::update.call();
@@ -329,6 +372,33 @@ fn dji() {
         .call();
     (|bus: &Bus, motor: AnyHandle| VelocityDrive::velocity(bus, motor)).call();
     device::<Bus>();
+}
+
+/// A motor of a user that may do anything.
+struct AnyMotor;
+
+impl OwnMotor for AnyMotor {
+    fn name(&self) -> MotorName {
+        any()
+    }
+    fn command_id(&self) -> Id {
+        any()
+    }
+    fn feedback_id(&self) -> Id {
+        any()
+    }
+    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+        black_box(frame);
+        any()
+    }
+    fn velocity(&self) -> AngularVelocity {
+        any()
+    }
+    fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
+        black_box((target, step));
+        any()
+    }
+    fn reset(&mut self) {}
 }
 
 /// A driver that may answer anything.

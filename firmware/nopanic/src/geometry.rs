@@ -10,6 +10,7 @@ pub fn call_all() {
     Twist::<Body>::new.call();
     Twist::<Body>::linear.call();
     Twist::<Body>::is_finite.call();
+    Twist::<Body>::with_wz.call();
     Twist::<Body>::over.call();
     Twist::<Body>::discretized.call();
     Twist::<Body>::at.call();

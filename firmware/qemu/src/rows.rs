@@ -152,6 +152,8 @@ pub fn motors() {
         })],
     );
     row("pack", &[pack()]);
+    row("update_speed", &[update(Targets::Speed)]);
+    row("update_cascade", &[update(Targets::Position)]);
     row("tick_speed", &[tick(Targets::Speed, 0, START)]);
     row("tick_speed_limit", &[tick(Targets::HighSpeed, 0, START)]);
     row("tick_cascade", &[tick(Targets::Position, 0, START)]);
@@ -177,14 +179,35 @@ fn decode_wrap() -> u32 {
     })
 }
 
+/// One update of a bus that has heard its motors.
+fn update(targets: Targets) -> u32 {
+    let (bus, tick) = heard(targets);
+    instructions(row_update as fn(&mut Bus, Tick), |update, _| update(&mut copy(&bus), tick))
+}
+
+/// The command frames of one update.
 fn pack() -> u32 {
-    let mut drive = Drive::new(Targets::Speed, 0, START);
-    instructions(row_pack as fn(&mut Bus), |pack, _| {
+    let (mut bus, tick) = heard(Targets::Speed);
+    bus.update(tick);
+    instructions(row_pack as fn(&mut Bus), |pack, _| pack(&mut copy(&bus)))
+}
+
+/// Runs for 10 ms, up to an update that has its feedback and its targets.
+fn heard(targets: Targets) -> (Bus, Tick) {
+    let mut drive = Drive::new(targets, 0, START);
+    for _ in 0..10 {
+        let (bus, frames, tick) = drive.parts();
+        row_tick(bus, frames, tick);
         drive.advance();
-        drive.hear();
-        drive.bus.update(Tick::new(drive.now, 0.001));
-        pack(&mut drive.bus);
-    })
+    }
+    drive.hear();
+    (drive.bus, Tick::new(drive.now, 0.001))
+}
+
+/// Copies a bus, so that every call finds the same one.
+fn copy(bus: &Bus) -> Bus {
+    // SAFETY: a bus owns nothing but its bytes.
+    black_box(unsafe { core::ptr::read(bus) })
 }
 
 pub fn tick(targets: Targets, turns: i64, start: Instant) -> u32 {

@@ -51,7 +51,7 @@ impl Drive {
         drive.advance();
         drive.hear();
         for motor in drive.motors {
-            drive.bus.set_present_position(motor, Position::from_turns(turns));
+            drive.bus.set_present_position(motor, Position::from_turns(turns)).unwrap();
         }
         drive.bus.arm(drive.now).unwrap();
         drive
