@@ -192,11 +192,13 @@ impl<B> Bus<B> {
             self.lose_all(before);
         }
         let cycle = Cycle { now: self.now, step, timeouts: self.timeouts };
-        for slot in &mut self.slots {
+        let mut rest = self.slots.as_mut_slice();
+        while let [slot, others @ ..] = rest {
             if slot.facts().is_some() {
                 let raw = slot.update(&cycle);
                 self.outbox.put(slot.place, raw);
             }
+            rest = others;
         }
         self.outbox.finish_update(self.now);
         self.check_one_slot();

@@ -70,17 +70,21 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
 /// Limits a raw command to ±`limit`, which is not negative.
 #[inline]
 pub(super) const fn saturate(raw: i32, limit: i16) -> i16 {
-    let limit = limit as i32;
     // One comparison for both ends: below -limit is far above, unsigned.
-    let within = raw.wrapping_add(limit).cast_unsigned() <= 2 * limit.cast_unsigned();
-    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
-    if within {
-        raw as i16
-    } else if raw < 0 {
-        -limit as i16
-    } else {
-        limit as i16
+    let end = limit as i32;
+    if raw.wrapping_add(end).cast_unsigned() > 2 * end.cast_unsigned() {
+        return at_the_limit(raw, limit);
     }
+    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+    let raw = raw as i16;
+    raw
+}
+
+/// Out of the line of [`saturate`].
+#[cold]
+#[inline(never)]
+const fn at_the_limit(raw: i32, limit: i16) -> i16 {
+    if raw < 0 { -limit } else { limit }
 }
 
 /// Counts the frames in a set; a Cortex-M has no instruction for it.
