@@ -202,6 +202,8 @@ impl Outbox {
     pub(super) fn clear(&mut self) {
         self.words = Words::ZERO;
         self.active = 0;
+        // A frame that was given back is replaced now.
+        self.dirty |= core::mem::take(&mut self.returned);
         self.mark(self.in_use);
     }
 

@@ -1,0 +1,194 @@
+//! F01 to F12: what is received.
+
+use crate::rig::{Rig, armed, at_ms, feedback, rpm, step};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Ingest, Link, Malformed};
+use drivetrain::runner::FrameQueue;
+use drivetrain::sim::{Fault, Line, World};
+use drivetrain::time::Duration;
+use embedded_can::{ExtendedId, Frame, StandardId};
+
+#[test]
+fn f01_a_wrong_length_is_counted_and_keeps_nothing_fresh() {
+    for length in 0..8 {
+        let world = World::new(1);
+        let mut rig = Rig::new(&world, Line::Can1, 2);
+        world
+            .fault(Fault::WrongLength { motor: rig.keys[0], length }, at_ms(600)..at_ms(650))
+            .unwrap();
+        rig.drive(700);
+        assert!(rig.first_zero(0, 600) < at_ms(613), "length {length}");
+        assert!(rig.words(0, 613, 650).iter().all(|word| *word == 0));
+        assert!(rig.words(1, 613, 650).iter().all(|word| *word > 0), "the other goes on");
+        let counted = rig.runner.device().counters().bad_length;
+        assert!((49..=51).contains(&counted), "{counted}");
+        assert_eq!(rig.runner.statistics().malformed, counted);
+        assert!(rig.words(0, 680, 700).iter().all(|word| *word != 0), "clears itself");
+    }
+}
+
+#[test]
+fn f02_a_remote_frame_is_handed_back() {
+    let world = World::new(1);
+    let mut rig = Rig::new(&world, Line::Can1, 1);
+    let remote = CanFrame::new_remote(StandardId::new(0x201).unwrap(), 8).unwrap();
+    rig.drive(100);
+    let before = rig.runner.device().state(rig.wheels[0]).unwrap();
+    assert_eq!(rig.runner.ingest(&remote, at_ms(100)), Ingest::Unrelated);
+    assert_eq!(rig.runner.device().state(rig.wheels[0]), Some(before));
+    world.inject(Line::Can1, remote).unwrap();
+    rig.drive(2);
+    assert_eq!(rig.unrelated, [remote]);
+}
+
+#[test]
+fn f03_an_extended_frame_of_the_same_number_is_handed_back() {
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    let before = bus.state(wheel);
+    for raw in [0x201, 0x201 << 18, 0x1000_0201] {
+        let frame = CanFrame::new(ExtendedId::new(raw).unwrap(), &[0x10; 8]).unwrap();
+        assert_eq!(bus.ingest(&frame, at_ms(2)), Ingest::Unrelated);
+    }
+    assert_eq!((bus.state(wheel), bus.counters().bad_length), (before, 0));
+}
+
+#[test]
+fn f04_every_unknown_id_is_handed_back_untouched_and_counted_apart() {
+    let world = World::new(1);
+    let mut rig = Rig::new(&world, Line::Can1, 1);
+    rig.drive(50);
+    let foreign = |id| CanFrame::standard(id, [0x5A; 8]).unwrap();
+    for id in (0..0x201).chain(0x20C..0x800) {
+        assert_eq!(rig.runner.ingest(&foreign(id), at_ms(50)), Ingest::Unrelated);
+    }
+    let counters = rig.runner.device().counters();
+    assert_eq!((counters.bad_length, counters.bad_field, counters.unattached), (0, 0, 0));
+    assert_eq!(rig.runner.statistics().unrelated, 0x800 - 11);
+    world.inject(Line::Can1, foreign(0x321)).unwrap();
+    rig.drive(2);
+    assert_eq!(rig.unrelated, [foreign(0x321)]);
+}
+
+#[test]
+fn f06_an_angle_above_8191_refuses_the_whole_frame() {
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    let before = bus.state(wheel).unwrap();
+    for angle in [8192, 9_000, u16::MAX] {
+        let outcome = bus.ingest(&feedback(0x201, angle, 5_000), at_ms(2));
+        assert_eq!(outcome, Ingest::Malformed(Malformed::Field));
+    }
+    assert_eq!(bus.state(wheel), Some(before), "no half update");
+    assert_eq!(bus.counters().bad_field, 3);
+
+    let world = World::new(1);
+    let mut rig = Rig::new(&world, Line::Can1, 2);
+    let wrong = Fault::WrongAngle { motor: rig.keys[0], raw: 8192 };
+    world.fault(wrong, at_ms(200)..at_ms(400)).unwrap();
+    rig.drive(350);
+    assert!(rig.first_zero(0, 200) < at_ms(213), "such frames are no sign of life");
+    assert_eq!(rig.link(0), Link::Offline);
+}
+
+#[test]
+fn f07_feedback_of_an_unattached_motor_has_its_own_counter() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::new(1)).unwrap();
+    for id in 0x202..=0x20B {
+        assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(1)), Ingest::Unrelated);
+    }
+    assert_eq!(bus.counters().unattached, 10);
+}
+
+#[test]
+fn f09_duplicated_frames_change_nothing() {
+    let run = |duplicated| {
+        let world = World::new(4);
+        let mut rig = Rig::new(&world, Line::Can1, 1);
+        if duplicated {
+            let all = Fault::DuplicateFrames { line: Line::Can1, id: None };
+            world.fault(all, ..).unwrap();
+        }
+        rig.drive(1_000);
+        let state = rig.runner.device().state(rig.wheels[0]).unwrap();
+        (state.rotor_counts, world.motor(rig.keys[0]).unwrap().rotor_counts, state.ambiguous_gaps)
+    };
+    assert_eq!(run(true), run(false));
+
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    bus.set_raw(wheel, 500).unwrap();
+    for _ in 0..100 {
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(1)); // all stamped with the first arrival
+    }
+    assert!(step(&mut bus, 11).is_some_and(|words| words[0] == 500));
+    assert_eq!(step(&mut bus, 12), Some([0; 4]), "not fresher than the real arrival");
+}
+
+#[test]
+fn f10_reordered_frames_are_one_sample_off_and_converge() {
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    let angle = |sample: u64| u16::try_from(sample * 1_000 % 8_192).unwrap();
+    for pair in (1..2_000_u64).step_by(2) {
+        let late_first = [pair + 1, pair];
+        for (arrival, sample) in (pair..).zip(late_first) {
+            _ = bus.ingest(&feedback(0x201, angle(sample), 7_324), at_ms(1 + arrival));
+            let counts = bus.state(wheel).unwrap().rotor_counts;
+            assert_eq!(counts, sample.cast_signed() * 1_000, "the sample that came last");
+        }
+    }
+    _ = bus.ingest(&feedback(0x201, angle(2_001), 7_324), at_ms(2_003));
+    assert_eq!(bus.state(wheel).unwrap().rotor_counts, 2_001_000);
+}
+
+#[test]
+fn f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins() {
+    let speed = PidConfig::new(0.6, 6.0, 0.001);
+    let config = Config::new(1).speed_loop(speed);
+    let (mut bus, [wheel]) = armed([config]);
+    let mut counts = 0_u64;
+    let mut hear = |bus: &mut Bus, ms| {
+        counts += 500;
+        let frame = feedback(0x201, u16::try_from(counts % 8_192).unwrap(), 3_662);
+        assert_eq!(bus.ingest(&frame, at_ms(ms)), Ingest::Taken);
+        counts
+    };
+    let mut last = 0;
+    for ms in 2..300 {
+        hear(&mut bus, ms);
+        bus.set_velocity(wheel, rpm(195.0)).unwrap();
+        last = step(&mut bus, ms).unwrap()[0];
+    }
+    // The loop stood for 64 ms; then all of it arrives at once.
+    let mut total = 0;
+    for _ in 0..64 {
+        total = hear(&mut bus, 364);
+    }
+    bus.set_velocity(wheel, rpm(195.0)).unwrap();
+    bus.update(drivetrain::time::Tick::new(at_ms(364), 0.064));
+    let raw = crate::rig::words(&bus.next_frame().unwrap())[0];
+    assert!((raw - last).abs() < 50, "no spike: {last} to {raw}");
+    let state = bus.state(wheel).unwrap();
+    assert_eq!(state.rotor_counts, total.cast_signed());
+    assert!(state.ambiguous_gaps <= 1, "64 ms between two stamps may be flagged");
+}
+
+#[test]
+fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
+    let mut queue = FrameQueue::<8>::new();
+    let (mut interrupt, mut task) = queue.split();
+    for ms in 0..20 {
+        interrupt.push(&feedback(0x201, ms, 0), at_ms(ms.into()));
+    }
+    assert_eq!(task.dropped(), 13);
+    assert_eq!(core::iter::from_fn(|| task.pop()).count(), 7);
+
+    let world = World::new(1).with_receive_depth(Line::Can1, 4);
+    let mut rig = Rig::new(&world, Line::Can1, 4);
+    rig.drive(100);
+    world.advance(Duration::from_millis(20)); // the application hangs
+    rig.drive(50);
+    assert_eq!(rig.runner.statistics().receive_errors.overrun, 1);
+    assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
+    assert!(rig.words(0, 140, 160).iter().all(|word| *word > 0));
+}

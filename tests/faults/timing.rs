@@ -1,0 +1,256 @@
+//! F24 to F33: time.
+
+use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, words};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{Fault, Line, World};
+use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
+
+#[test]
+fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
+    let run = |silent: Option<u64>| {
+        let world = World::new(2);
+        let mut rig = Rig::new(&world, Line::Can1, 4);
+        if let Some(ms) = silent {
+            world.fault(Fault::Silent(rig.keys[2]), at_ms(500)..at_ms(500 + ms)).unwrap();
+        }
+        rig.drive(900);
+        let others: Vec<[i16; 3]> =
+            rig.sent.iter().map(|sent| [sent.words[0], sent.words[1], sent.words[3]]).collect();
+        let armed = rig.runner.device().is_motor_armed(rig.wheels[2]);
+        let words = (rig.words(2, 512, 900), rig.words(2, 565, 900));
+        (others, (silent.map(|_| rig.first_zero(2, 500)), armed, words, rig.link(2)))
+    };
+    let (healthy, _) = run(None);
+    let (others, (zero, armed, (_, after), link)) = run(Some(60));
+    assert!(zero.is_some_and(|zero| zero < at_ms(512)));
+    assert!(armed && link == Link::Online && after.iter().all(|word| *word != 0), "clears itself");
+    assert_eq!(others, healthy, "late: another motor's bytes");
+    let (others, (zero, armed, (all, _), link)) = run(Some(150));
+    assert!(zero.is_some_and(|zero| zero < at_ms(512)));
+    assert!(!armed && link == Link::Online && all.iter().all(|word| *word == 0), "latched");
+    assert_eq!(others, healthy, "offline: another motor's bytes");
+
+    // The integrator rests while the feedback is late.
+    let speed = PidConfig::new(0.0, 1.0, 0.0);
+    let (mut bus, [wheel]) = armed_at_rest(speed);
+    let mut words = Vec::new();
+    for ms in 2..60 {
+        if !(20..50).contains(&ms) {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+        }
+        _ = bus.set_velocity(wheel, rpm(100.0));
+        words.push(step(&mut bus, ms).map_or(0, |words| words[0]));
+    }
+    let (before, after) = (words[27], words[48]); // ticks 29 and 50
+    let a_tick = words[10] - words[9];
+    assert!(after - before <= 2 * a_tick, "{before} to {after}");
+    assert_eq!(words[30], 0);
+}
+
+fn armed_at_rest(speed: PidConfig) -> (Bus, [drivetrain::dji::Handle<M3508>; 1]) {
+    armed([Config::new(1).speed_loop(speed)])
+}
+
+#[test]
+fn f25_with_all_feedback_lost_frames_are_still_offered() {
+    let world = World::new(2);
+    let mut rig = Rig::new(&world, Line::Can1, 4);
+    for key in rig.keys.clone() {
+        world.fault(Fault::Silent(key), at_ms(300)..at_ms(900)).unwrap();
+    }
+    rig.drive(890);
+    assert!((0..4).all(|wheel| rig.link(wheel) == Link::Offline));
+    let sent: Vec<_> = rig.sent.iter().filter(|sent| sent.at > at_ms(320)).collect();
+    assert!((50..=60).contains(&sent.len()), "a keep-alive every 10 ms, not {}", sent.len());
+    assert!(sent.iter().all(|sent| sent.words == [0; 4]));
+    rig.drive(100);
+    assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
+}
+
+#[test]
+fn f26_an_application_that_stops_is_zero_after_the_deadline() {
+    let world = World::new(2);
+    let mut rig = Rig::new(&world, Line::Can1, 2);
+    rig.drive(300);
+    rig.run(300, |_, _| {}); // ticks and frames go on, targets do not
+    let zero = rig.first_zero(0, 300);
+    assert!(zero > at_ms(395) && zero < at_ms(402), "{zero:?}");
+    assert!(rig.words(0, 402, 600).iter().all(|word| *word == 0));
+    let state = rig.runner.device().state(rig.wheels[0]).unwrap();
+    assert_eq!(state.forgotten_targets, 1);
+    rig.drive(50);
+    assert!(rig.words(0, 610, 650).iter().all(|word| *word > 0), "not latched");
+}
+
+#[test]
+fn f28_nothing_notices_that_a_hardware_counter_wraps() {
+    for (mut counter, mask, start) in [
+        (ExtendedCounter::new_16_bit(1_000_000).unwrap(), 0xFFFF_u64, 0xFF00_u64),
+        (ExtendedCounter::new_32_bit(1_000_000).unwrap(), 0xFFFF_FFFF, 0xFFFF_FF00),
+    ] {
+        let mut read =
+            |micros: u64| counter.extend(u32::try_from((start + micros) & mask).unwrap());
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let first = read(0);
+        _ = bus.ingest(&feedback(0x201, 0, 0), first);
+        bus.arm(first).unwrap();
+        for ms in 1..200 {
+            let now = read(ms * 1_000);
+            assert_eq!(now.since(first), Duration::from_millis(ms));
+            _ = bus.ingest(&feedback(0x201, 0, 0), now);
+            bus.set_raw(wheel, 7).unwrap();
+            bus.update(Tick::new(now, 0.001));
+            assert_eq!(words(&bus.next_frame().unwrap()), [7, 0, 0, 0]);
+        }
+    }
+}
+
+#[test]
+fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
+    // Back by as much, together with the last feedback, while the loop goes on.
+    for back in [1, 5, 9, 11, 1_000, 3_000_000] {
+        let start = 4_000_000;
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start));
+        bus.arm(at_ms(start)).unwrap();
+        step(&mut bus, start);
+        bus.set_raw(wheel, 700).unwrap();
+        assert_eq!(step(&mut bus, start + 1), Some([700, 0, 0, 0]));
+        let mut last_driven = 0;
+        for round in 0..200 {
+            let sent = step(&mut bus, start + 1 - back + round);
+            _ = bus.set_raw(wheel, 700);
+            if sent.is_some_and(|words| words[0] != 0) {
+                last_driven = round;
+            }
+        }
+        assert!(last_driven <= 10 + back.min(10), "back by {back} ms: driven for {last_driven}");
+        // Heard again, it works on.
+        for round in 200..220 {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start + 1 - back + round));
+            step(&mut bus, start + 1 - back + round);
+        }
+        assert_eq!(bus.link(wheel), Some(Link::Online));
+    }
+    // Standing: the runner has no tick, and a tick by hand holds once.
+    let clock = ManualClock::new(at_ms(10));
+    let (bus, [wheel]) = armed([Config::new(1)]);
+    let world = World::new(1);
+    let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
+    let tick = runner.due().unwrap();
+    _ = runner.ingest(&feedback(0x201, 0, 0), at_ms(10));
+    runner.device_mut().set_raw(wheel, 700).unwrap();
+    runner.tick(tick);
+    assert!((0..1_000).all(|_| runner.due().is_none()));
+    for _ in 0..3 {
+        runner.tick(Tick::new(at_ms(10), 0.0));
+    }
+    assert_eq!(runner.device().counters().bad_steps, 3);
+    clock.set(at_ms(3));
+    assert!(runner.due().is_none(), "no tick before the time comes again");
+}
+
+#[test]
+fn f30_a_motor_unheard_for_longer_than_any_counter_stays_offline() {
+    for days in [1_u64, 50, 5_000] {
+        let (mut bus, [wheel]) = armed([Config::new(1)]);
+        for ms in (2..300).step_by(1) {
+            step(&mut bus, ms);
+        }
+        assert_eq!(bus.link(wheel), Some(Link::Offline));
+        // Exactly where a stamp of 32 bits looks fresh again.
+        let wraps = days * 86_400_000_000 / (1 << 32) + 1;
+        for micros in [1_000, 5_000] {
+            bus.update(Tick::new(Instant::from_micros(wraps * (1 << 32) + micros), 0.001));
+            assert_eq!(bus.link(wheel), Some(Link::Offline));
+            assert_eq!(bus.set_raw(wheel, 5), Err(TargetError::Relaxed));
+        }
+    }
+}
+
+#[test]
+fn f31_a_bad_time_step_holds_once_and_is_counted() {
+    for bad in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(SPEED)]);
+        let run = |bus: &mut Bus, ms| {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+            bus.set_velocity(wheel, rpm(100.0)).unwrap();
+            step(bus, ms).unwrap()[0]
+        };
+        let before = run(&mut bus, 2);
+        bus.update(Tick::new(at_ms(2), bad));
+        assert_eq!(words(&bus.next_frame().unwrap())[0], before, "held");
+        let after = run(&mut bus, 3);
+        assert!(after >= before && after - before < 100, "goes on: {before}, {after}");
+        for _ in 0..2 {
+            bus.update(Tick::new(at_ms(3), bad));
+        }
+        assert_eq!(words(&bus.next_frame().unwrap())[0], 0, "only once");
+        assert_eq!(bus.counters().bad_steps, 3);
+    }
+}
+
+#[test]
+fn f32_a_huge_time_step_moves_no_integral() {
+    let integral = PidConfig::new(0.0, 1.0, 0.0);
+    for dt_s in [0.021, 10.0, 1e30] {
+        let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(integral)]);
+        let run = |bus: &mut Bus, ms, dt_s| {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+            bus.set_velocity(wheel, rpm(300.0)).unwrap();
+            bus.update(Tick::new(at_ms(ms), dt_s));
+            bus.next_frame().map_or(0, |frame| words(&frame)[0])
+        };
+        let before = (2..50).map(|ms| run(&mut bus, ms, 0.001)).last().unwrap();
+        assert!(before > 500);
+        let late = run(&mut bus, 50, dt_s);
+        assert!((late - before).abs() <= 26, "{before} to {late}"); // half a tick at most
+    }
+    let clock = ManualClock::new(at_ms(1));
+    let world = World::new(1);
+    let mut runner = Runner::new(Nb(world.controller()), &clock, Bus::new());
+    runner.due().unwrap();
+    clock.advance(Duration::from_secs(10));
+    let tick = runner.due().unwrap();
+    runner.tick(tick);
+    assert_eq!(runner.statistics().overruns, 9_999);
+}
+
+#[test]
+fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
+    let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(PidConfig::new(0.0, 5.0, 0.0))]);
+    for ms in 2..40 {
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+        bus.set_velocity(wheel, rpm(300.0)).unwrap();
+        step(&mut bus, ms);
+    }
+    for ms in 40..160 {
+        step(&mut bus, ms);
+    }
+    // Nine good frames, a pause, and the count begins again.
+    for ms in (160..169).chain(185..194) {
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+        step(&mut bus, ms);
+        assert_eq!(bus.link(wheel), Some(Link::Recovering), "{ms}");
+    }
+    _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(194));
+    assert_eq!(bus.link(wheel), Some(Link::Online));
+    assert_eq!(bus.set_velocity(wheel, rpm(300.0)), Err(TargetError::Relaxed), "waits for arming");
+    bus.arm(at_ms(194)).unwrap();
+    bus.set_velocity(wheel, rpm(300.0)).unwrap();
+    let first = step(&mut bus, 195).unwrap()[0];
+    assert!(first < 200, "the old integral is gone: {first}");
+
+    let world = World::new(2);
+    let ramp = Recovery::Ramp(Duration::from_millis(200));
+    let mut rig = Rig::with(&world, Line::Can1, 1, |config| config.with_recovery(ramp));
+    world.fault(Fault::Silent(rig.keys[0]), at_ms(300)..at_ms(500)).unwrap();
+    rig.drive(800);
+    let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();
+    assert!((1..2_000).contains(&back), "from zero: {back}");
+}
