@@ -142,9 +142,10 @@ impl Guard {
         }
         let Some(heard) = self.heard else { return };
         let age = now.since(heard);
+        let ahead = heard.since(now) > self.timeouts.late();
         if age > self.timeouts.offline().max(self.timeouts.late()) {
             self.lose();
-        } else if age > self.timeouts.late() && self.link == Link::Online {
+        } else if (ahead || age > self.timeouts.late()) && self.link == Link::Online {
             self.link = Link::Late;
         }
     }
@@ -172,7 +173,8 @@ impl Guard {
     /// Tells whether feedback is missing for arming at `now`.
     #[must_use]
     pub fn is_missing(&self, now: Instant) -> bool {
-        let fresh = |heard| now.since(heard) <= self.timeouts.late();
+        let late = self.timeouts.late();
+        let fresh = |heard: Instant| now.since(heard) <= late && heard.since(now) <= late;
         self.listens && !(self.link == Link::Online && self.heard.is_some_and(fresh))
     }
 
@@ -301,6 +303,16 @@ mod tests {
             assert!(!guard.drives(at_ms(4)));
             assert_eq!((guard.reversals(), guard.admit(true)), (1, Err(TargetError::Relaxed)));
         }
+    }
+
+    #[test]
+    fn a_stamp_a_little_ahead_is_fresh_and_one_far_ahead_is_not() {
+        let mut guard = driving();
+        guard.hear(at_ms(20));
+        assert!(guard.drives(at_ms(12)) && !guard.drives(at_ms(9)));
+        let mut guard = driving();
+        guard.hear(at_ms(1_000));
+        assert!(guard.is_missing(at_ms(2)) && !guard.drives(at_ms(2)));
     }
 
     #[test]

@@ -247,3 +247,42 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
     rig.drive(20);
     assert!(rig.words(0, 530, 540).iter().all(|word| *word != 0));
 }
+
+#[test]
+fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
+    use drivetrain::chassis::{GimbalEdge, Mode, ModeConfig, Modes, WithoutGimbal};
+    use drivetrain::geometry::Twist;
+    for (then, acting) in
+        [(WithoutGimbal::Independent, Mode::Independent), (WithoutGimbal::Relax, Mode::Relax)]
+    {
+        let follow = PidConfig::new(5.0, 0.0, 0.0);
+        let config = ModeConfig::new(follow).with_gimbal_timeout(0.1, then).with_transition(0.0);
+        let mut modes = Modes::new(config).unwrap();
+        modes.set_mode(Mode::FollowGimbal);
+        let mut edges = Vec::new();
+        let mut step = |yaw: Option<f32>| {
+            let yaw = yaw.map(Angle::from_radians);
+            let body = modes.update(Twist::new(1.0, 0.0, 0.0), yaw, 0.001);
+            edges.extend(modes.take_edge());
+            (modes.acting(), body)
+        };
+        assert_eq!(step(None).0, acting, "without any yaw");
+        assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
+        for ms in 1..1_000 {
+            let (mode, body) = step((ms % 2 == 0).then_some(f32::NAN));
+            match ms {
+                0..100 => assert_eq!(mode, Mode::FollowGimbal, "{ms}"),
+                102.. => {
+                    assert_eq!(mode, acting, "{ms}");
+                    assert!(body.is_none_or(
+                        |body| (body.vx_m_s - 1.0).abs() < 1e-6 && body.wz_rad_s.abs() < 1e-6
+                    ));
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
+        let (lost, back) = (GimbalEdge::Lost, GimbalEdge::Back);
+        assert_eq!(edges, [lost, back, lost, back], "each once");
+    }
+}

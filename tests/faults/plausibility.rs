@@ -86,7 +86,7 @@ fn f16_300_000_turns_one_way_lose_no_count() {
         let mut counts = 0_i64;
         for sample in 1..=614_400_u64 {
             counts += step;
-            let angle = counts.rem_euclid(8_192) as u16;
+            let angle = u16::try_from(counts.rem_euclid(8_192)).unwrap();
             _ = bus.ingest(&feedback(0x201, angle, 0), at_ms(1 + sample));
         }
         let state = bus.state(wheel).unwrap();

@@ -59,7 +59,7 @@ fn f04_every_unknown_id_is_handed_back_untouched_and_counted_apart() {
     let world = World::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     rig.drive(50);
-    let foreign = |id| CanFrame::standard(id, [id as u8; 8]).unwrap();
+    let foreign = |id| CanFrame::standard(id, [0x5A; 8]).unwrap();
     for id in (0..0x201).chain(0x20C..0x800) {
         assert_eq!(rig.runner.ingest(&foreign(id), at_ms(50)), Ingest::Unrelated);
     }
@@ -128,13 +128,13 @@ fn f09_duplicated_frames_change_nothing() {
 #[test]
 fn f10_reordered_frames_are_one_sample_off_and_converge() {
     let (mut bus, [wheel]) = armed([Config::new(1)]);
-    let angle = |sample: u64| (sample * 1_000 % 8_192) as u16;
+    let angle = |sample: u64| u16::try_from(sample * 1_000 % 8_192).unwrap();
     for pair in (1..2_000_u64).step_by(2) {
         let late_first = [pair + 1, pair];
         for (arrival, sample) in (pair..).zip(late_first) {
             _ = bus.ingest(&feedback(0x201, angle(sample), 7_324), at_ms(1 + arrival));
             let counts = bus.state(wheel).unwrap().rotor_counts;
-            assert_eq!(counts, sample as i64 * 1_000, "the sample that came last");
+            assert_eq!(counts, sample.cast_signed() * 1_000, "the sample that came last");
         }
     }
     _ = bus.ingest(&feedback(0x201, angle(2_001), 7_324), at_ms(2_003));
@@ -149,7 +149,7 @@ fn f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins() {
     let mut counts = 0_u64;
     let mut hear = |bus: &mut Bus, ms| {
         counts += 500;
-        let frame = feedback(0x201, (counts % 8_192) as u16, 3_662);
+        let frame = feedback(0x201, u16::try_from(counts % 8_192).unwrap(), 3_662);
         assert_eq!(bus.ingest(&frame, at_ms(ms)), Ingest::Taken);
         counts
     };
@@ -169,7 +169,7 @@ fn f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins() {
     let raw = crate::rig::words(&bus.next_frame().unwrap())[0];
     assert!((raw - last).abs() < 50, "no spike: {last} to {raw}");
     let state = bus.state(wheel).unwrap();
-    assert_eq!(state.rotor_counts, total as i64);
+    assert_eq!(state.rotor_counts, total.cast_signed());
     assert!(state.ambiguous_gaps <= 1, "64 ms between two stamps may be flagged");
 }
 

@@ -47,7 +47,7 @@ fn run(
             _ = runner.ingest(&feedback(id, 0, 0), clock.now());
         }
         for wheel in wheels {
-            _ = runner.device_mut().set_raw(wheel, (round % 10_000) as i16);
+            _ = runner.device_mut().set_raw(wheel, i16::try_from(round % 10_000).unwrap());
         }
         script(&mut runner.port_mut().0, round);
         runner.tick(Tick::new(clock.now(), 0.001));
@@ -102,7 +102,7 @@ fn f52_an_evicted_frame_is_offered_again_with_its_newest_value() {
 fn f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
     let kinds = [ErrorKind::Acknowledge, ErrorKind::Stuff, ErrorKind::Other];
     let (taken, statistics) = run(900, |can, round| {
-        let kind = kinds[(round % 3) as usize];
+        let kind = kinds[usize::try_from(round % 3).unwrap()];
         let error = Err(nb::Error::Other(kind));
         can.answers.extend(if round % 2 == 0 { [error, Ok(None)] } else { [Ok(None), error] });
     });
