@@ -6,6 +6,7 @@
 #![no_std]
 #![no_main]
 
+mod bytes;
 mod closed_loop;
 mod constant_time;
 mod meter;
@@ -26,6 +27,7 @@ fn main() -> ! {
         rows::control();
         rows::math();
         rows::space();
+        bytes::rows();
         constant_time::show();
         rows::stack();
         rows::sizes();
