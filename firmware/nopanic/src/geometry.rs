@@ -16,7 +16,7 @@ pub fn call_all() {
     Twist::<Body>::at.call();
     Twist::<Body>::about.call();
     Twist::<World>::to_body.call();
-    Twist::<Gimbal>::to_body.call();
+    Twist::<Gimbal>::to_body_by_yaw.call();
     Twist::<Body>::to_world.call();
     Point2::<Body>::new.call();
     Point2::<Body>::to_vec.call();
