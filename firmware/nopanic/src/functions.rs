@@ -215,6 +215,7 @@ fn encoder() {
     Shaft::advance_far.call();
     Shaft::position.call();
     Shaft::angle.call();
+    Shaft::is_direct.call();
     Shaft::rotor_counts.call();
     Position::new.call();
     Position::from_turns.call();
