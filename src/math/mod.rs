@@ -26,7 +26,7 @@ mod wrap;
 pub(crate) use root::cube_root;
 pub use root::sqrt;
 pub use trigonometry::{atan2, sin_cos};
-pub(crate) use wrap::near;
+pub(crate) use wrap::rest;
 pub use wrap::{wrap, wrap_pi, wrap_positive, wrap_tau};
 
 /// Added to and taken from a number of at most 2^22, leaves the nearest integer: 1.5 * 2^23, whose last bit counts ones.

@@ -61,17 +61,15 @@ pub const fn wrap_tau(x: f32) -> f32 {
 #[must_use]
 #[inline]
 pub const fn wrap(x: f32, period: f32) -> f32 {
-    let turns = (x / period + ROUND) - ROUND;
-    let rest = x - turns * period;
+    let rest = rest(x, period);
     if rest.abs() < 0.5 * period { rest } else { at_the_edge(rest, x, period) }
 }
 
-/// Returns what [`wrap`] does, or NaN where that needs a second look: half a period away, and past `f32`'s reach.
+/// Returns what [`wrap`] does where that is within half a period, the ends not included; otherwise something that is not.
 #[inline]
-pub(crate) const fn near(x: f32, period: f32) -> f32 {
+pub(crate) const fn rest(x: f32, period: f32) -> f32 {
     let turns = (x / period + ROUND) - ROUND;
-    let rest = x - turns * period;
-    if rest.abs() < 0.5 * period { rest } else { f32::NAN }
+    x - turns * period
 }
 
 /// Returns the value in [0, `period`) that differs from `x` by whole periods.

@@ -236,6 +236,10 @@ pub fn control() {
     row("pid_limit", &[pid_step(plain.with_output_limit(0.1))]);
     row("pid_options_step", &[pid_step(all)]);
     row("pid_options_update", &[pid_update(all)]);
+    row("pid_circle_step", &[pid_step(all.with_period(360.0))]);
+    row("pid_circle_update", &[pid_update(all.with_period(360.0))]);
+    // Every error and every change of the measurement is more than half a period.
+    row("pid_circle_wrap", &[pid_step(all.with_period(0.375))]);
 }
 
 fn swinging(call: u32) -> f32 {

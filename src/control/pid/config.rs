@@ -4,8 +4,8 @@ use crate::control::error::{ConfigError, check, not_negative, ordered, output_en
 const OFF: f32 = f32::MAX;
 
 const ASYMMETRIC: u8 = 1;
-pub(super) const INTEGRAL_WEIGHT: u8 = 1 << 1;
-pub(super) const DEAD_BAND: u8 = 1 << 2;
+const INTEGRAL_WEIGHT: u8 = 1 << 1;
+const DEAD_BAND: u8 = 1 << 2;
 pub(super) const FEED_FORWARD: u8 = 1 << 3;
 pub(super) const SLEW_LIMIT: u8 = 1 << 4;
 pub(super) const CIRCLE: u8 = 1 << 5;

@@ -1,6 +1,5 @@
 use super::PidConfig;
-use super::config::{CIRCLE, DERIVATIVE_ON_ERROR};
-use super::work::{CLOSED, UNKNOWN, gate, passes};
+use super::work::{CLOSED, UNKNOWN, gate, open_gate, passes};
 use crate::control::error::{ConfigError, not_negative};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -46,16 +45,19 @@ use crate::control::step::TimeStep;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// What a step stores stands first and in the order of the arguments of `saturate`, so that one vstmia stores it.
+#[repr(C)]
 pub struct Pid {
-    pub(super) config: PidConfig,
-    pub(super) integral_gate: u32,
-    pub(super) output_gate: u32,
-    pub(super) integral: f32,
-    pub(super) error: f32,
-    pub(super) measurement: f32,
-    pub(super) rate: f32,
     pub(super) output: f32,
+    pub(super) measurement: f32,
+    pub(super) error: f32,
+    pub(super) rate: f32,
+    pub(super) integral: f32,
+    pub(super) integral_gate: u32,
+    /// Of the output; with options on, of half the period.
+    pub(super) output_gate: u32,
     pub(super) full_weight_to: f32,
+    pub(super) config: PidConfig,
     pub(super) rejected: u16,
     pub(super) track_output: bool,
     pub(super) options: u8,
@@ -86,15 +88,15 @@ impl Pid {
             return Err(error);
         }
         let mut pid = Self {
-            config,
+            output: 0.0,
+            measurement: UNKNOWN,
+            error: UNKNOWN,
+            rate: 0.0,
+            integral: 0.0,
             integral_gate: CLOSED,
             output_gate: CLOSED,
-            integral: 0.0,
-            error: UNKNOWN,
-            measurement: UNKNOWN,
-            rate: 0.0,
-            output: 0.0,
             full_weight_to: 0.0,
+            config,
             rejected: 0,
             track_output: false,
             options: 0,
@@ -104,6 +106,7 @@ impl Pid {
     }
 
     /// Steps by `dt_s` seconds and returns the output.
+    #[inline]
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
         self.step(setpoint, measurement, &self.time_step(dt_s))
     }
@@ -120,24 +123,17 @@ impl Pid {
     /// The same as [`update`](Self::update) for several loops that share a tick.
     #[inline]
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let error = setpoint - measurement;
-        let rate = (measurement - self.measurement) * step.per_dt;
-        let growth = self.growth(error, step);
-        let integral = self.integral + growth;
-        let output = self.config.kp * error + integral - self.config.kd * rate;
-        // Options, limits, a step that is not normal, NaN and overflow: none of them passes both gates.
-        if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
-            self.integral = integral;
-            self.error = error;
-            self.measurement = measurement;
-            self.rate = rate;
-            self.output = output;
-            return output;
-        }
-        if self.has(CIRCLE | DERIVATIVE_ON_ERROR) {
+        if self.integral_gate == CLOSED {
             return self.step_with_options(setpoint, measurement, step);
         }
-        self.try_work(setpoint, measurement, error, rate, growth, step)
+        let error = setpoint - measurement;
+        let rate = (measurement - self.measurement) * step.per_dt;
+        let integral = self.integral + self.growth(error, step);
+        // The first call, a step that is not normal, NaN and overflow: none of them passes.
+        if !passes(integral, self.integral_gate) {
+            return self.step_with_options(setpoint, measurement, step);
+        }
+        self.finish(measurement, error, rate, integral, step)
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
@@ -146,18 +142,32 @@ impl Pid {
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let growth = self.growth(error, step);
-        let integral = self.integral + growth;
-        let output = self.config.kp * error + integral - self.config.kd * rate;
-        if passes(integral, self.integral_gate) && passes(output, self.output_gate) {
-            self.integral = integral;
-            self.error = error;
-            self.measurement = UNKNOWN;
-            self.rate = rate;
-            self.output = output;
-            return output;
+        let integral = self.integral + self.growth(error, step);
+        if !passes(integral, self.integral_gate) {
+            return self.work_with_options(0.0, UNKNOWN, error, rate, step);
         }
-        self.try_work(0.0, UNKNOWN, error, rate, growth, step)
+        self.finish(UNKNOWN, error, rate, integral, step)
+    }
+
+    #[inline]
+    fn finish(
+        &mut self,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        let output = self.config.kp * error + integral - self.config.kd * rate;
+        if !passes(output, self.output_gate) {
+            return self.saturate(output, measurement, error, rate, integral, step);
+        }
+        self.output = output;
+        self.measurement = measurement;
+        self.error = error;
+        self.rate = rate;
+        self.integral = integral;
+        output
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -272,7 +282,8 @@ impl Pid {
         self.full_weight_to = config.full_weight_to();
         let plain = self.options == 0;
         self.integral_gate = if plain { gate(config.integral_limit) } else { CLOSED };
-        self.output_gate = if plain { gate(config.output_upper) } else { CLOSED };
+        self.output_gate =
+            if plain { gate(config.output_upper) } else { open_gate(0.5 * config.period) };
     }
 
     fn change(&mut self, config: PidConfig) {
@@ -296,11 +307,16 @@ impl Pid {
         if known { self.error + self.measurement } else { 0.0 }
     }
 
+    #[inline]
     pub(super) const fn feed_forward(&self, setpoint: f32) -> f32 {
-        if setpoint == 0.0 {
-            return 0.0;
+        let moving = self.config.velocity_gain * setpoint;
+        if setpoint > 0.0 {
+            moving + self.config.static_gain
+        } else if setpoint < 0.0 {
+            moving - self.config.static_gain
+        } else {
+            moving
         }
-        self.config.velocity_gain * setpoint + self.config.static_gain.copysign(setpoint)
     }
 }
 
@@ -334,7 +350,7 @@ mod tests {
 
     #[test]
     fn two_loops_of_a_motor_fit_its_slot() {
-        assert!(size_of::<Pid>() <= 112, "{}", size_of::<Pid>());
+        assert!(size_of::<Pid>() <= 108, "{}", size_of::<Pid>());
     }
 
     #[test]
@@ -811,6 +827,28 @@ mod tests {
             for (setpoint, measurement) in samples {
                 let (fast, slow) = (fast.update(setpoint, measurement, DT_S), slow.update(setpoint, measurement, DT_S));
                 prop_assert!((fast - slow).abs() <= 1e-5 * fast.abs().max(1e3) || fast.abs() >= 1e6);
+            }
+        }
+
+        #[test]
+        fn at_the_limit_a_plain_controller_does_what_one_with_options_does(
+            gains in (0.0_f32..10.0, 0.0_f32..100.0, 0.0_f32..0.01),
+            windup in 0_u8..3,
+            samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0), 2..60),
+        ) {
+            let limited = PidConfig::new(gains.0, gains.1, gains.2)
+                .with_output_limit(10.0)
+                .with_integral_limit(8.0);
+            let limited = match windup {
+                0 => limited,
+                1 => limited.without_anti_windup(),
+                _ => limited.with_back_calculation(0.05),
+            };
+            let (mut plain, mut optional) = (pid(limited), pid(limited.with_slew_limit(1e30)));
+            for (setpoint, measurement) in samples {
+                let plain_output = plain.update(setpoint, measurement, DT_S);
+                prop_assert!((plain_output - optional.update(setpoint, measurement, DT_S)).abs() < 1e-3);
+                prop_assert!((plain.terms().i - optional.terms().i).abs() < 1e-3);
             }
         }
 

@@ -1,15 +1,13 @@
 //! The arithmetic of the positional controller behind its plain path.
 //!
 //! ```text
-//! step, step_error   gains and symmetric limits; whatever passes the gates is done here
-//!   └─ try_work      every option, without guards; gives up when something is not finite
-//!        └─ work_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
+//! step, step_error     gains and symmetric limits: whatever passes both gates is done here
+//!   ├─ saturate        gains and symmetric limits, with the output at its limit
+//!   └─ *_with_options  every option, without guards; gives up when something is not finite
+//!        └─ *_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
 //! ```
 
-use super::config::{
-    CIRCLE, DEAD_BAND, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, INTEGRAL_WEIGHT,
-    SLEW_LIMIT,
-};
+use super::config::{CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SLEW_LIMIT};
 use super::positional::{Pid, Terms};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -26,12 +24,51 @@ pub(super) const fn gate(limit: f32) -> u32 {
     (limit.to_bits() << 1) + 1
 }
 
+/// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
+pub(super) const fn open_gate(limit: f32) -> u32 {
+    limit.to_bits() << 1
+}
+
 #[inline]
 pub(super) const fn passes(value: f32, gate: u32) -> bool {
-    value.to_bits() << 1 < gate
+    magnitude(value) < gate
+}
+
+/// Sizes in an order that one integer comparison tells; NaN is larger than all numbers.
+#[inline]
+const fn magnitude(value: f32) -> u32 {
+    value.to_bits() << 1
 }
 
 impl Pid {
+    /// A plain controller whose integral passed its gate, so that all but `rate` is finite, and whose output did not.
+    #[inline(never)]
+    pub(super) fn saturate(
+        &mut self,
+        wanted: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        if !wanted.is_finite() {
+            if measurement == UNKNOWN {
+                return self.step_error_carefully(error, rate, step);
+            }
+            let rate = self.rate_at(measurement, error, step);
+            return self.work_carefully(0.0, measurement, error, rate, step);
+        }
+        let output = self.config.output_upper.copysign(wanted);
+        let growth = integral - self.integral;
+        self.integral = self.without_windup(wanted - output, integral, growth, step);
+        self.output = output;
+        self.measurement = measurement;
+        self.error = error;
+        self.rate = rate;
+        output
+    }
+
     #[inline(never)]
     pub(super) fn step_with_options(
         &mut self,
@@ -39,40 +76,80 @@ impl Pid {
         measurement: f32,
         step: &TimeStep,
     ) -> f32 {
-        let mut error = setpoint - measurement;
-        let mut travel = if self.has(DERIVATIVE_ON_ERROR) {
-            self.error - error
-        } else {
-            measurement - self.measurement
-        };
-        if self.has(CIRCLE) {
-            let period = self.config.period;
-            (error, travel) = (math::near(error, period), math::near(travel, period));
+        if self.has(DERIVATIVE_ON_ERROR) {
+            return self.step_on_error(setpoint, measurement, step);
         }
-        let growth = self.growth(error, step);
-        self.try_work(setpoint, measurement, error, travel * step.per_dt, growth, step)
+        self.step_by(setpoint, measurement, measurement - self.measurement, step)
     }
 
     #[inline(never)]
-    pub(super) fn try_work(
+    fn step_on_error(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let travel = self.error - (setpoint - measurement);
+        self.step_by(setpoint, measurement, travel, step)
+    }
+
+    #[inline]
+    fn step_by(&mut self, setpoint: f32, measurement: f32, travel: f32, step: &TimeStep) -> f32 {
+        let (mut error, mut travel) = (setpoint - measurement, travel);
+        if self.has(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
+            return self.step_carefully(setpoint, measurement, step);
+        }
+        self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
+    }
+
+    /// Takes the shorter way round, and tells whether that is certain: half a turn and overflow need a second look.
+    #[inline]
+    fn shorten(&self, way: &mut f32) -> bool {
+        if passes(*way, self.output_gate) {
+            return true;
+        }
+        *way = math::rest(*way, self.config.period);
+        passes(*way, self.output_gate)
+    }
+
+    /// Works on an error that was formed elsewhere when the measurement is [`UNKNOWN`].
+    #[inline(never)]
+    pub(super) fn work_with_options(
         &mut self,
         setpoint: f32,
         measurement: f32,
         error: f32,
         rate: f32,
-        growth: f32,
         step: &TimeStep,
     ) -> f32 {
-        match self.work::<false>(setpoint, error, rate, growth, step) {
-            Some(output) => {
-                self.measurement = measurement;
-                output
-            }
-            None => self.work_carefully(setpoint, measurement, error, rate, step),
+        match self.work::<false>(setpoint, measurement, error, rate, step) {
+            Some(output) => output,
+            None if measurement == UNKNOWN => self.step_error_carefully(error, rate, step),
+            None => self.step_carefully(setpoint, measurement, step),
         }
     }
 
     /// What happens seldom: bad arguments, the first call, a step that is frozen, half a turn, values that overflow.
+    #[cold]
+    #[inline(never)]
+    fn step_carefully(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
+            return self.refuse();
+        }
+        let error = self.shortest(setpoint - measurement);
+        let rate = self.rate_at(measurement, error, step);
+        self.work_carefully(setpoint, measurement, error, rate, step)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        if step.is_hold() || !error.is_finite() || !rate.is_finite() {
+            return self.refuse();
+        }
+        self.work_carefully(0.0, UNKNOWN, error, rate, step)
+    }
+
+    const fn refuse(&mut self) -> f32 {
+        self.rejected = self.rejected.saturating_add(1);
+        self.output
+    }
+
     #[cold]
     #[inline(never)]
     fn work_carefully(
@@ -83,53 +160,37 @@ impl Pid {
         rate: f32,
         step: &TimeStep,
     ) -> f32 {
-        // `step_error` passes no measurement, and an error and a rate that may be used as they are.
-        let formed = measurement == UNKNOWN;
-        let usable = if formed {
-            error.is_finite() && rate.is_finite()
-        } else {
-            setpoint.is_finite() && measurement.is_finite()
-        };
-        if step.is_hold() || !usable {
-            self.rejected = self.rejected.saturating_add(1);
-            return self.output;
-        }
-        let (mut error, mut rate, mut step) = (error, rate, *step);
-        if !formed {
-            (error, rate) = self.error_and_rate(setpoint, measurement, &step);
-        }
-        self.measurement = measurement;
+        let (mut rate, mut step) = (rate, *step);
         if step.is_frozen() {
             (rate, step.half_dt_s) = (self.rate, 0.0);
         }
         if self.track_output {
-            self.take_over(error, self.filtered(rate, &step));
+            self.take_over(measurement, error, self.filtered(rate, &step));
         }
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
-        let growth = self.growth(error, &step);
-        self.work::<true>(setpoint, error, rate, growth, &step).unwrap_or(self.output)
+        self.work::<true>(setpoint, measurement, error, rate, &step).unwrap_or(self.output)
     }
 
-    /// Error and rate by way of sums that are finite and angles that are exact.
-    fn error_and_rate(&self, setpoint: f32, measurement: f32, step: &TimeStep) -> (f32, f32) {
-        let shortest = |way: f32| {
-            finite(if self.has(CIRCLE) { math::wrap(way, self.config.period) } else { way })
-        };
-        let error = shortest(setpoint - measurement);
+    /// A way on the circle, exact and finite.
+    fn shortest(&self, way: f32) -> f32 {
+        finite(if self.has(CIRCLE) { math::wrap(way, self.config.period) } else { way })
+    }
+
+    /// The rate by way of sums that are finite.
+    fn rate_at(&self, measurement: f32, error: f32, step: &TimeStep) -> f32 {
         let (known, travel) = if self.has(DERIVATIVE_ON_ERROR) {
             (self.error, self.error - error)
         } else {
             (self.measurement, measurement - self.measurement)
         };
-        let rate = if known == UNKNOWN { 0.0 } else { finite(shortest(travel) * step.per_dt) };
-        (error, rate)
+        if known == UNKNOWN { 0.0 } else { finite(self.shortest(travel) * step.per_dt) }
     }
 
     /// Lets the integral make up what the other terms lack to the output that was set.
-    fn take_over(&mut self, error: f32, rate: f32) {
-        let next = Self { error, rate, ..*self };
+    fn take_over(&mut self, measurement: f32, error: f32, rate: f32) {
+        let next = Self { measurement, error, rate, ..*self };
         let Terms { p, d, feed_forward, .. } = next.terms();
         self.track_output = false;
         if self.config.ki > 0.0 {
@@ -142,20 +203,20 @@ impl Pid {
     fn work<const CAREFUL: bool>(
         &mut self,
         setpoint: f32,
+        measurement: f32,
         error: f32,
         rate: f32,
-        growth: f32,
         step: &TimeStep,
     ) -> Option<f32> {
         let finite = |value| if CAREFUL { finite(value) } else { value };
         let config = &self.config;
         let rate = finite(self.filtered(rate, step));
         let mut proportional = finite(config.kp * error);
-        let mut growth = finite(growth);
-        if self.has(INTEGRAL_WEIGHT) && error.abs() > self.full_weight_to {
+        let mut growth = finite(self.growth(error, step));
+        if magnitude(error) > magnitude(self.full_weight_to) {
             growth *= self.weight(error);
         }
-        if self.has(DEAD_BAND) && error.abs() < config.dead_band {
+        if magnitude(error) < magnitude(config.dead_band) {
             proportional = 0.0;
             let shrinks = growth * self.integral < 0.0;
             if !shrinks {
@@ -187,10 +248,11 @@ impl Pid {
             }
             (output, integral) = self.saturated(wanted, integral, growth, step);
         }
+        self.output = output;
+        self.measurement = measurement;
         self.error = error;
         self.rate = rate;
         self.integral = integral;
-        self.output = output;
         Some(output)
     }
 
@@ -204,14 +266,20 @@ impl Pid {
             output = limited(output, self.output - reach, self.output + reach);
         }
         output = limited(output, config.output_lower, config.output_upper);
-        let excess = wanted - output;
+        (output, self.without_windup(wanted - output, integral, growth, step))
+    }
+
+    /// The integral after anti-windup, for an `excess` that the limits cut off the output.
+    #[inline]
+    fn without_windup(&self, excess: f32, integral: f32, growth: f32, step: &TimeStep) -> f32 {
+        let config = &self.config;
         if config.tracking_time_s > 0.0 {
             let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
             let drained = finite(integral - finite(excess) * part);
-            return (output, limited(drained, -config.integral_limit, config.integral_limit));
+            return limited(drained, -config.integral_limit, config.integral_limit);
         }
         let outward = excess * growth > 0.0;
-        (output, if outward && !config.wind_up { self.integral } else { integral })
+        if outward && !config.wind_up { self.integral } else { integral }
     }
 
     #[inline]
