@@ -73,7 +73,8 @@ def compare(budget, found):
         elif figure > row["budget"][level]:
             wrong.append(f"{name} is {figure}, its budget {row['budget'][level]}")
     for name, (least, most) in found["spread"].items():
-        if least != most:
+        # Means of 1000 calls, rounded: a keep-alive more or less among them, by the phase of its timer, may show as 1.
+        if most - least > 1:
             wrong.append(f"{name} is not constant: {least} to {most}")
     if found["closed_loop"] != HOST["closed_loop"]:
         wrong.append(f"the closed loop gives {found['closed_loop']}, on the host {HOST['closed_loop']}")
