@@ -122,7 +122,6 @@ impl BrushedConfig {
     }
 }
 
-/// What a brushed motor is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
     Duty(f32),
