@@ -23,6 +23,8 @@ pub mod wire;
 
 // F3: device families and their simulation
 pub mod dji;
+#[cfg(feature = "hal")]
+pub mod pwm;
 #[cfg(feature = "sim")]
 pub mod sim;
 

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 12] = [
+const FLOORS: [(&str, u32); 13] = [
     ("units", 0),
     ("time", 0),
     ("math", 0),
@@ -18,6 +18,7 @@ const FLOORS: [(&str, u32); 12] = [
     ("wire", 20),
     ("chassis", 21),
     ("dji", 30),
+    ("pwm", 30),
     ("runner", 40),
 ];
 

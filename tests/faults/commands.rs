@@ -75,9 +75,12 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
     for reversed in [false, true] {
         let config = if reversed { Config::new(1).reversed() } else { Config::new(1) };
         let (mut bus, [wheel]) = armed([config]);
+        let mut ms = 1;
         let mut raw = |amperes: f32| {
+            ms += 1;
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
             bus.set_current(wheel, Current::from_amperes(amperes)).unwrap();
-            step(&mut bus, 2).map_or(0, |words| words[0])
+            step(&mut bus, ms).map_or(0, |words| words[0])
         };
         let sign = if reversed { -1 } else { 1 };
         let rising = [
@@ -101,9 +104,11 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
             last = value;
         }
         assert_eq!((last, raw(-0.0)), (16_384, 0));
-        for (word, limited) in [(i16::MIN, -16_384), (i16::MAX, 16_384), (-1, -1)] {
+        for (ms, word, limited) in [(40, i16::MIN, -16_384), (41, i16::MAX, 16_384), (42, -1, -1)] {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+            step(&mut bus, ms - 1);
             bus.set_raw(wheel, word).unwrap();
-            assert_eq!(step(&mut bus, 2).unwrap()[0], sign * limited);
+            assert_eq!(step(&mut bus, ms).unwrap()[0], sign * limited);
         }
     }
 }

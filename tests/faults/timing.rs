@@ -254,3 +254,71 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();
     assert!((1..2_000).contains(&back), "from zero: {back}");
 }
+
+/// Numbers without pattern: xorshift.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+fn at_us(us: u64) -> Instant {
+    Instant::from_micros(us)
+}
+
+/// Whether the motor is driven after an update.
+fn is_driven(bus: &mut Bus, now_us: u64, driven: bool) -> bool {
+    bus.update(Tick::new(at_us(now_us), 0.001));
+    core::iter::from_fn(|| bus.next_frame()).last().map_or(driven, |frame| words(&frame)[0] != 0)
+}
+
+#[test]
+fn f24_a_million_silences_end_with_the_first_tick_after_the_limit() {
+    let mut random = Random(0x5EED);
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    let mut now = 2_000;
+    for _ in 0..1_000_000 {
+        now += 1 + random.below(3_000);
+        let heard = now;
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_us(heard));
+        now += random.below(1_000);
+        let mut driven = is_driven(&mut bus, now, false);
+        bus.set_raw(wheel, 500).unwrap();
+        while now <= heard + 10_000 {
+            // Ticks of 1 ms, each up to 200 us late.
+            now += 1_000 + random.below(200);
+            driven = is_driven(&mut bus, now, driven);
+            assert_eq!(driven, now <= heard + 10_000, "heard at {heard}, now {now}");
+            _ = bus.set_raw(wheel, 500);
+        }
+    }
+}
+
+#[test]
+fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() {
+    let mut random = Random(0xDEAD);
+    let (mut bus, [wheel]) = armed([Config::new(1)]);
+    let mut now = 2_000;
+    for _ in 0..1_000_000 {
+        let mut tick = |bus: &mut Bus, now: u64, driven| {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_us(now));
+            is_driven(bus, now, driven)
+        };
+        now += 1 + random.below(3_000);
+        let mut driven = tick(&mut bus, now, false);
+        let commanded = now;
+        bus.set_raw(wheel, 500).unwrap();
+        while now <= commanded + 100_000 {
+            // Long strides first, then ticks.
+            let far = now + 12_000 < commanded + 100_000;
+            now += if far { 9_000 } else { 1_000 } + random.below(200);
+            driven = tick(&mut bus, now, driven);
+            assert_eq!(driven, now <= commanded + 100_000, "commanded at {commanded}, now {now}");
+        }
+    }
+}

@@ -1,0 +1,400 @@
+use super::rc::duty;
+use super::{Direction, Way};
+use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
+use crate::motor::{
+    ArmError, Guard, Link, Missing, MotorName, TargetError, Timeouts, VelocityDrive,
+};
+use crate::time::{Instant, Tick};
+use crate::units::AngularVelocity;
+use core::f32::consts::TAU;
+use embedded_hal::pwm::SetDutyCycle;
+
+/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
+const LONGEST_STEP_S: f32 = 0.02;
+
+/// What a brushed motor needs to be known of.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::pwm::BrushedConfig;
+///
+/// // 11 lines, counted fourfold, behind a gear of 30: 1320 counts a turn of the output shaft.
+/// const WHEEL: BrushedConfig = BrushedConfig::new(1)
+///     .with_encoder(11.0 * 4.0 * 30.0, 16)
+///     .with_speed_loop(PidConfig::new(0.02, 0.3, 0.0)) // of full duty, per rad/s and per rad
+///     .with_limit(0.8);
+/// assert!(WHEEL.validate().is_ok());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BrushedConfig {
+    name: MotorName,
+    counts_per_turn: Option<f32>,
+    counter_bits: u32,
+    filter_s: f32,
+    speed: Option<PidConfig>,
+    limit: f32,
+    reversed: bool,
+    timeouts: Timeouts,
+}
+
+impl BrushedConfig {
+    /// Takes the number by which the motor is called in errors. Without encoder and loop, with full duty as its limit.
+    #[must_use]
+    pub const fn new(id: u8) -> Self {
+        Self {
+            name: MotorName::new("brushed", id),
+            counts_per_turn: None,
+            counter_bits: 32,
+            filter_s: 0.005,
+            speed: None,
+            limit: 1.0,
+            reversed: false,
+            timeouts: Timeouts::new(),
+        }
+    }
+
+    /// Adds an encoder: its counts for a turn of the output shaft, and the width of its counter in bits, 8 to 32.
+    #[must_use]
+    pub const fn with_encoder(self, counts_per_turn: f32, counter_bits: u32) -> Self {
+        Self { counts_per_turn: Some(counts_per_turn), counter_bits, ..self }
+    }
+
+    /// Sets the time constant that smooths the measured velocity, in s: 5 ms at first, 0 for none.
+    #[must_use]
+    pub const fn with_velocity_filter(self, time_constant_s: f32) -> Self {
+        Self { filter_s: time_constant_s, ..self }
+    }
+
+    /// Adds a speed loop: rad/s of the output shaft in, a share of full duty out. It needs the encoder.
+    #[must_use]
+    pub const fn with_speed_loop(self, speed: PidConfig) -> Self {
+        Self { speed: Some(speed), ..self }
+    }
+
+    /// Lowers the largest duty, for the loop and for direct commands alike: above 0, at most 1.
+    #[must_use]
+    pub const fn with_limit(self, share: f32) -> Self {
+        Self { limit: share, ..self }
+    }
+
+    /// Turns the positive direction around, of duty and encoder alike.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self { reversed: !self.reversed, ..self }
+    }
+
+    /// Sets when counts and targets count as lost.
+    #[must_use]
+    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { timeouts, ..self }
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the first that is not usable.
+    pub fn validate(&self) -> Result<(), super::PwmError> {
+        let bad_counts = |counts: f32| !(counts.is_finite() && counts > 0.0);
+        Err(super::PwmError(if self.counts_per_turn.is_some_and(bad_counts) {
+            "counts per turn"
+        } else if !(8..=32).contains(&self.counter_bits) {
+            "counter width"
+        } else if !(self.filter_s.is_finite() && self.filter_s >= 0.0) {
+            "velocity filter"
+        } else if !(self.limit > 0.0 && self.limit <= 1.0) {
+            "limit"
+        } else if self.speed.is_some() && self.counts_per_turn.is_none() {
+            "speed loop without an encoder"
+        } else {
+            return self
+                .make_loop()
+                .map(|_| ())
+                .map_err(|error| super::PwmError(error.parameter()));
+        }))
+    }
+
+    fn make_loop(&self) -> Result<Option<Pid>, ConfigError> {
+        let Some(speed) = self.speed else { return Ok(None) };
+        let (lower, upper) = speed.output_range();
+        let limited = speed.with_output_range(lower.max(-self.limit), upper.min(self.limit));
+        Pid::new(limited).map(Some)
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Target {
+    Duty(f32),
+    Velocity(f32),
+}
+
+/// A pin that failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum BrushedError<P, D> {
+    /// The PWM channel.
+    Pwm(P),
+    /// A direction pin.
+    Direction(D),
+}
+
+impl<P: core::fmt::Debug, D: core::fmt::Debug> core::fmt::Display for BrushedError<P, D> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Pwm(error) => write!(f, "the PWM channel failed: {error:?}"),
+            Self::Direction(error) => write!(f, "a direction pin failed: {error:?}"),
+        }
+    }
+}
+
+impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedError<P, D> {}
+
+/// A brushed DC motor: a PWM channel and direction pins of its bridge, and the counts of its encoder.
+///
+/// # Examples
+/// ```
+/// use drivetrain::pwm::{Brushed, BrushedConfig, OnePin};
+/// use drivetrain::time::{Instant, Tick};
+/// # use embedded_hal::{digital, pwm::*};
+/// # struct Pin(u16);
+/// # impl ErrorType for Pin { type Error = core::convert::Infallible; }
+/// # impl digital::ErrorType for Pin { type Error = core::convert::Infallible; }
+/// # impl SetDutyCycle for Pin {
+/// #     fn max_duty_cycle(&self) -> u16 { 1_000 }
+/// #     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), core::convert::Infallible> { self.0 = duty; Ok(()) }
+/// # }
+/// # impl digital::OutputPin for Pin {
+/// #     fn set_low(&mut self) -> Result<(), core::convert::Infallible> { self.0 = 0; Ok(()) }
+/// #     fn set_high(&mut self) -> Result<(), core::convert::Infallible> { self.0 = 1; Ok(()) }
+/// # }
+/// # let (channel, pin) = (Pin(0), Pin(0));
+///
+/// let mut motor = Brushed::new(channel, OnePin(pin), BrushedConfig::new(1).with_limit(0.5))?;
+/// let now = Instant::from_micros(1_000);
+/// motor.arm(now)?;
+/// motor.set_duty(-0.9)?; // saturates at its limit
+/// motor.update(Tick::new(now, 0.001))?;
+/// assert_eq!((motor.channel().0, motor.direction().0.0), (500, 1)); // backward with half of 1000
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Brushed<P, D> {
+    channel: P,
+    direction: D,
+    config: BrushedConfig,
+    speed: Option<Pid>,
+    guard: Guard,
+    target: Target,
+    way: Way,
+    output: f32,
+    held_steps: u8,
+    counted: Option<(u32, Instant)>,
+    counts: i64,
+    rad_per_s: f32,
+}
+
+impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
+    /// Takes the pins: disarmed. Nothing is sent before the first [`update`](Self::update).
+    ///
+    /// # Errors
+    /// Names the parameter that is not usable.
+    pub fn new(channel: P, direction: D, config: BrushedConfig) -> Result<Self, super::PwmError> {
+        config.validate()?;
+        let speed = config.make_loop().map_err(|error| super::PwmError(error.parameter()))?;
+        let guard =
+            if config.counts_per_turn.is_some() { Guard::new() } else { Guard::without_feedback() };
+        Ok(Self {
+            channel,
+            direction,
+            config,
+            speed,
+            guard: guard.with_timeouts(config.timeouts),
+            target: Target::Duty(0.0),
+            way: Way::Coast,
+            output: 0.0,
+            held_steps: 0,
+            counted: None,
+            counts: 0,
+            rad_per_s: 0.0,
+        })
+    }
+
+    /// Takes a reading of the encoder's counter; it may wrap. Read it at least once in half a wrap.
+    pub fn ingest_counts(&mut self, counter: u32, now: Instant) {
+        let Some(counts_per_turn) = self.config.counts_per_turn else { return };
+        let (before, then) = self.counted.replace((counter, now)).unwrap_or((counter, now));
+        let spare_bits = 32 - self.config.counter_bits.min(32);
+        let moved = counter.wrapping_sub(before) << spare_bits;
+        let moved = i64::from(moved.cast_signed() >> spare_bits);
+        let moved = if self.config.reversed { -moved } else { moved };
+        self.counts = self.counts.wrapping_add(moved);
+        let dt_s = now.since(then).as_secs_f32();
+        if dt_s > 0.0 {
+            let measured = moved as f32 * TAU / (counts_per_turn * dt_s);
+            let share = dt_s / (self.config.filter_s + dt_s);
+            self.rad_per_s += (measured - self.rad_per_s) * share;
+        } else {
+            // No time between: the way belongs to the next reading.
+            self.counted = Some((before, then));
+            self.counts = self.counts.wrapping_sub(moved);
+        }
+        self.guard.hear(now);
+    }
+
+    /// Takes targets from now on.
+    ///
+    /// # Errors
+    /// When the emergency stop is set, or no counts came.
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
+    pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        if self.guard.is_stopped() {
+            return Err(ArmError::Stopped);
+        }
+        let missing = self.guard.is_missing(now).then_some(self.config.name);
+        if let Some(missing) = Missing::collect(missing.into_iter()) {
+            return Err(ArmError::Missing(missing));
+        }
+        if self.guard.engage(now) {
+            self.rest();
+        }
+        Ok(())
+    }
+
+    /// Refuses targets until armed again; the next update stops the motor.
+    pub fn disarm(&mut self) {
+        self.guard.disarm();
+        self.rest();
+    }
+
+    /// Disarms, and stays so until it is cleared and armed.
+    pub fn emergency_stop(&mut self) {
+        self.guard.emergency_stop();
+        self.rest();
+    }
+
+    /// Takes the emergency stop back; the motor stays disarmed.
+    pub const fn clear_emergency_stop(&mut self) {
+        self.guard.clear_emergency_stop();
+    }
+
+    /// Tells whether targets are taken.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.guard.is_armed()
+    }
+
+    /// Sets the duty directly: -1 to 1, saturating at the limit.
+    ///
+    /// # Errors
+    /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
+    pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
+        self.guard.admit(share.is_finite())?;
+        self.target = Target::Duty(share);
+        Ok(())
+    }
+
+    /// Runs the loop and sets the pins. Call it in every tick.
+    ///
+    /// # Errors
+    /// That of a pin; the next call tries again.
+    pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
+        let limit = self.config.limit;
+        self.output = self.command(tick).max(-limit).min(limit);
+        let output = if self.config.reversed { -self.output } else { self.output };
+        let share = output.abs();
+        let way = match duty(share, self.channel.max_duty_cycle()) {
+            0 => Way::Coast,
+            _ if output > 0.0 => Way::Forward,
+            _ => Way::Backward,
+        };
+        if way != self.way || way == Way::Coast {
+            // Never a pulse in the wrong direction while the pins change.
+            self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm)?;
+            self.direction.set(way).map_err(BrushedError::Direction)?;
+            self.way = way;
+        }
+        match way {
+            Way::Coast => Ok(()),
+            _ => self
+                .channel
+                .set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
+                .map_err(BrushedError::Pwm),
+        }
+    }
+
+    fn command(&mut self, tick: Tick) -> f32 {
+        if !self.guard.drives(tick.now()) {
+            // Late counts leave the integral as it is; without a target it starts afresh.
+            if !self.guard.has_target() {
+                self.rest();
+            }
+            return 0.0;
+        }
+        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
+        if step.is_hold() {
+            self.held_steps = self.held_steps.saturating_add(1);
+            return if self.held_steps >= 2 { 0.0 } else { self.output };
+        }
+        self.held_steps = 0;
+        match (self.target, &mut self.speed) {
+            (Target::Duty(share), _) => share,
+            (Target::Velocity(goal), Some(speed)) => speed.step(goal, self.rad_per_s, &step),
+            (Target::Velocity(_), None) => 0.0,
+        }
+    }
+
+    fn rest(&mut self) {
+        self.target = Target::Duty(0.0);
+        self.speed.iter_mut().for_each(Pid::reset);
+    }
+
+    /// Returns the counts since the first reading, in the positive direction; 0 without an encoder.
+    #[must_use]
+    pub const fn counts(&self) -> i64 {
+        self.counts
+    }
+
+    /// Returns the share of full duty of the last update, in the positive direction.
+    #[must_use]
+    pub const fn duty(&self) -> f32 {
+        self.output
+    }
+
+    /// Returns the PWM channel.
+    #[must_use]
+    pub const fn channel(&self) -> &P {
+        &self.channel
+    }
+
+    /// Returns the direction pins.
+    #[must_use]
+    pub const fn direction(&self) -> &D {
+        &self.direction
+    }
+
+    /// Returns what decides whether it may be driven.
+    #[must_use]
+    pub const fn guard(&self) -> &Guard {
+        &self.guard
+    }
+}
+
+impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        let fresh = self.config.counts_per_turn.is_some() && self.guard.link() == Link::Online;
+        fresh.then(|| AngularVelocity::from_rad_per_s(self.rad_per_s))
+    }
+
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        if self.speed.is_none() {
+            return Err(TargetError::NoLoop);
+        }
+        self.guard.admit(target.as_rad_per_s().is_finite())?;
+        let goal = target.as_rad_per_s();
+        if let (Target::Duty(share), Some(speed)) = (self.target, &mut self.speed) {
+            speed.reset_to(share);
+        }
+        self.target = Target::Velocity(goal);
+        Ok(())
+    }
+}

@@ -1,0 +1,37 @@
+//! Motors that are not on CAN: an RC ESC or servo, and a brushed motor behind an H-bridge. Feature `hal`.
+//!
+//! ```text
+//!                    ┌ RcPwm ───┐  SetDutyCycle     pulse of 1000 to 2000 us, 50 times a second
+//! set_throttle ──────┤          ├────────────────>  ▁▁█▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁█▁▁▁▁
+//!                    └──────────┘
+//!                    ┌ Brushed ─┐  SetDutyCycle     ▁██▁██▁██▁  to the bridge
+//! set_velocity ──────┤ PID      ├────────────────>
+//! counts ────────────┤          ├─ OutputPin(s) ─>  direction
+//!                    └──────────┘
+//! ```
+//!
+//! | item | what it is |
+//! |---|---|
+//! | [`RcPwm`], [`RcConfig`], [`Idle`] | an ESC or servo that listens to the length of a pulse |
+//! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
+//! | [`Direction`], [`OnePin`], [`TwoPins`] | how the bridge is told which way |
+//! | [`PwmError`], [`BrushedError`] | what is wrong with a configuration, or with a pin |
+//!
+//! They follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a target
+//! that is old, NaN or infinite, a bad time step, lost feedback and an emergency stop give the safe output. They are no
+//! [`CanDevice`](crate::motor::CanDevice), so the program calls `update` in each tick itself. With
+//! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
+//!
+//! # Limits
+//! A pin that fails is reported by `update` and tried again in the next one; the hardware may then go on with what it
+//! had. When `update` is no longer called, the timer goes on with its last pulse: a hardware watchdog is needed.
+
+mod brushed;
+mod direction;
+mod rc;
+#[cfg(test)]
+mod tests;
+
+pub use brushed::{Brushed, BrushedConfig, BrushedError};
+pub use direction::{Direction, OnePin, TwoPins, Way};
+pub use rc::{Idle, PwmError, RcConfig, RcPwm};

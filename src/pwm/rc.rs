@@ -1,0 +1,294 @@
+use crate::motor::{Guard, TargetError, Timeouts, VelocityDrive};
+use crate::time::{Duration, Instant, Tick};
+use crate::units::AngularVelocity;
+use embedded_hal::pwm::SetDutyCycle;
+
+/// What an [`RcPwm`] sends when it is not to move.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Idle {
+    /// The neutral pulse: an ESC stops, a servo goes to its centre.
+    #[default]
+    Neutral,
+    /// No pulse: a servo goes limp, and most ESCs disarm.
+    Off,
+}
+
+/// How an RC ESC or servo wants its pulses.
+///
+/// # Examples
+/// ```
+/// use drivetrain::pwm::RcConfig;
+/// use drivetrain::time::Duration;
+///
+/// // A fan that turns one way, on a 400 Hz timer.
+/// const FAN: RcConfig = RcConfig::new()
+///     .with_pulses_us(1_000, 1_000, 2_000)
+///     .with_period(Duration::from_micros(2_500));
+/// assert!(FAN.validate().is_ok());
+/// let wrong = FAN.with_pulses_us(1_000, 900, 2_000).validate();
+/// assert_eq!(wrong.map_err(|error| error.to_string()), Err("neutral pulse is not usable".into()));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RcConfig {
+    low_us: u16,
+    neutral_us: u16,
+    high_us: u16,
+    period_us: u64,
+    idle: Idle,
+    arming: Duration,
+    full_speed: Option<AngularVelocity>,
+    timeouts: Timeouts,
+}
+
+impl RcConfig {
+    /// Pulses of 1000, 1500 and 2000 µs every 20 ms, neutral when idle and for 2 s when arming.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            low_us: 1_000,
+            neutral_us: 1_500,
+            high_us: 2_000,
+            period_us: 20_000,
+            idle: Idle::Neutral,
+            arming: Duration::from_secs(2),
+            full_speed: None,
+            timeouts: Timeouts::new(),
+        }
+    }
+
+    /// Sets the pulses for throttle -1, 0 and 1, in µs. One that turns one way only has `low` as its neutral.
+    #[must_use]
+    pub const fn with_pulses_us(self, low: u16, neutral: u16, high: u16) -> Self {
+        Self { low_us: low, neutral_us: neutral, high_us: high, ..self }
+    }
+
+    /// Sets the period to which the timer is set: 20 ms at first.
+    #[must_use]
+    pub const fn with_period(self, period: Duration) -> Self {
+        Self { period_us: period.as_micros(), ..self }
+    }
+
+    /// Sets what is sent when it is not to move.
+    #[must_use]
+    pub const fn with_idle(self, idle: Idle) -> Self {
+        Self { idle, ..self }
+    }
+
+    /// Sets how long the neutral pulse is sent before targets are taken: what the ESC waits for. 2 s at first.
+    #[must_use]
+    pub const fn with_arming_time(self, time: Duration) -> Self {
+        Self { arming: time, ..self }
+    }
+
+    /// Sets the velocity that full throttle stands for, so that it takes velocities. Nothing measures it.
+    #[must_use]
+    pub const fn with_full_speed(self, velocity: AngularVelocity) -> Self {
+        Self { full_speed: Some(velocity), ..self }
+    }
+
+    /// Sets when a target counts as lost.
+    #[must_use]
+    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { timeouts, ..self }
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the first that is not usable.
+    pub fn validate(&self) -> Result<(), PwmError> {
+        let speed = self.full_speed.map(AngularVelocity::as_rad_per_s);
+        Err(PwmError(if self.low_us == 0 || self.low_us >= self.high_us {
+            "low pulse"
+        } else if self.neutral_us < self.low_us || self.neutral_us > self.high_us {
+            "neutral pulse"
+        } else if u64::from(self.high_us) > self.period_us {
+            "period"
+        } else if speed.is_some_and(|speed| !(speed.is_finite() && speed > 0.0)) {
+            "full speed"
+        } else {
+            return Ok(());
+        }))
+    }
+}
+
+impl Default for RcConfig {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A parameter that is not usable, by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PwmError(pub &'static str);
+
+impl core::fmt::Display for PwmError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} is not usable", self.0)
+    }
+}
+
+impl core::error::Error for PwmError {}
+
+/// An RC ESC or servo on a PWM channel whose timer runs at the period of the configuration.
+///
+/// It reports nothing, so it cannot be missing; what it does with its pulses is its own affair.
+///
+/// # Examples
+/// ```
+/// use drivetrain::pwm::{RcConfig, RcPwm};
+/// use drivetrain::time::{Instant, Tick};
+/// # use embedded_hal::pwm::*;
+/// # struct Channel(u16);
+/// # impl ErrorType for Channel { type Error = core::convert::Infallible; }
+/// # impl SetDutyCycle for Channel {
+/// #     fn max_duty_cycle(&self) -> u16 { 20_000 }
+/// #     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Self::Error> { self.0 = duty; Ok(()) }
+/// # }
+/// # let channel = Channel(0); // counts microseconds of 20 ms
+///
+/// let mut esc = RcPwm::new(channel, RcConfig::new())?;
+/// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
+/// esc.arm(at_ms(0).now());
+/// for ms in 0..=2_000 {
+///     esc.update(at_ms(ms))?; // neutral for 2 s
+/// }
+/// esc.set_throttle(0.5)?;
+/// esc.update(at_ms(2_001))?;
+/// assert_eq!(esc.channel().0, 1_750);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct RcPwm<P> {
+    channel: P,
+    config: RcConfig,
+    guard: Guard,
+    arming_since: Option<Instant>,
+    throttle: f32,
+}
+
+impl<P: SetDutyCycle> RcPwm<P> {
+    /// Takes a channel: disarmed. Nothing is sent before the first [`update`](Self::update).
+    ///
+    /// # Errors
+    /// Names the parameter that is not usable.
+    pub fn new(channel: P, config: RcConfig) -> Result<Self, PwmError> {
+        config.validate()?;
+        let guard = Guard::without_feedback().with_timeouts(config.timeouts);
+        Ok(Self { channel, config, guard, arming_since: None, throttle: 0.0 })
+    }
+
+    /// Begins to arm: sends neutral for the configured time, and takes targets then. Without effect while stopped or
+    /// armed.
+    pub fn arm(&mut self, now: Instant) {
+        if !self.guard.is_stopped() && !self.guard.is_armed() {
+            self.arming_since.get_or_insert(now);
+        }
+    }
+
+    /// Sends idle, and refuses targets until armed again.
+    pub const fn disarm(&mut self) {
+        self.guard.disarm();
+        self.arming_since = None;
+    }
+
+    /// Disarms, and stays so until it is cleared and armed.
+    pub const fn emergency_stop(&mut self) {
+        self.guard.emergency_stop();
+        self.arming_since = None;
+    }
+
+    /// Takes the emergency stop back; it stays disarmed.
+    pub const fn clear_emergency_stop(&mut self) {
+        self.guard.clear_emergency_stop();
+    }
+
+    /// Tells whether targets are taken.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.guard.is_armed()
+    }
+
+    /// Sets the throttle of an ESC or the place of a servo: -1 to 1, saturating, for low, neutral and high.
+    ///
+    /// # Errors
+    /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
+    pub fn set_throttle(&mut self, throttle: f32) -> Result<(), TargetError> {
+        self.guard.admit(throttle.is_finite())?;
+        self.throttle = throttle.clamp(-1.0, 1.0);
+        Ok(())
+    }
+
+    /// Sends the pulse of this tick. Call it in every one.
+    ///
+    /// # Errors
+    /// That of the channel; the next call tries again.
+    pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
+        let drives = self.guard.drives(tick.now());
+        if let Some(since) = self.arming_since {
+            if tick.now().since(since) >= self.config.arming {
+                self.arming_since = None;
+                self.guard.engage(tick.now());
+            }
+            return self.send(self.config.neutral_us.into());
+        }
+        if drives {
+            self.send(self.pulse_us())
+        } else if self.config.idle == Idle::Off && !self.guard.is_armed() {
+            self.channel.set_duty_cycle_fully_off()
+        } else {
+            self.send(self.config.neutral_us.into())
+        }
+    }
+
+    fn pulse_us(&self) -> f32 {
+        let RcConfig { low_us, neutral_us, high_us, .. } = self.config;
+        let [low, neutral, high] = [low_us, neutral_us, high_us].map(f32::from);
+        let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };
+        neutral + self.throttle * reach
+    }
+
+    fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {
+        let share = pulse_us / self.config.period_us as f32;
+        self.channel.set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
+    }
+
+    /// Returns the channel.
+    #[must_use]
+    pub const fn channel(&self) -> &P {
+        &self.channel
+    }
+
+    /// Returns what decides whether it may be driven.
+    #[must_use]
+    pub const fn guard(&self) -> &Guard {
+        &self.guard
+    }
+}
+
+/// The duty of a share from 0 to 1, to the nearest; saturates.
+pub(super) fn duty(share: f32, max: u16) -> u16 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturates, NaN gives 0"
+    )]
+    let duty = (share * f32::from(max) + 0.5) as u16;
+    duty.min(max)
+}
+
+/// Open loop, over [`RcConfig::with_full_speed`]: the velocity is asked for and not measured.
+impl<P: SetDutyCycle> VelocityDrive<()> for RcPwm<P> {
+    /// Always `None`.
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        None
+    }
+
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        let full = self.config.full_speed.ok_or(TargetError::Unsupported)?;
+        self.set_throttle(target.as_rad_per_s() / full.as_rad_per_s())
+    }
+}
