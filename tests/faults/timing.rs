@@ -305,7 +305,7 @@ fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() 
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let mut now = 2_000;
     for _ in 0..1_000_000 {
-        let mut tick = |bus: &mut Bus, now: u64, driven| {
+        let tick = |bus: &mut Bus, now: u64, driven| {
             _ = bus.ingest(&feedback(0x201, 0, 0), at_us(now));
             is_driven(bus, now, driven)
         };
