@@ -9,6 +9,7 @@
 mod bytes;
 mod closed_loop;
 mod constant_time;
+mod controllers;
 mod meter;
 mod rows;
 mod wiring;
@@ -25,6 +26,7 @@ fn main() -> ! {
         hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
         rows::control();
+        controllers::rows();
         rows::math();
         rows::space();
         bytes::rows();

@@ -238,20 +238,25 @@ pub fn control() {
     row("pid_options_update", &[pid_update(all)]);
     row("pid_circle_step", &[pid_step(all.with_period(360.0))]);
     row("pid_circle_update", &[pid_update(all.with_period(360.0))]);
+    row("pid_circle_across", &[pid_step_to(361.0, all.with_period(360.0))]);
     // Every error and every change of the measurement is more than half a period.
     row("pid_circle_wrap", &[pid_step(all.with_period(0.375))]);
 }
 
-fn swinging(call: u32) -> f32 {
+pub fn swinging(call: u32) -> f32 {
     [0.5, 1.25, 0.75, 1.5][call as usize % 4]
 }
 
 fn pid_step(config: PidConfig) -> u32 {
+    pid_step_to(1.0, config)
+}
+
+fn pid_step_to(setpoint: f32, config: PidConfig) -> u32 {
     let mut pid = Pid::new(black_box(config)).unwrap();
     let step = TimeStep::new(0.001, 0.1);
-    pid.step(1.0, 0.5, &step);
+    pid.step(setpoint, 0.5, &step);
     instructions(row_pid_step as fn(&mut Pid, f32, f32, &TimeStep) -> f32, |pid_step, call| {
-        pid_step(&mut pid, 1.0, swinging(call), &step);
+        pid_step(&mut pid, setpoint, swinging(call), &step);
     })
 }
 

@@ -3,14 +3,14 @@ use crate::control::error::{ConfigError, check, not_negative, ordered, output_en
 /// An option that is a threshold or a rate, and off.
 const OFF: f32 = f32::MAX;
 
-const ASYMMETRIC: u8 = 1;
+pub(super) const DERIVATIVE_ON_ERROR: u8 = 1;
 const INTEGRAL_WEIGHT: u8 = 1 << 1;
 const DEAD_BAND: u8 = 1 << 2;
 pub(super) const FEED_FORWARD: u8 = 1 << 3;
 pub(super) const SLEW_LIMIT: u8 = 1 << 4;
 pub(super) const CIRCLE: u8 = 1 << 5;
 pub(super) const DERIVATIVE_FILTER: u8 = 1 << 6;
-pub(super) const DERIVATIVE_ON_ERROR: u8 = 1 << 7;
+const ASYMMETRIC: u8 = 1 << 7;
 
 /// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
 ///

@@ -1,0 +1,117 @@
+//! The rows of the controllers beside `Pid`, each through its checked `update`.
+
+use crate::meter::instructions;
+use crate::row;
+use crate::rows::swinging;
+use core::hint::black_box;
+use drivetrain::control::{
+    Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
+    MotionLimits, MovingAverage, OptimalDifferentiator, PidConfig, PositionActuator,
+    PositionActuatorConfig, Profile, ProfileState, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
+};
+
+const DT_S: f32 = 0.001;
+
+/// Functions of one line, out of line. Not `row_`, whose code the row `text` sums.
+macro_rules! functions {
+    ($($name:ident($controller:ident: $kind:ty $(, $argument:ident)*) -> $result:ty = $body:expr;)*) => {
+        $(
+            #[unsafe(no_mangle)]
+            #[inline(never)]
+            fn $name($controller: $kind $(, $argument: f32)*) -> $result {
+                $body
+            }
+        )*
+    };
+}
+
+functions! {
+    control_incremental(pid: &mut IncrementalPid, setpoint, measurement, dt_s) -> f32 = pid.update(setpoint, measurement, dt_s);
+    control_speed(actuator: &mut SpeedActuator, setpoint, speed, dt_s) -> f32 = actuator.update(setpoint, speed, dt_s);
+    control_position(actuator: &mut PositionActuator, setpoint, angle, speed, dt_s) -> f32 = actuator.update(setpoint, angle, speed, dt_s);
+    control_low_pass(filter: &mut LowPass, input, dt_s) -> f32 = filter.update(input, dt_s);
+    control_biquad(filter: &mut Biquad, input) -> f32 = filter.update(input);
+    control_moving_average(filter: &mut MovingAverage<8>, sample) -> f32 = filter.update(sample);
+    control_median(filter: &mut Median<5>, sample) -> f32 = filter.update(sample);
+    control_linear(differentiator: &mut LinearDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
+    control_optimal(differentiator: &mut OptimalDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
+    control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
+    control_profile(profile: &Profile, time_s) -> ProfileState = profile.at(time_s);
+}
+
+type Step<C> = fn(&mut C, f32, f32, f32) -> f32;
+type Filter<C> = fn(&mut C, f32, f32) -> f32;
+type Sampler<C> = fn(&mut C, f32) -> f32;
+
+/// Two controllers of one loop, the actuators, the filters, and what shapes a target.
+pub fn rows() {
+    loops();
+    let mut filter = LowPass::new(black_box(30.0)).unwrap();
+    timed("low_pass", control_low_pass, &mut filter);
+    let mut filter = Biquad::low_pass(black_box(30.0), 0.7, 1_000.0).unwrap();
+    sampled("biquad", control_biquad, &mut filter);
+    sampled("moving_average_8", control_moving_average, &mut MovingAverage::new());
+    sampled("median_5", control_median, &mut Median::new());
+    let mut differentiator = LinearDifferentiator::new(black_box(100.0), 0.005).unwrap();
+    timed("differentiator_linear", control_linear, &mut differentiator);
+    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.005, 0.005).unwrap();
+    timed("differentiator_optimal", control_optimal, &mut differentiator);
+    let mut limiter = SlewLimiter::new(black_box(100.0), 50.0).unwrap();
+    timed("slew_limiter", control_slew, &mut limiter);
+    let limits = MotionLimits::new(2.0, 8.0);
+    profile("profile_trapezoid", limits);
+    profile("profile_s_curve", limits.with_jerk(80.0));
+}
+
+fn loops() {
+    let config = IncrementalPidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0);
+    let mut pid = IncrementalPid::new(black_box(config)).unwrap();
+    row(
+        "incremental_update",
+        &[instructions(control_incremental as Step<_>, |update, call| {
+            update(&mut pid, 1.0, swinging(call), DT_S);
+        })],
+    );
+    let pid = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0).with_integral_limit(10.0);
+    let bare = SpeedActuatorConfig::new(pid);
+    let filtered = bare.with_feedback_filter(100.0).with_output_filter(200.0);
+    for (name, config) in [("speed_actuator", bare), ("speed_actuator_filters", filtered)] {
+        let mut actuator = SpeedActuator::new(black_box(config)).unwrap();
+        row(
+            name,
+            &[instructions(control_speed as Step<_>, |update, call| {
+                update(&mut actuator, 1.0, swinging(call), DT_S);
+            })],
+        );
+    }
+    let mut actuator =
+        PositionActuator::new(black_box(PositionActuatorConfig::new(pid, bare))).unwrap();
+    row(
+        "position_actuator",
+        &[instructions(
+            control_position as fn(&mut PositionActuator, f32, f32, f32, f32) -> f32,
+            |update, call| {
+                update(&mut actuator, 1.0, swinging(call), swinging(call + 1), DT_S);
+            },
+        )],
+    );
+}
+
+fn timed<C>(name: &str, update: Filter<C>, controller: &mut C) {
+    let each = |update: Filter<C>, call| _ = update(controller, swinging(call), DT_S);
+    row(name, &[instructions(update, each)]);
+}
+
+fn sampled<C>(name: &str, update: Sampler<C>, controller: &mut C) {
+    let each = |update: Sampler<C>, call| _ = update(controller, swinging(call));
+    row(name, &[instructions(update, each)]);
+}
+
+/// Over all parts of a move that takes about a second.
+fn profile(name: &str, limits: MotionLimits) {
+    let profile = Profile::plan(0.0, black_box(1.5), &limits).unwrap();
+    let each = |at: fn(&Profile, f32) -> ProfileState, call: u32| {
+        _ = at(&profile, call as f32 * DT_S);
+    };
+    row(name, &[instructions(control_profile as fn(&Profile, f32) -> ProfileState, each)]);
+}
