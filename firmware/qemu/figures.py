@@ -3,7 +3,7 @@
 
 figures.py ELF      the runner of `cargo run`: one level, compared
 figures.py          builds and runs the three levels, compares, and shows the static bound of the stack
-  --update          writes the figures into budget.toml
+  --update          writes the figures into budget.toml and the documents that quote them
   --json            prints them as JSON instead of a table
   --markdown        prints the block for README from budget.toml, without a run
 """
@@ -108,6 +108,21 @@ def update(budget, runs):
         figures = [run["rows"][name] for run in runs]
         text = re.sub(rf"(?s)(\[{name}\]\n.*?\nlast = )\[[^]]*\]", rf"\g<1>{figures}", text, count=1)
     BUDGET.write_text(text)
+    quote(tomllib.loads(text))
+
+
+def quote(budget):
+    """Writes the figures into the documents: the rows that a document has, and all of them into docs/figures.md."""
+    budget.pop("host")
+    head, rule, *rows = markdown(budget).split("\n")
+    for name in ("README.md", "docs/figures.md"):
+        path = HERE.parent.parent / name
+        before, rest = path.read_text().split("<!-- figures -->")
+        block, after = rest.split("<!-- /figures -->")
+        had = {line.split("|")[1] for line in block.splitlines() if line.startswith("|")}
+        kept = [row for row in rows if name != "README.md" or row.split("|")[1] in had]
+        table = "\n".join([head, rule, *kept])
+        path.write_text(f"{before}<!-- figures -->\n{table}\n<!-- /figures -->{after}")
 
 
 def build(profile, folder, toolchain="", *more):
