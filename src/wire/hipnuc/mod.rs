@@ -136,3 +136,12 @@ impl Imu {
             && [self.roll, self.pitch, self.yaw].iter().all(|angle| angle.is_finite())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    /// Vector `crc.hipnuc.check` of `tests/data/wire/vectors.json`.
+    #[test]
+    fn the_checksum_is_that_of_xmodem() {
+        assert_eq!(super::CRC.checksum(b"123456789"), 0x31C3);
+    }
+}

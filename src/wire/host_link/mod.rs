@@ -78,3 +78,14 @@ fn seal(mut writer: Writer<'_>) -> &[u8] {
     writer.put(&crc.to_be_bytes());
     writer.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    /// Vectors `crc.modbus.*` of `tests/data/wire/vectors.json`.
+    #[test]
+    fn the_checksum_is_that_of_modbus() {
+        for (bytes, sum) in [(&[][..], 0xFFFF), (&[0], 0x40BF), (&[1, 3, 0, 0, 0, 10], 0xCDC5)] {
+            assert_eq!(super::CRC.checksum(bytes), sum);
+        }
+    }
+}
