@@ -29,7 +29,13 @@ struct Sample {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args().nth(1).unwrap_or_else(|| "omni.svg".into());
+    let path = match std::env::args().nth(1) {
+        Some(option) if option.starts_with('-') => {
+            eprintln!("usage: omni [FILE.svg]");
+            std::process::exit(2);
+        }
+        path => path.unwrap_or_else(|| "omni.svg".into()),
+    };
     let samples = drive()?;
     plot(&path, &samples)?;
     let (x, y) = samples.last().ok_or("no samples")?.position_m;

@@ -174,7 +174,13 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    let path = std::env::args().nth(1).unwrap_or_else(|| "tune.svg".into());
+    let path = match std::env::args().nth(1) {
+        Some(option) if option.starts_with('-') => {
+            eprintln!("usage: tune [FILE.svg]");
+            std::process::exit(2);
+        }
+        path => path.unwrap_or_else(|| "tune.svg".into()),
+    };
     plot(&path, &[tune(&WHEEL)?, tune(&YAW)?])?;
     println!("plot: {path}");
     Ok(())

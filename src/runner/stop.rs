@@ -28,7 +28,7 @@ impl EmergencyStop {
         self.0.store(true, Ordering::Release);
     }
 
-    /// Takes the stop back.
+    /// Takes the stop back; what it stopped stays stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
     pub fn clear(&self) {
         self.0.store(false, Ordering::Release);
     }

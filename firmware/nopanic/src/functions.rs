@@ -36,6 +36,7 @@ pub fn call_all() {
     runner();
     crate::geometry::call_all();
     crate::chassis::call_all();
+    crate::pwm::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
     #[cfg(feature = "panics")]

@@ -11,6 +11,7 @@ mod chassis;
 mod functions;
 mod geometry;
 mod opaque;
+mod pwm;
 mod shaping;
 mod wire;
 

@@ -86,14 +86,23 @@ pub fn rows() {
         "wire_goal" bytes_goal(&black_box(Goal { speed: 2250, ..Goal::default() }), &mut out): fn(&Goal, &mut [u8; 128]) -> usize;
         "wire_justfloat" bytes_justfloat(black_box(&[1.0, 2.0, 3.0, 4.0]), &mut out): fn(&[f32; 4], &mut [u8; 128]) -> usize;
     }
-    let mut single = Hosts::new(CommandFormat);
-    row(
-        "wire_host_byte",
-        &[instructions(bytes_host_command as fn(&mut Hosts, &[u8]) -> usize, |read, call| {
-            let next = call as usize % bytes.len();
-            _ = read(&mut single, bytes.get(next..=next).unwrap_or(&[]));
-        })],
-    );
+    macro_rules! byte {
+        ($($name:literal $function:ident($reader:expr, $bytes:expr): $kind:ty;)*) => {
+            $(
+                let (mut reader, bytes) = ($reader, black_box($bytes));
+                row($name, &[instructions($function as $kind, |read, call| {
+                    let next = call as usize % bytes.len();
+                    _ = read(&mut reader, bytes.get(next..=next).unwrap_or(&[]));
+                })]);
+            )*
+        };
+    }
+    byte! {
+        "wire_host_byte" bytes_host_command(Hosts::new(CommandFormat), bytes): fn(&mut Hosts, &[u8]) -> usize;
+        "wire_hipnuc_byte" bytes_hipnuc(Imus::new(HipNuc), IMU): fn(&mut Imus, &[u8]) -> usize;
+        "wire_sts_byte" bytes_sts_status(Servos::new(Sts), STATUS): fn(&mut Servos, &[u8]) -> usize;
+        "wire_dbus_byte" bytes_dbus(Dbus::new(), REMOTE): fn(&mut Dbus, &[u8]) -> usize;
+    }
     // A reader that found nothing would be cheap.
     assert_eq!(bytes_host_command(&mut hosts, &bytes), 1);
     assert_eq!(bytes_hipnuc(&mut imus, &IMU), 1);

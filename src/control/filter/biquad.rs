@@ -105,6 +105,8 @@ impl Biquad {
             (self.value, self.s1, self.s2) = (value, s1, s2);
         } else {
             self.rejected = self.rejected.saturating_add(1);
+            // What overflows with a good sample is the past: it starts anew with the next one.
+            self.started = self.started && !input.is_finite();
         }
         self.value
     }
@@ -121,6 +123,9 @@ impl Biquad {
         self.value = value;
         self.s2 = (self.b2 - self.a2) * value;
         self.s1 = (self.b1 - self.a1) * value + self.s2;
+        if !self.s1.is_finite() || !self.s2.is_finite() {
+            (self.s1, self.s2) = (0.0, 0.0);
+        }
         self.started = true;
     }
 
@@ -219,5 +224,19 @@ mod tests {
             assert_eq!(Biquad::notch(10.0, 1.0, bad).unwrap_err().parameter(), "sample_hz");
         }
         assert_eq!(Biquad::notch(500.0, 1.0, 1000.0).unwrap_err().fault(), ConfigFault::Unstable);
+    }
+
+    #[test]
+    fn a_past_that_overflows_is_forgotten() {
+        for huge in [3e38_f32, -3e38] {
+            let mut filter = Biquad::low_pass(20.0, 0.707, 1000.0).unwrap();
+            for _ in 0..200 {
+                filter.update(huge);
+            }
+            for _ in 0..2_000 {
+                filter.update(1.0);
+            }
+            assert!((filter.value() - 1.0).abs() < 1e-2, "{}", filter.value());
+        }
     }
 }
