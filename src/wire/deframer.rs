@@ -103,8 +103,8 @@ pub struct Counts {
 /// `N` is also the longest frame that is waited for: a frame that states to be longer is refused at once.
 ///
 /// Cost: a copy of every byte, and one checksum a frame. Damage costs at most one more checksum for each header that
-/// stands in the damaged bytes. Portions are cheap (12 instructions a byte for a host command on a Cortex-M4F, checksum
-/// included); single bytes cost about 100 each, so collect them where the serial port does not.
+/// stands in the damaged bytes. Portions are cheap; a byte that comes alone costs about ten
+/// times one of a portion (`docs/figures.md` has the counts), so collect them where the serial port does not.
 ///
 /// # Examples
 /// ```
