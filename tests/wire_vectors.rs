@@ -252,6 +252,9 @@ fn feetech_status_frames_of_the_manual() {
         assert!(status.errors().is_empty());
         let present = Present::from_status(status).unwrap();
         assert_eq!(present.position, position);
+        for (found, name) in [(present.speed, "speed"), (present.load, "load")] {
+            assert!(expect[name].is_null() || i64::from(found) == expect[name], "{id}: {name}");
+        }
         close(&[present.voltage_v()], &expect["voltage_v"], 1e-5);
         assert_eq!(i64::from(present.temperature_c), expect["temperature_c"]);
     }
@@ -289,6 +292,9 @@ fn dbus_frames() {
     );
     assert_eq!((rest.right_switch, rest.left_switch), (Switch::Middle, Switch::Up));
     close(&[rest.dial], &serde_json::json!(0), 0.0);
+    let expect = &vector("dbus.capture")["expect"];
+    assert_eq!([rest.mouse.x, rest.mouse.y, rest.mouse.z][..], integers::<i16>(&expect["mouse"]));
+    assert_eq!(i64::from(rest.keys.0), expect["keys"]);
 }
 
 #[test]
