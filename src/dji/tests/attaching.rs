@@ -1,0 +1,123 @@
+use super::*;
+
+#[test]
+fn ids_outside_of_the_model_are_rejected() {
+    let mut bus = Bus::new();
+    for id in [0, 9, 255] {
+        assert!(matches!(
+            bus.attach(Config::<M3508>::new(id)),
+            Err(AttachError::Id { highest: 8, .. })
+        ));
+        assert!(matches!(
+            bus.attach(Config::<M2006>::new(id)),
+            Err(AttachError::Id { highest: 8, .. })
+        ));
+    }
+    for id in [0, 8, 255] {
+        assert!(matches!(
+            bus.attach(Config::<Gm6020Voltage>::new(id)),
+            Err(AttachError::Id { highest: 7, .. })
+        ));
+        assert!(matches!(
+            bus.attach(Config::<Gm6020Current>::new(id)),
+            Err(AttachError::Id { highest: 7, .. })
+        ));
+    }
+    assert_eq!(bus.motors().count(), 0);
+}
+
+#[test]
+fn c620_5_with_gm6020_current_1_is_rejected_naming_0x205_and_both() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::new(5)).unwrap();
+    let error = bus.attach(Config::<Gm6020Current>::new(1)).unwrap_err();
+    assert_eq!(error.to_string(), "GM6020 (current) #1 collides with M3508 #5 on 0x205");
+    let error = bus.attach(Config::<Gm6020Voltage>::new(1)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "GM6020 (voltage) #1 collides with M3508 #5 on 0x205 and on slot 0 of 0x1FF"
+    );
+    let error = bus.attach(Config::<M2006>::new(5)).unwrap_err();
+    assert!(error.to_string().starts_with("M2006 #5 collides with M3508 #5"));
+}
+
+#[test]
+fn eight_c620_and_three_gm6020_share_a_bus() {
+    let mut bus = Bus::new();
+    bus.attach_all([1, 2, 3, 4, 5, 6, 7, 8].map(Config::<M3508>::new)).unwrap();
+    bus.attach_all([5, 6, 7].map(Config::<Gm6020Voltage>::new)).unwrap();
+    assert_eq!(bus.motors().count(), 11);
+    assert_eq!(bus.clash(), None);
+}
+
+#[test]
+fn an_array_is_attached_whole_or_not_at_all() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M2006>::new(3)).unwrap();
+    assert!(bus.attach_all([1, 2, 3].map(Config::<M3508>::new)).is_err());
+    assert_eq!(bus.motors().map(|(_, name)| name.to_string()).collect::<Vec<_>>(), ["M2006 #3"]);
+}
+
+#[test]
+fn a_parameter_that_is_not_usable_is_named() {
+    let mut bus = Bus::new();
+    let wheel = Config::<M3508>::new(1);
+    for limit in [0.0, -1.0, 20.1, f32::NAN, f32::INFINITY] {
+        let error = bus.attach(wheel.with_current_limit(Current::from_amperes(limit))).unwrap_err();
+        assert_eq!(error.to_string(), "M3508 #1: command limit is not usable");
+    }
+    let error = bus.attach(wheel.with_torque_constant(f32::NAN)).unwrap_err();
+    assert_eq!(error.to_string(), "M3508 #1: torque constant is not usable");
+    let yaw = Config::<Gm6020Voltage>::new(1).with_nominal_voltage(Voltage::from_volts(0.0));
+    assert_eq!(
+        bus.attach(yaw).unwrap_err().to_string(),
+        "GM6020 (voltage) #1: nominal voltage is not usable"
+    );
+    let error = bus.attach(wheel.speed_loop(PidConfig::new(f32::NAN, 0.0, 0.0))).unwrap_err();
+    assert_eq!(error.to_string(), "M3508 #1: kp is not usable");
+}
+
+#[test]
+fn a_detached_handle_finds_nothing_even_when_the_place_is_taken_again() {
+    let (mut bus, [old]) = armed([Config::<M3508>::new(1)]);
+    bus.detach(old);
+    let new = bus.attach(Config::<M3508>::new(1)).unwrap();
+    assert!(bus.state(old).is_none());
+    assert_eq!(bus.set_current(old, Current::from_amperes(1.0)), Err(TargetError::Detached));
+    assert_ne!(old.erase(), new.erase());
+    for _ in 0..20 {
+        bus.motors()
+            .map(|(motor, _)| motor)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .for_each(|motor| bus.detach(motor));
+        let again = bus.attach(Config::<M3508>::new(1));
+        assert!(again.is_ok_and(|again| again.erase() != old.erase()) || again.is_err());
+    }
+    assert!(matches!(bus.attach(Config::<M3508>::new(1)), Err(AttachError::WornOut { .. })));
+}
+
+#[test]
+fn detaching_in_operation_sends_one_frame_with_zero() {
+    let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
+    bus.set_raw(first, 100).unwrap();
+    bus.set_raw(second, 200).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [100, 200, 0, 0])]);
+    bus.detach(first);
+    step(&mut bus, 3);
+    assert_eq!(sent(&mut bus), [(0x200, [0, 200, 0, 0])]);
+    bus.detach(second);
+    assert_eq!(sent(&mut bus), [(0x200, [0, 0, 0, 0])]);
+    for ms in 4..30 {
+        step(&mut bus, ms);
+    }
+    assert_eq!(sent(&mut bus), []);
+}
+
+#[test]
+fn a_bus_is_built_in_a_static_and_a_handle_is_one_byte() {
+    static BUS: Bus = Bus::new();
+    assert_eq!(BUS.motors().count(), 0);
+    assert!(size_of::<Handle<M3508>>() == 1);
+}

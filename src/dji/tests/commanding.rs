@@ -1,0 +1,162 @@
+use super::*;
+
+#[test]
+fn one_ampere_is_the_raw_value_of_each_model() {
+    fn raw_of<M: CurrentControlled>(amperes: f32) -> i16 {
+        let (mut bus, [motor]) = armed([Config::<M>::new(1)]);
+        bus.set_current(motor, Current::from_amperes(amperes)).unwrap();
+        step(&mut bus, 2);
+        sent(&mut bus)[0].1[0]
+    }
+    assert_eq!(
+        [raw_of::<M2006>(1.0), raw_of::<M3508>(1.0), raw_of::<Gm6020Current>(1.0)],
+        [1000, 819, 5461]
+    );
+    assert_eq!(
+        [raw_of::<M2006>(50.0), raw_of::<M3508>(50.0), raw_of::<Gm6020Current>(50.0)],
+        [10_000, 16_384, 16_384]
+    );
+    assert_eq!([raw_of::<M2006>(-50.0), raw_of::<M3508>(-50.0)], [-10_000, -16_384]);
+}
+
+#[test]
+fn full_voltage_is_25000_and_30000_on_old_motors() {
+    for (config, raw) in [
+        (Config::<Gm6020Voltage>::new(5), 25_000),
+        (Config::<Gm6020Voltage>::new(5).with_legacy_full_scale(), 30_000),
+        (Config::<Gm6020Voltage>::new(5).with_nominal_voltage(Voltage::from_volts(25.2)), 23_810),
+    ] {
+        let (mut bus, [yaw]) = armed([config]);
+        bus.set_voltage(yaw, Voltage::from_volts(24.0)).unwrap();
+        step(&mut bus, 2);
+        assert_eq!(sent(&mut bus), [(0x2FF, [raw, 0, 0, 0])]);
+    }
+}
+
+#[test]
+fn extreme_requests_on_a_reversed_motor_saturate_and_keep_their_sign() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).reversed()]);
+    let mut ms = 1;
+    let mut request = |amperes: f32| {
+        ms += 1;
+        let result = bus.set_current(wheel, Current::from_amperes(amperes));
+        step(&mut bus, ms);
+        (result, sent(&mut bus).last().map_or(0, |frame| frame.1[0]))
+    };
+    assert_eq!(request(50.0), (Ok(()), -16_384));
+    assert_eq!(request(-50.0), (Ok(()), 16_384));
+    for amperes in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(request(amperes), (Err(TargetError::NotFinite), 0));
+    }
+    bus.set_raw(wheel, i16::MIN).unwrap();
+    step(&mut bus, 9);
+    assert_eq!(sent(&mut bus), [(0x200, [16_384, 0, 0, 0])]);
+}
+
+#[test]
+fn m3508_and_m2006_on_one_bus_share_one_frame_a_cycle() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let feeder = bus.attach(Config::<M2006>::new(2)).unwrap();
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
+    assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(1)), Ingest::Taken);
+    bus.arm(at_ms(1)).unwrap();
+    bus.set_current(wheel, Current::from_amperes(1.0)).unwrap();
+    bus.set_current(feeder, Current::from_amperes(1.0)).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [819, 1000, 0, 0])]);
+}
+
+#[test]
+fn a_motor_that_is_never_commanded_does_not_hold_up_the_others() {
+    let (mut bus, [first, _, third]) = armed([1, 2, 3].map(Config::<M3508>::new));
+    bus.set_raw(first, 11).unwrap();
+    bus.set_raw(third, 33).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [11, 0, 33, 0])]);
+}
+
+#[test]
+fn limits_hold_for_direct_commands_and_for_loops() {
+    let limit = Current::from_amperes(2.0);
+    let config = Config::<M3508>::new(1)
+        .with_current_limit(limit)
+        .speed_loop(PidConfig::new(100.0, 0.0, 0.0));
+    let (mut bus, [wheel]) = armed([config]);
+    bus.set_current(wheel, Current::from_amperes(20.0)).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [1638, 0, 0, 0])]);
+    bus.set_velocity(wheel, AngularVelocity::from_rpm(-400.0)).unwrap();
+    step(&mut bus, 3);
+    assert_eq!(sent(&mut bus), [(0x200, [-1638, 0, 0, 0])]);
+}
+
+#[test]
+fn a_speed_loop_gives_amperes_for_rad_per_s_of_the_output_shaft() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(10.0)).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [8192, 0, 0, 0])]); // 10 A of 20 A
+    let six = AngularVelocity::from_rad_per_s(6.0).as_rpm() * 3591.0 / 187.0;
+    #[expect(clippy::cast_possible_truncation, reason = "1100 rpm")]
+    let frame = feedback(0x201, 0, six.round() as i16);
+    assert_eq!(bus.ingest(&frame, at_ms(2)), Ingest::Taken);
+    step(&mut bus, 3);
+    let raw = sent(&mut bus)[0].1[0];
+    assert!((raw - 3277).abs() < 4, "4 A, got {raw}");
+}
+
+#[test]
+fn an_angle_goes_the_shortest_way() {
+    let config =
+        Config::<Gm6020Voltage>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
+    let (mut bus, [yaw]) = armed([config]);
+    let mut ms = 1;
+    let mut towards = |from: f32, to: f32| {
+        ms += 1;
+        bus.set_present_position(yaw, Position::from_angle(Angle::from_degrees(from))).unwrap();
+        bus.set_angle(yaw, Angle::from_degrees(to)).unwrap();
+        step(&mut bus, ms);
+        f32::from(sent(&mut bus)[0].1[0]) * 24.0 / 25_000.0
+    };
+    assert!((towards(350.0, 10.0) - 20.0_f32.to_radians()).abs() < 2e-3);
+    assert!((towards(10.0, 350.0) + 20.0_f32.to_radians()).abs() < 2e-3);
+}
+
+#[test]
+fn an_absolute_angle_of_a_geared_motor_needs_a_zero() {
+    let config = Config::<M3508>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
+    let (mut bus, [joint]) = armed([config]);
+    assert_eq!(bus.set_angle(joint, Angle::ZERO), Err(TargetError::NotHomed));
+    assert_eq!(bus.set_position(joint, Position::from_turns(2)), Ok(()));
+    bus.zero(joint).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])], "the old target is gone");
+    assert_eq!(bus.set_angle(joint, Angle::ZERO), Ok(()));
+}
+
+#[test]
+fn a_target_without_its_loop_is_an_error() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::NoLoop));
+    assert_eq!(bus.set_position(wheel, Position::ZERO), Err(TargetError::NoLoop));
+    assert_eq!(bus.set_speed_loop(wheel, SPEED), Err(LoopError::NoLoop));
+}
+
+#[test]
+fn gains_change_while_running() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();
+    step(&mut bus, 2);
+    assert_eq!(sent(&mut bus), [(0x200, [3277, 0, 0, 0])]);
+    bus.set_speed_loop(wheel, PidConfig::new(2.0, 0.0, 0.0)).unwrap();
+    let error = bus.set_speed_loop(wheel, PidConfig::new(1.0, f32::NAN, 0.0)).unwrap_err();
+    assert_eq!(error, LoopError::Parameter("ki"));
+    bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();
+    for ms in 3..50 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        step(&mut bus, ms);
+    }
+    let raw = sent(&mut bus)[0].1[0];
+    assert!((3277..=6554).contains(&raw), "between the old and the new gain: {raw}");
+}

@@ -1,0 +1,142 @@
+use super::*;
+
+#[test]
+fn wrong_lengths_remote_and_extended_frames_are_ignored_and_counted() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let id = StandardId::new(0x201).unwrap();
+    for length in 0..8 {
+        let short = CanFrame::new(id, &[0; 8][..length]).unwrap();
+        let outcome = bus.ingest(&short, at_ms(1));
+        assert_eq!(outcome, Ingest::Malformed(Malformed::Length(u8::try_from(length).unwrap())));
+    }
+    let remote = CanFrame::new_remote(id, 8).unwrap();
+    let extended = CanFrame::new(ExtendedId::new(0x201).unwrap(), &[0; 8]).unwrap();
+    assert_eq!(bus.ingest(&remote, at_ms(1)), Ingest::Unrelated);
+    assert_eq!(bus.ingest(&extended, at_ms(1)), Ingest::Unrelated);
+    assert_eq!(
+        bus.ingest(&feedback(0x201, 8192, 0), at_ms(1)),
+        Ingest::Malformed(Malformed::Field)
+    );
+    assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(1)), Ingest::Unrelated);
+    let counters = bus.counters();
+    assert_eq!((counters.bad_length, counters.bad_field, counters.unattached), (8, 1, 1));
+    assert_eq!((bus.state(wheel), bus.link(wheel)), (None, Some(Link::Unheard)));
+}
+
+#[test]
+fn the_router_is_total_over_all_ids_and_lengths() {
+    let mut bus = Bus::new();
+    bus.attach_all([1, 2, 3, 4, 5, 6, 7, 8].map(Config::<M3508>::new)).unwrap();
+    bus.attach_all([5, 6, 7].map(Config::<Gm6020Voltage>::new)).unwrap();
+    for raw in 0..=0x7FF {
+        for length in 0..=8 {
+            let frame = CanFrame::new(StandardId::new(raw).unwrap(), &[0; 8][..length]).unwrap();
+            let outcome = bus.ingest(&frame, at_ms(1));
+            match (raw, length) {
+                (0x201..=0x20B, 8) => assert_eq!(outcome, Ingest::Taken),
+                (0x201..=0x20B, _) => assert!(matches!(outcome, Ingest::Malformed(_))),
+                _ => assert_eq!(outcome, Ingest::Unrelated),
+            }
+        }
+    }
+}
+
+#[test]
+fn state_is_at_the_output_shaft_in_physical_units() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(4)).unwrap();
+    let frame =
+        CanFrame::standard(0x204, [0x1F, 0xFF, 0x24, 0x28, 0xE0, 0x00, 0x3C, 0x00]).unwrap();
+    assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
+    let state = bus.state(wheel).unwrap();
+    assert!((state.velocity.as_rpm() - 482.002_78).abs() < 1e-3);
+    assert_eq!(state.current, Current::from_amperes(-10.0));
+    assert!((state.torque_nm + 3.0).abs() < 1e-6);
+    assert_eq!((state.temperature_c, state.error, state.rotor_counts), (Some(60), None, 8191));
+    assert_eq!(state.homing, Homing::Relative);
+}
+
+#[test]
+fn c610_has_no_temperature_and_its_own_error_list() {
+    let mut bus = Bus::new();
+    let feeder = bus.attach(Config::<M2006>::new(5)).unwrap();
+    let frame =
+        CanFrame::standard(0x205, [0x10, 0x00, 0xB9, 0xB0, 0x13, 0x88, 0x00, 0x03]).unwrap();
+    assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
+    let state = bus.state(feeder).unwrap();
+    assert!((state.velocity.as_rpm() + 500.0).abs() < 1e-3);
+    assert_eq!((state.current, state.temperature_c), (Current::from_amperes(5.0), None));
+    assert_eq!(state.error, Some(ErrorCode::PhaseLoss));
+}
+
+#[test]
+fn a_reversed_motor_turns_everything_around() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1).reversed()).unwrap();
+    for (ms, angle) in [(1, 0), (2, 1000)] {
+        let frame = CanFrame::standard(0x201, {
+            let [a, b] = u16::to_be_bytes(angle);
+            [a, b, 0x17, 0x70, 0x10, 0x00, 0, 0]
+        });
+        assert_eq!(bus.ingest(&frame.unwrap(), at_ms(ms)), Ingest::Taken);
+    }
+    let state = bus.state(wheel).unwrap();
+    assert!(state.velocity.as_rpm() < -312.0 && state.torque_nm < 0.0);
+    assert_eq!((state.rotor_counts, state.position.turns()), (-1000, -1));
+}
+
+#[test]
+fn five_lost_frames_at_9000_rpm_are_resolved_with_the_speed() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let mut true_counts = 0_i64;
+    for ms in 1..2_000_u64 {
+        true_counts += 1229;
+        if ms % 50 >= 5 {
+            let angle = u16::try_from(true_counts.rem_euclid(8192)).unwrap();
+            assert_eq!(bus.ingest(&feedback(0x201, angle, 9001), at_ms(ms)), Ingest::Taken);
+        }
+    }
+    let first = 1229 * 5;
+    let state = bus.state(wheel).unwrap();
+    assert_eq!(state.rotor_counts - first % 8192, true_counts - first);
+    assert_eq!(state.ambiguous_gaps, 0);
+}
+
+#[test]
+fn a_gap_that_cannot_be_resolved_is_flagged_and_unhomes() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 9000), at_ms(1)), Ingest::Taken);
+    bus.zero(wheel).unwrap();
+    assert_eq!(bus.state(wheel).unwrap().homing, Homing::Homed);
+    assert_eq!(bus.ingest(&feedback(0x201, 17, 9000), at_ms(81)), Ingest::Taken);
+    let state = bus.state(wheel).unwrap();
+    assert_eq!((state.ambiguous_gaps, state.homing), (1, Homing::Uncertain));
+}
+
+#[test]
+fn frames_of_one_motor_are_handled_in_order() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    // 64 frames at once, after a stall of the loop: half a turn back and forth, and on.
+    for step in 0..64_u16 {
+        let angle = if step % 2 == 0 { step } else { step + 4000 };
+        assert_eq!(bus.ingest(&feedback(0x201, angle, 0), at_ms(70)), Ingest::Taken);
+    }
+    let state = bus.state(wheel).unwrap();
+    assert_eq!((state.rotor_counts, state.feedback.angle()), (4063, 4063));
+}
+
+#[test]
+fn two_buses_share_no_state() {
+    let (mut left, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut right, [other]) = armed([Config::<M3508>::new(1)]);
+    left.set_raw(wheel, 500).unwrap();
+    step(&mut left, 2);
+    step(&mut right, 2);
+    assert_eq!(sent(&mut left), [(0x200, [500, 0, 0, 0])]);
+    assert_eq!(sent(&mut right), [(0x200, [0; 4])]); // its first keep-alive
+    assert_eq!(right.state(other).unwrap().rotor_counts, 0);
+}

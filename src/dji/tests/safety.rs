@@ -1,0 +1,270 @@
+use super::*;
+
+#[test]
+fn a_clock_that_goes_back_neither_latches_nor_revives_a_motor() {
+    let (mut bus, [heard, silent]) = armed([1, 2].map(Config::<M3508>::new));
+    let hear = |bus: &mut Bus, id, ms| {
+        assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(ms)), Ingest::Taken)
+    };
+    for ms in 2..2_005 {
+        hear(&mut bus, 0x201, ms);
+        hear(&mut bus, 0x202, ms);
+        step(&mut bus, ms);
+    }
+    // One second back: that step is held, and the old stamps lie ahead, which is not fresh.
+    step(&mut bus, 999);
+    step(&mut bus, 1_000);
+    assert_eq!((bus.link(heard), bus.link(silent)), (Some(Link::Late), Some(Link::Late)));
+    for ms in 1_001..1_300 {
+        hear(&mut bus, 0x201, ms);
+        bus.set_raw(heard, 300).unwrap();
+        assert_eq!(bus.set_raw(silent, 300), Err(TargetError::NoFeedback));
+        step(&mut bus, ms);
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [300, 0, 0, 0])));
+    }
+    assert_eq!(bus.state(heard).unwrap().ambiguous_gaps, 0);
+}
+
+#[test]
+fn a_frame_stamped_after_the_tick_read_its_clock_is_fresh() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let at = Instant::from_micros;
+    for us in (2_000..50_000).step_by(1_000) {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(us + 300)), Ingest::Taken);
+        bus.set_raw(wheel, 300).unwrap();
+        bus.update(Tick::new(at(us), 0.001));
+        assert_eq!(sent(&mut bus), [(0x200, [300, 0, 0, 0])]);
+    }
+}
+
+#[test]
+fn feedback_that_returns_after_being_late_makes_no_derivative_spike() {
+    let config = Config::<M3508>::new(1).speed_loop(PidConfig::new(0.0, 0.0, 0.05));
+    let (mut bus, [wheel]) = armed([config]);
+    let turning = |ms: u64| feedback(0x201, 0, if ms < 40 { 0 } else { 9_000 });
+    for ms in 2..60 {
+        if !(10..40).contains(&ms) {
+            assert_eq!(bus.ingest(&turning(ms), at_ms(ms)), Ingest::Taken);
+        }
+        _ = bus.set_velocity(wheel, AngularVelocity::ZERO);
+        step(&mut bus, ms);
+        assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "at {ms} ms");
+    }
+}
+
+#[test]
+fn arming_again_does_not_disturb_the_motors_that_run() {
+    let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
+    for ms in 2..150 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        bus.set_raw(first, 500).unwrap();
+        step(&mut bus, ms);
+    }
+    assert!(!bus.is_armed() && bus.is_motor_armed(first) && !bus.is_motor_armed(second));
+    for ms in 150..160 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(ms)), Ingest::Taken);
+    }
+    bus.arm(at_ms(160)).unwrap();
+    step(&mut bus, 160);
+    assert_eq!(sent(&mut bus)[0], (0x200, [500, 0, 0, 0]), "the first keeps its target");
+    assert!(bus.is_armed());
+}
+
+#[test]
+fn engaging_arms_neither_the_unheard_nor_under_an_emergency_stop() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.engage(at_ms(1));
+    assert!(!bus.is_motor_armed(wheel));
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
+    bus.emergency_stop();
+    bus.engage(at_ms(1));
+    assert!(!bus.is_motor_armed(wheel));
+}
+
+#[test]
+fn a_position_is_zeroed_only_while_the_motor_is_heard() {
+    let mut bus = Bus::new();
+    let joint = bus.attach(Config::<M3508>::new(1)).unwrap();
+    assert_eq!(bus.zero(joint), Err(TargetError::NoFeedback));
+    assert_eq!(bus.ingest(&feedback(0x201, 5000, 0), at_ms(1)), Ingest::Taken);
+    assert_eq!(bus.zero(joint), Ok(()));
+    let nan = Position::from_angle(Angle::from_radians(f32::NAN));
+    assert_eq!(bus.set_present_position(joint, nan), Err(TargetError::NotFinite));
+    assert_eq!(bus.state(joint).unwrap().rotor_counts, 0);
+}
+
+#[test]
+fn nothing_moves_before_it_is_armed_and_the_missing_are_named() {
+    let mut bus = Bus::new();
+    assert_eq!(bus.arm(at_ms(1)), Err(ArmError::NoMotors));
+    let [first, _] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
+    assert_eq!(bus.set_raw(first, 1000), Err(TargetError::Disarmed));
+    assert_eq!(bus.arm(at_ms(2)).unwrap_err().to_string(), "no feedback from M3508 #2");
+    step(&mut bus, 2);
+    assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]));
+    assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(2)), Ingest::Taken);
+    assert_eq!(bus.arm(at_ms(2)), Ok(()));
+    assert_eq!(bus.arm(at_ms(500)).unwrap_err().to_string(), "no feedback from M3508 #1, M3508 #2");
+}
+
+#[test]
+fn late_feedback_is_zero_output_and_clears_itself() {
+    let (mut bus, [quiet, other]) =
+        armed([1, 2].map(|id| Config::<M3508>::new(id).speed_loop(SPEED)));
+    let mut zero_since = None;
+    for ms in 2..60 {
+        assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(ms)), Ingest::Taken);
+        if ms >= 40 {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        }
+        _ = bus.set_velocity(quiet, AngularVelocity::from_rad_per_s(1.0));
+        bus.set_velocity(other, AngularVelocity::from_rad_per_s(1.0)).unwrap();
+        step(&mut bus, ms);
+        let words = sent(&mut bus)[0].1;
+        assert_eq!(words[1], 819, "the other goes on");
+        match words[0] {
+            0 => zero_since = zero_since.or(Some(ms)),
+            _ if (12..40).contains(&ms) => panic!("moves at {ms} ms without feedback"),
+            _ => {}
+        }
+    }
+    assert_eq!(zero_since, Some(12)); // heard at 1 ms, late after 11 ms
+    assert!(bus.is_motor_armed(quiet));
+    step(&mut bus, 60);
+    assert_eq!(sent(&mut bus)[0].1, [819, 819, 0, 0]);
+}
+
+#[test]
+fn an_offline_motor_is_latched_until_it_is_armed_again() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    for ms in 2..150 {
+        _ = bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(1.0));
+        step(&mut bus, ms);
+    }
+    assert_eq!(bus.link(wheel), Some(Link::Offline));
+    for ms in 150..159 {
+        assert_eq!(bus.ingest(&feedback(0x201, 4000, 0), at_ms(ms)), Ingest::Taken);
+        assert_eq!(bus.link(wheel), Some(Link::Recovering));
+        assert!(
+            matches!(bus.arm(at_ms(ms)), Err(ArmError::Missing(_))),
+            "not before ten good frames"
+        );
+    }
+    assert_eq!(bus.ingest(&feedback(0x201, 4000, 0), at_ms(159)), Ingest::Taken);
+    assert_eq!(bus.link(wheel), Some(Link::Online));
+    assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::Relaxed));
+    bus.arm(at_ms(159)).unwrap();
+    assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Ok(()));
+    let state = bus.state(wheel).unwrap();
+    assert_eq!((state.position.turns(), state.rotor_counts), (0, 4000), "no turn was made up");
+}
+
+#[test]
+fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
+    let config = Config::<M3508>::new(1)
+        .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
+        .with_recovery(Recovery::Ramp(Duration::from_millis(100)));
+    let (mut bus, [wheel]) = armed([config]);
+    for ms in 2..150 {
+        step(&mut bus, ms);
+    }
+    let mut last = 0;
+    for ms in 150..300 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        let result = bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(10.0));
+        assert_eq!(result.is_ok(), ms >= 159);
+        step(&mut bus, ms);
+        if let Some((_, words)) = sent(&mut bus).last() {
+            assert!(words[0] >= last && words[0] - last <= 2200, "{ms}: {last} to {}", words[0]);
+            last = words[0];
+        }
+    }
+    assert_eq!(last, 16_384);
+}
+
+#[test]
+fn an_application_that_stops_setting_targets_stops_the_motor() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    bus.set_raw(wheel, 700).unwrap();
+    let mut last_driven = 0;
+    for ms in 2..300 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        step(&mut bus, ms);
+        if sent(&mut bus).iter().any(|frame| frame.1 != [0; 4]) {
+            last_driven = ms;
+        }
+    }
+    assert_eq!(last_driven, 101);
+    assert_eq!(bus.set_raw(wheel, 700), Ok(()), "not latched");
+}
+
+#[test]
+fn an_emergency_stop_is_zero_at_the_next_frame_until_cleared_and_armed() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    bus.set_raw(wheel, 700).unwrap();
+    step(&mut bus, 2);
+    bus.emergency_stop();
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+    assert_eq!(bus.set_raw(wheel, 700), Err(TargetError::Disarmed));
+    assert_eq!(bus.arm(at_ms(3)), Err(ArmError::Stopped));
+    bus.clear_emergency_stop();
+    assert_eq!(bus.set_raw(wheel, 700), Err(TargetError::Disarmed));
+    assert_eq!(bus.arm(at_ms(3)), Ok(()));
+}
+
+#[test]
+fn stamps_that_wrap_at_32_bits_change_nothing() {
+    let wrap = 1 << 32;
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let at = Instant::from_micros;
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(wrap - 3_000)), Ingest::Taken);
+    bus.update(Tick::new(at(wrap - 3_000), 0.001));
+    bus.arm(at(wrap - 3_000)).unwrap();
+    bus.set_raw(wheel, 5).unwrap();
+    for us in (wrap - 2_000..wrap + 5_000).step_by(1_000) {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(us)), Ingest::Taken);
+        bus.update(Tick::new(at(us), 0.001));
+        assert_eq!(sent(&mut bus), [(0x200, [5, 0, 0, 0])]);
+    }
+}
+
+#[test]
+fn a_motor_unheard_for_longer_than_a_stamp_can_tell_is_not_revived() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    step(&mut bus, 2);
+    bus.update(Tick::new(Instant::from_micros(1_000 + (1 << 32)), 0.001));
+    assert_eq!(bus.link(wheel), Some(Link::Offline));
+    assert_eq!(bus.set_raw(wheel, 5), Err(TargetError::Relaxed));
+}
+
+#[test]
+fn a_bad_time_step_holds_the_output_once_and_then_stops() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let at = Instant::from_micros;
+    for (now, bad) in (1..).zip([0.0, -0.001, f32::NAN, f32::INFINITY]) {
+        let now = 2_000 + 100 * now;
+        bus.set_raw(wheel, 9).unwrap();
+        bus.update(Tick::new(at(now), 0.001));
+        assert_eq!(sent(&mut bus), [(0x200, [9, 0, 0, 0])]);
+        bus.update(Tick::new(at(now + 10), bad));
+        assert_eq!(sent(&mut bus), [(0x200, [9, 0, 0, 0])]);
+        bus.update(Tick::new(at(now + 20), bad));
+        assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+    }
+    assert_eq!(bus.counters().bad_steps, 8);
+}
+
+#[test]
+fn timeouts_are_configured_within_ten_seconds() {
+    let timeouts = Timeouts::new()
+        .with_late(Duration::from_millis(3))
+        .with_offline(Duration::from_secs(9_999));
+    assert_eq!(
+        (timeouts.late(), timeouts.offline()),
+        (Duration::from_millis(3), Duration::from_secs(10))
+    );
+}
