@@ -24,6 +24,23 @@ pub struct TimeStep {
 }
 
 impl TimeStep {
+    /// The longest step in seconds that is believed, unless [`new`](Self::new) says otherwise.
+    pub const MAX_S: f32 = 0.1;
+
+    /// Takes the seconds since the step before, of which up to [`MAX_S`](Self::MAX_S) are believed.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::TimeStep;
+    ///
+    /// assert_eq!(TimeStep::of(0.001), TimeStep::new(0.001, 0.1));
+    /// ```
+    #[must_use]
+    #[inline]
+    pub const fn of(dt_s: f32) -> Self {
+        Self::new(dt_s, Self::MAX_S)
+    }
+
     /// Takes the seconds since the step before and the longest step that is still believed.
     ///
     /// A `dt_max_s` that is NaN counts as infinite; with one of zero or less every step holds.

@@ -56,7 +56,6 @@ pub fn call_all() {
     Median::<5>::reset.call();
     Median::<5>::value.call();
     Median::<5>::rejected.call();
-    Pid::time_step.call();
     Pid::interrupt.call();
     FeedForward::new.call();
     FeedForward::effort.call();

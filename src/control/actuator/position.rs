@@ -115,7 +115,7 @@ impl PositionActuator {
 
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.speed.pid().time_step(dt_s);
+        let step = TimeStep::of(dt_s);
         if !(setpoint.is_finite() && angle.is_finite() && speed.is_finite()) || step.is_hold() {
             return self.reject();
         }
@@ -130,7 +130,7 @@ impl PositionActuator {
     ///
     /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right. The angle filter does not apply.
     pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.speed.pid().time_step(dt_s);
+        let step = TimeStep::of(dt_s);
         if !(error.is_finite() && speed.is_finite()) || step.is_hold() {
             return self.reject();
         }
@@ -195,7 +195,7 @@ impl PositionActuator {
             self.until_outer -= 1;
             return None;
         }
-        let outer = self.angle.time_step(self.passed_s);
+        let outer = TimeStep::of(self.passed_s);
         (self.passed_s, self.until_outer) = (0.0, self.outer_divider - 1);
         Some(outer)
     }

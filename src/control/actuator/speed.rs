@@ -91,7 +91,7 @@ impl SpeedActuator {
 
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.pid.time_step(dt_s);
+        let step = TimeStep::of(dt_s);
         self.step(setpoint, speed, &step)
     }
 

@@ -42,7 +42,7 @@ impl IncrementalPidConfig {
             output_lower: -f32::MAX,
             output_upper: f32::MAX,
             tracking_r: None,
-            max_step_s: super::PidConfig::MAX_STEP_S,
+            max_step_s: TimeStep::MAX_S,
         }
     }
 

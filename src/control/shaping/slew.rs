@@ -1,6 +1,5 @@
 use crate::control::error::{ConfigError, check, positive};
 use crate::control::number::limited;
-use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 
 /// Bounds the rate at which a value rises and falls.
@@ -37,7 +36,7 @@ impl SlewLimiter {
     pub const fn new(up_per_s: f32, down_per_s: f32) -> Result<Self, ConfigError> {
         check!(positive("up", up_per_s));
         check!(positive("down", down_per_s));
-        let max_step_s = PidConfig::MAX_STEP_S;
+        let max_step_s = TimeStep::MAX_S;
         Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rejected: 0 })
     }
 

@@ -244,7 +244,7 @@ impl RelayTuner {
 
     /// Steps by `dt_s` seconds and returns the output for the plant.
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::new(dt_s, PidConfig::MAX_STEP_S);
+        let step = TimeStep::of(dt_s);
         let error = setpoint - measurement;
         if step.is_hold() || !error.is_finite() {
             self.rejected = self.rejected.saturating_add(1);
