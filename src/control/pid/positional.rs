@@ -234,7 +234,7 @@ impl Pid {
     #[must_use]
     pub fn terms(&self) -> Terms {
         let settings = &self.settings;
-        let error = if self.error == UNKNOWN || self.error.abs() < settings.dead_band {
+        let error = if self.error == UNKNOWN || passes(self.error, settings.dead_band_gate) {
             0.0
         } else {
             self.error

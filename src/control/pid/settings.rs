@@ -30,12 +30,12 @@ pub(super) struct Settings {
     pub(super) kd: f32,
     pub(super) output_lower: f32,
     pub(super) output_upper: f32,
-    pub(super) integral_limit: f32,
+    pub(super) integral_limit_gate: u32,
     /// The smaller one of `integral_separation` and `full_rate_below`, and the larger one.
-    pub(super) full_weight_to: f32,
-    other_edge: f32,
+    pub(super) full_weight_gate: u32,
+    pub(super) other_edge: f32,
     pub(super) no_rate_above: f32,
-    pub(super) dead_band: f32,
+    pub(super) dead_band_gate: u32,
     pub(super) static_gain: f32,
     pub(super) velocity_gain: f32,
     pub(super) slew_per_s: f32,
@@ -61,11 +61,11 @@ impl Settings {
             kd: config.kd,
             output_lower: config.output_lower,
             output_upper: config.output_upper,
-            integral_limit: config.integral_limit,
-            full_weight_to: if inside { separation } else { full_rate },
+            integral_limit_gate: gate(config.integral_limit),
+            full_weight_gate: gate(if inside { separation } else { full_rate }),
             other_edge: if inside { full_rate } else { separation },
             no_rate_above: config.no_rate_above,
-            dead_band: config.dead_band,
+            dead_band_gate: open_gate(config.dead_band),
             static_gain: config.static_gain,
             velocity_gain: config.velocity_gain,
             slew_per_s: config.slew_per_s,
@@ -76,18 +76,20 @@ impl Settings {
 
     /// Returns the configuration as it was given.
     pub(super) const fn config(&self, options: u16) -> PidConfig {
-        let (integral_separation, full_rate_below) = self.weight_edges(options);
+        let (first, other) = (limit_of(self.full_weight_gate), self.other_edge);
+        let (integral_separation, full_rate_below) =
+            if options & SEPARATION_INSIDE != 0 { (first, other) } else { (other, first) };
         PidConfig {
             kp: self.kp,
             ki: self.ki,
             kd: self.kd,
             output_lower: self.output_lower,
             output_upper: self.output_upper,
-            integral_limit: self.integral_limit,
+            integral_limit: limit_of(self.integral_limit_gate),
             integral_separation,
             full_rate_below,
             no_rate_above: self.no_rate_above,
-            dead_band: self.dead_band,
+            dead_band: limit_of(self.dead_band_gate),
             static_gain: self.static_gain,
             velocity_gain: self.velocity_gain,
             slew_per_s: self.slew_per_s,
@@ -105,14 +107,12 @@ impl Settings {
         2.0 * limit_of(self.output_gate)
     }
 
-    /// Returns `integral_separation` and `full_rate_below`.
+    /// Returns the period with the sign of `way`, on a circle.
     #[inline]
-    pub(super) const fn weight_edges(&self, options: u16) -> (f32, f32) {
-        if options & SEPARATION_INSIDE != 0 {
-            (self.full_weight_to, self.other_edge)
-        } else {
-            (self.other_edge, self.full_weight_to)
-        }
+    pub(super) const fn period_towards(&self, way: f32) -> f32 {
+        const SIGN: u32 = 1 << 31;
+        const DOUBLED: u32 = 1 << 23; // one more in the exponent
+        f32::from_bits((way.to_bits() & SIGN | self.output_gate >> 1) + DOUBLED)
     }
 }
 

@@ -9,7 +9,8 @@
 
 use super::positional::{Pid, Terms};
 use super::settings::{
-    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SLEW_LIMIT, TRACK_OUTPUT, WIND_UP,
+    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SEPARATION_INSIDE, SLEW_LIMIT,
+    TRACK_OUTPUT, WIND_UP,
 };
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -100,19 +101,41 @@ impl Pid {
     fn step_by(&mut self, setpoint: f32, measurement: f32, travel: f32, step: &TimeStep) -> f32 {
         let (mut error, mut travel) = (setpoint - measurement, travel);
         if self.has(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
-            return self.step_carefully(setpoint, measurement, step);
+            return self.step_by_turns(setpoint, measurement, step);
         }
         self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
     }
 
-    /// Takes the shorter way round, and tells whether that is certain: half a turn and overflow need a second look.
+    /// Takes the shorter way round if that is at most one turn off, and tells whether it was.
     #[inline]
     fn shorten(&self, way: &mut f32) -> bool {
-        if passes(*way, self.settings.output_gate) {
+        if self.is_short(*way) {
             return true;
         }
-        *way = math::rest(*way, self.settings.period());
-        passes(*way, self.settings.output_gate)
+        *way -= self.settings.period_towards(*way); // exact, if the result is short
+        self.is_short(*way)
+    }
+
+    /// Tells whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
+    #[inline]
+    const fn is_short(&self, way: f32) -> bool {
+        passes(way, self.settings.output_gate)
+    }
+
+    /// Setpoint and measurement, or two measurements, are turns apart.
+    #[inline(never)]
+    fn step_by_turns(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let (way, period) = (setpoint - measurement, self.settings.period());
+        let travel = if self.has(DERIVATIVE_ON_ERROR) {
+            self.error - way
+        } else {
+            measurement - self.measurement
+        };
+        let (error, travel) = (math::rest(way, period), math::rest(travel, period));
+        if !(self.is_short(error) && self.is_short(travel)) {
+            return self.step_carefully(setpoint, measurement, step);
+        }
+        self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
     }
 
     /// Works on an error that was formed elsewhere when the measurement is [`UNKNOWN`].
@@ -221,10 +244,10 @@ impl Pid {
         let rate = finite(self.filtered(rate, step));
         let mut proportional = finite(settings.kp * error);
         let mut growth = finite(self.growth(error, step));
-        if magnitude(error) > magnitude(settings.full_weight_to) {
+        if !passes(error, settings.full_weight_gate) {
             growth *= self.weight(error);
         }
-        if magnitude(error) < magnitude(settings.dead_band) {
+        if passes(error, settings.dead_band_gate) {
             proportional = 0.0;
             let shrinks = growth * self.integral < 0.0;
             if !shrinks {
@@ -237,11 +260,11 @@ impl Pid {
         }
         let mut integral = finite(self.integral + growth);
         let mut wanted = others + integral;
-        if integral.abs() > settings.integral_limit {
+        if !passes(integral, settings.integral_limit_gate) {
             if !CAREFUL && !integral.is_finite() {
                 return None;
             }
-            integral = settings.integral_limit.copysign(integral);
+            integral = limit_of(settings.integral_limit_gate).copysign(integral);
             wanted = others + integral;
         }
         let mut output = wanted;
@@ -284,7 +307,8 @@ impl Pid {
         if settings.tracking_time_s > 0.0 {
             let part = limited(step.dt_s / settings.tracking_time_s, 0.0, 1.0);
             let drained = finite(integral - finite(excess) * part);
-            return limited(drained, -settings.integral_limit, settings.integral_limit);
+            let limit = limit_of(settings.integral_limit_gate);
+            return limited(drained, -limit, limit);
         }
         let outward = excess * growth > 0.0;
         if outward && !self.has(WIND_UP) { self.integral } else { integral }
@@ -305,18 +329,19 @@ impl Pid {
         }
     }
 
-    /// The part of its rate at which the integral works at this error.
+    /// The part of its rate at which the integral works at an error beyond the first edge.
     #[inline]
     fn weight(&self, error: f32) -> f32 {
         let settings = &self.settings;
-        let (separation, full_rate_below) = settings.weight_edges(self.options);
         let size = error.abs();
-        if size > separation || size >= settings.no_rate_above {
+        if self.has(SEPARATION_INSIDE)
+            || size > settings.other_edge
+            || size >= settings.no_rate_above
+        {
             0.0
-        } else if size > full_rate_below {
-            (settings.no_rate_above - size) / (settings.no_rate_above - full_rate_below)
         } else {
-            1.0
+            let full_rate_below = limit_of(settings.full_weight_gate);
+            (settings.no_rate_above - size) / (settings.no_rate_above - full_rate_below)
         }
     }
 
