@@ -33,6 +33,10 @@ pub enum ConfigFault {
     Unstable,
     /// It is NaN or infinite.
     NotFinite,
+    /// It does not go together with another parameter.
+    Conflict,
+    /// It is where the change starts, so that there is none.
+    NoChange,
 }
 
 impl ConfigError {
@@ -62,6 +66,8 @@ impl fmt::Display for ConfigError {
             ConfigFault::Reversed => ": the lower end must lie below the upper one",
             ConfigFault::Unstable => ": too fast for this time step",
             ConfigFault::NotFinite => ": must be finite",
+            ConfigFault::Conflict => ": does not go together with another parameter",
+            ConfigFault::NoChange => ": must differ from the start",
         })
     }
 }

@@ -161,6 +161,7 @@ fn control() {
     PidConfig::gains.call();
     PidConfig::output_range.call();
     PidConfig::validate.call();
+    PidConfig::period.call();
     Pid::new.call();
     Pid::update.call();
     Pid::step.call();

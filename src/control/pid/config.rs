@@ -192,6 +192,12 @@ impl PidConfig {
         (self.output_lower, self.output_upper)
     }
 
+    /// Returns the period of the circle; zero without one.
+    #[must_use]
+    pub const fn period(&self) -> f32 {
+        self.period
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors

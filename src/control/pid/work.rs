@@ -176,7 +176,7 @@ impl Pid {
         self.work_carefully(0.0, UNKNOWN, error, rate, step)
     }
 
-    const fn refuse(&mut self) -> f32 {
+    pub(in crate::control) const fn refuse(&mut self) -> f32 {
         self.rejected = self.rejected.saturating_add(1);
         self.output
     }
