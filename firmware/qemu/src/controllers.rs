@@ -54,7 +54,7 @@ pub fn rows() {
     sampled("median_5", control_median, &mut Median::new());
     let mut differentiator = LinearDifferentiator::new(black_box(100.0), 0.005).unwrap();
     timed("differentiator_linear", control_linear, &mut differentiator);
-    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.005, 0.005).unwrap();
+    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.006, 0.004).unwrap();
     timed("differentiator_optimal", control_optimal, &mut differentiator);
     let mut limiter = SlewLimiter::new(black_box(100.0), 50.0).unwrap();
     timed("slew_limiter", control_slew, &mut limiter);
