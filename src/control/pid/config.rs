@@ -1,4 +1,6 @@
-use crate::control::error::{ConfigError, check, not_negative, ordered, output_ends, positive};
+use crate::control::error::{
+    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
+};
 
 /// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
 ///
@@ -111,12 +113,7 @@ impl PidConfig {
     /// integral with the time constant `tracking_time_s`, more than zero.
     #[must_use]
     pub const fn with_back_calculation(self, tracking_time_s: f32) -> Self {
-        Self {
-            // Zero means off, so a zero given here is kept as the NaN that is refused.
-            tracking_time_s: if tracking_time_s > 0.0 { tracking_time_s } else { f32::NAN },
-            wind_up: false,
-            ..self
-        }
+        Self { tracking_time_s: not_off(tracking_time_s), wind_up: false, ..self }
     }
 
     /// Lets the integral grow while the output is at its limit, as far as its own limit.
@@ -156,14 +153,13 @@ impl PidConfig {
     /// The error and the derivative go by the shortest way. Off by default.
     #[must_use]
     pub const fn with_period(self, period: f32) -> Self {
-        // Half of it must be a normal number too.
-        Self { period: if period >= 2.0 * f32::MIN_POSITIVE { period } else { f32::NAN }, ..self }
+        Self { period: not_off(period), ..self }
     }
 
     /// Filters the derivative with a first-order low-pass of this cut-off frequency, more than zero. Off by default.
     #[must_use]
     pub const fn with_derivative_filter(self, cutoff_hz: f32) -> Self {
-        Self { derivative_time_s: 1.0 / (core::f32::consts::TAU * cutoff_hz), ..self }
+        Self { derivative_time_s: not_off(1.0 / (core::f32::consts::TAU * cutoff_hz)), ..self }
     }
 
     /// Takes the derivative of the error, so that D answers changes of the setpoint too.
@@ -203,9 +199,7 @@ impl PidConfig {
     /// # Errors
     /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, or reversed.
     pub const fn validate(&self) -> Result<(), ConfigError> {
-        check!(not_negative("kp", self.kp));
-        check!(not_negative("ki", self.ki));
-        check!(not_negative("kd", self.kd));
+        check!(gains(self.kp, self.ki, self.kd));
         check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("integral_limit", self.integral_limit));
         check!(positive("integral_separation", self.integral_separation));
@@ -219,10 +213,16 @@ impl PidConfig {
         check!(not_negative("static_gain", self.static_gain));
         check!(not_negative("velocity_gain", self.velocity_gain));
         check!(positive("slew_limit", self.slew_per_s));
-        check!(not_negative("period", self.period));
-        check!(not_negative("derivative_filter", self.derivative_time_s));
-        not_negative("back_calculation", self.tracking_time_s)
+        check!(off_or_positive("period", self.period));
+        check!(off_or_positive("derivative_filter", self.derivative_time_s));
+        off_or_positive("back_calculation", self.tracking_time_s)
     }
+}
+
+/// Zero means off: what is no more than that, but was given, is kept as the NaN that is refused.
+const fn not_off(value: f32) -> f32 {
+    // Half a period must be a normal number too.
+    if value >= 2.0 * f32::MIN_POSITIVE { value } else { f32::NAN }
 }
 
 #[cfg(all(test, feature = "serde"))]

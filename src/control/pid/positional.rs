@@ -1,7 +1,7 @@
 use super::PidConfig;
 use super::settings::{Settings, TRACK_OUTPUT};
 use super::work::{CLOSED, UNKNOWN, passes};
-use crate::control::error::{ConfigError, not_negative};
+use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
@@ -62,18 +62,21 @@ pub struct Pid {
 #[cfg(target_pointer_width = "32")]
 const _: () = assert!(size_of::<Pid>() <= 92, "two for each motor of a bus");
 
-/// The parts of an output, in its unit. Their sum is the output before limits.
+/// The parts of the last output, in its unit.
+///
+/// Their sum is the output, as long as that is within its limits and its slew limit. Beyond them, `i` is the integral that
+/// anti-windup has left for the next step.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Terms {
-    /// Proportional: `kp` times the error.
+    /// Proportional: `kp` times the error; zero in the dead band.
     pub p: f32,
-    /// Integral.
+    /// Integral, within its limit.
     pub i: f32,
-    /// Derivative: `-kd` times the rate of the measurement.
+    /// Derivative: `-kd` times the rate of the measurement, filtered where that was asked for.
     pub d: f32,
-    /// Feed-forward: `kS sign(setpoint) + kV setpoint`.
+    /// Feed-forward: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the measurement.
     pub feed_forward: f32,
 }
 
@@ -212,9 +215,7 @@ impl Pid {
     /// # Errors
     /// Names the gain that is NaN, infinite or negative; then nothing changes.
     pub fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
-        not_negative("kp", kp)?;
-        not_negative("ki", ki)?;
-        not_negative("kd", kd)?;
+        gains(kp, ki, kd)?;
         self.change(self.config().with_gains(kp, ki, kd));
         Ok(())
     }
@@ -423,17 +424,21 @@ mod tests {
             (new.with_variable_integral(2.0, 1.0), "variable_integral", ConfigFault::Reversed),
             (new.with_variable_integral(-1.0, 1.0), "variable_integral", ConfigFault::Negative),
             (new.with_variable_integral(1.0, f32::NAN), "variable_integral", ConfigFault::Reversed),
-            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::Negative),
-            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::Negative),
+            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::NotPositive),
+            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::NotPositive),
             (new.with_dead_band(-1.0), "dead_band", ConfigFault::Negative),
             (new.with_feed_forward(-1.0, 0.0), "static_gain", ConfigFault::Negative),
             (new.with_feed_forward(0.0, f32::NAN), "velocity_gain", ConfigFault::Negative),
             (new.with_slew_limit(0.0), "slew_limit", ConfigFault::NotPositive),
-            (new.with_period(0.0), "period", ConfigFault::Negative),
-            (new.with_period(-360.0), "period", ConfigFault::Negative),
-            (new.with_period(f32::INFINITY), "period", ConfigFault::Negative),
-            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::Negative),
-            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::Negative),
+            (new.with_period(0.0), "period", ConfigFault::NotPositive),
+            (new.with_period(-360.0), "period", ConfigFault::NotPositive),
+            (new.with_period(f32::INFINITY), "period", ConfigFault::NotPositive),
+            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(BAD[0]), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(BAD[1]), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_back_calculation(BAD[1]), "back_calculation", ConfigFault::NotPositive),
+            (new.with_period(1e-40), "period", ConfigFault::NotPositive),
         ];
         for (config, parameter, fault) in cases {
             assert_eq!(Pid::new(config), Err(ConfigError::new(parameter, fault)));
@@ -755,6 +760,23 @@ mod tests {
                 // Before the first good sample the output is zero.
                 prop_assert!(output == 0.0 || (config.output_lower..=config.output_upper).contains(&output));
                 prop_assert!(pid.terms().i.abs() <= config.integral_limit);
+            }
+        }
+
+        #[test]
+        fn within_the_limits_the_terms_add_up_to_the_output(
+            config in any_config(),
+            samples in prop::collection::vec((0.0_f32..180.0, 0.0_f32..179.0), 1..40),
+        ) {
+            let mut pid = pid(config);
+            for (setpoint, measurement) in samples {
+                let output = pid.update(setpoint, measurement, DT_S);
+                let Terms { p, i, d, feed_forward } = pid.terms();
+                let sum = p + i + d + feed_forward;
+                let (lower, upper) = config.output_range();
+                let free = lower < output && output < upper && config.slew_per_s == PidConfig::OFF;
+                let largest = p.abs().max(d.abs()).max(1.0);
+                prop_assert!(!free || (sum - output).abs() < 1e-5 * largest, "{} {}", sum, output);
             }
         }
 
