@@ -459,6 +459,19 @@ mod tests {
     }
 
     #[test]
+    fn without_ki_back_calculation_has_nothing_to_drain() {
+        let config =
+            PidConfig::new(1.0, 0.0, 0.0).with_output_limit(5.0).with_back_calculation(0.1);
+        for config in [config, config.with_slew_limit(1e6)] {
+            let mut pid = pid(config);
+            for _ in 0..1000 {
+                pid.update(100.0, 0.0, DT_S);
+            }
+            assert_eq!((pid.terms().i, pid.update(1.0, 0.0, DT_S)), (0.0, 1.0));
+        }
+    }
+
+    #[test]
     fn huge_gains_end_at_the_limit_and_never_in_nan() {
         let huge = PidConfig::new(1e30, 1e30, 1e30);
         for config in [
