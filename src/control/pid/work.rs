@@ -304,7 +304,7 @@ impl Pid {
     #[inline]
     fn without_windup(&self, excess: f32, integral: f32, growth: f32, step: &TimeStep) -> f32 {
         let settings = &self.settings;
-        if settings.ki > 0.0 && settings.tracking_time_s > 0.0 {
+        if settings.tracking_time_s > 0.0 && settings.ki > 0.0 {
             let part = limited(step.dt_s / settings.tracking_time_s, 0.0, 1.0);
             let drained = finite(integral - finite(excess) * part);
             let limit = limit_of(settings.integral_limit_gate);
