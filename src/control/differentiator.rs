@@ -1,5 +1,5 @@
 use super::error::{ConfigError, ConfigFault, check, positive};
-use super::number::finite;
+use super::number::{finite, limited};
 use super::step::TimeStep;
 use crate::math;
 
@@ -32,10 +32,7 @@ use crate::math;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinearDifferentiator {
     r: f32,
-    max_step_s: f32,
-    value: f32,
-    rate: f32,
-    rejected: u16,
+    follower: Follower,
 }
 
 impl LinearDifferentiator {
@@ -49,50 +46,41 @@ impl LinearDifferentiator {
         if r * max_step_s > 1.0 {
             return Err(ConfigError::new("r", ConfigFault::Unstable));
         }
-        Ok(Self { r, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
+        Ok(Self { r, follower: Follower::new(max_step_s) })
     }
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
-    pub const fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        self.step(input, &TimeStep::new(dt_s, self.max_step_s))
+    pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
+        self.step(input, &TimeStep::new(dt_s, self.follower.max_step_s))
     }
 
     /// Steps by a time that was validated before.
-    pub(super) const fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
-        let dt_s = if step.dt_s > self.max_step_s { self.max_step_s } else { step.dt_s };
-        if dt_s > 0.0 && input.is_finite() {
-            let error = finite(self.value - input);
-            let pull = finite(self.r * finite(self.r * error + 2.0 * self.rate));
-            self.value = finite(self.value + dt_s * self.rate);
-            self.rate = finite(self.rate - dt_s * pull);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
-        }
-        self.value
+    pub(super) fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
+        let r = self.r;
+        self.follower.step(input, step, |error, rate| -finite(r * finite(r * error + 2.0 * rate)))
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, value: f32) {
-        self.value = if value.is_finite() { value } else { 0.0 };
-        self.rate = 0.0;
+        self.follower.reset_to(value);
     }
 
     /// Returns the value that follows the input.
     #[must_use]
     pub const fn value(&self) -> f32 {
-        self.value
+        self.follower.value
     }
 
     /// Returns its rate of change a second.
     #[must_use]
     pub const fn rate(&self) -> f32 {
-        self.rate
+        self.follower.rate
     }
 
     /// Returns the number of steps that were refused; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.follower.rejected
     }
 }
 
@@ -127,10 +115,7 @@ impl LinearDifferentiator {
 pub struct OptimalDifferentiator {
     r: f32,
     h0_s: f32,
-    max_step_s: f32,
-    value: f32,
-    rate: f32,
-    rejected: u16,
+    follower: Follower,
 }
 
 impl OptimalDifferentiator {
@@ -148,44 +133,70 @@ impl OptimalDifferentiator {
         if h0_s < Self::LEAST_STEPS * max_step_s {
             return Err(ConfigError::new("h0", ConfigFault::Unstable));
         }
-        Ok(Self { r, h0_s, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
+        Ok(Self { r, h0_s, follower: Follower::new(max_step_s) })
     }
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::new(dt_s, self.max_step_s);
-        if !step.is_hold() && input.is_finite() {
-            let acceleration = fhan(finite(self.value - input), self.rate, self.r, self.h0_s);
-            self.value = finite(self.value + step.dt_s * self.rate);
-            self.rate = finite(self.rate + step.dt_s * acceleration);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
-        }
-        self.value
+        let (r, h0_s) = (self.r, self.h0_s);
+        let step = TimeStep::new(dt_s, self.follower.max_step_s);
+        self.follower.step(input, &step, |error, rate| fhan(error, rate, r, h0_s))
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, value: f32) {
-        self.value = if value.is_finite() { value } else { 0.0 };
-        self.rate = 0.0;
+        self.follower.reset_to(value);
     }
 
     /// Returns the value that follows the input.
     #[must_use]
     pub const fn value(&self) -> f32 {
-        self.value
+        self.follower.value
     }
 
     /// Returns its rate of change a second.
     #[must_use]
     pub const fn rate(&self) -> f32 {
-        self.rate
+        self.follower.rate
     }
 
     /// Returns the number of steps that were refused; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.follower.rejected
+    }
+}
+
+/// A value and its rate that follow an input, stepped by Euler's rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Follower {
+    max_step_s: f32,
+    value: f32,
+    rate: f32,
+    rejected: u16,
+}
+
+impl Follower {
+    const fn new(max_step_s: f32) -> Self {
+        Self { max_step_s, value: 0.0, rate: 0.0, rejected: 0 }
+    }
+
+    /// Steps by the acceleration that `pull` makes of the error and the rate.
+    #[inline]
+    fn step(&mut self, input: f32, step: &TimeStep, pull: impl FnOnce(f32, f32) -> f32) -> f32 {
+        if step.admits(input.is_finite(), &mut self.rejected) {
+            let dt_s = limited(step.dt_s, 0.0, self.max_step_s);
+            let acceleration = pull(finite(self.value - input), self.rate);
+            self.value = finite(self.value + dt_s * self.rate);
+            self.rate = finite(self.rate + dt_s * acceleration);
+        }
+        self.value
+    }
+
+    const fn reset_to(&mut self, value: f32) {
+        self.value = if value.is_finite() { value } else { 0.0 };
+        self.rate = 0.0;
     }
 }
 
@@ -281,7 +292,7 @@ mod tests {
             optimal.update(1.0, no_time);
         }
         assert_eq!((linear.rejected(), optimal.rejected()), (8, 8));
-        (linear.rejected, optimal.rejected) = (0, 0);
+        (linear.follower.rejected, optimal.follower.rejected) = (0, 0);
         assert_eq!((linear, optimal), before);
     }
 

@@ -70,6 +70,15 @@ impl TimeStep {
         self.dt_s <= 0.0
     }
 
+    /// Tells whether there is time and the inputs are finite; what is refused is counted, up to 65535.
+    pub(super) const fn admits(&self, finite: bool, rejected: &mut u16) -> bool {
+        let admitted = finite && !self.is_hold();
+        if !admitted {
+            *rejected = rejected.saturating_add(1);
+        }
+        admitted
+    }
+
     /// Tells whether integral and derivative stay for this step: `dt_s` was above the maximum.
     #[must_use]
     pub const fn is_frozen(&self) -> bool {

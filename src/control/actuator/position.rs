@@ -118,8 +118,9 @@ impl PositionActuator {
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
-        if !(setpoint.is_finite() && angle.is_finite() && speed.is_finite()) || step.is_hold() {
-            return self.reject();
+        let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
+        if !step.admits(finite, &mut self.rejected) {
+            return self.output();
         }
         let angle = self.filter.pass(angle, &step);
         if let Some(outer) = self.outer_step(&step) {
@@ -133,8 +134,8 @@ impl PositionActuator {
     /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right. The angle filter does not apply.
     pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
-        if !(error.is_finite() && speed.is_finite()) || step.is_hold() {
-            return self.reject();
+        if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
+            return self.output();
         }
         if let Some(outer) = self.outer_step(&step) {
             self.cascade.step_position(error, speed, &outer);
@@ -199,11 +200,6 @@ impl PositionActuator {
         };
         (self.passed_s, self.until_outer) = (0.0, self.outer_divider - 1);
         Some(TimeStep::new(passed_s, longest_s))
-    }
-
-    const fn reject(&mut self) -> f32 {
-        self.rejected = self.rejected.saturating_add(1);
-        self.output()
     }
 }
 

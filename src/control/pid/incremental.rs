@@ -159,8 +159,7 @@ impl IncrementalPid {
 
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
+        if !step.admits(setpoint.is_finite() && measurement.is_finite(), &mut self.rejected) {
             return self.output;
         }
         let config = &self.config;

@@ -51,12 +51,10 @@ impl SlewLimiter {
 
     /// Steps by `dt_s` seconds towards `target` and returns the new value.
     pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
-        let dt_s = TimeStep::new(dt_s, self.max_step_s).dt_s;
-        if dt_s > 0.0 && target.is_finite() {
-            let lowest = self.value - self.down_per_s * dt_s;
-            self.value = limited(target, lowest, self.value + self.up_per_s * dt_s);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
+        let step = TimeStep::new(dt_s, self.max_step_s);
+        if step.admits(target.is_finite(), &mut self.rejected) {
+            let lowest = self.value - self.down_per_s * step.dt_s;
+            self.value = limited(target, lowest, self.value + self.up_per_s * step.dt_s);
         }
         self.value
     }

@@ -247,11 +247,8 @@ impl RelayTuner {
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
         let error = number::finite(setpoint - measurement);
-        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
-            return self.output();
-        }
-        if self.is_complete() {
+        let finite = setpoint.is_finite() && measurement.is_finite();
+        if !step.admits(finite, &mut self.rejected) || self.is_complete() {
             return self.output();
         }
         self.passed_s += step.dt_s();

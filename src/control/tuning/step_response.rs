@@ -98,8 +98,7 @@ impl StepResponse {
         if self.is_complete() {
             return;
         }
-        if TimeStep::new(dt_s, f32::MAX).is_hold() || !value.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
+        if !TimeStep::new(dt_s, f32::MAX).admits(value.is_finite(), &mut self.rejected) {
             return;
         }
         self.passed_s += dt_s;
