@@ -88,7 +88,7 @@ impl PositionActuator {
     /// Takes and checks the configuration.
     ///
     /// # Errors
-    /// Names the parameter of a loop as [`Pid::new`] does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
+    /// Names the parameter of a loop as [`Pid::new`](crate::control::Pid::new) does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
     /// is NaN, infinite, zero or negative, `angle_filter` when the angle loop has a period, `outer_divider` when zero.
     pub const fn new(config: PositionActuatorConfig) -> Result<Self, ConfigError> {
         if config.outer_divider == 0 {
