@@ -137,6 +137,7 @@ fn frame() {
 
 fn control() {
     TimeStep::new.call();
+    TimeStep::of.call();
     TimeStep::dt_s.call();
     TimeStep::is_hold.call();
     TimeStep::is_frozen.call();
@@ -156,11 +157,11 @@ fn control() {
     PidConfig::with_period.call();
     PidConfig::with_derivative_filter.call();
     PidConfig::with_derivative_on_error.call();
-    PidConfig::with_max_step.call();
     PidConfig::with_gains.call();
     PidConfig::gains.call();
     PidConfig::output_range.call();
     PidConfig::validate.call();
+    PidConfig::period.call();
     Pid::new.call();
     Pid::update.call();
     Pid::step.call();

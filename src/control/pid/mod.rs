@@ -3,6 +3,7 @@
 mod config;
 mod incremental;
 mod positional;
+mod settings;
 mod work;
 
 pub use config::PidConfig;
