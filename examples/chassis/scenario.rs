@@ -3,12 +3,12 @@
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Heading, Twist, World as WorldFrame};
+use drivetrain::geometry::{Heading, Twist, Vec2, World as WorldFrame};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner, Statistics};
 use drivetrain::sim::{
     ChassisConfig, Controller, Fault, Line, Model, MotorConfig, MotorKey, Record, SimClock,
-    Traffic, World,
+    Traffic, Wheel, World,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -157,7 +157,14 @@ fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error
     let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
     let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
         .try_map(motor)?;
-    world.attach_chassis(ChassisConfig::new(GEOMETRY), keys)?;
+    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
+    let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    world.attach_chassis(ChassisConfig::new(&[
+        wheel(keys.front_left, x, y),
+        wheel(keys.front_right, x, -y).reversed(),
+        wheel(keys.rear_left, -x, y),
+        wheel(keys.rear_right, -x, -y).reversed(),
+    ]))?;
     Ok(keys)
 }
 

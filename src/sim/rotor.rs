@@ -114,6 +114,14 @@ impl Rotor {
         self.angle.wrapping_add(self.travel(dt_s)) >> 19
     }
 
+    /// Returns the angle of the output shaft within a turn in rad, from that of the rotor's zero at the start.
+    #[expect(clippy::cast_possible_truncation, reason = "within a turn")]
+    pub(crate) fn shaft_rad(&self) -> f32 {
+        let turns = self.angle as f64 / f64::from(TURN) / f64::from(self.gear);
+        let within = turns - (turns as i64) as f64;
+        (within * core::f64::consts::TAU) as f32
+    }
+
     /// Returns the velocity of the output shaft in rad/s.
     pub(crate) const fn velocity(&self) -> f32 {
         self.velocity
