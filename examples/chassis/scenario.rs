@@ -14,7 +14,7 @@ use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
 
-const GEOMETRY: MecanumGeometry =
+pub(crate) const GEOMETRY: MecanumGeometry =
     MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
 /// A per rad/s and A per rad of the output shaft.
 const SPEED: PidConfig = PidConfig::new(4.0, 40.0, 0.0);
@@ -25,8 +25,8 @@ const RAMP_S: f32 = 0.3;
 /// After this time of constant velocity the wheels have to be where they belong.
 const SETTLING_S: f32 = 0.3;
 
-type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
-type Wheels = MecanumWheels<Handle<M3508>>;
+pub(crate) type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+pub(crate) type Wheels = MecanumWheels<Handle<M3508>>;
 
 /// What can be made to go wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,7 +153,7 @@ impl Scenario {
 }
 
 /// Four M3508 under a chassis of 20 kg.
-fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
+pub(crate) fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
     let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
     let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
         .try_map(motor)?;
@@ -169,7 +169,7 @@ fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error
 }
 
 /// The code that would run on the microcontroller.
-fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
+pub(crate) fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
     let wheel = |id| Config::<M3508>::new(id).speed_loop(SPEED);
     let wheels = MecanumWheels {
@@ -227,7 +227,7 @@ fn heading(world: &World) -> Heading {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "some metres or radians")]
-fn narrow(value: f64) -> f32 {
+pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }
 
@@ -239,11 +239,11 @@ fn share_of_error(sample: &Sample) -> f32 {
     errors.iter().fold(0.0_f32, |most, error| most.max(*error)) / largest
 }
 
-fn at(seconds: f32) -> Instant {
+pub(crate) fn at(seconds: f32) -> Instant {
     Instant::START + Duration::from_secs_f32(seconds).unwrap_or(Duration::ZERO)
 }
 
-fn seconds_of(instant: Instant) -> f32 {
+pub(crate) fn seconds_of(instant: Instant) -> f32 {
     instant.since(Instant::START).as_secs_f32()
 }
 
