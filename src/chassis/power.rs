@@ -29,6 +29,7 @@ pub struct WheelLoad {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Stored"))]
 pub struct PowerModel {
     pub(super) k0: f32,
     pub(super) k1: f32,
@@ -54,6 +55,26 @@ impl core::fmt::Display for PowerError {
 }
 
 impl core::error::Error for PowerError {}
+
+/// The coefficients as they stand in a file, where anybody may have changed them.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "PowerModel")]
+struct Stored {
+    k0: f32,
+    k1: f32,
+    k2: f32,
+    k3: f32,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Stored> for PowerModel {
+    type Error = PowerError;
+
+    fn try_from(Stored { k0, k1, k2, k3 }: Stored) -> Result<Self, PowerError> {
+        Self::new(k0, k1, k2, k3)
+    }
+}
 
 pub(super) fn not_negative(value: f32, name: &'static str) -> Result<f32, PowerError> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(PowerError::Negative(name)) }

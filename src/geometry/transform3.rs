@@ -7,6 +7,7 @@ use core::marker::PhantomData;
 ///
 /// The turn is kept as a matrix, which is cheaper to apply than a quaternion. After 10^6 compositions with the same
 /// small step its rows are some per cent off; [`normalized`](Self::normalized), once in some thousand, keeps them.
+/// Read with `serde`, rows that are off by more than 1e-3 are refused.
 ///
 /// # Examples
 /// ```
@@ -29,6 +30,7 @@ use core::marker::PhantomData;
 #[derive(Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
+#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredTransform3"))]
 pub struct Transform3<From, To> {
     rows: [Vec3; 3],
     translation_m: Vec3,
@@ -47,6 +49,11 @@ impl<From, To> Transform3<From, To> {
     pub const fn new(rotation: Rotation3, translation_m: Vec3) -> Self {
         let [[a, b, c], [d, e, f], [g, h, i]] = rotation.to_matrix();
         let rows = [Vec3::new(a, b, c), Vec3::new(d, e, f), Vec3::new(g, h, i)];
+        Self { rows, translation_m, frames: PhantomData }
+    }
+
+    #[cfg(feature = "serde")]
+    pub(super) const fn from_parts(rows: [Vec3; 3], translation_m: Vec3) -> Self {
         Self { rows, translation_m, frames: PhantomData }
     }
 
