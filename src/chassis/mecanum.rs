@@ -264,9 +264,9 @@ mod tests {
         assert_eq!(usual().forward(spin), Twist::new(0.0, 0.0, 2.0));
     }
 
-    // The fourth seed's rows are left-handed (y forward, x right, clockwise positive) and have no unit.
+    // The fifth seed's rows are left-handed (y forward, x right, clockwise positive) and have no unit.
     #[test]
-    fn the_fourth_seeds_rows_agree_after_its_axes_are_turned_into_ours() {
+    fn the_fifth_seeds_rows_agree_after_its_axes_are_turned_into_ours() {
         let (right, front, clockwise) = (0.3_f32, 0.7_f32, 0.2_f32);
         let one = right - front + clockwise; // its wheel 1, front right, positive backward
         let fr = wheels(&usual(), front, -right, -clockwise / 0.5)[1] * 0.5;

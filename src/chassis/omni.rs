@@ -80,11 +80,7 @@ impl<const N: usize> Omni<N> {
             let direction = Rotation2::new(wheel.direction).apply(Vec2::new(1.0, 0.0));
             Row::new(direction, wheel.position_m)
         });
-        let mut normal = Normal::new();
-        for row in rows {
-            normal.add(row);
-        }
-        let inverse = normal.inverse().ok_or(GeometryError::Singular("every motion"))?;
+        let inverse = Normal::of(rows).inverse().ok_or(GeometryError::Singular("every motion"))?;
         let shares = rows.map(|row| inverse.share(row) * wheel_radius_m);
         Ok(Self { rows, shares, wheel_radius_m, per_radius: 1.0 / wheel_radius_m })
     }
@@ -277,10 +273,10 @@ mod tests {
         assert_eq!(signs(0.0, 0.0, -1.0), [-1.0; 4]);
     }
 
-    // The second seed (x right, y forward, wheels clockwise from front right) leaves the factor 1/sqrt(2) out,
+    // The third seed (x right, y forward, wheels clockwise from front right) leaves the factor 1/sqrt(2) out,
     // and with a heading it does not put its rotated v_y into the rows and loses the signs of rows 3 and 4.
     #[test]
-    fn the_second_seeds_rows_hold_once_the_root_of_one_half_is_back() {
+    fn the_third_seeds_rows_hold_once_the_root_of_one_half_is_back() {
         let (x, y, w) = (0.3_f32, 0.8, 1.5); // its axes: x right, y forward
         let ours = four().inverse(Twist::new(y, -x, w)).map(|speed| speed.as_rad_per_s() * 0.05);
         let half = core::f32::consts::FRAC_1_SQRT_2;
