@@ -236,6 +236,12 @@ impl Outbox {
         }
     }
 
+    #[inline]
+    pub(super) fn get(&self, place: Place) -> i16 {
+        let word = self.words.0.as_flattened().get(usize::from(place.0 & 31));
+        word.map_or(0, |word| i16::from_le_bytes(*word))
+    }
+
     /// Sets every word to zero, and has every frame in use sent.
     pub(super) fn clear(&mut self) {
         self.words = Words::ZERO;

@@ -91,6 +91,7 @@ mod device;
 mod error;
 mod feedback;
 mod handle;
+mod limit;
 mod model;
 mod rare;
 mod slot;

@@ -367,6 +367,11 @@ fn dji() {
     (|bus: &mut Bus, motor: AnyHandle, to: Angle| Bus::set_angle(bus, motor, to)).call();
     (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_position(bus, motor, to)).call();
     (|bus: &mut Bus, motor: AnyHandle| Bus::relax(bus, motor)).call();
+    Bus::<()>::commanded_current::<M3508>.call();
+    (|bus: &mut Bus, motors: [AnyHandle; 4], factor: f32| {
+        Bus::scale_outputs(bus, motors, factor);
+    })
+    .call();
     (|bus: &mut Bus, motor: AnyHandle| Bus::zero(bus, motor)).call();
     (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_present_position(bus, motor, to))
         .call();
@@ -467,6 +472,10 @@ fn runner() {
         Runner::tick_with(runner, tick, |frame| {
             black_box(frame);
         })
+    })
+    .call();
+    (|runner: &mut Shell, tick: Tick, motors: [AnyHandle; 4], factor: f32| {
+        Runner::tick_limited(runner, tick, |bus| bus.scale_outputs(motors, factor));
     })
     .call();
     Shell::statistics.call();

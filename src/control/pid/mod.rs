@@ -1,6 +1,7 @@
 //! The positional and the incremental PID controller.
 
 mod config;
+mod cut;
 mod incremental;
 mod positional;
 mod settings;
