@@ -18,7 +18,8 @@ use drivetrain::motor::{
     VelocityDrive,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
+    BlockingTx, BusEdge, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
+    Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
@@ -470,6 +471,19 @@ fn runner() {
     .call();
     Shell::statistics.call();
     Shell::is_bus_down.call();
+    Shell::has.call();
+    Shell::next_edge.call();
+    (|runner: &mut Shell| Shell::edges(runner).count()).call();
+    Shell::heartbeat.call();
+    Shell::note_lost.call();
+    Shell::poll_queue.call();
+    (|runner: &mut Shell, queue: &mut FrameReceiver<'_>, budget: usize| {
+        Shell::poll_queue_with(runner, queue, budget, |frame| {
+            black_box(frame);
+        })
+    })
+    .call();
+    BusEdge::began.call();
     Shell::device.call();
     Shell::device_mut.call();
     Shell::port_mut.call();
