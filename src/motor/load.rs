@@ -1,3 +1,4 @@
+use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 
 /// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
@@ -48,6 +49,34 @@ impl BusLoad {
 
     /// Bits of a standard data frame of 8 bytes with as many stuff bits as can be, with the pause after it.
     pub const WORST_CASE_BITS: u32 = 135;
+
+    /// CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
+    const UNSTUFFED_BITS: u32 = 13;
+
+    /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with as many as can be.
+    ///
+    /// What is really sent lies between the two. A remote frame carries no data, whatever length it asks for.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::BusLoad;
+    /// use embedded_can::{ExtendedId, Frame};
+    ///
+    /// let command = CanFrame::standard(0x200, [0; 8]).ok_or("not an 11-bit id")?;
+    /// assert_eq!(BusLoad::frame_bits(&command), (111, 135));
+    /// let id = ExtendedId::new(0x1234).ok_or("not a 29-bit id")?;
+    /// let empty = CanFrame::new(id, &[]).ok_or("more than 8 bytes")?;
+    /// assert_eq!(BusLoad::frame_bits(&empty), (67, 80));
+    /// # Ok::<(), &str>(())
+    /// ```
+    #[must_use]
+    pub const fn frame_bits(frame: &CanFrame) -> (u32, u32) {
+        let data = if frame.is_remote() { 0 } else { 8 * frame.length() as u32 };
+        let stuffable = data + if frame.has_extended_id() { 54 } else { 34 };
+        let nominal = stuffable + Self::UNSTUFFED_BITS;
+        (nominal, nominal + (stuffable - 1) / 4)
+    }
 
     /// Takes the bit rate of a bus, in bits a second: 1 000 000 for DJI motors. 0 counts as 1.
     #[must_use]

@@ -20,6 +20,7 @@
 //! Nothing here is needed: a program can call [`CanDevice`] itself, as the examples `sans_io` and `async_sans_io` do.
 
 mod edge;
+mod meter;
 mod port;
 #[cfg(feature = "queue")]
 mod queue;
@@ -32,6 +33,7 @@ mod tests;
 mod watch;
 
 pub use edge::{BusCondition, BusEdge};
+pub use meter::MeasuredLoad;
 pub use port::{BlockingTx, Nb, Port, Received, Sent};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
@@ -41,6 +43,7 @@ pub use stop::EmergencyStop;
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, CanDevice};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use meter::Meter;
 use statistics::increment;
 use watch::Watch;
 
@@ -85,6 +88,7 @@ pub struct Runner<P, K, D> {
     statistics: Statistics,
     stop: Option<&'static EmergencyStop>,
     watch: Watch,
+    meter: Meter,
     /// The frame that goes last in the next tick, because it failed as the first one.
     yields: Option<u32>,
 }
@@ -120,6 +124,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
             },
             stop: None,
             watch: Watch::new(),
+            meter: Meter::new(),
             yields: None,
         }
     }
@@ -128,6 +133,13 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     #[must_use]
     pub fn with_period(mut self, period: Duration) -> Self {
         self.ticker = Ticker::new(period);
+        self
+    }
+
+    /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
+    #[must_use]
+    pub fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
+        self.meter.set_bit_rate(bits_per_s);
         self
     }
 
@@ -197,6 +209,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self.device.update(tick);
         self.turn = self.turn.wrapping_add(1);
         self.send(tick.now(), &mut evicted);
+        self.meter.finish(tick.now());
         if self.watch.finish(tick.now()) {
             increment(&mut self.statistics.bus_losses);
             self.device.disarm();
@@ -302,6 +315,14 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     #[must_use]
     pub const fn heartbeat(&self) -> u32 {
         self.watch.heartbeat
+    }
+
+    /// Returns how full the bus was in the last second, by the frames that came and went here; `None` in the first one.
+    ///
+    /// What the hardware filter drops is not seen.
+    #[must_use]
+    pub const fn measured_load(&self) -> Option<MeasuredLoad> {
+        self.meter.last()
     }
 
     /// Returns the device.

@@ -42,6 +42,7 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
                     self.count_sent(&frame);
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
+                        self.meter.discount(&other);
                         self.watch.unsent(other.header(), now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
@@ -74,6 +75,7 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
 
     fn count_sent(&mut self, frame: &CanFrame) {
         increment(&mut self.statistics.sent);
+        self.meter.count(frame);
         self.watch.sent(frame.header());
     }
 

@@ -19,7 +19,7 @@ use drivetrain::motor::{
 };
 use drivetrain::runner::{
     BlockingTx, BusEdge, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
-    Nb, Runner,
+    MeasuredLoad, Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
@@ -258,6 +258,7 @@ fn motor() {
     BusLoad::nominal.call();
     BusLoad::worst_case.call();
     BusLoad::frames_within.call();
+    BusLoad::frame_bits.call();
     Guard::new.call();
     Guard::without_feedback.call();
     Guard::with_timeouts.call();
@@ -475,6 +476,8 @@ fn runner() {
     Shell::next_edge.call();
     (|runner: &mut Shell| Shell::edges(runner).count()).call();
     Shell::heartbeat.call();
+    Shell::with_bit_rate.call();
+    Shell::measured_load.call();
     Shell::note_lost.call();
     Shell::poll_queue.call();
     (|runner: &mut Shell, queue: &mut FrameReceiver<'_>, budget: usize| {
@@ -484,6 +487,10 @@ fn runner() {
     })
     .call();
     BusEdge::began.call();
+    MeasuredLoad::new.call();
+    MeasuredLoad::frames_per_s.call();
+    MeasuredLoad::nominal.call();
+    MeasuredLoad::worst_case.call();
     Shell::device.call();
     Shell::device_mut.call();
     Shell::port_mut.call();
