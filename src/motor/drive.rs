@@ -1,3 +1,4 @@
+use super::{Capabilities, Capability};
 use crate::units::AngularVelocity;
 
 /// An owner of motors whose output shafts follow a velocity.
@@ -6,6 +7,12 @@ use crate::units::AngularVelocity;
 pub trait VelocityDrive<H: Copy> {
     /// Returns the measured velocity of the output shaft; `None` when there is no fresh feedback.
     fn velocity(&self, motor: H) -> Option<AngularVelocity>;
+
+    /// Returns what a motor offers as it is configured; at least velocities, unless said otherwise.
+    fn capabilities(&self, motor: H) -> Capabilities {
+        let _ = motor;
+        Capabilities::of(&[Capability::Velocity])
+    }
 
     /// Sets the velocity that the output shaft is to follow.
     ///
@@ -33,6 +40,10 @@ pub trait VelocityDrive<H: Copy> {
 impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
     fn velocity(&self, motor: H) -> Option<AngularVelocity> {
         (**self).velocity(motor)
+    }
+
+    fn capabilities(&self, motor: H) -> Capabilities {
+        (**self).capabilities(motor)
     }
 
     fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError> {

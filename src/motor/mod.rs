@@ -14,6 +14,7 @@
 //! |---|---|
 //! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
+//! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
 //! | [`OwnMotor`], [`Own`], [`Guard`] | a motor of your own, and the rules that make it safe |
@@ -24,6 +25,7 @@
 //! arrays and `&mut`, so an own struct needs only to forward to a tuple of its fields.
 
 mod arming;
+mod capability;
 mod claim;
 mod combine;
 mod device;
@@ -35,6 +37,7 @@ mod name;
 mod own;
 
 pub use arming::{ArmError, Missing};
+pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};

@@ -14,8 +14,8 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, CanDevice, Claim, Guard, Malformed, Missing, MotorName, Own, OwnMotor, Role, Timeouts,
-    VelocityDrive,
+    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Missing, MotorName, Own,
+    OwnMotor, Role, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
     BlockingTx, BusEdge, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
@@ -278,6 +278,11 @@ fn motor() {
     Guard::refused_targets.call();
     Guard::forgotten_targets.call();
     Guard::reversals.call();
+    Capability::is_target.call();
+    (|list: &[Capability]| Capabilities::of(list)).call();
+    Capabilities::with.call();
+    Capabilities::has.call();
+    (|set: Capabilities| Capabilities::iter(set).count()).call();
     Own::<AnyMotor>::new.call();
     Own::<AnyMotor>::with_timeouts.call();
     Own::<AnyMotor>::motor.call();
@@ -375,6 +380,7 @@ fn dji() {
     (|bus: &mut Bus, motor: AnyHandle, pid: PidConfig| Bus::set_position_loop(bus, motor, pid))
         .call();
     (|bus: &Bus, motor: AnyHandle| VelocityDrive::velocity(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| VelocityDrive::capabilities(bus, motor)).call();
     device::<Bus>();
 }
 
