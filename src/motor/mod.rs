@@ -18,6 +18,7 @@
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
 //! | [`OwnMotor`], [`Own`], [`Guard`] | a motor of your own, and the rules that make it safe |
+//! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
 //! | [`BusLoad`] | how full the bus is |
 //!
 //! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. Whatever
@@ -31,6 +32,7 @@ mod combine;
 mod device;
 mod drive;
 mod guard;
+mod homing;
 mod link;
 mod load;
 mod name;
@@ -42,6 +44,7 @@ pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
 pub use guard::Guard;
+pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
 pub use name::MotorName;

@@ -15,7 +15,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
     BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Missing, MotorName, Own,
-    OwnMotor, Role, Timeouts, VelocityDrive,
+    OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
     BlockingTx, BusEdge, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
@@ -283,6 +283,17 @@ fn motor() {
     Capabilities::with.call();
     Capabilities::has.call();
     (|set: Capabilities| Capabilities::iter(set).count()).call();
+    StopHomingConfig::new.call();
+    StopHomingConfig::with_standing_below.call();
+    StopHomingConfig::with_window.call();
+    StopHomingConfig::with_timeout.call();
+    StopHomingConfig::with_travel.call();
+    StopHomingConfig::with_stop_at.call();
+    StopHomingConfig::with_back_off.call();
+    StopHomingConfig::validate.call();
+    StopHoming::new.call();
+    StopHoming::step.call();
+    StopHoming::is_done.call();
     Own::<AnyMotor>::new.call();
     Own::<AnyMotor>::with_timeouts.call();
     Own::<AnyMotor>::motor.call();
