@@ -17,7 +17,7 @@
 //!
 //! | item | what it is |
 //! |---|---|
-//! | [`World`] | the two buses, up to 16 motors, and the time |
+//! | [`World`] | the three buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
 //! | [`ChassisConfig`], [`ChassisState`] | a mecanum body on four of them |
