@@ -176,8 +176,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err(format!("{fastest:.2} m/s before and {:.2} after, not 0.8", back.vx_m_s).into());
     }
     // Unplugged, the rear bus falls silent, and its frames do not leave any more: both are told, once, there only.
-    let told: Vec<_> =
-        edges.iter().map(|(bus, edge)| (*bus, edge.condition, edge.began())).collect();
+    let told: Vec<_> = edges.iter().map(|(bus, edge)| (*bus, edge.condition, edge.began)).collect();
     let expected = [
         ("rear", BusCondition::Silent, true),
         ("rear", BusCondition::Down, true),

@@ -46,16 +46,16 @@ impl core::fmt::Display for BusCondition {
             Self::Silent => "bus silent",
             Self::ReceiveOverrun => "receive overrun",
             Self::TickOverrun => "tick overrun",
-            Self::ClockStandstill => "clock stands still",
-            Self::ClockReversal => "clock went back",
+            Self::ClockStandstill => "clock standstill",
+            Self::ClockReversal => "clock reversal",
         })
     }
 }
 
 /// A [`BusCondition`] that began or ended.
 ///
-/// It is kept until it is read with [`Runner::next_edge`](super::Runner::next_edge). A condition that came and went
-/// several times before that is one edge with their number, so that nothing is lost and nothing floods. The edge
+/// Latched until it is read with [`Runner::next_edge`](super::Runner::next_edge), so none is lost; and as long as it waits,
+/// the same change is not noted again, so that none floods: [`Statistics`](super::Statistics) has the numbers. The edge
 /// read last always tells the present state; two beginnings in a row say that it ended in between.
 ///
 /// # Examples
@@ -64,40 +64,25 @@ impl core::fmt::Display for BusCondition {
 /// use drivetrain::time::Instant;
 ///
 /// let at = Instant::from_micros(2_310_000);
-/// let edge = BusEdge { at, condition: BusCondition::Silent, times: 3 };
-/// assert_eq!(edge.to_string(), "2.310000 s: bus silent (3 times)");
-/// assert_eq!(BusEdge { times: 0, ..edge }.to_string(), "2.310000 s: bus silent: over");
+/// let edge = BusEdge { condition: BusCondition::Silent, began: true, at };
+/// assert_eq!(edge.to_string(), "bus silent began at 2310000 us");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BusEdge {
+    /// What changed.
+    pub condition: BusCondition,
+    /// Whether it began; otherwise it ended.
+    pub began: bool,
     /// When it began, the first time since the last reading; or when it ended, the last time.
     pub at: Instant,
-    /// What began or ended.
-    pub condition: BusCondition,
-    /// How often it began since the last reading, saturating; 0 when this is its end.
-    pub times: u16,
-}
-
-impl BusEdge {
-    /// Tells whether the condition began; otherwise it ended.
-    #[must_use]
-    pub const fn began(&self) -> bool {
-        self.times > 0
-    }
 }
 
 impl core::fmt::Display for BusEdge {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let micros = self.at.as_micros();
-        let (whole, rest) = (micros / 1_000_000, micros % 1_000_000);
-        write!(f, "{whole}.{rest:06} s: {}", self.condition)?;
-        match self.times {
-            0 => f.write_str(": over"),
-            1 => Ok(()),
-            times => write!(f, " ({times} times)"),
-        }
+        let phase = if self.began { "began" } else { "ended" };
+        write!(f, "{} {phase} at {} us", self.condition, self.at.as_micros())
     }
 }
 
@@ -113,8 +98,7 @@ struct Latch {
     began: Instant,
     ended: Instant,
     seen: Instant,
-    /// Beginnings that were not read.
-    times: u16,
+    begin_waits: bool,
     end_waits: bool,
     active: bool,
 }
@@ -125,7 +109,7 @@ impl Edges {
             began: Instant::START,
             ended: Instant::START,
             seen: Instant::START,
-            times: 0,
+            begin_waits: false,
             end_waits: false,
             active: false,
         };
@@ -185,13 +169,13 @@ impl Latch {
             return false;
         }
         self.active = true;
-        if self.times == 0 {
-            self.began = at;
-        } else {
+        if self.begin_waits {
             // It ended and began again, and nobody has read either.
             self.end_waits = false;
+        } else {
+            self.began = at;
+            self.begin_waits = true;
         }
-        self.times = self.times.saturating_add(1);
         true
     }
 
@@ -206,18 +190,18 @@ impl Latch {
     /// Returns the edge that is to be read next.
     const fn waiting(&self, condition: BusCondition) -> Option<BusEdge> {
         // An end that waits while the condition is there belongs to the time before.
-        if self.end_waits && (self.active || self.times == 0) {
-            Some(BusEdge { at: self.ended, condition, times: 0 })
-        } else if self.times > 0 {
-            Some(BusEdge { at: self.began, condition, times: self.times })
+        if self.end_waits && (self.active || !self.begin_waits) {
+            Some(BusEdge { condition, began: false, at: self.ended })
+        } else if self.begin_waits {
+            Some(BusEdge { condition, began: true, at: self.began })
         } else {
             None
         }
     }
 
     const fn take(&mut self, edge: BusEdge) {
-        if edge.began() {
-            self.times = 0;
+        if edge.began {
+            self.begin_waits = false;
         } else {
             self.end_waits = false;
         }
@@ -237,9 +221,9 @@ mod tests {
         Instant::from_micros(1_000 * ms)
     }
 
-    fn drained(edges: &mut Edges) -> Vec<(BusCondition, u64, u16)> {
+    fn drained(edges: &mut Edges) -> Vec<(BusCondition, u64, bool)> {
         core::iter::from_fn(|| edges.next())
-            .map(|edge| (edge.condition, edge.at.as_micros() / 1_000, edge.times))
+            .map(|edge| (edge.condition, edge.at.as_micros() / 1_000, edge.began))
             .collect()
     }
 
@@ -247,27 +231,27 @@ mod tests {
     fn a_condition_that_lasts_is_one_edge_and_its_end_another() {
         let mut edges = Edges::new();
         assert!((10..500).filter(|ms| edges.begin(DOWN, at_ms(*ms))).eq([10]));
-        assert_eq!(drained(&mut edges), [(DOWN, 10, 1)]);
+        assert_eq!(drained(&mut edges), [(DOWN, 10, true)]);
         edges.begin(DOWN, at_ms(600));
         assert!(edges.is_active(DOWN) && edges.next().is_none());
         edges.end(DOWN, at_ms(700));
         edges.end(DOWN, at_ms(701));
-        assert_eq!(drained(&mut edges), [(DOWN, 700, 0)]);
+        assert_eq!(drained(&mut edges), [(DOWN, 700, false)]);
     }
 
     #[test]
-    fn what_came_and_went_unread_is_one_edge_with_its_number() {
+    fn what_came_and_went_unread_is_its_first_beginning_and_its_last_end() {
         let mut edges = Edges::new();
         for round in 0..3 {
             edges.begin(DOWN, at_ms(100 * round));
             edges.end(DOWN, at_ms(100 * round + 50));
         }
-        assert_eq!(drained(&mut edges), [(DOWN, 0, 3), (DOWN, 250, 0)]);
+        assert_eq!(drained(&mut edges), [(DOWN, 0, true), (DOWN, 250, false)]);
         edges.begin(DOWN, at_ms(300));
-        assert_eq!(drained(&mut edges), [(DOWN, 300, 1)]);
+        assert_eq!(drained(&mut edges), [(DOWN, 300, true)]);
         edges.end(DOWN, at_ms(350));
         edges.begin(DOWN, at_ms(400));
-        assert_eq!(drained(&mut edges), [(DOWN, 350, 0), (DOWN, 400, 1)]);
+        assert_eq!(drained(&mut edges), [(DOWN, 350, false), (DOWN, 400, true)]);
     }
 
     #[test]
@@ -277,11 +261,11 @@ mod tests {
             edges.begin(OVERRUN, at_ms(ms));
             edges.settle(at_ms(ms + 899));
         }
-        assert_eq!(drained(&mut edges), [(OVERRUN, 0, 1)]);
+        assert_eq!(drained(&mut edges), [(OVERRUN, 0, true)]);
         edges.settle(at_ms(5_499));
         assert!(edges.is_active(OVERRUN));
         edges.settle(at_ms(5_500));
-        assert_eq!(drained(&mut edges), [(OVERRUN, 5_500, 0)]);
+        assert_eq!(drained(&mut edges), [(OVERRUN, 5_500, false)]);
     }
 
     #[test]
@@ -294,23 +278,21 @@ mod tests {
     }
 
     proptest! {
-        /// Law: the edge read last tells the present state, an end follows a beginning, and no beginning is lost.
+        /// Law: the edge read last tells the present state, and an end follows a beginning.
         #[test]
         fn the_last_edge_tells_the_state(steps in prop::collection::vec(0..4_u8, 0..200)) {
             let mut edges = Edges::new();
-            let (mut known, mut began, mut counted) = (false, 0, 0);
+            let mut known = false;
             for (step, ms) in steps.into_iter().zip(0..) {
                 match step {
-                    0 => began += u16::from(edges.begin(DOWN, at_ms(ms))),
+                    0 => _ = edges.begin(DOWN, at_ms(ms)),
                     1 => edges.end(DOWN, at_ms(ms)),
                     _ => {
                         while let Some(edge) = edges.next() {
-                            prop_assert!(edge.began() || known, "an end after an end");
-                            known = edge.began();
-                            counted += edge.times;
+                            prop_assert!(edge.began || known, "an end after an end");
+                            known = edge.began;
                         }
                         prop_assert_eq!(known, edges.is_active(DOWN));
-                        prop_assert_eq!(counted, began);
                     }
                 }
             }

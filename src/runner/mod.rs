@@ -265,7 +265,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     ///     clock.advance(Duration::from_millis(1));
     /// }
     /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
-    /// assert_eq!(log, ["1.000000 s: tick overrun", "2.000000 s: tick overrun: over"]);
+    /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
     /// ```
     pub fn next_edge(&mut self) -> Option<BusEdge> {
         self.watch.next_edge()

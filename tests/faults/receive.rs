@@ -201,7 +201,7 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     }
     assert_eq!(runner.statistics().lost, 998 * 2);
     let edges: Vec<String> = runner.edges().map(|edge| edge.to_string()).collect();
-    assert_eq!(edges, ["0.002000 s: receive overrun", "1.999000 s: receive overrun: over"]);
+    assert_eq!(edges, ["receive overrun began at 2000 us", "receive overrun ended at 1999000 us"]);
 
     let world = World::new(1).with_receive_depth(Line::Can1, 4);
     let mut rig = Rig::new(&world, Line::Can1, 4);
@@ -210,7 +210,10 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     rig.drive(50);
     assert_eq!(rig.runner.statistics().receive_errors.overrun, 1);
     let overrun = rig.runner.edges().find(|edge| edge.condition == BusCondition::ReceiveOverrun);
-    assert_eq!(overrun.map(|edge| (edge.at, edge.times)), Some((Instant::from_micros(120_100), 1)));
+    assert_eq!(
+        overrun.map(|edge| (edge.at, edge.began)),
+        Some((Instant::from_micros(120_100), true))
+    );
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
     assert!(rig.words(0, 140, 160).iter().all(|word| *word > 0));
 }

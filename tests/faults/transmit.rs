@@ -146,8 +146,8 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
         let down: Vec<_> =
             rig.runner.edges().filter(|edge| edge.condition == BusCondition::Down).collect();
         let [began, ended] = *down else { panic!("{fault:?}: {down:?}") };
-        assert!(began.times == 1 && (at_ms(399)..at_ms(405)).contains(&began.at), "{began}");
-        assert!(!ended.began() && (at_ms(599)..at_ms(605)).contains(&ended.at), "{ended}");
+        assert!(began.began && (at_ms(399)..at_ms(405)).contains(&began.at), "{began}");
+        assert!(!ended.began && (at_ms(599)..at_ms(605)).contains(&ended.at), "{ended}");
         assert!(!rig.runner.is_bus_down() && !rig.runner.is_armed());
         rig.runner.arm(Tick::new(world.now(), 0.001)).unwrap();
         rig.drive(50);

@@ -18,7 +18,7 @@ use drivetrain::motor::{
     OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
-    BlockingTx, BusEdge, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
     MeasuredLoad, Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
@@ -503,7 +503,6 @@ fn runner() {
         })
     })
     .call();
-    BusEdge::began.call();
     MeasuredLoad::new.call();
     MeasuredLoad::frames_per_s.call();
     MeasuredLoad::nominal.call();
