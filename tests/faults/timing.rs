@@ -1,6 +1,7 @@
 //! F24 to F33: time.
 
-use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, words};
+use crate::case::{Case, cases, safe_after, saw};
+use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
@@ -8,7 +9,23 @@ use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
 
-#[test]
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice,
+    f25_with_all_feedback_lost_frames_are_still_offered,
+    f27_a_heartbeat_stops_with_any_part_of_the_loop,
+    f26_an_application_that_stops_is_zero_after_the_deadline,
+    f28_nothing_notices_that_a_hardware_counter_wraps,
+    f29_time_that_stands_or_goes_back_is_never_fresh_for_ever,
+    f30_a_motor_unheard_for_longer_than_any_counter_stays_offline,
+    f31_a_bad_time_step_holds_once_and_is_counted,
+    f32_a_huge_time_step_moves_no_integral,
+    f33_recovery_takes_ten_good_frames_and_starts_from_zero,
+    f24_a_million_silences_end_with_the_first_tick_after_the_limit,
+    f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline,
+];
+
+#[cfg_attr(test, test)]
 fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
     let run = |silent: Option<u64>| {
         let world = World::new(2);
@@ -30,6 +47,8 @@ fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
     assert_eq!(others, healthy, "late: another motor's bytes");
     let (others, (zero, armed, (all, _), link)) = run(Some(150));
     assert!(zero.is_some_and(|zero| zero < at_ms(512)));
+    safe_after(zero.map_or(u64::MAX, |zero| ticks_since(500, zero)));
+    saw("60 ms: late, clears itself; 150 ms: relaxed, latched; others the same to the bit");
     assert!(!armed && link == Link::Online && all.iter().all(|word| *word == 0), "latched");
     assert_eq!(others, healthy, "offline: another motor's bytes");
 
@@ -54,7 +73,7 @@ fn armed_at_rest(speed: PidConfig) -> (Bus, [drivetrain::dji::Handle<M3508>; 1])
     armed([Config::new(1).speed_loop(speed)])
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f25_with_all_feedback_lost_frames_are_still_offered() {
     let world = World::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 4);
@@ -71,8 +90,11 @@ fn f25_with_all_feedback_lost_frames_are_still_offered() {
     // From the tick that heard the last frame, 100 ms and a tick at most.
     assert!((at_ms(399)..=at_ms(402)).contains(&edge.at), "{edge}");
     assert_eq!(rig.runner.next_edge(), None, "one edge for 490 ms, and the bus is not down");
+    let sent = sent.len();
     rig.drive(100);
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
+    safe_after(ticks_since(300, rig.first_zero(0, 300)));
+    saw(format!("{sent} zero frames in 570 ms; {edge}"));
     let edge = rig.runner.next_edge().unwrap();
     assert!(!edge.began && (at_ms(900)..=at_ms(903)).contains(&edge.at), "{edge}");
 
@@ -89,7 +111,7 @@ fn f25_with_all_feedback_lost_frames_are_still_offered() {
     assert_eq!(rig.runner.next_edge(), None);
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f27_a_heartbeat_stops_with_any_part_of_the_loop() {
     const TICKS: u32 = 50;
     #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,9 +159,10 @@ fn f27_a_heartbeat_stops_with_any_part_of_the_loop() {
     for stops in [Stops::Receive, Stops::Tick, Stops::Clock] {
         assert!(resets_at(stops).is_err_and(|(ms, beat)| ms <= 56 && beat <= TICKS), "{stops:?}");
     }
+    saw("stops without receive, tick or a clock that goes on, and not with a dead bus");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f26_an_application_that_stops_is_zero_after_the_deadline() {
     let world = World::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 2);
@@ -152,9 +175,11 @@ fn f26_an_application_that_stops_is_zero_after_the_deadline() {
     assert_eq!(state.forgotten_targets, 1);
     rig.drive(50);
     assert!(rig.words(0, 610, 650).iter().all(|word| *word > 0), "not latched");
+    safe_after(ticks_since(300, zero));
+    saw(format!("zero, {} target forgotten, not latched", state.forgotten_targets));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f28_nothing_notices_that_a_hardware_counter_wraps() {
     for (mut counter, mask, start) in [
         (ExtendedCounter::new_16_bit(1_000_000).unwrap(), 0xFFFF_u64, 0xFF00_u64),
@@ -176,9 +201,10 @@ fn f28_nothing_notices_that_a_hardware_counter_wraps() {
             assert_eq!(words(&bus.next_frame().unwrap()), [7, 0, 0, 0]);
         }
     }
+    saw("200 ticks across the wrap of 16 and of 32 bits: nothing");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     // Back by as much, together with the last feedback, while the loop goes on.
     for back in [1, 5, 9, 11, 1_000, 3_000_000] {
@@ -199,6 +225,7 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
             }
         }
         assert!(last_driven <= 10 + back.min(10), "back by {back} ms: driven for {last_driven}");
+        safe_after(last_driven + 1);
         // Heard again, it works on.
         for round in 200..220 {
             _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start + 1 - back + round));
@@ -243,9 +270,10 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     assert_eq!(runner.statistics().clock_reversals, 2);
     let others: Vec<_> = runner.edges().map(|edge| edge.condition).collect();
     assert_eq!(others, [BusCondition::TickOverrun], "going back is one condition that lasts");
+    saw("no tick while time stands; back by up to 50 min: late, then online; both counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f30_a_motor_unheard_for_longer_than_any_counter_stays_offline() {
     for days in [1_u64, 50, 5_000] {
         let (mut bus, [wheel]) = armed([Config::new(1)]);
@@ -261,9 +289,10 @@ fn f30_a_motor_unheard_for_longer_than_any_counter_stays_offline() {
             assert_eq!(bus.set_raw(wheel, 5), Err(TargetError::Relaxed));
         }
     }
+    saw("offline after 1, 50 and 5000 days, where 32 bits look fresh");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f31_a_bad_time_step_holds_once_and_is_counted() {
     for bad in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(SPEED)]);
@@ -283,9 +312,10 @@ fn f31_a_bad_time_step_holds_once_and_is_counted() {
         assert_eq!(words(&bus.next_frame().unwrap())[0], 0, "only once");
         assert_eq!(bus.counters().bad_steps, 3);
     }
+    saw("held once, then zero, 3 counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f32_a_huge_time_step_moves_no_integral() {
     let integral = PidConfig::new(0.0, 1.0, 0.0);
     for dt_s in [0.021, 10.0, 1e30] {
@@ -311,9 +341,10 @@ fn f32_a_huge_time_step_moves_no_integral() {
     assert_eq!(runner.statistics().overruns, 9_999);
     let edges: Vec<_> = runner.edges().map(|edge| (edge.condition, edge.at)).collect();
     assert_eq!(edges, [(BusCondition::TickOverrun, at_ms(10_001))]);
+    saw("steps of 21 ms to 1e30 s move nothing, 9999 overruns counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(PidConfig::new(0.0, 5.0, 0.0))]);
     for ms in 2..40 {
@@ -345,6 +376,7 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     rig.drive(800);
     let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();
     assert!((1..2_000).contains(&back), "from zero: {back}");
+    saw(format!("ten good frames; then {first} after arming, {back} of 16384 on a ramp"));
 }
 
 /// Numbers without pattern: xorshift.
@@ -369,9 +401,9 @@ fn is_driven(bus: &mut Bus, now_us: u64, driven: bool) -> bool {
     core::iter::from_fn(|| bus.next_frame()).last().map_or(driven, |frame| words(&frame)[0] != 0)
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f24_a_million_silences_end_with_the_first_tick_after_the_limit() {
-    let mut random = Random(0x5EED);
+    let (mut random, mut longest) = (Random(0x5EED), 0);
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let mut now = 2_000;
     for _ in 0..1_000_000 {
@@ -388,12 +420,15 @@ fn f24_a_million_silences_end_with_the_first_tick_after_the_limit() {
             assert_eq!(driven, now <= heard + 10_000, "heard at {heard}, now {now}");
             _ = bus.set_raw(wheel, 500);
         }
+        longest = longest.max(now - heard);
     }
+    safe_after(longest.div_ceil(1_000));
+    saw(format!("1000000 silences, {longest} us at most"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() {
-    let mut random = Random(0xDEAD);
+    let (mut random, mut longest) = (Random(0xDEAD), 0);
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let mut now = 2_000;
     for _ in 0..1_000_000 {
@@ -412,5 +447,8 @@ fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() 
             driven = tick(&mut bus, now, driven);
             assert_eq!(driven, now <= commanded + 100_000, "commanded at {commanded}, now {now}");
         }
+        longest = longest.max(now - commanded);
     }
+    safe_after(longest.div_ceil(1_000));
+    saw(format!("1000000 hung applications, {longest} us at most"));
 }
