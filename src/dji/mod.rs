@@ -91,6 +91,7 @@ mod device;
 mod error;
 mod feedback;
 mod handle;
+mod measured;
 mod model;
 mod rare;
 mod slot;

@@ -72,6 +72,8 @@ pub enum TargetError {
     NotHomed,
     /// This motor does not offer this kind of target.
     Unsupported,
+    /// The measurement that the target goes with is too old, or lies ahead. The motor goes to its safe output at once.
+    StaleMeasurement,
 }
 
 impl core::fmt::Display for TargetError {
@@ -85,6 +87,7 @@ impl core::fmt::Display for TargetError {
             Self::NoLoop => "the motor was attached without the loop for this target",
             Self::NotHomed => "the output angle is unknown until the position is zeroed",
             Self::Unsupported => "the motor does not offer this kind of target",
+            Self::StaleMeasurement => "the measurement is too old",
         })
     }
 }

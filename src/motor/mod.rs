@@ -35,6 +35,7 @@ mod guard;
 mod homing;
 mod link;
 mod load;
+mod measured;
 mod name;
 mod own;
 
@@ -47,5 +48,6 @@ pub use guard::Guard;
 pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
+pub use measured::Measured;
 pub use name::MotorName;
 pub use own::{Own, OwnMotor};

@@ -59,7 +59,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands those of others to
     /// `unrelated`. Returns how many came.
     ///
-    /// Frames that the queue dropped since the last call are noted as [`lost`](Statistics::lost).
+    /// Frames that the queue dropped since the last call are noted as [`lost`](super::Statistics::lost).
     ///
     /// # Examples
     /// ```

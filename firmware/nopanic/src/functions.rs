@@ -14,7 +14,7 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Missing, MotorName, Own,
+    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing, MotorName, Own,
     OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
@@ -246,6 +246,8 @@ fn motor() {
     Timeouts::with_late.call();
     Timeouts::with_offline.call();
     Timeouts::with_command.call();
+    Timeouts::with_measured.call();
+    Timeouts::measured.call();
     Timeouts::with_good_frames.call();
     Timeouts::late.call();
     Timeouts::offline.call();
@@ -392,6 +394,17 @@ fn dji() {
         .call();
     (|bus: &Bus, motor: AnyHandle| VelocityDrive::velocity(bus, motor)).call();
     (|bus: &Bus, motor: AnyHandle| VelocityDrive::capabilities(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| Bus::capabilities(bus, motor)).call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Angle, measured: Measured| {
+        Bus::set_angle_measured(bus, motor, to, measured)
+    })
+    .call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Position, measured: Measured<Position>| {
+        Bus::set_position_measured(bus, motor, to, measured)
+    })
+    .call();
+    Measured::<Angle>::way_to.call();
+    Measured::<Position>::way_to.call();
     device::<Bus>();
 }
 
