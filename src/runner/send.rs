@@ -21,7 +21,7 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
     /// first or always the last, keeps no frame from the bus.
     pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
         let yields = self.yields.take();
-        let (mut held, mut goes_first) = (None, None);
+        let (mut held, mut goes_first, mut refused) = (None, None, None);
         let mut is_first = true;
         for _ in 0..FRAMES_A_TICK {
             let frame = match self.device.next_frame(self.turn) {
@@ -51,24 +51,27 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
                 }
                 Sent::Full => {
                     increment(&mut self.statistics.refused);
-                    self.keep(&frame, now);
-                    goes_first = Some(frame);
+                    self.watch.unsent(frame.header(), now);
+                    refused = Some(frame);
                     break;
                 }
                 Sent::Failed(kind) => {
                     self.statistics.send_errors.count(kind);
-                    let tries = self.keep(&frame, now);
-                    if tries >= PATIENCE && is_first {
-                        self.yields = Some(frame.header());
-                    } else if tries >= PATIENCE {
+                    let tries = self.watch.unsent(frame.header(), now);
+                    if tries >= PATIENCE && !is_first && goes_first.is_none() {
                         goes_first = Some(frame);
+                    } else {
+                        self.device.requeue(&frame);
+                        if tries >= PATIENCE && is_first {
+                            self.yields = Some(frame.header());
+                        }
                     }
                 }
             }
             is_first = false;
         }
         // What is given back last goes first.
-        for frame in [held, goes_first].into_iter().flatten() {
+        for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);
         }
     }
@@ -77,11 +80,5 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
         increment(&mut self.statistics.sent);
         self.meter.count(frame);
         self.watch.sent(frame.header());
-    }
-
-    /// Gives a frame back to the device; returns in how many ticks it was not taken.
-    fn keep(&mut self, frame: &CanFrame, now: Instant) -> u8 {
-        self.device.requeue(frame);
-        self.watch.unsent(frame.header(), now)
     }
 }
