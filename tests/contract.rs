@@ -7,6 +7,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{
     AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
+use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     CanDevice, Claim, Ingest, MotorName, Own, Recovery, TargetError, VelocityDrive,
@@ -22,7 +23,7 @@ mod custom_motor;
 use custom_motor::MyMotor;
 
 const SPEED: PidConfig = PidConfig::new(1.0, 4.0, 0.0);
-const RULES: usize = 19;
+const RULES: usize = 20;
 
 fn velocity(share: f32) -> AngularVelocity {
     AngularVelocity::from_rad_per_s(5.0 * share)
@@ -56,6 +57,10 @@ impl<M: Model, const N: usize> Subject for OneModel<M, N> {
     }
     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
         self.0.drive(self.1.map(|handle| (handle, velocity(share))))
+    }
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        let positions = self.1.map(|handle| self.0.set_position(handle, Position::ZERO));
+        positions.into_iter().collect()
     }
 }
 
@@ -272,6 +277,37 @@ fn careless(mistake: Mistake) -> Result<usize, Violation> {
             Ok(())
         },
     })
+}
+
+/// A wheel that takes another target for one that it does not offer; and says so, or not.
+struct Obliging(OneModel<M3508, 1>, Result<(), TargetError>);
+
+impl Subject for Obliging {
+    type Device = Bus;
+    fn device(&mut self) -> &mut Bus {
+        self.0.device()
+    }
+    fn motors(&self) -> usize {
+        1
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        self.0.feedback(motor)
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        self.0.drive(share)
+    }
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        self.0.drive(0.5)?;
+        self.1
+    }
+}
+
+#[test]
+fn the_check_finds_a_target_that_is_taken_without_being_offered() {
+    for answer in [Ok(()), Err(TargetError::Unsupported)] {
+        let found = check_contract(|| Obliging(OneModel::new([1], |config| config), answer));
+        assert_eq!(found.map_err(|violation| violation.rule), Err(Rule::UnsupportedIsAnError));
+    }
 }
 
 #[test]

@@ -92,6 +92,7 @@ mod error;
 mod feedback;
 mod handle;
 mod limit;
+mod measured;
 mod model;
 mod rare;
 mod slot;

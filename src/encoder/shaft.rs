@@ -48,6 +48,11 @@ impl Turns {
         Self { high: (turns >> 32) as i32, low: turns.cast_unsigned() as u32 }
     }
 
+    /// Returns the lower half, for what is kept in the place of turns.
+    pub(crate) const fn low(self) -> u32 {
+        self.low
+    }
+
     pub(crate) const fn get(self) -> i64 {
         (self.high as i64) << 32 | self.low as i64
     }

@@ -1,3 +1,4 @@
+use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 
 /// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
@@ -13,11 +14,21 @@ use core::num::NonZeroU32;
 /// The load is `bits * frames a second / bit rate`. What a bus carries lies between the two, and depends on the
 /// content. Above 1 the frames of lowest priority, those with the highest ids, do not get through.
 ///
+/// Feedback of DJI motors at 1 kHz, and a command frame for every four of them at the same rate, at 1 Mbit/s:
+///
+/// | motors | 4 | 5 | 6 | 7 | 8 |
+/// |---|--:|--:|--:|--:|--:|
+/// | nominal, % | 55.5 | 77.7 | 88.8 | 99.9 | 111.0 |
+/// | worst case, % | 67.5 | 94.5 | 108.0 | 121.5 | 135.0 |
+///
+/// On such a bus the commands 0x1FE, 0x1FF and 0x200 win over all feedback (0x201 to 0x20B), but **0x2FE and 0x2FF, the
+/// commands of GM6020 #5..=7, lose to it**: when feedback alone fills the bus, these motors never get a new command.
+///
 /// Sources: Bosch CAN specification 2.0 (1991), part B, chapters 3.1 and 5; for the worst case T. Nolte, H. Hansson,
 /// C. Norström, "Minimizing CAN response-time jitter by message manipulation" (2002), equation 1.
 ///
 /// # Examples
-/// Feedback at 1 kHz from four to eight motors, and a command frame for every four at the same rate:
+/// The table above:
 /// ```
 /// use drivetrain::motor::BusLoad;
 ///
@@ -48,6 +59,34 @@ impl BusLoad {
 
     /// Bits of a standard data frame of 8 bytes with as many stuff bits as can be, with the pause after it.
     pub const WORST_CASE_BITS: u32 = 135;
+
+    /// CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
+    const UNSTUFFED_BITS: u32 = 13;
+
+    /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with as many as can be.
+    ///
+    /// What is really sent lies between the two. A remote frame carries no data, whatever length it asks for.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::BusLoad;
+    /// use embedded_can::{ExtendedId, Frame};
+    ///
+    /// let command = CanFrame::standard(0x200, [0; 8]).ok_or("not an 11-bit id")?;
+    /// assert_eq!(BusLoad::frame_bits(&command), (111, 135));
+    /// let id = ExtendedId::new(0x1234).ok_or("not a 29-bit id")?;
+    /// let empty = CanFrame::new(id, &[]).ok_or("more than 8 bytes")?;
+    /// assert_eq!(BusLoad::frame_bits(&empty), (67, 80));
+    /// # Ok::<(), &str>(())
+    /// ```
+    #[must_use]
+    pub const fn frame_bits(frame: &CanFrame) -> (u32, u32) {
+        let data = if frame.is_remote() { 0 } else { 8 * frame.length() as u32 };
+        let stuffable = data + if frame.has_extended_id() { 54 } else { 34 };
+        let nominal = stuffable + Self::UNSTUFFED_BITS;
+        (nominal, nominal + (stuffable - 1) / 4)
+    }
 
     /// Takes the bit rate of a bus, in bits a second: 1 000 000 for DJI motors. 0 counts as 1.
     #[must_use]

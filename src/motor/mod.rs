@@ -14,9 +14,11 @@
 //! |---|---|
 //! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
+//! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
 //! | [`OwnMotor`], [`Own`], [`Guard`] | a motor of your own, and the rules that make it safe |
+//! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
 //! | [`BusLoad`] | how full the bus is |
 //!
 //! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. Whatever
@@ -24,22 +26,28 @@
 //! arrays and `&mut`, so an own struct needs only to forward to a tuple of its fields.
 
 mod arming;
+mod capability;
 mod claim;
 mod combine;
 mod device;
 mod drive;
 mod guard;
+mod homing;
 mod link;
 mod load;
+mod measured;
 mod name;
 mod own;
 
 pub use arming::{ArmError, Missing};
+pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
 pub use guard::Guard;
+pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
+pub use measured::Measured;
 pub use name::MotorName;
 pub use own::{Own, OwnMotor};

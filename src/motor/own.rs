@@ -1,6 +1,6 @@
 use super::{
-    CanDevice, Claim, Guard, Ingest, Malformed, MotorName, Role, TargetError, Timeouts,
-    VelocityDrive,
+    CanDevice, Capabilities, Capability, Claim, Guard, Ingest, Malformed, MotorName, Role,
+    TargetError, Timeouts, VelocityDrive,
 };
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -39,6 +39,11 @@ pub trait OwnMotor {
 
     /// Brings the loop to rest: called before the motor is driven, and when it stops.
     fn reset(&mut self);
+
+    /// Returns what the motor offers: velocities and feedback, unless said otherwise.
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::of(&[Capability::Velocity, Capability::Feedback])
+    }
 }
 
 /// A motor of your own as a device of the runner, beside all others.
@@ -252,6 +257,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
         (self.guard.link() == super::Link::Online).then(|| self.motor.velocity())
+    }
+
+    fn capabilities(&self, (): ()) -> Capabilities {
+        self.motor.capabilities()
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {

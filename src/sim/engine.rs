@@ -32,7 +32,7 @@ pub(crate) struct Engine {
     pub(crate) now_ns: u64,
     stepped_ns: u64,
     steps: u64,
-    wires: [Wire; 2],
+    wires: [Wire; 3],
     escs: Escs,
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
@@ -47,7 +47,7 @@ impl Engine {
             now_ns: 0,
             stepped_ns: 0,
             steps: 0,
-            wires: [Wire::new(Line::Can1), Wire::new(Line::Can2)],
+            wires: [Wire::new(Line::Can1), Wire::new(Line::Can2), Wire::new(Line::Can3)],
             escs: [None; MotorKey::CAPACITY],
             chassis: None,
             faults: Faults::new(),
@@ -56,18 +56,20 @@ impl Engine {
     }
 
     pub(crate) const fn wire(&self, line: Line) -> &Wire {
-        let [can1, can2] = &self.wires;
+        let [can1, can2, can3] = &self.wires;
         match line {
             Line::Can1 => can1,
             Line::Can2 => can2,
+            Line::Can3 => can3,
         }
     }
 
     pub(crate) const fn wire_mut(&mut self, line: Line) -> &mut Wire {
-        let [can1, can2] = &mut self.wires;
+        let [can1, can2, can3] = &mut self.wires;
         match line {
             Line::Can1 => can1,
             Line::Can2 => can2,
+            Line::Can3 => can3,
         }
     }
 

@@ -17,7 +17,7 @@
 //!
 //! | item | what it is |
 //! |---|---|
-//! | [`World`] | the two buses, up to 16 motors, and the time |
+//! | [`World`] | the three buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |

@@ -1,6 +1,8 @@
 //! One motor: feedback in, loops, raw command out.
 
 mod arming;
+mod capability;
+mod measured;
 mod receive;
 mod target;
 mod update;

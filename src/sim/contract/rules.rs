@@ -19,6 +19,7 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     others(make)?;
     old_target(Run::driving(make())?)?;
     nan(Run::driving(make())?)?;
+    unsupported(Run::driving(make())?, Run::driving(make())?)?;
     bad_steps(make)?;
     requeue(Run::driving(make())?)?;
     emergency_stop(Run::driving(make())?)?;
@@ -165,6 +166,17 @@ fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
         let refused = run.subject.drive(share) == Err(TargetError::NotFinite);
         let output = run.step()?;
         run.expect(refused && output.driving == 0, Rule::NanIsZero)?;
+    }
+    Ok(())
+}
+
+/// On one device of two: the other must not differ.
+fn unsupported<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
+    for _ in 0..20 {
+        let outcome = run.subject.drive_unsupported();
+        let refused = matches!(outcome, Err(TargetError::Unsupported | TargetError::NoLoop));
+        let same = run.step()? == other.step()?;
+        run.expect(refused && same, Rule::UnsupportedIsAnError)?;
     }
     Ok(())
 }
