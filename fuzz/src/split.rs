@@ -1,4 +1,4 @@
-//! What the fuzz targets of the framed byte protocols have in common.
+//! Framed byte protocols: what is found must not depend on how the bytes were split.
 
 use std::fmt::Debug;
 

@@ -1,0 +1,13 @@
+//! What the fuzz targets share: the oracle, and how bytes become input.
+
+mod controllers;
+mod input;
+mod motors;
+mod split;
+mod watched;
+
+pub use controllers::Observed;
+pub use input::Input;
+pub use motors::{COUNT, Target};
+pub use split::any_split_gives_the_same;
+pub use watched::{Watched, words};
