@@ -20,6 +20,8 @@
 //! | [`World`] | the two buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
+//! | [`JointConfig`], [`JointKey`], [`JointState`] | a joint of a snake robot, with its drive |
+//! | [`SerialLine`], [`Noise`] | a serial line that takes its time, and damages bytes |
 //! | [`ChassisConfig`], [`ChassisState`] | a mecanum body on four of them |
 //! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
@@ -73,12 +75,14 @@ mod engine;
 mod error;
 mod esc;
 mod fault;
+mod joint;
 mod line;
 mod mailbox;
 mod motor;
 mod random;
 mod ring;
 mod rotor;
+mod serial;
 mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
@@ -87,6 +91,8 @@ pub use contract::{Rule, Subject, Violation, check_contract};
 pub use controller::{Controller, ControllerError};
 pub use error::AttachError;
 pub use fault::{Fault, FaultsFull};
+pub use joint::{JointConfig, JointKey, JointState};
 pub use line::{Line, Record, Sender, Traffic};
 pub use motor::{LostCommand, Model, MotorConfig, MotorKey, MotorState};
+pub use serial::{Noise, SerialCounts, SerialLine};
 pub use world::{SimClock, World};
