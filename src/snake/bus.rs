@@ -225,12 +225,8 @@ impl Joints {
                 continue;
             }
             let stops = slot.update(tick.now());
-            let (is_driven, reminds) = (slot.is_driven(), slot.wants_reminder(tick.now()));
-            if stops || reminds {
+            if stops || slot.wants_reminder(tick.now()) {
                 self.stop(index);
-            } else if is_driven {
-                self.stops &= !(1 << index);
-                self.returned.0 &= !(1 << index);
             }
         }
         self.plan();

@@ -32,7 +32,7 @@
 //!   is not finite, a bad time step, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
 //! * again each 100 ms as long as a joint is relaxed: a drive may have missed it.
 //!
-//! A joint that is to move is written in the order mode, current, acceleration, deceleration, speed, target, enable, so
+//! A relaxed joint is disabled before it is brought up again, however soon that is. It is written in the order mode, current, acceleration, deceleration, speed, target, enable, so
 //! that none is enabled with an old target; then its target is repeated in its turn, so that a lost frame does not last.
 //! The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
 //! ([`State::resets`]), and waits to be armed.
@@ -56,6 +56,10 @@
 //! let gripper = BusLoad::new(1_000_000).with_frames(4, 1_000); // two feedbacks, two commands
 //! assert_eq!(joints.and(&gripper).to_string(), "70 % to 85 %");
 //! ```
+//!
+//! That is four frames in a tick, and 12 more for a stop of all: a controller with three mailboxes needs a driver that
+//! queues what waits and feeds them from its transmit interrupt, as the example `snake` has one. Without it the frames
+//! that found no room go out first in the next tick.
 //!
 //! # Sources
 //! The public firmware of the robot (`can1.c`, `chasis_task.c`, `uart3.c`). It reads only the position and never looks at

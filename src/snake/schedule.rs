@@ -15,7 +15,7 @@ impl Joints {
         // What the driver refused goes first, so that neither starves the other.
         self.reads_first = self.reads | reads != 0 && self.writes | writes == 0;
         self.stops |= stops;
-        self.writes |= writes & !self.stops;
+        self.writes |= writes;
         self.reads |= reads;
         // Who has news goes before who only hears the old again.
         for news in [true, false] {
@@ -24,7 +24,7 @@ impl Joints {
                     break;
                 }
                 let Some(slot) = self.slots.get(usize::from(index)) else { continue };
-                let free = self.is_free(index) && (self.stops | self.writes) & 1 << index == 0;
+                let free = self.is_free(index) && self.writes & 1 << index == 0;
                 let wants = if news { slot.has_news() } else { slot.is_driven() };
                 if free && wants {
                     self.writes |= 1 << index;
@@ -59,7 +59,7 @@ impl Joints {
         if let Some(index) = lowest(self.stops & !quiet) {
             self.stops &= !(1 << index);
             if let Some(slot) = self.slots.get_mut(usize::from(index)) {
-                _ = slot.next_write(now); // notes the time
+                slot.told_to_relax(now);
             }
             return Command::DISABLE.frame(index + 1);
         }
@@ -94,7 +94,10 @@ impl Joints {
         let Some(command) = Command::decode(frame.data()) else { return false };
         let (bit, attached) = (1 << index, slot.id.is_some());
         match command {
-            Command::DISABLE => self.returned.0 |= bit,
+            Command::DISABLE => {
+                slot.told_to_relax(self.now);
+                self.returned.0 |= bit;
+            }
             _ if !attached => return false,
             Command::Write(register, _) => {
                 slot.unwrite(register);

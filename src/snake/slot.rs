@@ -215,6 +215,12 @@ impl Slot {
         core::mem::replace(&mut self.driven, false)
     }
 
+    /// Notes that it is told to relax now. A joint that has a target again is brought up from the beginning after that.
+    pub(super) const fn told_to_relax(&mut self, now: Instant) {
+        self.stopped = now;
+        self.pending = ALL;
+    }
+
     /// Returns the frame that is next to be written.
     pub(super) fn next_write(&mut self, now: Instant) -> Command {
         if !self.driven {

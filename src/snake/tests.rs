@@ -187,6 +187,24 @@ fn zeroing_makes_the_present_position_zero_and_relaxes() {
 }
 
 #[test]
+fn a_joint_that_gets_a_new_target_at_once_is_disabled_before_it_is_brought_up() {
+    let mut bench = Bench::armed(&[2]);
+    bench.drive(20);
+    bench.joints.relax(bench.handles[0]);
+    bench.joints.set_pulses(bench.handles[0], 5).unwrap();
+    let sent = writes(&bench.run(9));
+    assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
+    assert_eq!(sent[7], Command::Write(Register::Enable, 1));
+    // The same when the driver gives the disable back.
+    bench.joints.relax(bench.handles[0]);
+    bench.joints.set_pulses(bench.handles[0], 6).unwrap();
+    let refused = bench.joints.next_frame().unwrap();
+    assert!(bench.joints.requeue(&refused));
+    let sent = writes(&bench.run(9));
+    assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
+}
+
+#[test]
 fn a_reversed_joint_turns_position_speed_and_target_around() {
     let mut bench = Bench::new(&[]);
     bench.handles.push(bench.joints.attach(Config::new(6).reversed()).unwrap());

@@ -199,6 +199,7 @@ impl Drive {
         let turns_per_s = self.velocity / PULSES_PER_TURN as f32;
         JointState {
             pulses: nearest(self.shaft),
+            counter: nearest(self.shaft - self.zero),
             velocity: AngularVelocity::from_rpm(turns_per_s * 60.0),
             is_enabled: self.powered && self.registers.moves(),
             target: self.registers.position,

@@ -101,6 +101,8 @@ impl JointKey {
 pub struct JointState {
     /// Where the shaft is, in pulses since the start, whatever its drive forgot.
     pub pulses: i32,
+    /// What the drive's own counter shows: the same, until it forgot where its zero was.
+    pub counter: i32,
     /// How fast it turns.
     pub velocity: AngularVelocity,
     /// Whether its drive moves it, or holds it.
