@@ -225,6 +225,8 @@ fn the_check_itself_finds_what_it_should() {
     assert_eq!(violations("encoder", "use crate::{units::Angle, motor::Link};").len(), 1);
     assert_eq!(violations("dji", "let x = crate::runner::Nb(can);").len(), 1);
     assert_eq!(violations("chassis", "use crate::dji::Bus;").len(), 1);
+    assert_eq!(strangers("use crate::snake::{Joints, Register};").len(), 1);
+    assert_eq!(strangers("use crate::dji::{Bus, Facts};").len(), 1);
     assert!(
         violations(
             "dji",

@@ -101,7 +101,7 @@ pub(crate) struct Host {
     /// All that was sent.
     pub(crate) sent: Vec<Command>,
     pub(crate) sent_bytes: u32,
-    /// The largest angle of a joint that came back, in degrees.
+    /// The largest angle of a joint that came back during the gait, in degrees.
     pub(crate) furthest_deg: f32,
 }
 
@@ -180,7 +180,9 @@ impl Host {
     /// Takes bytes of the line.
     pub(crate) fn receive(&mut self, mut bytes: &[u8], now: Instant) {
         while let Some(telemetry) = self.telemetry.read(&mut bytes) {
-            let angles = telemetry.positions_pulses.iter().map(|pulses| degrees(*pulses).abs());
+            let is_moving = self.operator.gait_since(seconds(now)).is_some();
+            let shown = telemetry.positions_pulses.iter().filter(|_| is_moving);
+            let angles = shown.map(|pulses| degrees(*pulses).abs());
             self.furthest_deg = angles.fold(self.furthest_deg, f32::max);
             self.latest = Some(telemetry);
             self.received_s = seconds(now);

@@ -45,8 +45,8 @@ impl Report {
         if checksum_errors + length_errors + skipped_bytes > 0 {
             return Err(format!("TCP damages nothing, but: {:?}", self.counts));
         }
-        if !self.armed || self.furthest_deg < 20.0 {
-            return Err(format!("the robot did not move: {:.1} degrees", self.furthest_deg));
+        if !self.armed || !(20.0..40.0).contains(&self.furthest_deg) {
+            return Err(format!("it did not swing by 30 degrees, but {:.1}", self.furthest_deg));
         }
         Ok(())
     }
@@ -67,8 +67,8 @@ pub(crate) fn robot(
     let mut wall = Wall::start();
     let mut report = Report::new(run_s);
     while wall.seconds() < run_s {
-        let received = read(&mut stream, &mut buffer)?;
-        let Some(received) = received else { break };
+        std::thread::sleep(NAP);
+        let Some(received) = read(&mut stream, &mut buffer)? else { break };
         report.bytes += received.len();
         robot.hear_host(received, world.now());
         wall.catch_up(seconds(world.now()), LARGEST_DELAY_S);
@@ -93,13 +93,15 @@ pub(crate) fn robot(
             }
             output.host.clear();
         }
+        if !robot.runner.is_armed() {
+            continue; // not zeroed yet, or not moving
+        }
         let states = plant.states();
         let angles = robot.joints.iter().zip(states).filter_map(|(joint, state)| {
             let offset = robot.runner.device().0.offset(*joint)?;
             Some(super::degrees(offset.shown(state?.counter)).abs())
         });
         report.furthest_deg = angles.fold(report.furthest_deg, f32::max);
-        std::thread::sleep(NAP);
     }
     report.counts = robot.host_counts();
     report.losses = robot.host_losses();

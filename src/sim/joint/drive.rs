@@ -269,7 +269,7 @@ mod tests {
             fastest = fastest.max(before);
         }
         assert!((fastest - 65_536.0).abs() < 1.0);
-        assert_eq!((drive.state().pulses, drive.velocity as i32), (65_536, 0));
+        assert!(drive.state().pulses == 65_536 && drive.velocity.abs() < 1.0);
         // 0.1 s up and 0.2 s down at 1 turn/s: a turn takes 1.15 s.
         let mut again = self::drive();
         steps(&mut again, 11_000);
