@@ -190,6 +190,31 @@ fn a_second_controller_shows_in_the_counters() {
     assert_eq!(robot.runner.device().counters().foreign_commands, 1);
 }
 
+/// The negative control of every `collisions == 0` here and in `snake_robot`.
+#[test]
+fn a_controller_that_does_not_wait_for_the_answer_collides_with_it() {
+    use embedded_can::nb::Can;
+    let world = World::new(6);
+    let key = world.attach_joint(JointConfig::new(3)).unwrap();
+    let mut can = world.controller();
+    let read = Command::Read(Register::ActualPosition).frame(3).unwrap();
+    let write = Command::Write(Register::Position, 5).frame(3).unwrap();
+    let urgent = CanFrame::standard(0, [0; 8]).unwrap();
+    for _ in 0..50 {
+        can.transmit(&read).unwrap();
+        world.advance(Duration::from_micros(130));
+        // The bus is busy until after the answer is due, and this waits as well.
+        for _ in 0..2 {
+            world.inject(Line::Can1, urgent).unwrap();
+        }
+        world.advance(Duration::from_micros(10));
+        can.transmit(&write).unwrap();
+        world.advance(Duration::from_millis(2));
+    }
+    let state = world.joint(key).unwrap();
+    assert!(state.replies == 50 && state.collisions > 25, "{state:?}");
+}
+
 #[test]
 fn one_bus_carries_dji_motors_and_joints_and_finds_no_clash() {
     use drivetrain::dji::{Bus, Config as Dji, Gm6020Voltage, M2006};

@@ -63,7 +63,9 @@
 //!
 //! # Sources
 //! The public firmware of the robot (`can1.c`, `chasis_task.c`, `uart3.c`). It reads only the position and never looks at
-//! the register of a reply; here a reply is sorted by it. What a drive does when it hears nothing is not documented.
+//! the register of a reply; here a reply is sorted by it. What a drive does when it hears nothing is not documented, nor
+//! whether it answers for every register: if not for `10`, that shows as requests without an answer
+//! ([`State::unanswered`]), one of 24, and a drive that lost its enable is noticed only by its position.
 
 mod budget;
 mod bus;
