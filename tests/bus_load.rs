@@ -25,6 +25,11 @@ proptest! {
 fn the_bounds_are_those_of_the_simulator() {
     assert_eq!(BusLoad::NOMINAL_BITS, nominal_bits(false, 8));
     assert_eq!(BusLoad::WORST_CASE_BITS, worst_case_bits(false, 8));
+    for length in 0..=9 {
+        let load = BusLoad::new(1_000_000).with_frames_of(length, 1, 1_000_000);
+        let bits = [nominal_bits(false, length), worst_case_bits(false, length)];
+        assert_eq!(load.to_string(), format!("{} % to {} %", bits[0] * 100, bits[1] * 100));
+    }
 }
 
 /// Runs motors with raw commands for a second; returns the reckoned and the measured load.

@@ -1,6 +1,6 @@
 use super::esc::Tampering;
 use super::random::Random;
-use super::{Line, MotorKey};
+use super::{JointKey, Line, MotorKey};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use core::ops::{Bound, RangeBounds};
@@ -66,6 +66,10 @@ pub enum Fault {
         /// Whether the angle at which it starts again is its new zero.
         forgets_angle: bool,
     },
+    /// The joint answers nothing, and goes on otherwise.
+    SilentJoint(JointKey),
+    /// The joint has no supply. Afterwards it starts afresh, disabled, and counts from where it is.
+    JointPowerLoss(JointKey),
     /// Angle and speed in the feedback stay what they were.
     StuckEncoder(MotorKey),
     /// The angle field of the feedback has this value; above 8191 it is not valid.

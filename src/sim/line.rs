@@ -26,6 +26,8 @@ pub enum Sender {
     Controller,
     /// A simulated motor.
     Motor(super::MotorKey),
+    /// A simulated joint.
+    Joint(super::JointKey),
     /// Anybody else: [`World::inject`](super::World::inject) or a flood.
     Foreign,
 }

@@ -38,6 +38,7 @@ pub fn call_all() {
     crate::geometry::call_all();
     crate::chassis::call_all();
     crate::pwm::call_all();
+    crate::snake::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
     #[cfg(feature = "panics")]
@@ -256,6 +257,8 @@ fn motor() {
     Timeouts::good_frames.call();
     BusLoad::new.call();
     BusLoad::with_frames.call();
+    BusLoad::with_frames_of.call();
+    BusLoad::and.call();
     BusLoad::frames_per_s.call();
     BusLoad::bit_rate.call();
     BusLoad::nominal.call();

@@ -13,6 +13,7 @@ mod geometry;
 mod opaque;
 mod pwm;
 mod shaping;
+mod snake;
 mod wire;
 
 use core::panic::PanicInfo;

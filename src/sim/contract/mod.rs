@@ -45,6 +45,12 @@ pub trait Subject {
         11
     }
 
+    /// Returns the milliseconds that an emergency stop may take until it is on its way: 0, unless the protocol has it wait
+    /// for an answer.
+    fn stop_ms(&self) -> u64 {
+        0
+    }
+
     /// Returns the milliseconds after which a target no longer counts, one tick included.
     fn command_ms(&self) -> u64 {
         101

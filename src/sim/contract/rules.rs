@@ -222,15 +222,20 @@ fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
     // In the middle of a cycle: what waits now must be zero already.
     run.subject.device().emergency_stop();
     let output = run.drain()?;
-    run.expect(output.frames > 0 && output.driving == 0, rule)?;
-    for _ in 0..20 {
+    let mut frames = output.frames;
+    run.expect(output.driving == 0, rule)?;
+    for ms in 0..20 {
         let now = run.now();
         let refused = run.subject.device().arm(now) == Err(ArmError::Stopped);
         let no_target = run.subject.drive(1.0) == Err(TargetError::Disarmed);
-        let zero = run.step()?.driving == 0;
+        let output = run.step()?;
+        if ms < run.subject.stop_ms() {
+            frames += output.frames;
+        }
         let stopped = run.subject.device().is_stopped();
-        run.expect(refused && no_target && zero && stopped, rule)?;
+        run.expect(refused && no_target && output.driving == 0 && stopped, rule)?;
     }
+    run.expect(frames > 0, rule)?;
     run.subject.device().clear_emergency_stop();
     let zero = run.step()?.driving == 0;
     let disarmed = !run.subject.device().is_armed();
