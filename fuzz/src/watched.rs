@@ -256,7 +256,8 @@ impl Watched {
             // A loop that has run since it was at rest may integrate from now on.
             alone.moved |= alone.commanded.is_some() && !old;
             alone.first_velocity &= old;
-            if is_old(now, alone.commanded, COMMAND_US) {
+            // While the feedback is late nobody looks at the target: where time goes back, it may be young again.
+            if is_old(now, alone.commanded, COMMAND_US) && !is_old(now, alone.heard, LATE_US) {
                 alone.commanded = None;
             }
             if alone.bus.link(motor.handle()) == Some(Link::Offline) {
