@@ -333,6 +333,6 @@ mod tests {
     #[test]
     fn an_error_says_column_and_what_was_expected() {
         let error = Record::parse(b"can0 201#0E1").unwrap_err();
-        assert_eq!(std::format!("{error}"), "column 12: expected two hexadecimal digits");
+        assert_eq!(std::format!("{error}"), "column 13: expected two hexadecimal digits");
     }
 }
