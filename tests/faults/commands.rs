@@ -1,6 +1,7 @@
 //! F34 to F43: what is asked for.
 
-use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, words};
+use crate::case::{Case, cases, safe_after, saw};
+use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, M2006, M3508};
 use drivetrain::encoder::{GearRatio, Position};
@@ -10,9 +11,23 @@ use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, Current, Voltage};
 
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f34_a_setpoint_that_is_not_finite_gives_zero_at_once_and_is_counted,
+    f35_gains_and_limits_that_make_no_sense_are_named,
+    f36_conversions_saturate_symmetrically_and_monotonically,
+    f37_each_model_has_its_own_scale,
+    f38_a_gear_of_zero_and_a_torque_constant_that_makes_no_sense_are_refused,
+    f39_wind_up_is_bounded_and_unwinds_at_once,
+    f40_a_change_of_target_kind_under_load_does_not_jump,
+    f41_a_refused_command_says_why_and_is_not_kept,
+    f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed,
+    f64_a_gimbal_whose_yaw_is_lost_is_not_followed,
+];
+
 const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
-#[test]
+#[cfg_attr(test, test)]
 fn f34_a_setpoint_that_is_not_finite_gives_zero_at_once_and_is_counted() {
     let loops = (PidConfig::new(3.0, 0.0, 0.0), SPEED);
     let (mut bus, [wheel]) = armed([Config::new(1).position_loop(loops.0, loops.1)]);
@@ -41,9 +56,11 @@ fn f34_a_setpoint_that_is_not_finite_gives_zero_at_once_and_is_counted() {
     assert_eq!(bus.state(wheel).unwrap().refused_targets, refused);
     bus.set_velocity(wheel, rpm(10.0)).unwrap();
     assert!(step(&mut bus, ms + 2).unwrap()[0] > 0, "works on");
+    safe_after(1);
+    saw(format!("{refused} refused, zero at once, works on"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f35_gains_and_limits_that_make_no_sense_are_named() {
     let mut bus = Bus::new();
     let mut refused = |config: Config<M3508>| bus.attach(config).unwrap_err().to_string();
@@ -68,9 +85,10 @@ fn f35_gains_and_limits_that_make_no_sense_are_named() {
         .attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(-1.0, 0.0, 0.0)))
         .is_err();
     const { assert!(REFUSED) };
+    saw(refused(Config::new(1).speed_loop(reversed)));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f36_conversions_saturate_symmetrically_and_monotonically() {
     for reversed in [false, true] {
         let config = if reversed { Config::new(1).reversed() } else { Config::new(1) };
@@ -111,10 +129,11 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
             assert_eq!(step(&mut bus, ms).unwrap()[0], sign * limited);
         }
     }
+    saw("3.4e38 A is 16384 and -3.4e38 A is -16384; -32768 is -16384");
 }
 
 /// That the wrong unit does not compile is shown by the `compile_fail` examples of `CurrentControlled` and `branded`.
-#[test]
+#[cfg_attr(test, test)]
 fn f37_each_model_has_its_own_scale() {
     fn raw_of<M: CurrentControlled>(base: u16) -> i16 {
         let mut bus = Bus::new();
@@ -127,9 +146,10 @@ fn f37_each_model_has_its_own_scale() {
     }
     let raw = [raw_of::<M2006>(0x200), raw_of::<M3508>(0x200), raw_of::<Gm6020Current>(0x204)];
     assert_eq!(raw, [1_000, 819, 5_461]);
+    saw(format!("1 A is {raw:?} on M2006, M3508, GM6020"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f38_a_gear_of_zero_and_a_torque_constant_that_makes_no_sense_are_refused() {
     for (rotor, output) in [(0, 1), (1, 0), (0, 0)] {
         assert!(GearRatio::new(rotor, output).is_err(), "{rotor}:{output}");
@@ -143,9 +163,10 @@ fn f38_a_gear_of_zero_and_a_torque_constant_that_makes_no_sense_are_refused() {
         let error = bus.attach(yaw).unwrap_err().to_string();
         assert_eq!(error, "GM6020 (voltage) #1: nominal voltage is not usable");
     }
+    saw("gears with a 0, constants of 0, -1, NaN, infinity: refused by name");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f39_wind_up_is_bounded_and_unwinds_at_once() {
     let greedy = PidConfig::new(1.0, 1e6, 0.0);
     let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(greedy)]);
@@ -161,9 +182,10 @@ fn f39_wind_up_is_bounded_and_unwinds_at_once() {
     assert_eq!(run(&mut bus, 20_000, 400.0, 0), 16_384);
     let unwound = (20_001..20_010).any(|ms| run(&mut bus, ms, -400.0, 0) < 0);
     assert!(unwound, "nothing to unwind");
+    saw("at the limit for 20 s with ki 1e6, turns around within 10 ticks");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f40_a_change_of_target_kind_under_load_does_not_jump() {
     let loops = (PidConfig::new(8.0, 0.0, 0.0), PidConfig::new(0.6, 6.0, 0.0));
     let world = World::new(5);
@@ -193,10 +215,11 @@ fn f40_a_change_of_target_kind_under_load_does_not_jump() {
         let words = rig.words(0, change - 2, change + 5);
         let jump = words.windows(2).map(|pair| (pair[1] - pair[0]).abs()).max().unwrap();
         assert!(jump < 700, "at {change} ms by {jump} of 16384: {words:?}");
+        saw(format!("{jump} of 16384 at {change} ms"));
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f41_a_refused_command_says_why_and_is_not_kept() {
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
@@ -220,9 +243,10 @@ fn f41_a_refused_command_says_why_and_is_not_kept() {
     rig.runner.arm(tick).unwrap();
     rig.run(50, |_, _| {});
     assert!(rig.words(0, 112, 650).iter().all(|word| *word == 0), "not kept while offline");
+    saw(format!("{errors:?}; none kept"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
     // In the middle of a tick: between update and sending.
     let (mut bus, [wheel]) = armed([Config::new(1)]);
@@ -251,9 +275,11 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
     rig.runner.arm(Tick::new(world.now(), 0.001)).unwrap();
     rig.drive(20);
     assert!(rig.words(0, 530, 540).iter().all(|word| *word != 0));
+    safe_after(ticks_since(300, rig.first_zero(0, 300)));
+    saw("zero until cleared and armed");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
     use drivetrain::chassis::{GimbalEdge, Mode, ModeConfig, Modes, WithoutGimbal};
     use drivetrain::geometry::Twist;
@@ -289,5 +315,6 @@ fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
         assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
         let (lost, back) = (GimbalEdge::Lost, GimbalEdge::Back);
         assert_eq!(edges, [lost, back, lost, back], "each once");
+        saw(format!("{acting:?}, edges {edges:?}"));
     }
 }

@@ -1,14 +1,18 @@
 //! The catalogue of faults in `docs/faults.md`, driven through the simulator and the public API.
 //!
-//! A test's name begins with the id of its row; `table.rs` holds both together.
+//! A test's name begins with the id of its row; `table.rs` holds both together. `cargo run --release --example faults`
+//! runs the same functions and prints what they saw.
 
 #![cfg(test)]
 
+mod case;
+mod catalogue;
 mod commands;
 mod plausibility;
 mod receive;
 mod registration;
 mod rig;
+mod rows;
 mod table;
 mod timing;
 mod transmit;

@@ -1,12 +1,23 @@
 //! F13 to F23: what feedback can mean.
 
-use crate::rig::{Rig, armed, at_ms, feedback};
+use crate::case::{Case, cases, safe_after, saw};
+use crate::rig::{Rig, armed, at_ms, feedback, ticks_since};
 use drivetrain::dji::{Bus, Config, ErrorCode, Gm6020Voltage, M2006, M3508};
 use drivetrain::encoder::Homing;
 use drivetrain::motor::{Ingest, Link};
 use drivetrain::sim::{Fault, Line, World};
 
-#[test]
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f13_the_first_frame_sets_the_angle_without_a_turn,
+    f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent,
+    f15_a_power_cycle_in_motion_relaxes_and_makes_the_position_uncertain,
+    f16_300_000_turns_one_way_lose_no_count,
+    f19_error_codes_of_each_esc_are_read_and_unlisted_ones_kept,
+    f20_a_c610_has_no_temperature,
+];
+
+#[cfg_attr(test, test)]
 fn f13_the_first_frame_sets_the_angle_without_a_turn() {
     for angle in [0, 1, 4_097, 5_000, 8_000, 8_191] {
         let mut bus = Bus::new();
@@ -18,10 +29,13 @@ fn f13_the_first_frame_sets_the_angle_without_a_turn() {
         assert!((state.position.angle().as_degrees() - degrees).abs() < 1e-3);
         assert!((state.velocity.as_rpm() + 60.0).abs() < 1e-3);
         assert_eq!(state.homing, Homing::Absolute);
+        if angle == 8_191 {
+            saw(format!("{:.2} degrees, 0 turns", state.position.angle().as_degrees()));
+        }
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent() {
     for seed in 1..=5 {
         let world = World::new(seed);
@@ -45,9 +59,10 @@ fn f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent() {
     _ = bus.ingest(&feedback(0x201, 4_000, 9_000), at_ms(90));
     let state = bus.state(wheel).unwrap();
     assert_eq!((state.ambiguous_gaps, state.homing), (1, Homing::Uncertain));
+    saw("40 % lost at both full speeds: exact or flagged; 88 ms: flagged");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f15_a_power_cycle_in_motion_relaxes_and_makes_the_position_uncertain() {
     for forgets_angle in [false, true] {
         let world = World::new(3);
@@ -75,10 +90,12 @@ fn f15_a_power_cycle_in_motion_relaxes_and_makes_the_position_uncertain() {
         let truth = world.motor(rig.keys[0]).unwrap().velocity;
         assert!((after.velocity - truth).as_rpm().abs() < 2.0, "no jump in velocity");
         assert!(rig.words(1, 520, 1_200).iter().all(|word| *word > 0), "the other goes on");
+        safe_after(ticks_since(500, rig.first_zero(0, 500)));
+        saw(format!("{made_up} counts made up, {:?}, relaxed", after.homing));
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f16_300_000_turns_one_way_lose_no_count() {
     for direction in [1_i64, -1] {
         let (mut bus, [wheel]) = armed([Config::new(1)]);
@@ -94,10 +111,11 @@ fn f16_300_000_turns_one_way_lose_no_count() {
         assert!(counts.abs() > i64::from(i32::MAX));
         let turns = counts * 187 / 3_591 / 8_192;
         assert!((state.position.turns() - turns).abs() <= 1);
+        saw(format!("{} counts, exact", state.rotor_counts));
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f19_error_codes_of_each_esc_are_read_and_unlisted_ones_kept() {
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
@@ -117,9 +135,10 @@ fn f19_error_codes_of_each_esc_are_read_and_unlisted_ones_kept() {
     }
     assert_eq!(read(0x201, 6), Some(ErrorCode::Unlisted(6)), "not assigned on C620");
     assert_ne!(read(0x202, 6), Some(ErrorCode::Unlisted(6)), "a stall on C610");
+    saw(format!("6 is {:?} on a C610, unlisted on a C620", read(0x202, 6)));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f20_a_c610_has_no_temperature() {
     let mut bus = Bus::new();
     let feeder = bus.attach(Config::<M2006>::new(1)).unwrap();
@@ -129,4 +148,5 @@ fn f20_a_c610_has_no_temperature() {
     }
     assert_eq!(bus.state(feeder).unwrap().temperature_c, None);
     assert_eq!(bus.state(wheel).unwrap().temperature_c, Some(25));
+    saw("None beside Some(25)");
 }

@@ -1,6 +1,7 @@
 //! F01 to F12: what is received.
 
-use crate::rig::{Rig, armed, at_ms, feedback, rpm, step};
+use crate::case::{Case, cases, safe_after, saw};
+use crate::rig::{Rig, armed, at_ms, feedback, rpm, step, ticks_since};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
@@ -10,7 +11,21 @@ use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::Duration;
 use embedded_can::{ExtendedId, Frame, StandardId};
 
-#[test]
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f01_a_wrong_length_is_counted_and_keeps_nothing_fresh,
+    f02_a_remote_frame_is_handed_back,
+    f03_an_extended_frame_of_the_same_number_is_handed_back,
+    f04_every_unknown_id_is_handed_back_untouched_and_counted_apart,
+    f06_an_angle_above_8191_refuses_the_whole_frame,
+    f07_feedback_of_an_unattached_motor_has_its_own_counter,
+    f09_duplicated_frames_change_nothing,
+    f10_reordered_frames_are_one_sample_off_and_converge,
+    f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins,
+    f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest,
+];
+
+#[cfg_attr(test, test)]
 fn f01_a_wrong_length_is_counted_and_keeps_nothing_fresh() {
     for length in 0..8 {
         let world = World::new(1);
@@ -26,10 +41,14 @@ fn f01_a_wrong_length_is_counted_and_keeps_nothing_fresh() {
         assert!((49..=51).contains(&counted), "{counted}");
         assert_eq!(rig.runner.statistics().malformed, counted);
         assert!(rig.words(0, 680, 700).iter().all(|word| *word != 0), "clears itself");
+        safe_after(ticks_since(600, rig.first_zero(0, 600)));
+        if length == 7 {
+            saw(format!("{counted} refused, the other motor went on, clears itself"));
+        }
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f02_a_remote_frame_is_handed_back() {
     let world = World::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
@@ -41,9 +60,10 @@ fn f02_a_remote_frame_is_handed_back() {
     world.inject(Line::Can1, remote).unwrap();
     rig.drive(2);
     assert_eq!(rig.unrelated, [remote]);
+    saw(format!("handed back: {:?}", rig.unrelated[0]));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f03_an_extended_frame_of_the_same_number_is_handed_back() {
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let before = bus.state(wheel);
@@ -52,9 +72,10 @@ fn f03_an_extended_frame_of_the_same_number_is_handed_back() {
         assert_eq!(bus.ingest(&frame, at_ms(2)), Ingest::Unrelated);
     }
     assert_eq!((bus.state(wheel), bus.counters().bad_length), (before, 0));
+    saw("3 handed back, nothing changed");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f04_every_unknown_id_is_handed_back_untouched_and_counted_apart() {
     let world = World::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
@@ -69,9 +90,10 @@ fn f04_every_unknown_id_is_handed_back_untouched_and_counted_apart() {
     world.inject(Line::Can1, foreign(0x321)).unwrap();
     rig.drive(2);
     assert_eq!(rig.unrelated, [foreign(0x321)]);
+    saw(format!("{} handed back, counted apart", rig.runner.statistics().unrelated));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f06_an_angle_above_8191_refuses_the_whole_frame() {
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let before = bus.state(wheel).unwrap();
@@ -89,9 +111,11 @@ fn f06_an_angle_above_8191_refuses_the_whole_frame() {
     rig.drive(350);
     assert!(rig.first_zero(0, 200) < at_ms(213), "such frames are no sign of life");
     assert_eq!(rig.link(0), Link::Offline);
+    safe_after(ticks_since(200, rig.first_zero(0, 200)));
+    saw(format!("{} refused whole, {:?}", rig.runner.device().counters().bad_field, rig.link(0)));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f07_feedback_of_an_unattached_motor_has_its_own_counter() {
     let mut bus = Bus::new();
     bus.attach(Config::<M3508>::new(1)).unwrap();
@@ -99,9 +123,10 @@ fn f07_feedback_of_an_unattached_motor_has_its_own_counter() {
         assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(1)), Ingest::Unrelated);
     }
     assert_eq!(bus.counters().unattached, 10);
+    saw("10 handed back, 10 counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f09_duplicated_frames_change_nothing() {
     let run = |duplicated| {
         let world = World::new(4);
@@ -123,9 +148,10 @@ fn f09_duplicated_frames_change_nothing() {
     }
     assert!(step(&mut bus, 11).is_some_and(|words| words[0] == 500));
     assert_eq!(step(&mut bus, 12), Some([0; 4]), "not fresher than the real arrival");
+    saw("the same counts with every frame twice; 100 copies: late all the same");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f10_reordered_frames_are_one_sample_off_and_converge() {
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let angle = |sample: u64| u16::try_from(sample * 1_000 % 8_192).unwrap();
@@ -139,9 +165,10 @@ fn f10_reordered_frames_are_one_sample_off_and_converge() {
     }
     _ = bus.ingest(&feedback(0x201, angle(2_001), 7_324), at_ms(2_003));
     assert_eq!(bus.state(wheel).unwrap().rotor_counts, 2_001_000);
+    saw("one sample off, exact with the next");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins() {
     let speed = PidConfig::new(0.6, 6.0, 0.001);
     let config = Config::new(1).speed_loop(speed);
@@ -171,9 +198,10 @@ fn f11_64_frames_after_a_stall_are_all_taken_and_the_last_one_wins() {
     let state = bus.state(wheel).unwrap();
     assert_eq!(state.rotor_counts, total.cast_signed());
     assert!(state.ambiguous_gaps <= 1, "64 ms between two stamps may be flagged");
+    saw(format!("all taken, output {last} to {raw}, {} flagged", state.ambiguous_gaps));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     let mut queue = FrameQueue::<8>::new();
     let (mut interrupt, mut task) = queue.split();
@@ -191,4 +219,5 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     assert_eq!(rig.runner.statistics().receive_errors.overrun, 1);
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
     assert!(rig.words(0, 140, 160).iter().all(|word| *word > 0));
+    saw("13 dropped by the queue, 1 overrun of the controller, counted");
 }

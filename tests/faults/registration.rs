@@ -1,5 +1,6 @@
 //! F44 to F50: who is on the bus.
 
+use crate::case::{self, Case, cases, safe_after, saw};
 use crate::rig::{SPEED, armed, at_ms, feedback, rpm, step, words};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508,
@@ -9,6 +10,17 @@ use drivetrain::motor::{ArmError, CanDevice, Claim, MotorName, Role, TargetError
 use drivetrain::time::Tick;
 use embedded_can::StandardId;
 use proptest::prelude::*;
+
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f44_an_id_out_of_range_leaves_the_bus_unchanged,
+    f45_a_taken_slot_names_both_motors_frame_and_slot,
+    f46_every_pair_that_shares_an_id_or_a_slot_is_refused_and_no_other,
+    f47_a_handle_of_a_motor_since_detached_finds_nothing,
+    f48_detaching_in_operation_sends_one_zero_and_frees_the_slot,
+    f49_calls_in_any_order_before_anything_is_heard_give_zeros,
+    f50_an_over_subscribed_bus_says_load_ceiling_and_what_to_change,
+];
 
 fn attach<M: Model>(bus: &mut Bus, id: u8) -> Result<AnyHandle, AttachError> {
     bus.attach(Config::<M>::new(id)).map(Handle::erase)
@@ -23,7 +35,7 @@ const MODELS: [(&Facts, Attach); 4] = [
     (Gm6020Current::FACTS, attach::<Gm6020Current>),
 ];
 
-#[test]
+#[cfg_attr(test, test)]
 fn f44_an_id_out_of_range_leaves_the_bus_unchanged() {
     for (facts, attach) in MODELS {
         let mut bus = Bus::new();
@@ -32,21 +44,23 @@ fn f44_an_id_out_of_range_leaves_the_bus_unchanged() {
             assert!(matches!(error, AttachError::Id { highest, .. } if highest == facts.ids));
             assert!(error.to_string().contains(&format!("1..={}", facts.ids)), "{error}");
         }
+        saw(attach(&mut bus, 0).unwrap_err());
         assert_eq!((bus.motors().count(), bus.claims().count()), (0, 0));
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f45_a_taken_slot_names_both_motors_frame_and_slot() {
     let mut bus = Bus::new();
     bus.attach(Config::<M3508>::new(6)).unwrap();
     let error = bus.attach(Config::<Gm6020Voltage>::new(2)).unwrap_err().to_string();
     let why = "GM6020 (voltage) #2 collides with M3508 #6 on 0x206 and on slot 1 of 0x1FF";
     assert_eq!(error, why);
+    saw(error);
 }
 
 /// All pairs of all models and ids, against the rules written down another way.
-#[test]
+#[cfg_attr(test, test)]
 fn f46_every_pair_that_shares_an_id_or_a_slot_is_refused_and_no_other() {
     let mut refused = 0;
     for (one, attach_one) in MODELS {
@@ -86,10 +100,14 @@ fn f46_every_pair_that_shares_an_id_or_a_slot_is_refused_and_no_other() {
     let id = StandardId::new(0x201).unwrap();
     let damiao = Claim::new(id, Role::Command, MotorName::new("DM4310 (velocity)", 1));
     assert!(both.0.claims().any(|claim| claim.clashes_with(&damiao)));
+    saw(format!(
+        "{refused} pairs refused, no other; two families: {}",
+        both.arm(at_ms(1)).unwrap_err()
+    ));
 }
 
 /// That a handle of another brand does not compile is shown by the `compile_fail` example of `Bus::branded`.
-#[test]
+#[cfg_attr(test, test)]
 fn f47_a_handle_of_a_motor_since_detached_finds_nothing() {
     let (mut bus, [old, other]) = armed([1, 2].map(|id| Config::new(id).speed_loop(SPEED)));
     bus.detach(old);
@@ -104,9 +122,10 @@ fn f47_a_handle_of_a_motor_since_detached_finds_nothing() {
     bus.set_raw(new, 5).unwrap();
     bus.set_raw(other, 6).unwrap();
     assert_eq!(step(&mut bus, 3), Some([5, 6, 0, 0]), "never another motor's command");
+    saw("Detached, None; the new motor untouched");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f48_detaching_in_operation_sends_one_zero_and_frees_the_slot() {
     let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
     bus.set_raw(first, 100).unwrap();
@@ -118,6 +137,8 @@ fn f48_detaching_in_operation_sends_one_zero_and_frees_the_slot() {
     assert_eq!(bus.next_frame().map(|frame| words(&frame)), Some([0; 4]));
     assert!((4..40).all(|ms| step(&mut bus, ms).is_none()));
     assert!(bus.attach(Config::<M2006>::new(1)).is_ok());
+    safe_after(1);
+    saw("one frame of zeros, then silence");
 }
 
 /// One call of the bus, by number.
@@ -142,10 +163,12 @@ fn call(bus: &mut Bus, number: u8, id: u8, ms: u64) {
 }
 
 proptest! {
-    #[test]
+    #[cfg_attr(test, test)]
     fn f49_calls_in_any_order_before_anything_is_heard_give_zeros(
         calls in prop::collection::vec((0_u8..14, 0_u8..9), 0..200),
     ) {
+        _ = case::take_seen();
+        saw("up to 200 calls of 14 kinds in random order: zeros only");
         let mut bus = Bus::new();
         for (ms, (number, id)) in (1..).zip(calls) {
             call(&mut bus, number, id, ms);
@@ -157,7 +180,7 @@ proptest! {
     }
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f50_an_over_subscribed_bus_says_load_ceiling_and_what_to_change() {
     let mut bus = Bus::new().with_load_ceiling(0.8);
     bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new)).unwrap();
@@ -169,4 +192,5 @@ fn f50_an_over_subscribed_bus_says_load_ceiling_and_what_to_change() {
     let mut slower = bus.with_feedback_rate(785);
     slower.attach(Config::<M3508>::new(5)).unwrap();
     assert!(slower.load().worst_case() <= 0.8);
+    saw(error);
 }

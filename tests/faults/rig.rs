@@ -17,6 +17,11 @@ pub(crate) fn at_ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
 }
 
+/// How many ticks of 1 ms lie between an instant in ms and a later one, begun ones included.
+pub(crate) fn ticks_since(ms: u64, later: Instant) -> u64 {
+    later.since(at_ms(ms)).as_micros().div_ceil(1_000)
+}
+
 pub(crate) fn rpm(rpm: f32) -> AngularVelocity {
     AngularVelocity::from_rpm(rpm)
 }

@@ -1,6 +1,7 @@
 //! F24 to F33: time.
 
-use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, words};
+use crate::case::{Case, cases, safe_after, saw};
+use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
@@ -8,7 +9,22 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
 
-#[test]
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice,
+    f25_with_all_feedback_lost_frames_are_still_offered,
+    f26_an_application_that_stops_is_zero_after_the_deadline,
+    f28_nothing_notices_that_a_hardware_counter_wraps,
+    f29_time_that_stands_or_goes_back_is_never_fresh_for_ever,
+    f30_a_motor_unheard_for_longer_than_any_counter_stays_offline,
+    f31_a_bad_time_step_holds_once_and_is_counted,
+    f32_a_huge_time_step_moves_no_integral,
+    f33_recovery_takes_ten_good_frames_and_starts_from_zero,
+    f24_a_million_silences_end_with_the_first_tick_after_the_limit,
+    f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline,
+];
+
+#[cfg_attr(test, test)]
 fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
     let run = |silent: Option<u64>| {
         let world = World::new(2);
@@ -30,6 +46,8 @@ fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
     assert_eq!(others, healthy, "late: another motor's bytes");
     let (others, (zero, armed, (all, _), link)) = run(Some(150));
     assert!(zero.is_some_and(|zero| zero < at_ms(512)));
+    safe_after(zero.map_or(u64::MAX, |zero| ticks_since(500, zero)));
+    saw("60 ms: late, clears itself; 150 ms: relaxed, latched; others the same to the bit");
     assert!(!armed && link == Link::Online && all.iter().all(|word| *word == 0), "latched");
     assert_eq!(others, healthy, "offline: another motor's bytes");
 
@@ -54,7 +72,7 @@ fn armed_at_rest(speed: PidConfig) -> (Bus, [drivetrain::dji::Handle<M3508>; 1])
     armed([Config::new(1).speed_loop(speed)])
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f25_with_all_feedback_lost_frames_are_still_offered() {
     let world = World::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 4);
@@ -66,11 +84,14 @@ fn f25_with_all_feedback_lost_frames_are_still_offered() {
     let sent: Vec<_> = rig.sent.iter().filter(|sent| sent.at > at_ms(320)).collect();
     assert!((50..=60).contains(&sent.len()), "a keep-alive every 10 ms, not {}", sent.len());
     assert!(sent.iter().all(|sent| sent.words == [0; 4]));
+    let sent = sent.len();
     rig.drive(100);
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
+    safe_after(ticks_since(300, rig.first_zero(0, 300)));
+    saw(format!("{} zero frames in 570 ms", sent));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f26_an_application_that_stops_is_zero_after_the_deadline() {
     let world = World::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 2);
@@ -83,9 +104,11 @@ fn f26_an_application_that_stops_is_zero_after_the_deadline() {
     assert_eq!(state.forgotten_targets, 1);
     rig.drive(50);
     assert!(rig.words(0, 610, 650).iter().all(|word| *word > 0), "not latched");
+    safe_after(ticks_since(300, zero));
+    saw(format!("zero, {} target forgotten, not latched", state.forgotten_targets));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f28_nothing_notices_that_a_hardware_counter_wraps() {
     for (mut counter, mask, start) in [
         (ExtendedCounter::new_16_bit(1_000_000).unwrap(), 0xFFFF_u64, 0xFF00_u64),
@@ -107,9 +130,10 @@ fn f28_nothing_notices_that_a_hardware_counter_wraps() {
             assert_eq!(words(&bus.next_frame().unwrap()), [7, 0, 0, 0]);
         }
     }
+    saw("200 ticks across the wrap of 16 and of 32 bits: nothing");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     // Back by as much, together with the last feedback, while the loop goes on.
     for back in [1, 5, 9, 11, 1_000, 3_000_000] {
@@ -130,6 +154,7 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
             }
         }
         assert!(last_driven <= 10 + back.min(10), "back by {back} ms: driven for {last_driven}");
+        safe_after(last_driven + 1);
         // Heard again, it works on.
         for round in 200..220 {
             _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start + 1 - back + round));
@@ -153,9 +178,10 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     assert_eq!(runner.device().counters().bad_steps, 3);
     clock.set(at_ms(3));
     assert!(runner.due().is_none(), "no tick before the time comes again");
+    saw("no tick while time stands; back by up to 50 min: late, then online");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f30_a_motor_unheard_for_longer_than_any_counter_stays_offline() {
     for days in [1_u64, 50, 5_000] {
         let (mut bus, [wheel]) = armed([Config::new(1)]);
@@ -171,9 +197,10 @@ fn f30_a_motor_unheard_for_longer_than_any_counter_stays_offline() {
             assert_eq!(bus.set_raw(wheel, 5), Err(TargetError::Relaxed));
         }
     }
+    saw("offline after 1, 50 and 5000 days, where 32 bits look fresh");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f31_a_bad_time_step_holds_once_and_is_counted() {
     for bad in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(SPEED)]);
@@ -193,9 +220,10 @@ fn f31_a_bad_time_step_holds_once_and_is_counted() {
         assert_eq!(words(&bus.next_frame().unwrap())[0], 0, "only once");
         assert_eq!(bus.counters().bad_steps, 3);
     }
+    saw("held once, then zero, 3 counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f32_a_huge_time_step_moves_no_integral() {
     let integral = PidConfig::new(0.0, 1.0, 0.0);
     for dt_s in [0.021, 10.0, 1e30] {
@@ -219,9 +247,10 @@ fn f32_a_huge_time_step_moves_no_integral() {
     let tick = runner.due().unwrap();
     runner.tick(tick);
     assert_eq!(runner.statistics().overruns, 9_999);
+    saw("steps of 21 ms to 1e30 s move nothing, 9999 overruns counted");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     let (mut bus, [wheel]) = armed([Config::new(1).speed_loop(PidConfig::new(0.0, 5.0, 0.0))]);
     for ms in 2..40 {
@@ -253,6 +282,7 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     rig.drive(800);
     let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();
     assert!((1..2_000).contains(&back), "from zero: {back}");
+    saw(format!("ten good frames; then {first} after arming, {back} of 16384 on a ramp"));
 }
 
 /// Numbers without pattern: xorshift.
@@ -277,9 +307,9 @@ fn is_driven(bus: &mut Bus, now_us: u64, driven: bool) -> bool {
     core::iter::from_fn(|| bus.next_frame()).last().map_or(driven, |frame| words(&frame)[0] != 0)
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f24_a_million_silences_end_with_the_first_tick_after_the_limit() {
-    let mut random = Random(0x5EED);
+    let (mut random, mut longest) = (Random(0x5EED), 0);
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let mut now = 2_000;
     for _ in 0..1_000_000 {
@@ -296,12 +326,15 @@ fn f24_a_million_silences_end_with_the_first_tick_after_the_limit() {
             assert_eq!(driven, now <= heard + 10_000, "heard at {heard}, now {now}");
             _ = bus.set_raw(wheel, 500);
         }
+        longest = longest.max(now - heard);
     }
+    safe_after(longest.div_ceil(1_000));
+    saw(format!("1000000 silences, {longest} us at most"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() {
-    let mut random = Random(0xDEAD);
+    let (mut random, mut longest) = (Random(0xDEAD), 0);
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     let mut now = 2_000;
     for _ in 0..1_000_000 {
@@ -320,5 +353,8 @@ fn f26_a_million_hung_applications_end_with_the_first_tick_after_the_deadline() 
             driven = tick(&mut bus, now, driven);
             assert_eq!(driven, now <= commanded + 100_000, "commanded at {commanded}, now {now}");
         }
+        longest = longest.max(now - commanded);
     }
+    safe_after(longest.div_ceil(1_000));
+    saw(format!("1000000 hung applications, {longest} us at most"));
 }

@@ -1,5 +1,6 @@
 //! F51 to F56: what the driver does with frames.
 
+use crate::case::{Case, cases, safe_after, saw};
 use crate::rig::{Rig, armed, at_ms, feedback, words};
 use drivetrain::dji::Config;
 use drivetrain::frame::CanFrame;
@@ -9,6 +10,16 @@ use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ManualClock, Tick};
 use embedded_can::ErrorKind;
 use std::collections::VecDeque;
+
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f51_would_block_keeps_the_newest_value_and_starves_nobody,
+    f52_an_evicted_frame_is_offered_again_with_its_newest_value,
+    f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on,
+    f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed,
+    f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody,
+    f56_two_buses_share_nothing,
+];
 
 /// Answers as scripted, then takes everything.
 #[derive(Default)]
@@ -59,7 +70,7 @@ fn of(frames: &[CanFrame], id: u32) -> Vec<i16> {
     frames.iter().filter(|frame| frame.header() == id).map(|frame| words(frame)[0]).collect()
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f51_would_block_keeps_the_newest_value_and_starves_nobody() {
     // Once, in the middle: the frame comes with the next tick, with its value.
     let (taken, _) = run(3, |can, round| {
@@ -81,9 +92,14 @@ fn f51_would_block_keeps_the_newest_value_and_starves_nobody() {
     });
     assert_eq!((of(&taken, 0x200), of(&taken, 0x1FF)), (vec![90], vec![90]));
     assert_eq!((statistics.refused, statistics.bus_losses), (89, 0));
+    saw(format!(
+        "blocked in each tick: {} and {} of 1000 frames; for ever: the newest",
+        one.len(),
+        other.len()
+    ));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f52_an_evicted_frame_is_offered_again_with_its_newest_value() {
     let (taken, statistics) = run(3, |can, round| {
         if round == 2 {
@@ -96,9 +112,10 @@ fn f52_an_evicted_frame_is_offered_again_with_its_newest_value() {
     assert_eq!(statistics.evicted, 1);
     assert_eq!(taken[4].header(), 0x200, "first in the next tick");
     assert_eq!(of(&taken, 0x200), [1, 2, 3]);
+    saw("first in the next tick, with its value");
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
     let kinds = [ErrorKind::Acknowledge, ErrorKind::Stuff, ErrorKind::Other];
     let (taken, statistics) = run(900, |can, round| {
@@ -107,6 +124,7 @@ fn f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
         can.answers.extend(if round % 2 == 0 { [error, Ok(None)] } else { [Ok(None), error] });
     });
     let errors = statistics.send_errors;
+    let errors_by_kind = errors.total();
     assert_eq!(
         (errors.acknowledge, errors.stuff, errors.other, errors.total()),
         (300, 300, 300, 900)
@@ -122,9 +140,14 @@ fn f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
     assert!(statistics.receive_errors.total() > 100 && statistics.send_errors.total() > 100);
     assert_eq!(rig.link(0), Link::Online);
     assert!(rig.words(0, 600, 1_200).iter().all(|word| *word > 0));
+    saw(format!(
+        "{} by kind; {} more on the simulator",
+        errors_by_kind,
+        statistics.send_errors.total()
+    ));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
     for (fault, stale_at_most) in
         [(Fault::BusOff(Line::Can1), 3), (Fault::Unplugged(Line::Can1), 3)]
@@ -147,6 +170,8 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
         rig.runner.arm(Tick::new(world.now(), 0.001)).unwrap();
         rig.drive(50);
         assert!(rig.words(0, 960, 1_000).iter().all(|word| *word > 0));
+        safe_after(stale as u64 + 1);
+        saw(format!("{fault:?}: {stale} stale, then zeros until armed"));
     }
     // With the driver's abort there is no stale frame at all.
     let world = World::new(6);
@@ -158,9 +183,10 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
     rig.drive(100);
     let stale = rig.words(0, 600, 650).into_iter().filter(|word| *word != 0).count();
     assert!(stale <= 1, "{stale}: only the one in transmission");
+    saw(format!("with abort: {stale}"));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody() {
     let world = World::new(7);
     let mut rig = Rig::new(&world, Line::Can1, 2);
@@ -178,9 +204,10 @@ fn f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody() {
     assert_eq!(rig.runner.statistics().receive_errors.total(), 0);
     assert!((0..2).all(|wheel| rig.link(wheel) == Link::Online));
     assert!(rig.words(0, 600, 1_700).iter().all(|word| *word > 0));
+    saw(format!("{} handed back, none lost, driven all the time", rig.unrelated.len()));
 }
 
-#[test]
+#[cfg_attr(test, test)]
 fn f56_two_buses_share_nothing() {
     let run = |trouble: bool| {
         let world = World::new(8);
@@ -211,5 +238,7 @@ fn f56_two_buses_share_nothing() {
         assert!(right.runner.is_armed() && right.runner.statistics().bus_losses == 0);
         commands
     };
-    assert_eq!(run(true), run(false), "one bus fails, the other's frames are the same to the bit");
+    let (troubled, healthy) = (run(true), run(false));
+    assert_eq!(troubled, healthy, "one bus fails, the other's frames are the same to the bit");
+    saw(format!("{} frames of the other bus, the same to the bit", healthy.len()));
 }

@@ -1,0 +1,174 @@
+//! A mecanum chassis on a RoboMaster development board C (STM32F407IG): RTIC 2, stm32f4xx-hal and bxcan.
+//!
+//! ```text
+//! interrupt CAN1_RX0 ──FrameQueue, stamped──> control, 1 kHz: frames in, loops, frames out
+//! interrupts USART3, USART1 ──bytes──> pilot <── steer, 100 Hz: arms, sets targets
+//! ```
+//!
+//! | plug | pins | what |
+//! |---|---|---|
+//! | CAN1 | PD0 receive, PD1 transmit | four C620, ids 1 to 4, 1 Mbit/s |
+//! | DBUS | PC11, USART3 (the board inverts the signal) | DR16 receiver |
+//! | UART2, 4 pins | PB7 receive, USART1 | HiPNUC IMU, 115200 baud, 100 Hz |
+//!
+//! Pins and the 12 MHz crystal: DJI's own examples for this board. Flash with a probe on the SWD plug:
+//! `probe-rs run --chip STM32F407IGHx target/thumbv7em-none-eabihf/release/c-board-rtic`
+#![no_std]
+#![no_main]
+
+use bxcan::{Frame, Tx};
+use core::convert::Infallible;
+use panic_halt as _;
+use stm32f4xx_hal::{can::Can, pac};
+
+/// The sending half of bxcan as a driver; frames are received in the interrupt.
+pub struct Sending(Tx<Can<pac::CAN1>>);
+
+impl embedded_can::nb::Can for Sending {
+    type Frame = Frame;
+    type Error = Infallible;
+
+    fn transmit(&mut self, frame: &Frame) -> nb::Result<Option<Frame>, Infallible> {
+        self.0.transmit(frame).map(|status| status.dequeued_frame().cloned())
+    }
+
+    fn receive(&mut self) -> nb::Result<Frame, Infallible> {
+        Err(nb::Error::WouldBlock)
+    }
+}
+
+#[rtic::app(device = stm32f4xx_hal::pac, dispatchers = [EXTI0, EXTI1])]
+mod app {
+    use super::Sending;
+    use bxcan::filter::Mask32;
+    use bxcan::{Fifo, Interrupt, Rx0};
+    use drivetrain::dji::Bus;
+    use drivetrain::motor::CanDevice;
+    use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, Runner};
+    use drivetrain::time::{Instant, Tick};
+    use pilot::{Pilot, Wish};
+    use rtic_time::Monotonic;
+    use stm32f4xx_hal::can::Can;
+    use stm32f4xx_hal::pac::{CAN1, TIM2, USART1, USART3};
+    use stm32f4xx_hal::prelude::*;
+    use stm32f4xx_hal::serial::{Config, Rx, Serial};
+    use stm32f4xx_hal::{rcc, timer::MonoTimerUs};
+
+    type Micros = MonoTimerUs<TIM2>;
+    type Robot = Runner<Nb<Sending>, fn() -> Instant, Bus>;
+
+    fn now() -> Instant {
+        Instant::from_micros(Micros::now().ticks())
+    }
+
+    #[shared]
+    struct Shared {
+        runner: Robot,
+        pilot: Pilot,
+    }
+
+    #[local]
+    struct Local {
+        receiving: Rx0<Can<CAN1>>,
+        into_queue: FrameSender<'static>,
+        queue: FrameReceiver<'static>,
+        remote: Rx<USART3>,
+        imu: Rx<USART1>,
+    }
+
+    #[init(local = [frames: FrameQueue<64> = FrameQueue::new()])]
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        // 168 MHz from the crystal; APB1 42 MHz: prescaler 3, 14 quanta a bit, sampled at 85.7 %: 1 Mbit/s exactly.
+        let clocks = rcc::Config::hse(12.MHz()).sysclk(168.MHz()).pclk1(42.MHz());
+        let mut rcc = cx.device.RCC.freeze(clocks);
+        cx.device.TIM2.monotonic_us(&mut cx.core.NVIC, &mut rcc);
+        let gpiob = cx.device.GPIOB.split(&mut rcc);
+        let gpioc = cx.device.GPIOC.split(&mut rcc);
+        let gpiod = cx.device.GPIOD.split(&mut rcc);
+
+        let can = cx.device.CAN1.can((gpiod.pd1, gpiod.pd0), &mut rcc);
+        let mut can = bxcan::Can::builder(can).set_bit_timing(0x001A_0002).enable();
+        can.modify_filters().enable_bank(0, Fifo::Fifo0, Mask32::accept_all());
+        can.enable_interrupt(Interrupt::Fifo0MessagePending);
+        let (sending, receiving, _) = can.split();
+
+        let line = Config::default().baudrate(100_000.bps()).wordlength_9().parity_even();
+        let remote = Serial::rx(cx.device.USART3, gpioc.pc11, line, &mut rcc);
+        let line = Config::default().baudrate(115_200.bps());
+        let imu = Serial::rx(cx.device.USART1, gpiob.pb7, line, &mut rcc);
+        let (Ok(mut remote), Ok(mut imu)) = (remote, imu) else { panic!("a serial line") };
+        remote.listen();
+        imu.listen();
+
+        let mut bus = Bus::new();
+        let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
+        let runner = Runner::new(Nb(Sending(sending)), now as fn() -> Instant, bus);
+        let (into_queue, queue) = cx.local.frames.split();
+        control::spawn().expect("the first");
+        steer::spawn().expect("the first");
+        (Shared { runner, pilot }, Local { receiving, into_queue, queue, remote, imu })
+    }
+
+    #[task(binds = CAN1_RX0, priority = 4, local = [receiving, into_queue])]
+    fn receive(cx: receive::Context) {
+        loop {
+            match cx.local.receiving.receive() {
+                Ok(frame) => _ = cx.local.into_queue.push(&frame, now()),
+                // The controller's FIFO ran over: what came after is still to be read.
+                Err(nb::Error::Other(_)) => {}
+                Err(nb::Error::WouldBlock) => break,
+            }
+        }
+    }
+
+    #[task(binds = USART3, priority = 3, shared = [pilot], local = [remote])]
+    fn hear_remote(mut cx: hear_remote::Context) {
+        if let Ok(byte) = cx.local.remote.read() {
+            cx.shared.pilot.lock(|pilot| pilot.hear_remote(&[byte], now()));
+        }
+    }
+
+    #[task(binds = USART1, priority = 3, shared = [pilot], local = [imu])]
+    fn hear_imu(mut cx: hear_imu::Context) {
+        if let Ok(byte) = cx.local.imu.read() {
+            cx.shared.pilot.lock(|pilot| pilot.hear_imu(&[byte], now()));
+        }
+    }
+
+    #[task(priority = 2, shared = [runner], local = [queue])]
+    async fn control(mut cx: control::Context) {
+        let mut next = Micros::now();
+        loop {
+            next += 1.millis();
+            Micros::delay_until(next).await;
+            cx.shared.runner.lock(|runner| {
+                while let Some((frame, arrived)) = cx.local.queue.pop() {
+                    _ = runner.ingest(&frame, arrived);
+                }
+                if let Some(tick) = runner.due() {
+                    runner.tick(tick);
+                }
+            });
+        }
+    }
+
+    #[task(priority = 1, shared = [runner, pilot])]
+    async fn steer(cx: steer::Context) {
+        const PERIOD_S: f32 = 0.01;
+        let steer::SharedResources { mut runner, mut pilot, .. } = cx.shared;
+        let mut next = Micros::now();
+        loop {
+            next += 10.millis();
+            Micros::delay_until(next).await;
+            let tick = Tick::new(now(), PERIOD_S);
+            (&mut runner, &mut pilot).lock(|runner, pilot| {
+                match pilot.wish(tick.now()) {
+                    Wish::Arm => _ = runner.arm(tick),
+                    Wish::GoOn => {}
+                    Wish::Rest => runner.device_mut().disarm(),
+                }
+                pilot.drive(runner.device_mut(), tick);
+            });
+        }
+    }
+}

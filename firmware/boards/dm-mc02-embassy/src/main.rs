@@ -1,0 +1,166 @@
+//! A mecanum chassis on a DM-MC02 (STM32H723VG): embassy without the runner. One task receives, one ticks and sends.
+//!
+//! | plug | pins | what |
+//! |---|---|---|
+//! | CAN1 | PD0 receive, PD1 transmit, FDCAN1 | four C620, ids 1 to 4, classic frames, 1 Mbit/s |
+//! | DBUS | PD2, UART5 (the board inverts the signal) | DR16 receiver |
+//! | UART1 | PA10 receive, PA9 transmit, USART1 | HiPNUC IMU, 115200 baud, 100 Hz |
+//! | 5 V | PC15 high switches it on | for the receiver and the IMU |
+//!
+//! Pins and the 24 MHz crystal: public projects for this board, which agree. Flash with a probe on the SWD plug:
+//! `probe-rs run --chip STM32H723VGTx target/thumbv7em-none-eabihf/release/dm-mc02-embassy`
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+use drivetrain::dji::Bus;
+use drivetrain::motor::CanDevice;
+use drivetrain::time::{Instant, Tick};
+use embassy_executor::Spawner;
+use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
+use embassy_stm32::{Config, bind_interrupts, peripherals, rcc, time::Hertz};
+use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
+use embassy_time::{Duration, Ticker};
+use embedded_io_async::Read;
+use panic_halt as _;
+use pilot::{Pilot, Wish};
+use static_cell::StaticCell;
+
+bind_interrupts!(struct Interrupts {
+    FDCAN1_IT0 => can::IT0InterruptHandler<peripherals::FDCAN1>;
+    FDCAN1_IT1 => can::IT1InterruptHandler<peripherals::FDCAN1>;
+    UART5 => usart::BufferedInterruptHandler<peripherals::UART5>;
+    USART1 => usart::BufferedInterruptHandler<peripherals::USART1>;
+});
+
+/// The motors and who drives them; never borrowed across an await.
+struct Robot {
+    bus: Bus,
+    pilot: Pilot,
+}
+
+type Shared = Mutex<ThreadModeRawMutex, RefCell<Robot>>;
+
+fn micros(instant: embassy_time::Instant) -> Instant {
+    Instant::from_micros(instant.as_micros())
+}
+
+#[embassy_executor::task]
+async fn receive(can: BufferedCanReceiver, robot: &'static Shared) {
+    loop {
+        // An error of the bus is not a frame: the motors' ages do the rest.
+        let Ok(envelope) = can.receive().await else { continue };
+        let (frame, arrived) = envelope.parts(); // stamped in the interrupt
+        robot.lock(|robot| _ = robot.borrow_mut().bus.ingest_any(&frame, micros(arrived)));
+    }
+}
+
+#[embassy_executor::task]
+async fn control(mut can: BufferedCanSender, robot: &'static Shared) {
+    const PERIOD_S: f32 = 0.001;
+    let mut millisecond = Ticker::every(Duration::from_millis(1));
+    loop {
+        millisecond.next().await;
+        let tick = Tick::new(micros(embassy_time::Instant::now()), PERIOD_S);
+        robot.lock(|robot| {
+            let Robot { bus, pilot } = &mut *robot.borrow_mut();
+            match pilot.wish(tick.now()) {
+                Wish::Arm => _ = bus.arm(tick.now()),
+                Wish::GoOn => {}
+                Wish::Rest => bus.disarm(),
+            }
+            pilot.drive(bus, tick);
+            bus.update(tick);
+            while let Some(frame) = bus.next_frame() {
+                // No waiting here: a frame without a place goes with the next tick, with newer values.
+                let offered = frame.convert::<can::Frame>();
+                if offered.is_none_or(|offered| can.try_write(offered).is_err()) {
+                    bus.requeue(&frame);
+                }
+            }
+        });
+    }
+}
+
+#[embassy_executor::task]
+async fn hear_remote(mut port: BufferedUartRx<'static>, robot: &'static Shared) {
+    let mut bytes = [0; 18];
+    loop {
+        // An overrun loses bytes; what follows in this frame is thrown away by its decoder.
+        let count = port.read(&mut bytes).await.unwrap_or(0);
+        let now = micros(embassy_time::Instant::now());
+        robot.lock(|robot| robot.borrow_mut().pilot.hear_remote(&bytes[..count], now));
+    }
+}
+
+#[embassy_executor::task]
+async fn hear_imu(mut port: BufferedUartRx<'static>, robot: &'static Shared) {
+    let mut bytes = [0; 64];
+    loop {
+        let count = port.read(&mut bytes).await.unwrap_or(0);
+        let now = micros(embassy_time::Instant::now());
+        robot.lock(|robot| robot.borrow_mut().pilot.hear_imu(&bytes[..count], now));
+    }
+}
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    let board = embassy_stm32::init(clocks());
+    let supply = Output::new(board.PC15, Level::High, Speed::Low);
+    core::mem::forget(supply); // stays on
+
+    let mut bus = Bus::new();
+    let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
+    static ROBOT: StaticCell<Shared> = StaticCell::new();
+    let robot: &'static Shared = ROBOT.init(Mutex::new(RefCell::new(Robot { bus, pilot })));
+
+    static SENDING: StaticCell<can::TxBuf<8>> = StaticCell::new();
+    static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
+    let mut can = CanConfigurator::new(board.FDCAN1, board.PD0, board.PD1, Interrupts);
+    can.set_bitrate(1_000_000);
+    let can = can.into_normal_mode();
+    let can = can.buffered(SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
+    spawner.spawn(receive(can.reader(), robot).expect("the first"));
+    spawner.spawn(control(can.writer(), robot).expect("the first"));
+
+    static REMOTE: StaticCell<([u8; 4], [u8; 64])> = StaticCell::new();
+    let (out, into) = REMOTE.init(([0; 4], [0; 64]));
+    let mut line = usart::Config::default();
+    (line.baudrate, line.parity) = (100_000, Parity::ParityEven);
+    let port = BufferedUart::new(board.UART5, board.PD2, board.PC12, out, into, Interrupts, line);
+    let Ok(port) = port else { panic!("the line of the remote control") };
+    spawner.spawn(hear_remote(port.split().1, robot).expect("the first"));
+
+    static IMU: StaticCell<([u8; 4], [u8; 256])> = StaticCell::new();
+    let (out, into) = IMU.init(([0; 4], [0; 256]));
+    let line = usart::Config::default();
+    let port = BufferedUart::new(board.USART1, board.PA10, board.PA9, out, into, Interrupts, line);
+    let Ok(port) = port else { panic!("the line of the IMU") };
+    spawner.spawn(hear_imu(port.split().1, robot).expect("the first"));
+    core::future::pending().await
+}
+
+/// 400 MHz from the 24 MHz crystal, which is also the clock of the CAN controller: 24 quanta a bit.
+fn clocks() -> Config {
+    let mut config = Config::default();
+    config.rcc.hse = Some(rcc::Hse { freq: Hertz(24_000_000), mode: rcc::HseMode::Oscillator });
+    config.rcc.pll1 = Some(rcc::Pll {
+        source: rcc::PllSource::HSE,
+        prediv: rcc::PllPreDiv::DIV3,
+        mul: rcc::PllMul::MUL50,
+        divp: Some(rcc::PllDiv::DIV1),
+        divq: None,
+        divr: None,
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_P;
+    config.rcc.voltage_scale = rcc::VoltageScale::Scale1;
+    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV2;
+    config.rcc.apb1_pre = rcc::APBPrescaler::DIV2;
+    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config.rcc.apb3_pre = rcc::APBPrescaler::DIV2;
+    config.rcc.apb4_pre = rcc::APBPrescaler::DIV2;
+    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::HSE;
+    config
+}

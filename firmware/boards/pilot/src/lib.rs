@@ -1,0 +1,151 @@
+//! What the boards share: a DBUS remote control and a HiPNUC IMU drive a mecanum chassis of four M3508.
+//!
+//! Arm: both sticks at rest, turn the right switch from anywhere to the top. Stop: turn it away, or lose the remote.
+//! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
+//! without one, forward is where the chassis looks.
+#![cfg_attr(not(test), no_std)]
+
+use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::geometry::{Heading, Twist};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{AngularVelocity, Current};
+use drivetrain::wire::Link;
+use drivetrain::wire::dbus::{Dbus, Remote, Stick, Switch};
+use drivetrain::wire::hipnuc::{EulerOrder, HipNuc, MAX_FRAME};
+
+/// A per rad/s and A per rad at the output shaft; `cargo run --example tune` finds those of your robot.
+const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
+const CURRENT_LIMIT: Current = Current::from_amperes(10.0);
+const FASTEST_WHEEL: AngularVelocity = AngularVelocity::from_rpm(400.0);
+const FASTEST_M_S: f32 = 1.5;
+const FASTEST_RAD_S: f32 = 4.0;
+const IMU_DEADLINE: Duration = Duration::from_millis(50);
+
+/// What the remote control asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wish {
+    /// The switch was turned to the top just now.
+    Arm,
+    /// It still is there.
+    GoOn,
+    /// It is not, or the remote control is not heard.
+    Rest,
+}
+
+/// The robot without its board.
+#[derive(Debug)]
+pub struct Pilot {
+    wheels: MecanumWheels<Handle<M3508>>,
+    chassis: Chassis<Mecanum>,
+    dbus: Dbus,
+    imu: Link<HipNuc, MAX_FRAME>,
+    switch: Switch,
+}
+
+impl Pilot {
+    /// Attaches the four wheels: ids 1 to 4 are front right, front left, rear left, rear right.
+    pub fn new(bus: &mut Bus) -> Result<Self, &'static str> {
+        let wheel =
+            |id| Config::<M3508>::new(id).speed_loop(SPEED).with_current_limit(CURRENT_LIMIT);
+        let mut attach = |config| bus.attach(config).map_err(|_| "a wheel's id is taken");
+        let wheels = MecanumWheels {
+            front_left: attach(wheel(2))?,
+            front_right: attach(wheel(1).reversed())?,
+            rear_left: attach(wheel(3))?,
+            rear_right: attach(wheel(4).reversed())?,
+        };
+        let geometry =
+            MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+        let mut chassis = Chassis::new(Mecanum::new(geometry).map_err(|_| "no such chassis")?);
+        let limits =
+            ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
+        chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
+        let imu = Link::new(HipNuc, IMU_DEADLINE);
+        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch: Switch::Absent })
+    }
+
+    /// Takes bytes of the remote control that arrived at `now`.
+    pub fn hear_remote(&mut self, mut bytes: &[u8], now: Instant) {
+        while self.dbus.read(&mut bytes, now).is_some() {}
+    }
+
+    /// Takes bytes of the IMU that arrived at `now`.
+    pub fn hear_imu(&mut self, mut bytes: &[u8], now: Instant) {
+        while self.imu.read(&mut bytes, now).is_some() {}
+    }
+
+    /// Returns what the remote control asks for; to be called once a tick.
+    pub fn wish(&mut self, now: Instant) -> Wish {
+        let remote = self.dbus.remote(now);
+        let before = core::mem::replace(&mut self.switch, remote.right_switch);
+        match (before, remote.right_switch) {
+            (Switch::Up, Switch::Up) => Wish::GoOn,
+            // The turn of the switch, not its place: a remote that comes back in range must not start a robot.
+            (Switch::Middle | Switch::Down, Switch::Up) if at_rest(&remote) => {
+                self.chassis.restart();
+                Wish::Arm
+            }
+            _ => Wish::Rest,
+        }
+    }
+
+    /// Sets the targets of the wheels.
+    pub fn drive(&mut self, bus: &mut Bus, tick: Tick) {
+        self.steer(&self.dbus.remote(tick.now()), tick.now());
+        self.chassis.drive(bus, self.wheels, tick);
+    }
+
+    fn steer(&mut self, remote: &Remote, now: Instant) {
+        let Stick { x, y } = remote.right;
+        let turn = -remote.left.x * FASTEST_RAD_S;
+        let (vx, vy) = (y * FASTEST_M_S, -x * FASTEST_M_S);
+        match self.imu.latest(now) {
+            Some(imu) => {
+                let (_, _, yaw) = imu.attitude.euler(EulerOrder::RollX);
+                self.chassis.set_world(Twist::new(vx, vy, turn), Heading::new(yaw));
+            }
+            None => self.chassis.set_body(Twist::new(vx, vy, turn)),
+        }
+    }
+}
+
+fn at_rest(remote: &Remote) -> bool {
+    [remote.right, remote.left].iter().all(|stick| stick.x == 0.0 && stick.y == 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame with all channels at rest but the first, and the right switch at `switch`.
+    fn frame(channel: u64, switch: u64) -> [u8; 18] {
+        let bits = channel | 1024 << 11 | 1024 << 22 | 1024 << 33 | switch << 44 | 3 << 46;
+        let mut frame = [0; 18];
+        frame[..6].copy_from_slice(&bits.to_le_bytes()[..6]);
+        frame
+    }
+
+    fn wishes(frames: &[[u8; 18]]) -> Wish {
+        let mut pilot = Pilot::new(&mut Bus::new()).unwrap();
+        let mut wish = Wish::Rest;
+        for (frame, ms) in frames.iter().zip((14..).step_by(14)) {
+            let now = Instant::START + Duration::from_millis(ms);
+            pilot.hear_remote(frame, now);
+            wish = pilot.wish(now);
+        }
+        wish
+    }
+
+    #[test]
+    fn only_turning_the_switch_to_the_top_with_both_sticks_at_rest_arms() {
+        const UP: u64 = 1;
+        const MIDDLE: u64 = 3;
+        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP)]), Wish::Arm);
+        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1024, UP), frame(1684, UP)]), Wish::GoOn);
+        assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
+        assert_eq!(wishes(&[frame(1024, UP)]), Wish::Rest, "at power-on");
+        assert_eq!(wishes(&[frame(1024, UP), frame(1024, MIDDLE)]), Wish::Rest);
+    }
+}

@@ -1,0 +1,38 @@
+//! What a row of the catalogue is as a program: a function that fails, and what it saw.
+
+use std::cell::RefCell;
+use std::fmt::Display;
+
+/// The name of a case, which begins with its id, and the function that drives it.
+pub(crate) type Case = (&'static str, fn());
+
+macro_rules! cases {
+    ($($name:ident),* $(,)?) => { &[$((stringify!($name), $name as fn())),*] };
+}
+pub(crate) use cases;
+
+/// What a case saw: the example `faults` prints it.
+#[derive(Debug, Default, Clone, PartialEq, Eq)]
+pub(crate) struct Seen {
+    pub(crate) what: Vec<String>,
+    pub(crate) ticks_to_safe: Option<u64>,
+}
+
+thread_local! {
+    static SEEN: RefCell<Seen> = RefCell::default();
+}
+
+/// Notes what was seen.
+pub(crate) fn saw(what: impl Display) {
+    SEEN.with_borrow_mut(|seen| seen.what.push(what.to_string()));
+}
+
+/// Notes how many ticks of 1 ms passed from a fault to the first safe frame; the longest one counts.
+pub(crate) fn safe_after(ticks: u64) {
+    SEEN.with_borrow_mut(|seen| seen.ticks_to_safe = seen.ticks_to_safe.max(Some(ticks)));
+}
+
+/// Returns what was noted on this thread since the last call.
+pub(crate) fn take_seen() -> Seen {
+    SEEN.take()
+}

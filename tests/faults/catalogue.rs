@@ -1,0 +1,13 @@
+//! All cases, file by file.
+
+use crate::case::Case;
+use crate::{commands, plausibility, receive, registration, timing, transmit};
+
+pub(crate) const CATALOGUE: [&[Case]; 6] = [
+    receive::CASES,
+    plausibility::CASES,
+    timing::CASES,
+    commands::CASES,
+    registration::CASES,
+    transmit::CASES,
+];
