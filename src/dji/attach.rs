@@ -60,6 +60,9 @@ impl<B> Bus<B> {
         self.outbox.open(frame);
         #[expect(clippy::cast_possible_truncation, reason = "below 11")]
         let index = index as u8;
+        if self.used <= index {
+            self.used = index + 1;
+        }
         Ok(Key::new(index, generation))
     }
 

@@ -1,7 +1,7 @@
 use super::budget::Budget;
 use super::command::Outbox;
 use super::handle::Key;
-use super::slot::{Cycle, Slot};
+use super::slot::Slot;
 use super::{AnyHandle, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -47,17 +47,30 @@ pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
+// The slots first: their addresses need no offset then.
+#[repr(C)]
 pub struct Bus<B = ()> {
     pub(super) slots: [Slot; SLOTS],
     pub(super) outbox: Outbox,
+    /// The time that new targets get.
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
     pub(super) budget: Budget,
-    /// Without an update until then all stamps are void; at the start of the clock before the first one.
-    pub(super) lost_after: Instant,
+    /// The time of the last update.
+    pub(super) updated: Instant,
+    /// Until then no age exceeds its limit and no frame is due, unless something [disturbs](Self::disturb) that.
+    pub(super) quiet_until: Instant,
+    /// The last usable time step as it was given, and as the loops take it.
+    dt_s: f32,
+    step: TimeStep,
     pub(super) rejects: Rejects,
     pub(super) held_steps: u8,
-    turn: u8,
+    /// Whether each motor has to be seen to with the next update.
+    pub(super) is_disturbed: bool,
+    /// All slots from here on are free.
+    pub(super) used: u8,
+    /// Whether there was an update.
+    pub(super) running: bool,
     pub(super) stopped: bool,
     brand: PhantomData<fn() -> B>,
 }
@@ -80,7 +93,7 @@ pub struct Counters {
     pub bad_steps: u32,
     /// Command frames that an update had ready; wraps.
     pub packed: u32,
-    /// Command frames that were replaced by newer ones before they were taken; wraps.
+    /// Command frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
     pub superseded: u32,
 }
 
@@ -128,10 +141,15 @@ impl<B> Bus<B> {
             now: 0,
             timeouts: Timeouts::new(),
             budget: Budget::new(),
-            lost_after: Instant::START,
+            updated: Instant::START,
+            quiet_until: Instant::START,
+            dt_s: 0.001,
+            step: TimeStep::new(0.001, LONGEST_STEP_S),
             rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
             held_steps: 0,
-            turn: 0,
+            is_disturbed: true,
+            used: 0,
+            running: false,
             stopped: false,
             brand: PhantomData,
         }
@@ -141,6 +159,7 @@ impl<B> Bus<B> {
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.timeouts = timeouts;
+        self.disturb();
         self
     }
 
@@ -151,18 +170,20 @@ impl<B> Bus<B> {
             Some(micros) if micros < 10_000_000 => micros,
             _ => 10_000_000,
         });
+        self.disturb();
         self
     }
 
     /// Takes a received frame that arrived at `now`. Constant time.
+    ///
+    /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
+    /// [`Timeouts::late`] counts as late: not at once, but within twice that time.
     #[inline]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
-        match Feedback::decode(frame.bytes()) {
-            Ok(feedback) if frame.length() == 8 && slot.receive(feedback, now.stamp()) => {
-                Ingest::Taken
-            }
+        match Feedback::of_frame(frame) {
+            Some(feedback) if slot.receive(feedback, now.stamp()) => Ingest::Taken,
             _ => self.ingest_unusual(frame, now),
         }
     }
@@ -180,37 +201,37 @@ impl<B> Bus<B> {
     /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that does not move on, change nothing and leave the
     /// last commands for one update; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
-        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
+        let before = core::mem::replace(&mut self.updated, tick.now());
         self.now = tick.now().stamp();
-        let before = self.lost_after;
-        self.lost_after = tick.now() + LONGEST_PAUSE;
-        if step.is_hold() || self.lost_after <= before {
+        if !self.takes_step(tick.dt_s()) || !self.takes_time(before) {
             return self.hold(before);
         }
-        self.held_steps = 0;
-        if tick.now() > before {
-            self.lose_all(before);
+        let step = self.step;
+        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
+            let raw = slot.update(&step);
+            self.outbox.put(slot.place, raw);
         }
-        let cycle = Cycle { now: self.now, step, timeouts: self.timeouts };
-        let mut rest = self.slots.as_mut_slice();
-        while let [slot, others @ ..] = rest {
-            if slot.facts().is_some() {
-                let raw = slot.update(&cycle);
-                self.outbox.put(slot.place, raw);
-            }
-            rest = others;
-        }
-        self.outbox.finish_update(self.now);
-        self.check_one_slot();
+        self.outbox.finish_update();
     }
 
-    /// Does what one motor a tick is enough for.
+    /// Sees to what the time that passed brings with it; `false` when none passed.
     #[inline]
-    fn check_one_slot(&mut self) {
-        self.turn = if usize::from(self.turn) + 1 < SLOTS { self.turn + 1 } else { 0 };
-        if let Some(slot) = self.slots.get_mut(usize::from(self.turn)) {
-            slot.ramp(self.now);
+    fn takes_time(&mut self, before: Instant) -> bool {
+        let is_quiet = before < self.updated && self.updated < self.quiet_until;
+        is_quiet || self.look_around(before)
+    }
+
+    /// Takes over a time step, unless it is none.
+    #[inline]
+    fn takes_step(&mut self, dt_s: f32) -> bool {
+        if dt_s.to_bits() == self.dt_s.to_bits() {
+            return true;
         }
+        let step = TimeStep::new(dt_s, LONGEST_STEP_S);
+        if !step.is_hold() {
+            (self.dt_s, self.step) = (dt_s, step);
+        }
+        !step.is_hold()
     }
 
     /// Returns a command frame that waits to be sent, and takes it off the list.
@@ -285,6 +306,13 @@ impl<B> Bus<B> {
         let differing = ids().fold(0, |bits, id| bits | (id ^ first));
         let open = if differing == 0 { 0 } else { u16::MAX >> differing.leading_zeros() };
         (first & !open, 0x7FF & !open)
+    }
+
+    /// Has the next update see to each motor. To be called wherever an age may become greater than by the time that
+    /// passes, or another limit hold for it.
+    pub(super) const fn disturb(&mut self) {
+        self.quiet_until = Instant::START;
+        self.is_disturbed = true;
     }
 
     pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {

@@ -34,10 +34,10 @@ impl CommandFrame {
         }
     }
 
-    /// The ids in the order of the index.
-    const IDS: [u16; 5] = {
+    /// The ids in the order of the index, as many as there are [`Words`].
+    const IDS: [u16; 8] = {
         let [a, b, c, d, e] = Self::ALL;
-        [a.id(), b.id(), c.id(), d.id(), e.id()]
+        [a.id(), b.id(), c.id(), d.id(), e.id(), 0, 0, 0]
     };
 
     const fn bit(self) -> u8 {
@@ -67,17 +67,44 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     saturate((halves >> 1) + (halves & !(halves >> 31) & 1), limit)
 }
 
+/// As [`to_raw`], for what a loop gives in every update: half a count goes to the even neighbour.
+#[inline]
+pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
+    // From 2^23 to 2^24 floats are the whole numbers: this sum is rounded, and its last bits count from here.
+    const WHOLE: f32 = 1.5 * 8_388_608.0;
+    let sum = value * raw_per_unit + WHOLE;
+    let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
+    if !is_within(raw, limit) {
+        return beyond(value, raw_per_unit, limit);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+    let raw = raw as i16;
+    raw
+}
+
+/// Out of the line of [`loop_to_raw`]: also for what is no number, or too large for its sum.
+#[cold]
+#[inline(never)]
+const fn beyond(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
+    to_raw(value, raw_per_unit, limit)
+}
+
 /// Limits a raw command to ±`limit`, which is not negative.
 #[inline]
 pub(super) const fn saturate(raw: i32, limit: i16) -> i16 {
-    // One comparison for both ends: below -limit is far above, unsigned.
-    let end = limit as i32;
-    if raw.wrapping_add(end).cast_unsigned() > 2 * end.cast_unsigned() {
+    if !is_within(raw, limit) {
         return at_the_limit(raw, limit);
     }
     #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
     let raw = raw as i16;
     raw
+}
+
+#[inline]
+const fn is_within(raw: i32, limit: i16) -> bool {
+    // One comparison for both ends: below -limit is far above, unsigned.
+    let end = limit as i32;
+    raw.wrapping_add(end).cast_unsigned() <= 2 * end.cast_unsigned()
 }
 
 /// Out of the line of [`saturate`].
@@ -105,8 +132,15 @@ impl Place {
         Self((frame as u8) << 2 | (slot & 3))
     }
 
+    /// Stands in no frame: what is put there is never sent.
+    pub(super) const NOWHERE: Self = Self(31);
+
     pub(super) const fn same_as(self, other: Self) -> bool {
         self.0 == other.0
+    }
+
+    pub(super) const fn slot(self) -> u8 {
+        self.0 & 3
     }
 
     pub(super) const fn frame(self) -> CommandFrame {
@@ -141,10 +175,11 @@ pub(super) struct Outbox {
     words: Words,
     in_use: u8,
     ever_used: u8,
+    /// Had a word that was not zero in the last update, or has to be sent with the next one all the same.
     active: u8,
     dirty: u8,
-    returned: u8,
-    first: u8,
+    /// The frames after the one that was sent last.
+    ahead: u8,
     keep_alive_us: u32,
     kept_alive: u32,
     pub(super) packed: u32,
@@ -159,8 +194,7 @@ impl Outbox {
             ever_used: 0,
             active: 0,
             dirty: 0,
-            returned: 0,
-            first: 0,
+            ahead: 0,
             keep_alive_us: 10_000,
             kept_alive: 0,
             packed: 0,
@@ -205,29 +239,34 @@ impl Outbox {
     /// Sets every word to zero, and has every frame in use sent.
     pub(super) fn clear(&mut self) {
         self.words = Words::ZERO;
-        self.active = 0;
-        // A frame that was given back is replaced now.
-        self.dirty |= core::mem::take(&mut self.returned);
-        self.mark(self.in_use);
+        let due = core::mem::take(&mut self.active);
+        self.mark(due | self.in_use);
+    }
+
+    /// Has every frame in use sent with this update when it is time for it; returns when it is time again, in µs.
+    pub(super) fn keep_alive(&mut self, now: u32) -> u32 {
+        let since = now.wrapping_sub(self.kept_alive);
+        if since < self.keep_alive_us {
+            return self.keep_alive_us - since;
+        }
+        self.kept_alive = now;
+        self.active |= self.in_use;
+        self.keep_alive_us
     }
 
     /// Marks what this update gave to send.
     #[inline]
-    pub(super) fn finish_update(&mut self, now: u32) {
+    pub(super) fn finish_update(&mut self) {
         let mut active = 0;
         for (frame, words) in CommandFrame::ALL.iter().zip(&self.words.0) {
+            if self.in_use < frame.bit() {
+                break; // nor is any after it
+            }
             if *words != [[0; 2]; 4] {
                 active |= frame.bit();
             }
         }
-        let mut due = active | self.active;
-        self.active = active;
-        if now.wrapping_sub(self.kept_alive) >= self.keep_alive_us {
-            self.kept_alive = now;
-            due |= self.in_use;
-        }
-        self.dirty |= self.returned;
-        self.returned = 0;
+        let due = active | core::mem::replace(&mut self.active, active);
         self.mark(due);
     }
 
@@ -243,31 +282,31 @@ impl Outbox {
     /// Takes the next waiting frame; each search starts after the frame that was sent last.
     #[inline]
     pub(super) fn next(&mut self) -> Option<CanFrame> {
-        if self.dirty == 0 {
+        let waiting = self.dirty;
+        if waiting == 0 {
             return None;
         }
-        let dirty = u32::from(self.dirty);
-        let ahead = dirty & (u32::MAX << (self.first & 7));
-        let index = if ahead == 0 { dirty } else { ahead }.trailing_zeros();
+        let ahead = waiting & self.ahead;
+        let index = if ahead == 0 { waiting } else { ahead }.trailing_zeros() & 7;
+        let bit = 1_u8 << index;
+        self.dirty = waiting & !bit;
+        self.ahead = (bit << 1).wrapping_neg();
         let (id, words) =
             (*CommandFrame::IDS.get(index as usize)?, self.words.0.get(index as usize)?);
-        self.dirty &= !(1 << index);
-        #[expect(clippy::cast_possible_truncation, reason = "at most 5")]
-        let next = index as u8 + 1;
-        self.first = next;
         let [[a, b], [c, d], [e, f], [g, h]] = *words;
         let [a, b, c, d] = swapped([a, b, c, d]);
         let [e, f, g, h] = swapped([e, f, g, h]);
         CanFrame::standard(id, [a, b, c, d, e, f, g, h])
     }
 
-    /// Takes back a frame that was refused or evicted. It waits for the next update, so that a caller's loop ends,
-    /// and then goes first.
+    /// Takes back a frame that was refused or evicted. It waits for the next update, which replaces its words, so that
+    /// a caller's loop ends; and then it goes first.
     pub(super) fn requeue(&mut self, header: u32) -> bool {
         match CommandFrame::with_id(header) {
             Some(frame) if self.ever_used & frame.bit() != 0 => {
-                self.returned |= frame.bit();
-                self.first = frame as u8;
+                self.active |= frame.bit();
+                self.superseded = self.superseded.wrapping_add(1);
+                self.ahead = frame.bit().wrapping_neg();
                 true
             }
             _ => false,
@@ -298,12 +337,14 @@ mod tests {
         let mut outbox = outbox(&[CommandFrame::X200]);
         outbox.set_keep_alive(5_000);
         outbox.put(Place::new(CommandFrame::X200, 1), 100);
-        outbox.finish_update(1_000);
+        outbox.keep_alive(1_000);
+        outbox.finish_update();
         assert_eq!(ids(&mut outbox), [0x200]);
         outbox.put(Place::new(CommandFrame::X200, 1), 0);
         let sent: Vec<usize> = (2..12)
             .map(|ms| {
-                outbox.finish_update(ms * 1_000);
+                outbox.keep_alive(ms * 1_000);
+                outbox.finish_update();
                 ids(&mut outbox).len()
             })
             .collect();
@@ -316,11 +357,11 @@ mod tests {
         for frame in [CommandFrame::X200, CommandFrame::X1FF, CommandFrame::X2FE] {
             outbox.put(Place::new(frame, 0), 1);
         }
-        outbox.finish_update(1);
+        outbox.finish_update();
         assert_eq!(ids(&mut outbox), [0x200, 0x1FF, 0x2FE]);
         assert!(outbox.requeue(0x1FF));
         assert_eq!(outbox.next(), None);
-        outbox.finish_update(2);
+        outbox.finish_update();
         assert_eq!(ids(&mut outbox), [0x1FF, 0x2FE, 0x200]);
         assert!(!outbox.requeue(0x1FE), "not ours");
         assert!(!outbox.requeue(0x8000_0200), "extended");
@@ -331,7 +372,7 @@ mod tests {
         let mut outbox = outbox(&[CommandFrame::X200]);
         for raw in [1, 2, 3] {
             outbox.put(Place::new(CommandFrame::X200, 0), raw);
-            outbox.finish_update(0);
+            outbox.finish_update();
         }
         assert_eq!(outbox.next().map(|frame| frame.data()[..2].to_vec()), Some(std::vec![0, 3]));
         assert_eq!((outbox.packed, outbox.superseded), (3, 2));
@@ -358,6 +399,17 @@ mod tests {
             }
         }
 
+        /// Law: a loop's output goes to the nearest number too, and is limited the same way.
+        #[test]
+        fn loop_to_raw_is_to_raw_but_for_ties(value in any::<f32>(), near in -40_000.0_f32..40_000.0, limit in 0_i16..=i16::MAX, scale in -2000.0_f32..2000.0) {
+            for value in [value, near / scale, near.round() / scale, (near.round() + 0.5) / scale] {
+                let (raw, other) = (loop_to_raw(value, scale, limit), to_raw(value, scale, limit));
+                let is_tie = (value * scale).fract().abs().to_bits() == 0.5_f32.to_bits();
+                prop_assert!(raw == other || is_tie && raw % 2 == 0 && raw.abs_diff(other) == 1, "{} {} {}", value, raw, other);
+                prop_assert_eq!(loop_to_raw(-value, scale, limit), -raw);
+            }
+        }
+
         /// Law: every word stands in its slot, big-endian, and nothing else does.
         #[test]
         fn words_stand_in_their_slots(words: [[i16; 4]; 5]) {
@@ -367,7 +419,7 @@ mod tests {
                     outbox.put(Place::new(*frame, slot), *word);
                 }
             }
-            outbox.finish_update(0);
+            outbox.finish_update();
             outbox.mark(0b1_1111);
             let mut seen = 0;
             while let Some(frame) = outbox.next() {

@@ -1,5 +1,6 @@
 //! The bus as a device of the runner.
 
+use super::bus::LONGEST_PAUSE;
 use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
@@ -45,7 +46,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let unwatched = self.lost_after != Instant::START && now > self.lost_after;
+        let unwatched = self.running && now > self.updated + LONGEST_PAUSE;
         let missing = move |slot: &&Slot| unwatched || slot.is_missing(now.stamp(), &self.timeouts);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
@@ -53,6 +54,7 @@ impl<B> CanDevice for Bus<B> {
     fn engage(&mut self, now: Instant) {
         if !self.stopped {
             self.now = now.stamp();
+            self.disturb();
             let timeouts = self.timeouts;
             self.slots.iter_mut().for_each(|slot| slot.engage(now.stamp(), &timeouts));
         }
@@ -120,6 +122,7 @@ impl<B> Bus<B> {
             return Err(ArmError::Missing(missing));
         }
         self.now = now.stamp();
+        self.disturb();
         let timeouts = self.timeouts;
         for motor in motors {
             if let Some(slot) = self.slot_mut(*motor) {

@@ -1,11 +1,11 @@
 //! What the data path meets seldom, out of its line: the usual case then needs few registers and no copies.
 
 use super::Feedback;
-use super::bus::{Bus, FIRST_FEEDBACK_ID};
-use super::slot::Slot;
+use super::bus::{Bus, FIRST_FEEDBACK_ID, LONGEST_PAUSE};
+use super::slot::{Ages, Slot};
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Malformed};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 impl<B> Bus<B> {
     /// Takes any frame: also the first one of a motor, one after a gap, and what is no feedback at all.
@@ -27,28 +27,74 @@ impl<B> Bus<B> {
             return Ingest::Malformed(Malformed::Field);
         };
         slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
+        self.disturb();
         Ingest::Taken
+    }
+
+    /// Sees to all that grows old or is due now and then, and finds out until when there is nothing of it; `false` when
+    /// the time did not move on.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn look_around(&mut self, before: Instant) -> bool {
+        if self.running && self.updated <= before {
+            return false;
+        }
+        if self.running && self.updated > before + LONGEST_PAUSE {
+            self.lose_all();
+        }
+        self.running = true;
+        self.held_steps = 0;
+        let keep_alive_us = self.outbox.keep_alive(self.now);
+        let ages = if self.is_disturbed { None } else { self.ages().within_limits_us() };
+        if let Some(micros) = ages {
+            let quiet = Duration::from_micros(micros.min(keep_alive_us).into());
+            self.quiet_until = self.updated + quiet;
+        } else {
+            self.see_to_motors();
+        }
+        true
+    }
+
+    fn ages(&self) -> Ages {
+        let mut ages = Ages::none(self.now, self.timeouts);
+        let mut rest = self.slots.get(..usize::from(self.used)).unwrap_or_default();
+        while let [slot, others @ ..] = rest {
+            slot.add_to(&mut ages);
+            rest = others;
+        }
+        ages
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn see_to_motors(&mut self) {
+        let (now, timeouts) = (self.now, self.timeouts);
+        self.is_disturbed = false;
+        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
+            self.is_disturbed |= !slot.see_to(now, &timeouts);
+        }
+    }
+
+    /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
+    #[cold]
+    #[inline(never)]
+    fn lose_all(&mut self) {
+        self.slots.iter_mut().for_each(Slot::lose);
     }
 
     /// Ends an update whose time is not usable: the last commands stay once, then zeros.
     #[cold]
     #[inline(never)]
-    pub(super) fn hold(&mut self, lost_after_before: Instant) {
+    pub(super) fn hold(&mut self, before: Instant) {
+        self.running = true;
+        self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
-        let late = self.lost_after.since(lost_after_before) > self.timeouts.late();
+        let late = self.updated.since(before) > self.timeouts.late();
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }
-        self.outbox.finish_update(self.now);
-    }
-
-    /// Takes every motor for lost, after a pause too long for stamps of 32 bits. The first update ends no pause.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn lose_all(&mut self, lost_after_before: Instant) {
-        if lost_after_before != Instant::START {
-            self.slots.iter_mut().for_each(Slot::lose);
-        }
+        self.outbox.keep_alive(self.now);
+        self.outbox.finish_update();
     }
 }

@@ -16,7 +16,7 @@ use drivetrain::geometry::{
 };
 use drivetrain::math as maths;
 use drivetrain::motor::Ingest;
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
 pub const START: Instant = Instant::from_micros(1_000_000);
@@ -156,8 +156,10 @@ pub fn motors() {
     row("update_cascade", &[update(Targets::Position)]);
     row("tick_speed", &[tick(Targets::Speed, 0, START)]);
     row("tick_speed_limit", &[tick(Targets::HighSpeed, 0, START)]);
+    row("tick_speed_look", &[dearest_tick(Targets::Speed)]);
     row("tick_cascade", &[tick(Targets::Position, 0, START)]);
     row("tick_cascade_limit", &[tick(Targets::FarPosition, 0, START)]);
+    row("tick_cascade_look", &[dearest_tick(Targets::Position)]);
 }
 
 /// One frame of motor `id`, whose output shaft is at `turns` at the time `start`.
@@ -166,7 +168,7 @@ pub fn decode(id: u16, turns: i64, start: Instant) -> u32 {
     let mut angle = 126;
     instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, _| {
         angle += 3;
-        now = now + drivetrain::time::Duration::from_micros(1_000);
+        now = now + Duration::from_micros(1_000);
         _ = decode(&mut bus, &feedback(id, angle % 8192, 191), now);
     })
 }
@@ -192,10 +194,10 @@ fn pack() -> u32 {
     instructions(row_pack as fn(&mut Bus), |pack, _| pack(&mut copy(&bus)))
 }
 
-/// Runs for 10 ms, up to an update that has its feedback and its targets.
+/// Runs for 5 ms, up to an update that has its feedback and its targets and nothing to do but that.
 fn heard(targets: Targets) -> (Bus, Tick) {
     let mut drive = Drive::new(targets, 0, START);
-    for _ in 0..10 {
+    for _ in 0..5 {
         let (bus, frames, tick) = drive.parts();
         row_tick(bus, frames, tick);
         drive.advance();
@@ -216,6 +218,19 @@ pub fn tick(targets: Targets, turns: i64, start: Instant) -> u32 {
         drive.advance();
         let (bus, frames, tick) = drive.parts();
         whole_tick(bus, frames, tick);
+    })
+}
+
+/// The dearest ticks of a bus without a fault: each looks at all ages, and has another time step than the one before.
+fn dearest_tick(targets: Targets) -> u32 {
+    let mut drive = Drive::new(targets, 0, START);
+    // A keep-alive is due in each of them, which takes a look around.
+    drive.bus = drive.bus.with_keep_alive(Duration::from_micros(1));
+    instructions(row_tick as fn(&mut Bus, &[CanFrame; 8], Tick), |whole_tick, call| {
+        drive.advance();
+        let (bus, frames, tick) = drive.parts();
+        let dt_s = if call % 2 == 0 { 0.001 } else { 0.000_999 };
+        whole_tick(bus, frames, Tick::new(tick.now(), dt_s));
     })
 }
 

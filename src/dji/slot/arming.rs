@@ -2,6 +2,15 @@ use super::{Slot, age, is_near};
 use crate::dji::command::to_raw;
 use crate::motor::{Link, Timeouts};
 
+/// Whether the motor takes targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Arming {
+    Disarmed,
+    Armed,
+    /// Relaxed by a fault since it was armed.
+    Latched,
+}
+
 impl Slot {
     /// Tells whether the motor is online with feedback that is fresh at `now`. A free slot is not missing.
     pub(in crate::dji) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
@@ -12,29 +21,35 @@ impl Slot {
     /// Takes targets from now on, starting from rest, if the motor is heard. One that takes them already goes on
     /// undisturbed.
     pub(in crate::dji) fn engage(&mut self, now: u32, timeouts: &Timeouts) {
-        if self.is_armed() || self.is_missing(now, timeouts) {
+        if self.facts.is_none() || self.is_armed() || self.is_missing(now, timeouts) {
             return;
         }
         self.relax();
-        self.armed = self.facts.is_some();
-        self.latched = false;
+        self.arming = Arming::Armed;
         self.limit = self.full_limit;
         self.commanded = now;
     }
 
     pub(in crate::dji) fn disarm(&mut self) {
         self.relax();
-        self.armed = false;
+        self.arming = Arming::Disarmed;
     }
 
     pub(in crate::dji) const fn is_armed(&self) -> bool {
-        self.armed && !self.latched
+        matches!(self.arming, Arming::Armed)
+    }
+
+    /// Refuses targets until it is armed again, or ramps back.
+    pub(super) fn latch(&mut self) {
+        if self.arming == Arming::Armed {
+            self.arming = Arming::Latched;
+        }
     }
 
     /// Starts again from zero output after a recovery, where that is configured.
     pub(super) fn start_ramp(&mut self) {
-        if self.armed && self.latched && self.ramp_ms.is_some() {
-            self.latched = false;
+        if self.arming == Arming::Latched && self.ramp_ms.is_some() {
+            self.arming = Arming::Armed;
             self.limit = 0;
             self.ramp_started = self.heard;
         }

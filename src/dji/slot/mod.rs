@@ -8,58 +8,50 @@ mod update;
 use super::command::{Place, to_raw};
 use super::config::PlainConfig;
 use super::handle::Key;
-use super::{AttachError, CommandFrame, Facts, Feedback, State};
+use super::{AttachError, Facts, Feedback, State};
 use crate::control::{Pid, PidConfig};
-use crate::encoder::{GearRatio, Homing, Position, Shaft, Turns};
+use crate::encoder::{GearRatio, Homing, Position, Shaft};
 use crate::motor::{Link, MotorName, Recovery, TargetError};
 use crate::units::{AngularVelocity, Current};
+use arming::Arming;
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
-
-pub(super) use update::Cycle;
-
-/// What the motor is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Target {
-    Relax,
-    Raw(i16),
-    Velocity(f32),
-    /// Phase of the shaft; the shortest way.
-    Angle(i32),
-    /// Turns and phase of the shaft.
-    Position(Turns, i32),
-}
+use target::{Action, Goal};
+pub(super) use update::Ages;
 
 #[derive(Debug, Clone, Copy)]
+// In the order of use, so that neighbours are loaded and stored together.
+#[repr(C)]
 pub(super) struct Slot {
-    facts: Option<&'static Facts>,
-    target: Target,
-    shaft: Shaft,
     feedback: Feedback,
     heard: u32,
-    commanded: u32,
     /// Up to this age of the last frame the shortest way is the way; 0 unless online.
     trusted_gap_us: u32,
+    shaft: Shaft,
     rad_per_s_per_rpm: f32,
-    raw_per_unit: f32,
-    nm_per_a: f32,
+    /// What an update does: what is asked for, or nothing while the feedback is late.
+    action: Action,
+    asked: Action,
+    pub(super) place: Place,
+    link: Link,
     limit: i16,
     full_limit: i16,
-    ramp_ms: Option<NonZeroU16>,
+    raw_per_unit: f32,
+    goal: Goal,
+    commanded: u32,
+    speed: Pid,
+    position: Pid,
+    facts: Option<&'static Facts>,
+    nm_per_a: f32,
     ramp_started: u32,
+    ramp_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
     refused_targets: u16,
     forgotten_targets: u16,
-    speed: Pid,
-    position: Pid,
-    id: u8,
-    generation: u8,
-    pub(super) place: Place,
-    link: Link,
-    good_frames: u8,
+    arming: Arming,
     homing: Homing,
-    armed: bool,
-    latched: bool,
+    good_frames: u8,
+    generation: u8,
 }
 
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
@@ -72,7 +64,9 @@ const NO_LOOP: Pid = match Pid::new(PidConfig::new(0.0, 0.0, 0.0)) {
 impl Slot {
     pub(super) const FREE: Self = Self {
         facts: None,
-        target: Target::Relax,
+        action: Action::Rest,
+        asked: Action::Rest,
+        goal: Goal::NONE,
         shaft: Shaft::new(GearRatio::DIRECT, false),
         feedback: Feedback::NONE,
         heard: 0,
@@ -90,14 +84,12 @@ impl Slot {
         forgotten_targets: 0,
         speed: NO_LOOP,
         position: NO_LOOP,
-        id: 0,
         generation: 0,
-        place: Place::new(CommandFrame::X200, 0),
+        place: Place::NOWHERE,
         link: Link::Unheard,
         good_frames: 0,
         homing: Homing::Relative,
-        armed: false,
-        latched: false,
+        arming: Arming::Disarmed,
     };
 
     /// Makes the slot of a motor, validating its configuration.
@@ -156,7 +148,6 @@ impl Slot {
             ramp_ms: ramp_time(config.recovery),
             speed,
             position,
-            id: config.id,
             generation,
             place,
             homing: if direct { Homing::Absolute } else { Homing::Relative },
@@ -190,9 +181,16 @@ impl Slot {
 
     pub(super) const fn name(&self) -> Option<MotorName> {
         match self.facts {
-            Some(facts) => Some(MotorName::new(facts.name, self.id)),
+            Some(facts) => Some(MotorName::new(facts.name, self.id(facts))),
             None => None,
         }
+    }
+
+    /// Returns the id on the ESC, which the place of the command word tells.
+    const fn id(&self, facts: &Facts) -> u8 {
+        let [lower, _] = facts.command;
+        let before = if self.place.frame() as u8 == lower as u8 { 0 } else { 4 };
+        before + self.place.slot() + 1
     }
 
     pub(super) const fn link(&self) -> Link {
@@ -209,7 +207,7 @@ impl Slot {
             self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
                 / f32::from(facts.current_raw);
         Some(State {
-            motor: MotorName::new(facts.name, self.id),
+            motor: MotorName::new(facts.name, self.id(facts)),
             position: self.shaft.position(),
             homing: self.homing,
             velocity: self.velocity(),
@@ -241,7 +239,7 @@ impl Slot {
         if !position.is_finite() {
             return Err(TargetError::NotFinite);
         }
-        if matches!(self.target, Target::Angle(_) | Target::Position(..)) {
+        if self.asked.is_way() {
             self.relax();
         }
         self.shaft.set_position(position);

@@ -1,3 +1,4 @@
+use super::target::Action;
 use super::{Slot, age, is_near};
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{Gap, Homing, shortest};
@@ -83,6 +84,7 @@ impl Slot {
 
     fn set_online(&mut self, facts: &Facts) {
         self.link = Link::Online;
+        self.action = self.asked;
         // Half a rotor turn at no-load speed, 30 s / rpm, less what frames may be delayed by others on the bus.
         let half_turn_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
         self.trusted_gap_us = half_turn_us.saturating_sub(500);
@@ -91,12 +93,14 @@ impl Slot {
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
+        self.action = Action::Rest;
         self.trusted_gap_us = 0;
         self.speed.interrupt();
         self.position.interrupt();
     }
 
     /// Nobody knows any more when the motor was heard.
+    #[inline(never)]
     pub(in crate::dji) fn lose(&mut self) {
         if self.link != Link::Unheard {
             self.set_offline();
@@ -107,7 +111,7 @@ impl Slot {
     pub(super) fn set_offline(&mut self) {
         self.link = Link::Offline;
         self.trusted_gap_us = 0;
-        self.latched = true;
+        self.latch();
         self.relax();
     }
 }

@@ -1,14 +1,66 @@
-use super::{Slot, Target, is_loop};
+use super::arming::Arming;
+use super::{Slot, is_loop};
 use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
 use crate::dji::command::to_raw;
-use crate::encoder::Position;
+use crate::encoder::{Position, Turns};
 use crate::motor::{Link, TargetError};
+
+/// What a motor does in an update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Action {
+    Rest,
+    Raw,
+    Velocity,
+    /// The shortest way.
+    Angle,
+    Position,
+}
+
+impl Action {
+    /// Tells whether it goes to a place of the shaft.
+    pub(super) const fn is_way(self) -> bool {
+        matches!(self, Self::Angle | Self::Position)
+    }
+}
+
+/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
+    turns: Turns,
+    /// Raw command, bits of the rad/s, or phase of the shaft.
+    value: i32,
+}
+
+impl Goal {
+    pub(super) const NONE: Self = Self::of(0);
+
+    const fn of(value: i32) -> Self {
+        Self { turns: Turns::new(0), value }
+    }
+
+    pub(super) const fn raw(&self) -> i32 {
+        self.value
+    }
+
+    pub(super) const fn rad_per_s(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    pub(super) const fn phase(&self) -> i32 {
+        self.value
+    }
+
+    pub(super) const fn turns(&self) -> Turns {
+        self.turns
+    }
+}
 
 impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
-        self.target = Target::Relax;
+        self.ask(Action::Rest, Goal::NONE);
         self.speed.reset();
         self.position.reset();
     }
@@ -16,14 +68,16 @@ impl Slot {
     /// Takes a value in the unit of the command: amperes or volts.
     pub(in crate::dji) fn set_output(&mut self, value: f32, now: u32) -> Result<(), TargetError> {
         self.admit(value.is_finite())?;
-        self.start(Target::Raw(to_raw(value, self.raw_per_unit, self.full_limit)), now);
+        let raw = to_raw(value, self.raw_per_unit, self.full_limit);
+        self.start(Action::Raw, Goal::of(raw.into()), now);
         Ok(())
     }
 
     /// Takes a value on the wire's scale, in the direction of the shaft.
     pub(in crate::dji) fn set_raw(&mut self, raw: i16, now: u32) -> Result<(), TargetError> {
         self.admit(true)?;
-        self.start(Target::Raw(to_raw(f32::from(raw), self.direction(), self.full_limit)), now);
+        let raw = to_raw(f32::from(raw), self.direction(), self.full_limit);
+        self.start(Action::Raw, Goal::of(raw.into()), now);
         Ok(())
     }
 
@@ -36,10 +90,8 @@ impl Slot {
     ) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
         needs(&self.speed)?;
-        if !matches!(self.target, Target::Velocity(_)) {
-            self.enter_speed_loop();
-        }
-        self.start(Target::Velocity(rad_per_s), now);
+        self.enter_speed_loop();
+        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
     }
 
@@ -56,7 +108,7 @@ impl Slot {
         }
         let (_, phase) = self.shaft.locate(angle);
         self.enter_position_loop();
-        self.start(Target::Angle(phase), now);
+        self.start(Action::Angle, Goal::of(phase), now);
         Ok(())
     }
 
@@ -70,7 +122,7 @@ impl Slot {
         needs(&self.position)?;
         let (turns, phase) = self.shaft.locate(position);
         self.enter_position_loop();
-        self.start(Target::Position(turns, phase), now);
+        self.start(Action::Position, Goal { turns, value: phase }, now);
         Ok(())
     }
 
@@ -91,45 +143,48 @@ impl Slot {
     /// value must not act in its place when the feedback comes back.
     fn admit(&mut self, finite: bool) -> Result<(), TargetError> {
         if !finite {
-            self.target = Target::Relax;
+            self.ask(Action::Rest, Goal::NONE);
             self.refused_targets = self.refused_targets.saturating_add(1);
             return Err(TargetError::NotFinite);
         }
-        if !self.armed {
-            return Err(TargetError::Disarmed);
-        }
-        if self.latched {
-            return Err(TargetError::Relaxed);
+        match self.arming {
+            Arming::Disarmed => return Err(TargetError::Disarmed),
+            Arming::Latched => return Err(TargetError::Relaxed),
+            Arming::Armed => {}
         }
         if self.link != Link::Online {
-            self.target = Target::Relax;
+            self.ask(Action::Rest, Goal::NONE);
             return Err(TargetError::NoFeedback);
         }
         Ok(())
     }
 
-    fn start(&mut self, target: Target, now: u32) {
-        self.target = target;
+    fn start(&mut self, action: Action, goal: Goal, now: u32) {
+        self.ask(action, goal);
         self.commanded = now;
+    }
+
+    const fn ask(&mut self, action: Action, goal: Goal) {
+        self.asked = action;
+        self.action = action;
+        self.goal = goal;
     }
 
     /// The speed loop takes over from a direct command where that was: no jump of the output.
     fn enter_speed_loop(&mut self) {
-        if let Target::Raw(raw) = self.target {
-            self.speed.reset_to(f32::from(raw) / self.raw_per_unit);
+        if self.asked == Action::Raw {
+            self.speed.reset_to(self.goal.raw() as f32 / self.raw_per_unit);
         }
     }
 
     /// The position loop starts from the present velocity: no jump of its output.
     fn enter_position_loop(&mut self) {
-        if matches!(self.target, Target::Angle(_) | Target::Position(..)) {
+        if self.asked.is_way() {
             return;
         }
         self.enter_speed_loop();
-        let moving = matches!(self.target, Target::Velocity(_) | Target::Raw(_));
-        let velocity = self.velocity().as_rad_per_s();
-        if moving {
-            self.position.reset_to(velocity);
+        if self.asked != Action::Rest {
+            self.position.reset_to(self.velocity().as_rad_per_s());
         }
     }
 }

@@ -1,59 +1,91 @@
-use super::{Slot, Target, age, is_near};
+use super::target::Action;
+use super::{Slot, age, is_near};
 use crate::control::TimeStep;
-use crate::dji::command::{saturate, to_raw};
+use crate::dji::command::{loop_to_raw, saturate};
 use crate::motor::{Link, Timeouts};
 
-/// What every slot needs to know of this update.
+/// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
+/// limit a stamp is near.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::dji) struct Cycle {
-    pub(in crate::dji) now: u32,
-    pub(in crate::dji) step: TimeStep,
-    pub(in crate::dji) timeouts: Timeouts,
+pub(in crate::dji) struct Ages {
+    now: u32,
+    timeouts: Timeouts,
+    heard: u32,
+    commanded: u32,
+}
+
+impl Ages {
+    /// The ages of no motor; but a target may come at any time from now on.
+    pub(in crate::dji) const fn none(now: u32, timeouts: Timeouts) -> Self {
+        Self { now, timeouts, heard: 0, commanded: timeouts.command_us() }
+    }
+
+    /// Returns after how many µs one of them is above its limit; `None` when one is already.
+    pub(in crate::dji) fn within_limits_us(&self) -> Option<u32> {
+        let heard = (2 * self.timeouts.late_us()).checked_sub(self.heard)?;
+        let commanded = (2 * self.timeouts.command_us()).checked_sub(self.commanded)?;
+        Some(heard.min(commanded) + 1)
+    }
 }
 
 impl Slot {
-    /// Runs the loops of this motor and returns its raw command: 0 whenever something is in doubt.
+    /// Runs the loops of this motor and returns its raw command.
     #[inline]
-    pub(in crate::dji) fn update(&mut self, cycle: &Cycle) -> i16 {
-        if !is_near(cycle.now, self.heard, cycle.timeouts.late_us())
-            || !is_near(cycle.now, self.commanded, cycle.timeouts.command_us())
-        {
-            self.rest(cycle);
-            return 0;
-        }
+    pub(in crate::dji) fn update(&mut self, step: &TimeStep) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
-        let goal = if let Target::Velocity(rad_per_s) = self.target {
-            rad_per_s
+        let goal = if self.action == Action::Velocity {
+            self.goal.rad_per_s()
         } else {
-            let way = match self.target {
-                Target::Position(turns, phase) => self.shaft.way_to(turns, phase),
-                Target::Angle(phase) => self.shaft.shortest_way_to(phase),
-                Target::Raw(raw) => return saturate(i32::from(raw), self.limit),
-                Target::Relax | Target::Velocity(_) => return 0,
+            let way = match self.action {
+                Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
+                Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+                Action::Raw => return saturate(self.goal.raw(), self.limit),
+                Action::Rest | Action::Velocity => return 0,
             };
-            self.position.step_error(way, velocity, &cycle.step)
+            self.position.step_error(way, velocity, step)
         };
-        to_raw(self.speed.step(goal, velocity, &cycle.step), self.raw_per_unit, self.limit)
+        loop_to_raw(self.speed.step(goal, velocity, step), self.raw_per_unit, self.limit)
     }
 
-    /// The last feedback is late, or the last target.
-    #[cold]
-    #[inline(never)]
-    fn rest(&mut self, cycle: &Cycle) {
-        if !is_near(cycle.now, self.heard, cycle.timeouts.late_us()) {
-            self.grow_old(cycle);
-        } else if self.target != Target::Relax {
+    /// Adds the ages of this motor's feedback and target, when it is heard.
+    #[inline]
+    pub(in crate::dji) fn add_to(&self, ages: &mut Ages) {
+        if self.link != Link::Online {
+            return;
+        }
+        let since = |stamp, limit| ages.now.wrapping_add(limit).wrapping_sub(stamp);
+        let heard = since(self.heard, ages.timeouts.late_us());
+        let commanded = since(self.commanded, ages.timeouts.command_us());
+        ages.heard = ages.heard.max(heard);
+        if self.asked != Action::Rest {
+            ages.commanded = ages.commanded.max(commanded);
+        }
+    }
+
+    /// Sees to what grew old or rises with time; `false` when there may be more to see to at the next update, whatever
+    /// comes or does not come until then.
+    pub(in crate::dji) fn see_to(&mut self, now: u32, timeouts: &Timeouts) -> bool {
+        self.ramp(now);
+        match self.link {
+            Link::Unheard | Link::Offline => return true,
+            Link::Online if is_near(now, self.heard, timeouts.late_us()) => {}
+            _ => {
+                self.grow_old(now, timeouts);
+                return false;
+            }
+        }
+        if self.asked != Action::Rest && !is_near(now, self.commanded, timeouts.command_us()) {
             self.forget_target();
         }
+        self.limit == self.full_limit
     }
 
-    /// The last feedback is late; its age decides how far that goes.
-    fn grow_old(&mut self, cycle: &Cycle) {
-        match self.link {
-            Link::Unheard | Link::Offline => {}
-            _ if age(cycle.now, self.heard) > cycle.timeouts.offline_us() => self.set_offline(),
-            Link::Online | Link::Late => self.set_late(),
-            Link::Recovering => {}
+    /// The last feedback is not fresh; its age decides how far that goes.
+    fn grow_old(&mut self, now: u32, timeouts: &Timeouts) {
+        if age(now, self.heard) > timeouts.offline_us() {
+            self.set_offline();
+        } else if self.link == Link::Online {
+            self.set_late();
         }
     }
 

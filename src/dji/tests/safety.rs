@@ -268,3 +268,78 @@ fn timeouts_are_configured_within_ten_seconds() {
         (Duration::from_millis(3), Duration::from_secs(10))
     );
 }
+
+/// What has to become of a motor's target, reckoned anew in every tick.
+#[derive(Default, Clone, Copy)]
+struct Watched {
+    heard: u64,
+    is_late: bool,
+    commanded: Option<u64>,
+}
+
+impl Watched {
+    fn is_driven(&mut self, now: u64) -> bool {
+        self.is_late |= now > self.heard + 4_000;
+        if self.is_late {
+            return false;
+        }
+        self.commanded = self.commanded.filter(|commanded| now <= commanded + 6_000);
+        self.commanded.is_some()
+    }
+}
+
+#[test]
+fn each_of_several_motors_stops_at_its_own_limit_however_the_ages_are_mixed() {
+    let mut seed = 0x5EED_u64;
+    let mut random = |below: u64| {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        seed % below
+    };
+    let (bus, wheels) = armed([1, 2, 3].map(Config::<M3508>::new));
+    let timeouts = Timeouts::new()
+        .with_late(Duration::from_micros(4_000))
+        .with_command(Duration::from_micros(6_000))
+        .with_offline(Duration::from_secs(10));
+    let mut bus = bus.with_timeouts(timeouts);
+    let mut watched = [Watched { heard: 1_000, ..Watched::default() }; 3];
+    let (mut now, mut words, mut stops) = (1_000, [0; 4], 0);
+    for _ in 0..200_000 {
+        let before = now;
+        now += 1 + random(2_500);
+        for ((id, wheel), watched) in (0x201..).zip(wheels).zip(&mut watched) {
+            if random(3) != 0 {
+                // Some frames are stamped before the last update, or after the one to come.
+                let at = (now + random(600)).saturating_sub(300).max(watched.heard);
+                assert_eq!(
+                    bus.ingest(&feedback(id, 0, 0), Instant::from_micros(at)),
+                    Ingest::Taken
+                );
+                (watched.heard, watched.is_late) = (at, false);
+            }
+            match random(4) {
+                0 => {
+                    let set = bus.set_raw(wheel, 100);
+                    assert_eq!(set.is_err(), watched.is_late);
+                    watched.commanded = (!watched.is_late).then_some(before);
+                }
+                1 if random(8) == 0 => {
+                    bus.relax(wheel);
+                    watched.commanded = None;
+                }
+                _ => {}
+            }
+        }
+        bus.update(Tick::new(Instant::from_micros(now), 0.001));
+        for (_, sent) in sent(&mut bus) {
+            words = sent;
+        }
+        for (word, watched) in words.iter().zip(&mut watched) {
+            let was = watched.commanded.is_some();
+            assert_eq!(*word != 0, watched.is_driven(now), "at {now} us");
+            stops += u32::from(was && *word == 0);
+        }
+    }
+    assert!(stops > 10_000, "{stops}");
+}
