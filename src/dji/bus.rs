@@ -1,11 +1,12 @@
 use super::budget::Budget;
 use super::command::Outbox;
 use super::handle::Key;
+use super::health::Rounds;
 use super::slot::Slot;
 use super::{AnyHandle, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Link, MotorName, Timeouts};
+use crate::motor::{Ingest, Journal, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
@@ -72,11 +73,13 @@ pub struct Bus<B = ()> {
     /// Whether there was an update.
     pub(super) running: bool,
     pub(super) stopped: bool,
+    pub(super) journal: Journal<12>,
+    pub(super) rounds: Rounds,
     brand: PhantomData<fn() -> B>,
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3584);
+const _: () = assert!(size_of::<Slot>() <= 348 && size_of::<Bus>() <= 4120);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -151,6 +154,8 @@ impl<B> Bus<B> {
             used: 0,
             running: false,
             stopped: false,
+            journal: Journal::EMPTY,
+            rounds: Rounds::NEW,
             brand: PhantomData,
         }
     }
@@ -181,7 +186,7 @@ impl<B> Bus<B> {
     #[inline]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
+        let Some(slot) = self.slots.get_mut(index) else { return self.ingest_other(frame, now) };
         match Feedback::of_frame(frame) {
             Some(feedback) if slot.receive(feedback, now.stamp()) => Ingest::Taken,
             _ => self.ingest_unusual(frame, now),
@@ -206,6 +211,7 @@ impl<B> Bus<B> {
         if !self.takes_step(tick.dt_s()) || !self.takes_time(before) {
             return self.hold(before);
         }
+        self.check_one_slot();
         let step = self.step;
         for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
             let raw = slot.update(&step);

@@ -45,7 +45,7 @@ pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
-pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic};
+pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
 pub use name::MotorName;

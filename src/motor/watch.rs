@@ -1,6 +1,6 @@
 use super::{
     Condition, Conditions, Guard, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic,
-    Vitals,
+    Vitals, elapsed,
 };
 use crate::time::{Duration, Instant};
 
@@ -9,6 +9,9 @@ static USUAL: HealthConfig = HealthConfig::new();
 
 /// So long after another node sent the command frame it is forgotten.
 const RIVAL_FORGOTTEN: Duration = Duration::from_secs(1);
+
+/// What changes slowly is looked at this often.
+const PERIOD: Duration = Duration::from_millis(8);
 
 /// Frames are counted for this long.
 const WINDOW: Duration = Duration::from_secs(1);
@@ -24,6 +27,9 @@ pub(super) struct Watch {
     rival: Option<Instant>,
     saturated: u16,
     error_code: u8,
+    looked: Instant,
+    /// What is left of the output.
+    share: f32,
 }
 
 impl Watch {
@@ -37,6 +43,8 @@ impl Watch {
             rival: None,
             saturated: 0,
             error_code: 0,
+            looked: Instant::START,
+            share: 1.0,
         }
     }
 
@@ -77,7 +85,7 @@ impl Watch {
     /// The motor is about to be driven.
     pub(super) fn start(&mut self, guard: &mut Guard, now: Instant) {
         guard.note(Condition::Runaway, false, now);
-        self.monitor.start();
+        self.monitor = Monitor::NEW;
     }
 
     /// Looks at the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
@@ -86,40 +94,46 @@ impl Watch {
         self.count_frames(now);
         self.rival = self.rival.filter(|rival| now.since(*rival) <= RIVAL_FORGOTTEN);
         guard.note(Condition::SecondMaster, self.has_rival(), now);
-        let elapsed = self.monitor.elapsed(now.stamp());
-        let share = if guard.link() == Link::Online {
-            self.look_at(guard, vitals, elapsed, now)
+        if guard.link() != Link::Online {
+            self.monitor = Monitor::NEW;
         } else {
-            self.monitor.start();
-            1.0
-        };
+            self.read_error(guard, vitals, now);
+            let since = now.since(self.looked);
+            if since >= PERIOD {
+                self.looked = now;
+                self.share = self.look_at(guard, vitals, elapsed(since.micros_u32()), now);
+            }
+        }
         let begun = guard.conditions().minus(before).and(self.config.relaxing());
         if !begun.is_empty() || self.is_faulty(guard) {
             guard.relax_until_armed();
         }
-        share
+        self.share
     }
 
-    fn look_at(&mut self, guard: &mut Guard, vitals: &Vitals, elapsed: u16, now: Instant) -> f32 {
+    fn look_at(&mut self, guard: &mut Guard, vitals: &Vitals, elapsed: u8, now: Instant) -> f32 {
         let sample = Sample {
             elapsed,
             fresh: false,
             effort: vitals.effort,
             speed: vitals.speed,
             current: vitals.current,
+            word: 0,
+            word_change: u8::MAX,
             angle: 0,
             rest: 0,
             temperature: vitals.temperature_c.zip(self.config.temperatures_c()),
         };
         let saturated = guard.is_armed() && vitals.effort.abs() >= 1.0;
         self.saturated = self.saturated.saturating_add(u16::from(saturated));
-        let changed = core::mem::replace(&mut self.error_code, vitals.error_code);
-        let changed = changed != vitals.error_code;
         let (monitor, config) = (&mut self.monitor, self.config);
-        guard.look(now, |latch| {
-            latch.report(vitals.error, changed, config);
-            monitor.look(latch, &sample, config)
-        })
+        guard.look(now, |latch| monitor.look(latch, &sample, config))
+    }
+
+    fn read_error(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) {
+        let before = core::mem::replace(&mut self.error_code, vitals.error_code);
+        let changed = before != vitals.error_code;
+        guard.look(now, |latch| latch.report(vitals.error, changed, self.config));
     }
 
     fn count_frames(&mut self, now: Instant) {

@@ -1,6 +1,7 @@
 //! What is wrong with a motor.
 
 use crate::opaque::Function;
+use drivetrain::dji::{AnyHandle, Bus, Config, M3508};
 use drivetrain::motor::{Condition, Conditions, Guard, HealthConfig, Reaction};
 
 pub fn call_all() {
@@ -24,4 +25,9 @@ pub fn call_all() {
     Guard::conditions.call();
     Guard::next_edge.call();
     Guard::relax_until_armed.call();
+    Config::<M3508>::with_health.call();
+    Bus::<()>::with_loopback.call();
+    Bus::<()>::next_edge.call();
+    (|bus: &Bus, motor: AnyHandle| Bus::health(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| Bus::conditions(bus, motor)).call();
 }

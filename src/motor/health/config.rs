@@ -167,12 +167,11 @@ impl HealthConfig {
     }
 
     /// Radians of the output shaft.
-    #[expect(dead_code, reason = "for the DJI bus")]
     pub(crate) const fn soft_limits(&self) -> Option<(f32, f32)> {
         self.soft_limits
     }
 
-    pub(super) const fn stall_effort(&self) -> f32 {
+    pub(crate) const fn stall_effort(&self) -> f32 {
         self.stall_effort
     }
 

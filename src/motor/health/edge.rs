@@ -1,6 +1,6 @@
 use super::{Condition, Conditions, HealthConfig};
 use crate::motor::{MotorName, Severity};
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 
 /// One change of a condition of one motor.
 ///
@@ -143,7 +143,16 @@ impl<const N: usize> Journal<N> {
     pub(crate) const EMPTY: Self = Self { at: [0; N], what: [0; N], first: 0, length: 0, last: 0 };
 
     /// Notes the changes of a motor since `before`.
+    #[inline]
     pub(crate) fn note(&mut self, motor: u8, before: &Latch, after: &Latch, now: Instant) {
+        if before != after {
+            self.note_changes(motor, before, after, now);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_changes(&mut self, motor: u8, before: &Latch, after: &Latch, now: Instant) {
         for (condition, began) in after.news(before) {
             self.push(motor, condition, began, coarse(now));
         }
@@ -176,7 +185,17 @@ impl<const N: usize> Journal<N> {
         Some(Entry { motor, condition, began: rest & 1 != 0, at })
     }
 
-    /// Returns the time of an entry, seen from `now`: exact to 1.024 ms, up to an age of 50 days.
+    /// Forgets the entries of a motor that is no longer there.
+    pub(crate) fn forget(&mut self, motor: u8) {
+        for what in &mut self.what {
+            if *what >> 8 == u16::from(motor) {
+                *what |= 0xFF00;
+            }
+        }
+    }
+
+    /// Returns the time of an entry, seen from a `now` that may lie a little before it: exact to 1.024 ms, up to an age
+    /// of 25 days.
     pub(crate) fn time_of(&self, entry: &Entry, now: Instant) -> Instant {
         fine(entry.at, now)
     }
@@ -200,14 +219,15 @@ const fn coarse(now: Instant) -> u32 {
 }
 
 fn fine(at: u32, now: Instant) -> Instant {
-    let age = u64::from(coarse(now).wrapping_sub(at)) << 10;
+    let age = i64::from(coarse(now).wrapping_sub(at).cast_signed()) << 10;
     let rounded = now.as_micros() & !1023;
-    Instant::START + Duration::from_micros(rounded.saturating_sub(age))
+    Instant::from_micros(rounded.saturating_add_signed(-age))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::Duration;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
     use std::vec::Vec;
@@ -267,15 +287,32 @@ mod tests {
     }
 
     #[test]
-    fn a_time_of_49_days_ago_is_still_told() {
+    fn a_time_of_24_days_ago_is_still_told_and_one_that_lies_ahead_is_too() {
         let mut journal = Journal::<1>::EMPTY;
         let mut after = Latch::NONE;
         after.set(Condition::Hot, true);
         let start = Instant::from_micros(1 << 40);
         journal.note(0, &Latch::NONE, &after, start);
-        let later = start + Duration::from_secs(49 * 86_400);
         let entry = journal.pop().unwrap();
-        assert_eq!(journal.time_of(&entry, later), start);
+        for later in
+            [start + Duration::from_secs(24 * 86_400), Instant::from_micros((1 << 40) - 900)]
+        {
+            assert_eq!(journal.time_of(&entry, later), start);
+        }
+    }
+
+    #[test]
+    fn what_a_motor_left_behind_is_no_other_motors() {
+        let mut journal = Journal::<4>::EMPTY;
+        let mut after = Latch::NONE;
+        after.set(Condition::Hot, true);
+        journal.note(1, &Latch::NONE, &after, NOW);
+        journal.note(2, &Latch::NONE, &after, NOW);
+        journal.forget(1);
+        assert_eq!(
+            [journal.pop(), journal.pop()].map(|e| e.map(|e| e.motor)),
+            [Some(255), Some(2)]
+        );
     }
 
     proptest! {

@@ -1,24 +1,37 @@
-use super::{Condition, Latch, Sample, Timer};
+use super::{Condition, Latch, Sample};
 
 /// Below this share of the no-load speed a rotor moves too little between two looks to tell.
 const MOVES: f32 = 0.05;
-/// The change of the command that a current has to follow.
-const CHANGE: f32 = 0.2;
 /// 100 ms, in units of 1.024 ms.
-const WINDOW: u16 = 98;
+const WINDOW: u8 = 98;
+
+/// An angle has 13 bits.
+const ANGLE: u16 = 0x1FFF;
 
 /// What the feedback was when it was looked at last.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frozen {
-    timer: Timer,
-    angle: u16,
-    rest: u16,
-    /// The command when the feedback became what it is, in 100ths of full scale.
-    effort: i8,
+    lasted: u8,
+    /// The angle, and three bits that change with the current: by chance they do not, but not ten times in a row.
+    feedback: u16,
+    /// The command when the feedback became what it is.
+    word: i8,
 }
 
 impl Frozen {
-    pub(super) const NONE: Self = Self { timer: Timer::ZERO, angle: u16::MAX, rest: 0, effort: 0 };
+    pub(super) const NONE: Self = Self { lasted: 0, feedback: 0, word: 0 };
+
+    /// Tells whether an angle is another one than when it was looked at last.
+    #[inline]
+    pub(super) const fn has_moved(&self, angle: u16) -> bool {
+        (self.feedback ^ angle) & ANGLE != 0
+    }
+
+    /// Takes feedback that moved.
+    #[inline]
+    pub(super) const fn follow(&mut self, angle: u16, word: i8) {
+        *self = Self { lasted: 0, feedback: angle, word };
+    }
 
     /// Looks for feedback that stands still and cannot be true.
     ///
@@ -33,18 +46,18 @@ impl Frozen {
         if !sample.fresh {
             return;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-        let effort = (sample.effort * 100.0) as i8;
-        let same_angle = sample.angle == self.angle;
-        let same = same_angle && sample.rest == self.rest;
-        if !same {
-            self.effort = effort;
+        let feedback = (sample.angle & ANGLE) | (sample.rest & !ANGLE);
+        let changes = feedback ^ self.feedback;
+        self.feedback = feedback;
+        if changes != 0 {
+            self.word = sample.word;
         }
-        let answers_not = same && f32::from(effort.abs_diff(self.effort)) >= 100.0 * CHANGE;
-        let contradicts = same_angle && sample.speed.abs() >= MOVES;
-        (self.angle, self.rest) = (sample.angle, sample.rest);
-        let lasted = self.timer.run(answers_not || contradicts, sample.elapsed);
-        latch.set(Condition::Frozen, lasted >= WINDOW);
+        let change = sample.word.abs_diff(self.word);
+        let answers_not = changes == 0 && change >= sample.word_change;
+        let contradicts = changes & ANGLE == 0 && sample.speed.abs() >= MOVES;
+        let holds = answers_not || contradicts;
+        self.lasted = if holds { self.lasted.saturating_add(sample.elapsed) } else { 0 };
+        latch.set(Condition::Frozen, self.lasted >= WINDOW);
     }
 }
 
@@ -54,7 +67,9 @@ mod tests {
 
     fn look(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
         let mut latch = Latch::NONE;
-        let sample = Sample { angle, rest, effort, speed, elapsed: 11, ..Sample::AT_REST };
+        #[expect(clippy::cast_possible_truncation, reason = "at most 100")]
+        let word = (effort * 100.0) as i8;
+        let sample = Sample { angle, rest, word, speed, elapsed: 11, ..Sample::AT_REST };
         frozen.check(&mut latch, &sample);
         latch.has(Condition::Frozen)
     }
@@ -69,14 +84,15 @@ mod tests {
         let mut frozen = Frozen::NONE;
         for step in 0..1_000_u16 {
             let effort = f32::from(step % 200) / 200.0;
-            assert!(!look(&mut frozen, 77, step % 200, effort, 0.0));
+            assert!(!look(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
         }
     }
 
     #[test]
     fn an_angle_that_rests_while_the_speed_does_not_is_frozen_and_ends() {
         let mut frozen = Frozen::NONE;
-        let looks = (0..20_u16).map(|step| look(&mut frozen, 77, step, 0.1, -0.3)).position(|f| f);
+        let looks =
+            (0..20_u16).map(|step| look(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
         assert_eq!(looks, Some(9), "100 ms");
         assert!(!look(&mut frozen, 78, 0, 0.1, -0.3));
     }

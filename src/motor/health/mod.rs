@@ -25,6 +25,6 @@ pub use config::{HealthConfig, Reaction};
 pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
 use monitor::Timer;
-pub(crate) use monitor::{Monitor, Sample};
+pub(crate) use monitor::{Monitor, Sample, elapsed};
 pub use report::Health;
 pub(crate) use traffic::Traffic;

@@ -2,8 +2,12 @@ use super::frozen::Frozen;
 use super::runaway::Runaway;
 use super::{Condition, HealthConfig, Latch, stall, thermal};
 
-/// A longer pause between two looks counts as this long, in units of 1.024 ms: what lay between was not seen.
-const LONGEST_LOOK: u16 = 128;
+/// Returns a time between two looks as the checks take it.
+pub(crate) fn elapsed(micros: Option<u32>) -> u8 {
+    const LONGEST: u8 = 128;
+    let units = micros.and_then(|micros| u8::try_from(micros >> 10).ok());
+    units.map_or(LONGEST, |units| units.min(LONGEST))
+}
 
 /// For how long something holds, in units of 1.024 ms; saturates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,8 +17,8 @@ impl Timer {
     pub(super) const ZERO: Self = Self(0);
 
     /// Goes on while it holds, and starts anew when it does not.
-    pub(super) const fn run(&mut self, holds: bool, elapsed: u16) -> u16 {
-        self.0 = if holds { self.0.saturating_add(elapsed) } else { 0 };
+    pub(super) const fn run(&mut self, holds: bool, elapsed: u8) -> u16 {
+        self.0 = if holds { self.0.saturating_add(elapsed as u16) } else { 0 };
         self.0
     }
 }
@@ -22,8 +26,8 @@ impl Timer {
 /// What a look at a motor finds, in the direction of its rotor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
-    /// Time since the look before, in units of 1.024 ms; see [`Monitor::elapsed`].
-    pub(crate) elapsed: u16,
+    /// Time since the look before, in units of 1.024 ms: at most 128, because what lay between was not seen.
+    pub(crate) elapsed: u8,
     /// Whether a frame came since.
     pub(crate) fresh: bool,
     /// The command that was sent, as a share of the motor's limit.
@@ -32,9 +36,12 @@ pub(crate) struct Sample {
     pub(crate) speed: f32,
     /// The reported current, as a share of its full scale; 0 when it is not known.
     pub(crate) current: f32,
+    /// The command that was sent in a coarse unit of its own, and the change of it that a current has to follow.
+    pub(crate) word: i8,
+    pub(crate) word_change: u8,
     /// Rotor angle, as it was reported.
     pub(crate) angle: u16,
-    /// Anything that changes with the rest of the feedback.
+    /// Anything that changes with the current; its upper three bits count.
     pub(crate) rest: u16,
     /// What the motor reports, and at which temperatures it gets warm and hot.
     pub(crate) temperature: Option<(i16, (i16, i16))>,
@@ -48,6 +55,8 @@ impl Sample {
         effort: 0.0,
         speed: 0.0,
         current: 0.0,
+        word: 0,
+        word_change: 20,
         angle: 0,
         rest: 0,
         temperature: None,
@@ -57,7 +66,6 @@ impl Sample {
 /// The slow checks of one motor: everything that need not be looked at in every tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Monitor {
-    looked: u16,
     stall: Timer,
     runaway: Runaway,
     frozen: Frozen,
@@ -65,20 +73,19 @@ pub(crate) struct Monitor {
 
 impl Monitor {
     pub(crate) const NEW: Self =
-        Self { looked: 0, stall: Timer::ZERO, runaway: Runaway::NONE, frozen: Frozen::NONE };
+        Self { stall: Timer::ZERO, runaway: Runaway::NONE, frozen: Frozen::NONE };
 
-    /// Returns the time since the look before in units of 1.024 ms, and notes this one.
-    #[expect(clippy::cast_possible_truncation, reason = "a wrapping difference of up to 67 s")]
-    pub(crate) const fn elapsed(&mut self, now_stamp: u32) -> u16 {
-        let now = (now_stamp >> 10) as u16;
-        let elapsed = now.wrapping_sub(self.looked);
-        self.looked = now;
-        if elapsed < LONGEST_LOOK { elapsed } else { LONGEST_LOOK }
-    }
-
-    /// Forgets what was seen: the motor was not heard, or is about to start.
-    pub(crate) const fn start(&mut self) {
-        *self = Self { looked: self.looked, ..Self::NEW };
+    /// As [`look`](Self::look), for a motor that is moderately driven and cool; `false` when its angle did not move, and
+    /// has to be looked at.
+    #[inline]
+    pub(crate) const fn glance(&mut self, angle: u16, word: i8) -> bool {
+        let moved = self.frozen.has_moved(angle);
+        if moved {
+            self.stall = Timer::ZERO;
+            self.runaway = Runaway::NONE;
+            self.frozen.follow(angle, word);
+        }
+        moved
     }
 
     /// Looks at the motor and returns the share of the output that it is left with.

@@ -1,4 +1,4 @@
-use super::{Condition, Latch, Sample, Timer};
+use super::{Condition, Latch, Sample};
 
 /// Speeds are kept in 64ths of the no-load speed.
 const SCALE: f32 = 64.0;
@@ -6,21 +6,21 @@ const SCALE: f32 = 64.0;
 const GAIN: u8 = 19;
 /// A speed that is this much lower than the highest has fallen: 5 %.
 const FALL: u8 = 3;
-/// It has to last 100 ms, and the speed must be gained within 0.5 s, in units of 1.024 ms: more slowly than that, it is
+/// It has to last 100 ms, and the speed must be gained within 0.5 s, in units of 2.048 ms: more slowly than that, it is
 /// a slope or somebody who pushes.
-const SHORTEST: u16 = 98;
-const LONGEST: u16 = 488;
+const SHORTEST: u8 = 49;
+const LONGEST: u8 = 244;
 
 /// What was seen of a motor that turns the wrong way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Runaway {
-    timer: Timer,
+    lasted: u8,
     from: u8,
     highest: u8,
 }
 
 impl Runaway {
-    pub(super) const NONE: Self = Self { timer: Timer::ZERO, from: 0, highest: 0 };
+    pub(super) const NONE: Self = Self { lasted: 0, from: 0, highest: 0 };
 
     /// Looks for a motor that speeds up although its command says otherwise. Latched: it ends when it is armed.
     ///
@@ -37,16 +37,13 @@ impl Runaway {
         let current = sample.current * 1.0_f32.copysign(sample.speed);
         let wrong = effort <= -0.5 || (effort.abs() < 0.05 && current >= 0.2);
         let falls = speed.saturating_add(FALL) < self.highest;
-        if !wrong || falls || self.timer == Timer::ZERO {
-            *self = Self { timer: Timer::ZERO, from: speed, highest: speed };
+        if falls || self.lasted == 0 || self.lasted > LONGEST {
+            *self = Self { lasted: 0, from: speed, highest: speed };
         }
-        let lasted = self.timer.run(wrong, sample.elapsed);
-        if lasted > LONGEST {
-            *self = Self::NONE;
-            return;
-        }
+        self.lasted =
+            if wrong { self.lasted.saturating_add(sample.elapsed.div_ceil(2)) } else { 0 };
         self.highest = self.highest.max(speed);
-        if lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN) {
+        if self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN) {
             latch.set(Condition::Runaway, true);
         }
     }
@@ -57,7 +54,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const STEP: u16 = 11;
+    const STEP: u8 = 11;
 
     /// Lets a motor with this effort, current and no-load speed of 1 run for a second.
     fn runs_away(motor: impl Fn(f32) -> (f32, f32, f32)) -> bool {

@@ -11,23 +11,14 @@ pub(crate) struct Traffic {
     /// What the last whole window had.
     rate_hz: u16,
     last_gap: u16,
-    /// Jumps of the angle to and fro, while more frames come than should.
-    jumps: u8,
-    /// How the angle jumped last: -1, 0 or 1.
-    direction: i8,
+    /// Jumps of the angle to and fro, while more frames come than should; and how it jumped last, as a sign.
+    jumps: i8,
     crowded: bool,
 }
 
 impl Traffic {
-    pub(crate) const NONE: Self = Self {
-        frames: 0,
-        longest_gap: 0,
-        rate_hz: 0,
-        last_gap: 0,
-        jumps: 0,
-        direction: 0,
-        crowded: false,
-    };
+    pub(crate) const NONE: Self =
+        Self { frames: 0, longest_gap: 0, rate_hz: 0, last_gap: 0, jumps: 0, crowded: false };
 
     /// Counts a frame.
     #[inline]
@@ -45,7 +36,6 @@ impl Traffic {
     }
 
     /// Tells whether more frames come than one motor sends, so that each has to be [compared](Self::compare).
-    #[cfg_attr(not(test), expect(dead_code, reason = "for the DJI bus"))]
     pub(crate) const fn is_crowded(&self) -> bool {
         self.crowded
     }
@@ -55,23 +45,21 @@ impl Traffic {
     /// Two motors with one id take turns, and so the angle jumps to and fro between theirs, each time by more than the
     /// speed explains. One motor may seem to jump, after a gap or when frames are stamped late, but not back again and
     /// again.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for the DJI bus"))]
     pub(crate) const fn compare(&mut self, counts: i32, predicted: i32, tolerance: i32) {
         let off = counts.wrapping_sub(predicted);
         if off.unsigned_abs() <= tolerance.unsigned_abs() {
             return;
         }
-        let direction = if off < 0 { -1 } else { 1 };
-        if direction == -self.direction {
-            self.jumps = self.jumps.saturating_add(1);
+        // To and fro: one more, in the other direction. The same way again: as many as before.
+        if (off < 0) != (self.jumps < 0) || self.jumps == 0 {
+            let jumps = self.jumps.saturating_abs().saturating_add(1);
+            self.jumps = if off < 0 { -jumps } else { jumps };
         }
-        self.direction = direction;
     }
 
     /// Tells whether two motors answer, as far as this window has seen it.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for the DJI bus"))]
     pub(crate) const fn is_double(&self) -> bool {
-        self.jumps >= JUMPS
+        self.jumps.unsigned_abs() >= JUMPS
     }
 
     /// Ends a window of `window` units of 1.024 ms. Half as many frames again as `nominal_hz` are a crowd.
@@ -87,7 +75,6 @@ impl Traffic {
             rate_hz: rate,
             last_gap: self.longest_gap,
             jumps: 0,
-            direction: 0,
             crowded: rate as u32 * 2 > nominal_hz.saturating_mul(3),
         };
     }
