@@ -3,7 +3,7 @@ use super::command::Outbox;
 use super::handle::Key;
 use super::health::Rounds;
 use super::slot::Slot;
-use super::{AnyHandle, Feedback, State};
+use super::{AnyHandle, CommandFrame, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Journal, Link, MotorName, Timeouts};
@@ -13,6 +13,10 @@ use core::marker::PhantomData;
 /// The lowest feedback id, and how many there are: 0x201..=0x20B.
 pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
 const SLOTS: usize = 11;
+
+/// All commands, and the feedback, lie from 0x1FE to 0x2FF.
+const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
+const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
@@ -186,11 +190,15 @@ impl<B> Bus<B> {
     #[inline]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else { return self.ingest_other(frame, now) };
-        match Feedback::of_frame(frame) {
-            Some(feedback) if slot.receive(feedback, now.stamp()) => Ingest::Taken,
-            _ => self.ingest_unusual(frame, now),
+        if let Some(slot) = self.slots.get_mut(index) {
+            if Feedback::of_frame(frame).is_some_and(|feedback| slot.receive(feedback, now.stamp()))
+            {
+                return Ingest::Taken;
+            }
+        } else if frame.header().wrapping_sub(LOWEST_COMMAND_ID) > COMMAND_IDS {
+            return Ingest::Unrelated;
         }
+        self.ingest_unusual(frame, now)
     }
 
     /// Takes a received standard data frame from a driver without an `embedded-can` frame type.

@@ -4,7 +4,7 @@ use super::bus::Bus;
 use super::slot::{Look, Slot};
 use super::{AnyHandle, CommandFrame};
 use crate::frame::CanFrame;
-use crate::motor::{Claim, Condition, Conditions, Edge, Health, Ingest, Role, elapsed};
+use crate::motor::{Claim, Condition, Conditions, Edge, Health, Role, elapsed};
 use crate::time::Instant;
 
 /// Feedback frames are counted for this long, in µs.
@@ -175,20 +175,8 @@ impl<B> Bus<B> {
         self.journal.note(motor, &before, &slot.conditions, self.updated);
     }
 
-    /// Takes a frame that is no feedback of this family: a command of ours from another node, say.
-    #[inline]
-    pub(super) fn ingest_other(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        const LOWEST: u32 = CommandFrame::X1FE.id() as u32;
-        const HIGHEST: u32 = CommandFrame::X2FF.id() as u32;
-        if frame.header().wrapping_sub(LOWEST) <= HIGHEST - LOWEST {
-            self.ingest_command(frame, now);
-        }
-        Ingest::Unrelated
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn ingest_command(&mut self, frame: &CanFrame, now: Instant) {
+    /// Takes a frame of another node that may be one of our commands.
+    pub(super) fn ingest_command(&mut self, frame: &CanFrame, now: Instant) {
         let Some(frame) = CommandFrame::with_id(frame.header()) else { return };
         if self.rounds.echoes || !self.outbox.is_in_use(frame) {
             return;

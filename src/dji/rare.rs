@@ -13,7 +13,10 @@ impl<B> Bus<B> {
     #[inline(never)]
     pub(super) fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
+        let Some(slot) = self.slots.get_mut(index) else {
+            self.ingest_command(frame, now);
+            return Ingest::Unrelated;
+        };
         #[expect(clippy::cast_possible_truncation, reason = "below 11")]
         let motor = index as u8;
         let Some(facts) = slot.facts() else {
