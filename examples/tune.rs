@@ -8,7 +8,7 @@
 //! of their inertia and friction is an estimate: take the procedure home, not the gains.
 
 use drivetrain::control::{
-    Gains, Oscillation, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
+    Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
 };
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::runner::{Nb, Runner};
@@ -28,7 +28,7 @@ struct Plan<M: Model> {
     /// A speed about which the motor swings: away from zero, where dry friction would hold it.
     swing_about: f32,
     relay: RelayTunerConfig,
-    guessed: Gains,
+    guessed: PidConfig,
     rule: TuningRule,
     step_to: f32,
     effort: fn(&mut Bus, Handle<M>, f32),
@@ -40,7 +40,7 @@ const WHEEL: Plan<M3508> = Plan {
     simulated: SimModel::M3508,
     swing_about: 15.0,
     relay: RelayTunerConfig::new(3.0, 0.05),
-    guessed: Gains { kp: 0.1, ki: 2.0, kd: 0.0 },
+    guessed: PidConfig::new(0.1, 2.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 30.0,
     effort: |bus, motor, amperes| _ = bus.set_current(motor, Current::from_amperes(amperes)),
@@ -53,7 +53,7 @@ const YAW: Plan<Gm6020Voltage> = Plan {
     swing_about: 8.0,
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
     relay: RelayTunerConfig::new(8.0, 0.15).with_bias(6.0),
-    guessed: Gains { kp: 0.2, ki: 4.0, kd: 0.0 },
+    guessed: PidConfig::new(0.2, 4.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 12.0,
     effort: |bus, motor, volts| _ = bus.set_voltage(motor, Voltage::from_volts(volts)),
@@ -72,14 +72,14 @@ struct Tuned {
 /// Runs one motor for `seconds`; `work` gets its handle, its measured speed and the time step, once a tick.
 fn run<M: Model>(
     plan: &Plan<M>,
-    gains: Gains,
+    speed: PidConfig,
     seconds: u32,
     mut work: impl FnMut(&mut Bus, Handle<M>, f32, f32),
 ) -> Outcome<()> {
     let world = World::new(1);
     world.attach(MotorConfig::new(plan.simulated, 1))?;
     let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M>::new(1).speed_loop(gains.config()))?;
+    let motor = bus.attach(Config::<M>::new(1).speed_loop(speed))?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
     let mut armed = false;
     for _ in 0..seconds * 10_000 {
@@ -105,10 +105,10 @@ fn identify<M: Model>(plan: &Plan<M>) -> Outcome<Oscillation> {
     Ok(tuner.oscillation().ok_or("the motor did not swing steadily")?)
 }
 
-fn step<M: Model>(plan: &Plan<M>, gains: Gains) -> Outcome<(StepMeasures, Curve)> {
+fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepMeasures, Curve)> {
     let mut response = StepResponse::new(0.0, plan.step_to, 1.0, 0.05)?;
     let (mut curve, mut time_s) = (Curve::new(), 0.0);
-    run(plan, gains, 2, |bus, motor, speed, dt_s| {
+    run(plan, speed, 2, |bus, motor, speed, dt_s| {
         _ = bus.set_velocity(motor, AngularVelocity::from_rad_per_s(plan.step_to));
         if !response.is_complete() {
             response.record(speed, dt_s);
@@ -131,17 +131,18 @@ fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
     let (before, before_curve) = step(plan, plan.guessed)?;
     report("guessed", plan.guessed, &before);
     let gains = found.gains(plan.rule);
-    let (after, after_curve) = step(plan, gains)?;
-    report(&format!("{:?}", plan.rule), gains, &after);
+    let (after, after_curve) = step(plan, gains.config())?;
+    report(&format!("{:?}", gains.rule), gains.config(), &after);
     Ok(Tuned { name: plan.name, target: plan.step_to, before: before_curve, after: after_curve })
 }
 
-fn report(title: &str, gains: Gains, measures: &StepMeasures) {
+fn report(title: &str, speed: PidConfig, measures: &StepMeasures) {
     let ms = |time_s: Option<f32>| time_s.map_or("never".into(), |s| format!("{:.0} ms", 1e3 * s));
+    let (kp, ki, _) = speed.gains();
     println!(
         "  {title:<15} kp {:.3}  ki {:.2}   rise {}, overshoot {:.1} %, settled (5 %) {}, steady error {:+.3} rad/s",
-        gains.kp,
-        gains.ki,
+        kp,
+        ki,
         ms(measures.rise_time_s),
         100.0 * measures.overshoot,
         ms(measures.settling_time_s),

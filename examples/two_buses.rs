@@ -7,11 +7,11 @@
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AttachError, Bus, Config, Handle, M3508};
-use drivetrain::geometry::Twist;
+use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{CanDevice, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, SimClock, World,
+    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, SimClock, Wheel, World,
 };
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
@@ -77,7 +77,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         rear_left: wheel(1, Line::Can2)?,
         rear_right: wheel(2, Line::Can2)?,
     };
-    world.attach_chassis(ChassisConfig::new(GEOMETRY), wheels)?;
+    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
+    let mounted = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    world.attach_chassis(ChassisConfig::new(&[
+        mounted(wheels.front_left, x, y),
+        mounted(wheels.front_right, x, -y).reversed(),
+        mounted(wheels.rear_left, -x, y),
+        mounted(wheels.rear_right, -x, -y).reversed(),
+    ]))?;
     let fault = Instant::from_micros(1_500_000)..Instant::from_micros(1_900_000);
     world.fault(Fault::Unplugged(Line::Can2), fault)?;
 

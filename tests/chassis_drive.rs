@@ -9,10 +9,10 @@ use drivetrain::chassis::{
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Heading, Twist};
+use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Fault, Model, MotorConfig, SimClock, World,
+    ChassisConfig, ChassisState, Controller, Fault, Model, MotorConfig, SimClock, Wheel, World,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
@@ -34,7 +34,16 @@ impl<'w> Robot<'w> {
         let ids = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
         let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
         let motors = ids.try_map(motor).unwrap();
-        world.attach_chassis(ChassisConfig::new(GEOMETRY), motors).unwrap();
+        let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
+        let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+        world
+            .attach_chassis(ChassisConfig::new(&[
+                wheel(motors.front_left, x, y),
+                wheel(motors.front_right, x, -y).reversed(),
+                wheel(motors.rear_left, -x, y),
+                wheel(motors.rear_right, -x, -y).reversed(),
+            ]))
+            .unwrap();
         if silent {
             let from = Instant::START + Duration::from_millis(2_000);
             let window = from..from + Duration::from_millis(8_000);

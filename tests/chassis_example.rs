@@ -8,10 +8,22 @@ mod scenario;
 #[path = "../examples/chassis/justfloat.rs"]
 mod justfloat;
 
+#[path = "../examples/chassis/modes.rs"]
+mod modes;
+
+#[path = "../examples/chassis/verdict.rs"]
+mod verdict;
+
+use drivetrain::chassis::Mode;
+
 use drivetrain::wire::Deframer;
 use drivetrain::wire::vofa::JustFloat;
 
+use modes::Drive;
 use scenario::{Run, Sample, Scenario, Trouble};
+use verdict::Verdict;
+
+const MODES: [Mode; 4] = [Mode::FollowGimbal, Mode::Rotor, Mode::Independent, Mode::Relax];
 
 fn run(seed: u64, fault: Option<Trouble>) -> Run {
     Scenario { seconds: 10.0, seed, fault }.run(|_| {}, |_| {}).unwrap()
@@ -96,4 +108,56 @@ fn the_justfloat_stream_reads_back_as_the_samples() {
         assert_eq!(&channels[4..], &sample.measured_rpm.into_array());
     }
     assert_eq!((reader.read(&mut rest), run.samples.len()), (None, 10_000));
+}
+
+#[test]
+fn every_mode_does_what_it_is_for_with_and_without_a_power_limit() {
+    for mode in MODES {
+        for (seed, power_limit_w) in [(1, None), (2, Some(60.0)), (3, Some(25.0))] {
+            let drive = Drive { mode, power_limit_w, seconds: 10.0, seed };
+            let outcome = drive.run(|_| {}, |_| {}).unwrap();
+            let Verdict { text, faults } = Verdict::of(&drive, &outcome);
+            assert!(faults.is_empty(), "{mode:?} {power_limit_w:?}: {faults:?}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn the_power_limit_binds_and_the_buffer_stays_above_its_reserve() {
+    let drive = Drive { mode: Mode::Rotor, power_limit_w: Some(30.0), seconds: 10.0, seed: 1 };
+    let outcome = drive.run(|_| {}, |_| {}).unwrap();
+    let cut = outcome.samples.iter().filter(|sample| sample.scale < 0.9).count();
+    assert!(cut > 500, "cut for {cut} ms");
+    let lowest = outcome.samples.iter().map(|sample| sample.buffer_j).fold(60.0, f32::min);
+    assert!((18.0..30.0).contains(&lowest), "{lowest} J");
+    // The simulated winding has 0.065 ohm; the fit starts from 0.1.
+    let load = drivetrain::chassis::WheelLoad { torque: 10.0, speed_rad_s: 0.0 };
+    let heat = outcome.fitted.power_w(load);
+    assert!((heat - 6.5).abs() < 0.7, "{heat} W, {:?}", outcome.fitted);
+}
+
+#[test]
+fn a_drive_that_fails_its_mode_is_told_so() {
+    for mode in MODES {
+        let drive = Drive { mode, power_limit_w: Some(60.0), seconds: 4.0, seed: 1 };
+        let mut outcome = drive.run(|_| {}, |_| {}).unwrap();
+        for sample in &mut outcome.samples {
+            (sample.heading_deg, sample.wz_rad_s, sample.buffer_j) = (90.0, -1.0, 0.0);
+            sample.is_quiet = false;
+        }
+        let faults = Verdict::of(&drive, &outcome).faults;
+        assert!(faults.len() >= 2, "{mode:?}: {faults:?}");
+    }
+}
+
+#[test]
+fn the_rotor_goes_where_the_gimbal_looks_and_no_wheel_is_too_fast() {
+    let drive = Drive { mode: Mode::Rotor, power_limit_w: None, seconds: 10.0, seed: 1 };
+    let samples = drive.run(|_| {}, |_| {}).unwrap().samples;
+    let forward = samples.iter().find(|sample| sample.time_s >= 1.5).unwrap();
+    let (x, y) = forward.position_m;
+    assert!(x > 1.2 && y.abs() < 0.1 * x && forward.heading_deg > 180.0, "({x}, {y}) m");
+    let speeds = samples.iter().flat_map(|sample| sample.wheel_rpm.into_array());
+    let fastest = speeds.fold(0.0_f32, |fastest, rpm| fastest.max(rpm.abs()));
+    assert!((430.0..475.0).contains(&fastest), "{fastest} rpm"); // the limit is 450
 }

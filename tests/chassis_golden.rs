@@ -4,7 +4,8 @@
 
 use drivetrain::chassis::{
     Differential, DifferentialGeometry, DifferentialWheels, FloorX, Mecanum, MecanumGeometry,
-    MecanumWheels, Omni, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels, OmniWheel, Swerve,
+    MecanumWheels, ModuleState, Omni, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels,
+    OmniWheel, Swerve,
 };
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -121,9 +122,27 @@ fn differential() {
 
 #[test]
 fn swerve_speeds_and_angles() {
-    let swerve = Swerve::new(0.076, CORNERS).unwrap();
-    let coarse = if cfg!(feature = "micromath") { 0.3 } else { 1e-3 };
-    for (motion, expected) in cases("swerve") {
+    compare_modules("swerve", CORNERS);
+    let off_centre = [Vec2::new(0.3, 0.1), Vec2::new(0.0, -0.2), Vec2::new(-0.1, 0.3)];
+    compare_modules("swerve_off_centre", off_centre);
+}
+
+fn compare_modules<const N: usize>(layout: &str, places: [Vec2; N]) {
+    let swerve = Swerve::new(0.076, places).unwrap();
+    let (coarse, relative) = if cfg!(feature = "micromath") { (0.3, 6e-3) } else { (1e-3, 1e-5) };
+    for (motion, expected) in cases(layout) {
+        let mut given = expected.chunks(2);
+        let modules = places.map(|_| {
+            let module = given.next().unwrap();
+            let velocity = AngularVelocity::from_rad_per_s(module[0]);
+            ModuleState::new(velocity, Angle::from_degrees(module[1]))
+        });
+        let error = swerve.forward(modules) - motion;
+        let bound = relative * (1.0 + motion.linear().norm() + motion.wz_rad_s.abs());
+        assert!(
+            error.linear().norm() + error.wz_rad_s.abs() < 3.0 * bound,
+            "{layout} {motion:?}: {error:?}"
+        );
         for (module, should) in swerve.inverse(motion).iter().zip(expected.chunks(2)) {
             assert!((module.velocity.as_rad_per_s() - should[0]).abs() < 2e-5 * (1.0 + should[0]));
             let turn = (module.angle.as_degrees() - should[1]).abs();

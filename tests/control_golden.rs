@@ -4,7 +4,7 @@
 
 use drivetrain::control::{
     Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, MotionLimits,
-    OptimalDifferentiator, Pid, PidConfig, Profile, fhan,
+    OptimalDifferentiator, Oscillation, Pid, PidConfig, Profile, TuningRule, fhan,
 };
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
@@ -147,6 +147,7 @@ fn low_pass_with_a_time_step_that_varies() {
 
 #[test]
 fn profiles_up_down_short_and_overlong() {
+    let mut compared = 0;
     for (_, row) in rows(include_str!("data/control/profile.csv")) {
         let mut limits = MotionLimits::new(row[2], row[3]);
         if row[4] > 0.0 {
@@ -159,5 +160,32 @@ fn profiles_up_down_short_and_overlong() {
         let late = row[5] * 1e-6 * row[2];
         assert_close(state.position, row[7], 1e-6 + late, "position");
         assert_close(state.velocity, row[8], 1e-5 + row[5] * 1e-6 * row[3], "speed");
+        if row[9].is_nan() {
+            continue; // where the acceleration jumps
+        }
+        assert_close(state.acceleration, row[9], 1e-4 + row[5] * 1e-6 * row[4], "acceleration");
+        compared += 1;
     }
+    assert!(compared > 300, "{compared}");
+}
+
+#[test]
+fn gains_by_the_rules_of_the_papers() {
+    let mut compared = 0;
+    for (name, row) in rows(include_str!("data/control/tuning.csv")) {
+        let rule = match name {
+            "ZieglerNicholsP" => TuningRule::ZieglerNicholsP,
+            "ZieglerNicholsPi" => TuningRule::ZieglerNicholsPi,
+            "ZieglerNicholsPid" => TuningRule::ZieglerNicholsPid,
+            "TyreusLuybenPi" => TuningRule::TyreusLuybenPi,
+            _ => TuningRule::TyreusLuybenPid,
+        };
+        let gains = Oscillation { ultimate_gain: row[1], ultimate_period_s: row[2] }.gains(rule);
+        assert_eq!(format!("{:?}", gains.rule), name);
+        assert_close(gains.kp, row[3], 1e-6, name);
+        assert_close(gains.ki, row[4], 1e-6, name);
+        assert_close(gains.kd, row[5], 1e-6, name);
+        compared += 1;
+    }
+    assert_eq!(compared, 10);
 }

@@ -197,6 +197,24 @@ fn the_simulator_takes_facts_from_the_driver_and_no_code() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Its floor and the kinematics under test derive the same motion, each by its own way.
+#[test]
+fn the_simulator_knows_nothing_of_the_chassis() {
+    let found: Vec<String> = sources()
+        .iter()
+        .filter(|(module, ..)| module == "sim")
+        .flat_map(|(_, path, text)| {
+            let chassis = joined(text).into_iter().filter(|(_, line)| knows_chassis(line));
+            chassis.map(move |(number, line)| format!("{}:{number}: {line}", path.display()))
+        })
+        .collect();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+fn knows_chassis(line: &str) -> bool {
+    named(line).iter().any(|module| module == "chassis")
+}
+
 #[test]
 fn no_file_is_longer_than_400_lines_without_its_tests() {
     let long: Vec<String> = sources()
@@ -215,6 +233,8 @@ fn the_check_itself_finds_what_it_should() {
     assert_eq!(violations("encoder", "use crate::{units::Angle, motor::Link};").len(), 1);
     assert_eq!(violations("dji", "let x = crate::runner::Nb(can);").len(), 1);
     assert_eq!(violations("chassis", "use crate::dji::Bus;").len(), 1);
+    assert!(knows_chassis("use crate::{geometry::Vec2, chassis::Mecanum};"));
+    assert!(!knows_chassis("use super::chassis::Chassis;"));
     assert!(
         violations(
             "dji",

@@ -6,10 +6,10 @@
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Body, Twist};
+use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, SimClock, World,
+    ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, SimClock, Wheel, World,
 };
 use drivetrain::time::Duration;
 use drivetrain::units::AngularVelocity;
@@ -45,7 +45,16 @@ impl<'a> Car<'a> {
         let motors = IDS.zip(lines).map(|(id, line)| {
             world.attach(MotorConfig::new(Model::M3508, id).with_line(line)).unwrap()
         });
-        world.attach_chassis(ChassisConfig::new(GEOMETRY), motors).unwrap();
+        let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
+        let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+        world
+            .attach_chassis(ChassisConfig::new(&[
+                wheel(motors.front_left, x, y),
+                wheel(motors.front_right, x, -y).reversed(),
+                wheel(motors.rear_left, -x, y),
+                wheel(motors.rear_right, -x, -y).reversed(),
+            ]))
+            .unwrap();
         let mut buses = [Bus::new(), Bus::new()];
         let wheels = IDS.zip(lines).zip(ON_THE_RIGHT).map(|((id, line), on_the_right)| {
             let config = Config::<M3508>::new(id).speed_loop(SPEED);

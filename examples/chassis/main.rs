@@ -3,32 +3,47 @@
 //! ```text
 //! cargo run --release --example chassis -- [--seconds S] [--output FILE.svg] [--csv FILE] [--justfloat FILE]
 //!                                          [--candump FILE] [--seed N] [--fault silent-motor|lost-frames|bus-off]
+//!                                          [--mode follow|rotor|independent|relax] [--power-limit W]
 //! ```
+//!
+//! With a mode or a power limit, a pilot drives it under a gimbal instead; it fails when that does not do what it is for.
 
 mod justfloat;
 mod log;
+mod modes;
+mod modes_plot;
 mod options;
 mod plot;
 mod report;
 mod scenario;
+mod verdict;
 
+use drivetrain::chassis::Mode;
 use log::Log;
+use modes::Drive;
 use options::{Options, Request};
 use scenario::Scenario;
 use std::error::Error;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Instant;
+use verdict::Verdict;
 
 fn main() -> ExitCode {
     match Options::parse(std::env::args().skip(1)) {
-        Ok(Request::Run(options)) => match run(&options) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => {
-                eprintln!("chassis: {error}");
-                ExitCode::FAILURE
+        Ok(Request::Run(options)) => {
+            let outcome = match options.mode {
+                Some(mode) => run_mode(&options, mode),
+                None => run(&options),
+            };
+            match outcome {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) => {
+                    eprintln!("chassis: {error}");
+                    ExitCode::FAILURE
+                }
             }
-        },
+        }
         Ok(Request::Help) => {
             println!("{}", options::USAGE);
             ExitCode::SUCCESS
@@ -73,6 +88,32 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         elapsed.as_secs_f64() * 1e6 / ticks as f64
     );
     Ok(())
+}
+
+fn run_mode(options: &Options, mode: Mode) -> Result<(), Box<dyn Error>> {
+    let show_progress = std::io::stderr().is_terminal();
+    let drive = Drive {
+        mode,
+        power_limit_w: options.power_limit_w,
+        seconds: options.seconds,
+        seed: options.seed,
+    };
+    let mut log = Log::create(options.candump.as_deref())?;
+    let show = |share| {
+        if show_progress {
+            progress(share);
+        }
+    };
+    let outcome = drive.run(show, |record| log.write(record))?;
+    log.finish()?;
+    if show_progress {
+        eprintln!();
+    }
+    modes_plot::write(&options.output, &drive, &outcome)?;
+    let Verdict { text, faults } = Verdict::of(&drive, &outcome);
+    print!("{text}");
+    println!("plot         {}", options.output.display());
+    if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
 }
 
 fn progress(share: f32) {

@@ -1,6 +1,7 @@
 //! The command line.
 
 use super::scenario::Trouble;
+use drivetrain::chassis::Mode;
 use std::path::PathBuf;
 
 pub(crate) const USAGE: &str = "usage: chassis [options]
@@ -11,6 +12,8 @@ pub(crate) const USAGE: &str = "usage: chassis [options]
   --candump FILE    writes every frame on the bus as a line of candump, too
   --seed N          chooses phases and chances of the simulation (default 1)
   --fault NAME      silent-motor, lost-frames or bus-off
+  --mode NAME       a pilot drives under a gimbal instead: follow, rotor, independent or relax
+  --power-limit W   keeps a referee's limit of 10 to 500 W and its buffer of 60 J; independent without --mode
   --help            shows this";
 
 #[derive(Debug)]
@@ -22,7 +25,16 @@ pub(crate) struct Options {
     pub(crate) candump: Option<PathBuf>,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
+    pub(crate) mode: Option<Mode>,
+    pub(crate) power_limit_w: Option<f32>,
 }
+
+const MODES: [(&str, Mode); 4] = [
+    ("follow", Mode::FollowGimbal),
+    ("rotor", Mode::Rotor),
+    ("independent", Mode::Independent),
+    ("relax", Mode::Relax),
+];
 
 #[derive(Debug)]
 pub(crate) enum Request {
@@ -40,6 +52,8 @@ impl Options {
             candump: None,
             seed: 1,
             fault: None,
+            mode: None,
+            power_limit_w: None,
         };
         let mut arguments = arguments.into_iter();
         while let Some(name) = arguments.next() {
@@ -67,8 +81,27 @@ impl Options {
                     options.fault =
                         Some(fault.ok_or_else(|| format!("--fault {text}: no such fault"))?);
                 }
+                "--mode" => {
+                    let text = value()?;
+                    let mode = MODES.into_iter().find(|(name, _)| *name == text);
+                    let (_, mode) = mode.ok_or_else(|| format!("--mode {text}: no such mode"))?;
+                    options.mode = Some(mode);
+                }
+                "--power-limit" => {
+                    let text = value()?;
+                    let watts = text.parse::<f32>().ok().filter(|w| (10.0..=500.0).contains(w));
+                    options.power_limit_w = Some(watts.ok_or_else(|| {
+                        format!("--power-limit {text}: not a number from 10 to 500")
+                    })?);
+                    options.mode = options.mode.or(Some(Mode::Independent));
+                }
                 other => return Err(format!("unknown option {other}")),
             }
+        }
+        let of_the_square =
+            options.fault.is_some() || options.csv.is_some() || options.justfloat.is_some();
+        if options.mode.is_some() && of_the_square {
+            return Err("--fault, --csv and --justfloat are not for a drive with --mode".into());
         }
         Ok(Request::Run(options))
     }

@@ -1,6 +1,6 @@
 //! Targets and speeds of the wheels, and the path, as one picture.
 
-use super::scenario::Run;
+use super::scenario::{Run, Sample};
 use plotters::prelude::*;
 use std::error::Error;
 use std::path::Path;
@@ -9,8 +9,8 @@ const TITLES: [&str; 4] =
     ["front left, rpm", "front right, rpm", "rear left, rpm", "rear right, rpm"];
 /// Makes the map as high as it is wide, so that a square looks like one.
 const MAP_HEIGHT: i32 = 440;
-const TARGET: RGBColor = RGBColor(200, 60, 40);
-const MEASURED: RGBColor = RGBColor(30, 80, 180);
+pub(crate) const TARGET: RGBColor = RGBColor(200, 60, 40);
+pub(crate) const MEASURED: RGBColor = RGBColor(30, 80, 180);
 const FAULT: RGBColor = RGBColor(245, 225, 160);
 
 pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
@@ -24,12 +24,15 @@ pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
         draw_wheel(area, run, wheel, title)?;
     }
     let (map, _) = map.split_vertically(MAP_HEIGHT);
-    draw_path(&map, run)?;
+    let line = |place: fn(&Sample) -> (f32, f32)| run.samples.iter().map(place).collect::<Vec<_>>();
+    let (planned, driven) = (line(|sample| sample.planned_m), line(|sample| sample.position_m));
+    let title = "path, m (red: planned, blue: driven)";
+    draw_map(&map, title, &[(TARGET, &planned), (MEASURED, &driven)])?;
     root.present()?;
     Ok(())
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 fn draw_wheel(area: &Area<'_>, run: &Run, wheel: usize, title: &str) -> Result<(), Box<dyn Error>> {
     let end = run.samples.last().map_or(1.0, |sample| sample.time_s);
@@ -56,22 +59,25 @@ fn draw_wheel(area: &Area<'_>, run: &Run, wheel: usize, title: &str) -> Result<(
     Ok(())
 }
 
-fn draw_path(area: &Area<'_>, run: &Run) -> Result<(), Box<dyn Error>> {
-    let planned = || run.samples.iter().map(|sample| sample.planned_m);
-    let driven = || run.samples.iter().map(|sample| sample.position_m);
+pub(crate) fn draw_map(
+    area: &Area<'_>,
+    title: &str,
+    lines: &[(RGBColor, &[(f32, f32)])],
+) -> Result<(), Box<dyn Error>> {
     let (mut low, mut high) = (-0.2_f32, 0.2_f32);
-    for (x, y) in planned().chain(driven()) {
+    for &(x, y) in lines.iter().flat_map(|(_, line)| *line) {
         low = low.min(x - 0.2).min(y - 0.2);
         high = high.max(x + 0.2).max(y + 0.2);
     }
     let mut chart = ChartBuilder::on(area)
-        .caption("path, m (red: planned, blue: driven)", ("sans-serif", 16))
+        .caption(title, ("sans-serif", 16))
         .margin(10)
         .x_label_area_size(24)
         .y_label_area_size(46)
         .build_cartesian_2d(low..high, low..high)?;
     chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
-    chart.draw_series(LineSeries::new(planned().step_by(5), &TARGET))?;
-    chart.draw_series(LineSeries::new(driven().step_by(5), &MEASURED))?;
+    for (color, line) in lines {
+        chart.draw_series(LineSeries::new(line.iter().step_by(5).copied(), color))?;
+    }
     Ok(())
 }

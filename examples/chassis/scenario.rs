@@ -3,18 +3,18 @@
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::geometry::{Heading, Twist, World as WorldFrame};
+use drivetrain::geometry::{Heading, Twist, Vec2, World as WorldFrame};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner, Statistics};
 use drivetrain::sim::{
     ChassisConfig, Controller, Fault, Line, Model, MotorConfig, MotorKey, Record, SimClock,
-    Traffic, World,
+    Traffic, Wheel, World,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
 
-const GEOMETRY: MecanumGeometry =
+pub(crate) const GEOMETRY: MecanumGeometry =
     MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
 /// A per rad/s and A per rad of the output shaft.
 const SPEED: PidConfig = PidConfig::new(4.0, 40.0, 0.0);
@@ -25,8 +25,8 @@ const RAMP_S: f32 = 0.3;
 /// After this time of constant velocity the wheels have to be where they belong.
 const SETTLING_S: f32 = 0.3;
 
-type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
-type Wheels = MecanumWheels<Handle<M3508>>;
+pub(crate) type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+pub(crate) type Wheels = MecanumWheels<Handle<M3508>>;
 
 /// What can be made to go wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,16 +153,23 @@ impl Scenario {
 }
 
 /// Four M3508 under a chassis of 20 kg.
-fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
+pub(crate) fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
     let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
     let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
         .try_map(motor)?;
-    world.attach_chassis(ChassisConfig::new(GEOMETRY), keys)?;
+    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
+    let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    world.attach_chassis(ChassisConfig::new(&[
+        wheel(keys.front_left, x, y),
+        wheel(keys.front_right, x, -y).reversed(),
+        wheel(keys.rear_left, -x, y),
+        wheel(keys.rear_right, -x, -y).reversed(),
+    ]))?;
     Ok(keys)
 }
 
 /// The code that would run on the microcontroller.
-fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
+pub(crate) fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
     let wheel = |id| Config::<M3508>::new(id).speed_loop(SPEED);
     let wheels = MecanumWheels {
@@ -220,7 +227,7 @@ fn heading(world: &World) -> Heading {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "some metres or radians")]
-fn narrow(value: f64) -> f32 {
+pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }
 
@@ -232,11 +239,11 @@ fn share_of_error(sample: &Sample) -> f32 {
     errors.iter().fold(0.0_f32, |most, error| most.max(*error)) / largest
 }
 
-fn at(seconds: f32) -> Instant {
+pub(crate) fn at(seconds: f32) -> Instant {
     Instant::START + Duration::from_secs_f32(seconds).unwrap_or(Duration::ZERO)
 }
 
-fn seconds_of(instant: Instant) -> f32 {
+pub(crate) fn seconds_of(instant: Instant) -> f32 {
     instant.since(Instant::START).as_secs_f32()
 }
 

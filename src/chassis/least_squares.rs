@@ -40,11 +40,20 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    pub(super) const fn new() -> Self {
+    const fn new() -> Self {
         Self { xx: 0.0, xy: 0.0, xw: 0.0, yy: 0.0, yw: 0.0, ww: 0.0, reach_m2: 0.0 }
     }
 
-    pub(super) const fn add(&mut self, row: Row) {
+    /// The normal equations of all these rows.
+    pub(super) fn of(rows: impl IntoIterator<Item = Row>) -> Self {
+        let mut normal = Self::new();
+        for row in rows {
+            normal.add(row);
+        }
+        normal
+    }
+
+    const fn add(&mut self, row: Row) {
         let Row { direction: Vec2 { x, y }, yaw_m: w, reach_m2 } = row;
         self.xx += x * x;
         self.xy += x * y;
@@ -100,10 +109,6 @@ impl Inverse {
 
 /// Fits the motion to the measurements in m/s; `None` when they leave some of it undetermined.
 pub(super) fn fit(measured: impl Iterator<Item = (Row, f32)> + Clone) -> Option<Twist<Body>> {
-    let mut normal = Normal::new();
-    for (row, _) in measured.clone() {
-        normal.add(row);
-    }
-    let inverse = normal.inverse()?;
+    let inverse = Normal::of(measured.clone().map(|(row, _)| row)).inverse()?;
     Some(measured.fold(Twist::ZERO, |sum, (row, speed)| sum + inverse.share(row) * speed))
 }

@@ -218,7 +218,6 @@ impl<M: RollerMounting> Kinematics for Mecanum<M> {
 #[expect(clippy::float_cmp, reason = "halves and quarters are exact")]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     const SQUARE: MecanumGeometry =
         MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.25 };
@@ -265,9 +264,9 @@ mod tests {
         assert_eq!(usual().forward(spin), Twist::new(0.0, 0.0, 2.0));
     }
 
-    // The fourth seed's rows are left-handed (y forward, x right, clockwise positive) and have no unit.
+    // The fifth seed's rows are left-handed (y forward, x right, clockwise positive) and have no unit.
     #[test]
-    fn the_fourth_seeds_rows_agree_after_its_axes_are_turned_into_ours() {
+    fn the_fifth_seeds_rows_agree_after_its_axes_are_turned_into_ours() {
         let (right, front, clockwise) = (0.3_f32, 0.7_f32, 0.2_f32);
         let one = right - front + clockwise; // its wheel 1, front right, positive backward
         let fr = wheels(&usual(), front, -right, -clockwise / 0.5)[1] * 0.5;
@@ -334,57 +333,5 @@ mod tests {
         assert_eq!(fast.desaturate(limit(f32::INFINITY)), fast);
         let broken = MecanumWheels { rear_left: limit(f32::NAN), ..fast };
         assert_eq!(broken.desaturate(limit(10.0)), still);
-    }
-
-    fn geometries() -> impl Strategy<Value = MecanumGeometry> {
-        (0.02_f32..0.3, 0.05_f32..1.0, 0.05_f32..1.0).prop_map(|(r, a, b)| MecanumGeometry {
-            wheel_radius_m: r,
-            half_wheelbase_m: a,
-            half_track_m: b,
-        })
-    }
-
-    fn twists() -> impl Strategy<Value = Twist<Body>> {
-        (-5.0_f32..5.0, -5.0_f32..5.0, -20.0_f32..20.0).prop_map(|(x, y, w)| Twist::new(x, y, w))
-    }
-
-    fn largest(twist: Twist<Body>) -> f32 {
-        twist.vx_m_s.abs().max(twist.vy_m_s.abs()).max(twist.wz_rad_s.abs())
-    }
-
-    proptest! {
-        #[test]
-        fn forward_undoes_inverse(geometry in geometries(), twist in twists()) {
-            let mecanum = Mecanum::new(geometry).unwrap();
-            let error = mecanum.forward(mecanum.inverse(twist)) - twist;
-            let arm = geometry.half_track_m + geometry.half_wheelbase_m;
-            let size = twist.linear().norm() + arm * twist.wz_rad_s.abs();
-            prop_assert!(error.linear().norm() <= 1e-5 * size, "{error:?}");
-            prop_assert!(error.wz_rad_s.abs() * arm <= 1e-5 * size, "{error:?}");
-        }
-
-        #[test]
-        fn desaturating_keeps_the_direction_of_travel(
-            geometry in geometries(), twist in twists(), limit in 0.1_f32..50.0
-        ) {
-            let mecanum = Mecanum::new(geometry).unwrap();
-            let limited = mecanum.inverse(twist).desaturate(AngularVelocity::from_rad_per_s(limit));
-            for wheel in limited {
-                prop_assert!(wheel.as_rad_per_s().abs() <= limit * 1.000_001);
-            }
-            let slower = mecanum.forward(limited);
-            let scale = largest(slower) / largest(twist).max(1e-9);
-            prop_assert!(scale <= 1.0 + 1e-5);
-            prop_assert!(largest(slower - twist * scale) <= 2e-5 * (1.0 + largest(twist)));
-        }
-
-        #[test]
-        fn forward_is_linear(geometry in geometries(), a in twists(), b in twists(), k in -2.0_f32..2.0) {
-            let mecanum = Mecanum::new(geometry).unwrap();
-            let (left, right) = (mecanum.inverse(a), mecanum.inverse(b));
-            let together = mecanum.forward(left.zip(right).map(|(l, r)| l * k + r));
-            let apart = mecanum.forward(left) * k + mecanum.forward(right);
-            prop_assert!(largest(together - apart) <= 1e-4 * (1.0 + largest(a) + largest(b)) );
-        }
     }
 }

@@ -14,10 +14,30 @@ use core::f32::consts::{FRAC_PI_2, PI};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "Stored"))]
 pub struct SteeringConfig {
     hysteresis: Angle,
     hold_below: AngularVelocity,
     cosine_compensation: bool,
+}
+
+/// The configuration as it stands in a file, where anybody may have changed it.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "SteeringConfig")]
+struct Stored {
+    hysteresis: Angle,
+    hold_below: AngularVelocity,
+    cosine_compensation: bool,
+}
+
+#[cfg(feature = "serde")]
+impl From<Stored> for SteeringConfig {
+    fn from(stored: Stored) -> Self {
+        let config =
+            Self::new().with_hysteresis(stored.hysteresis).with_hold_below(stored.hold_below);
+        Self { cosine_compensation: stored.cosine_compensation, ..config }
+    }
 }
 
 impl SteeringConfig {

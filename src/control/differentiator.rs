@@ -1,5 +1,5 @@
 use super::error::{ConfigError, ConfigFault, check, positive};
-use super::number::finite;
+use super::number::{finite, limited};
 use super::step::TimeStep;
 use crate::math;
 
@@ -14,6 +14,7 @@ use crate::math;
 /// # Edge behaviour
 /// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
 /// [`rejected`](Self::rejected) grows. `dt_s` above the maximum: counts as the maximum. Starts from zero at rest; see [`reset_to`](Self::reset_to).
+/// What overflows `f32` stays at its largest number.
 ///
 /// # Examples
 /// ```
@@ -31,10 +32,7 @@ use crate::math;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinearDifferentiator {
     r: f32,
-    max_step_s: f32,
-    value: f32,
-    rate: f32,
-    rejected: u16,
+    follower: Follower,
 }
 
 impl LinearDifferentiator {
@@ -48,50 +46,41 @@ impl LinearDifferentiator {
         if r * max_step_s > 1.0 {
             return Err(ConfigError::new("r", ConfigFault::Unstable));
         }
-        Ok(Self { r, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
+        Ok(Self { r, follower: Follower::new(max_step_s) })
     }
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
-    pub const fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        self.step(input, &TimeStep::new(dt_s, self.max_step_s))
+    pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
+        self.step(input, &TimeStep::new(dt_s, self.follower.max_step_s))
     }
 
     /// Steps by a time that was validated before.
-    pub(super) const fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
-        let dt_s = if step.dt_s > self.max_step_s { self.max_step_s } else { step.dt_s };
-        if dt_s > 0.0 && input.is_finite() {
-            let error = finite(self.value - input);
-            let pull = finite(self.r * finite(self.r * error + 2.0 * self.rate));
-            self.value = finite(self.value + dt_s * self.rate);
-            self.rate = finite(self.rate - dt_s * pull);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
-        }
-        self.value
+    pub(super) fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
+        let r = self.r;
+        self.follower.step(input, step, |error, rate| -finite(r * finite(r * error + 2.0 * rate)))
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, value: f32) {
-        self.value = if value.is_finite() { value } else { 0.0 };
-        self.rate = 0.0;
+        self.follower.reset_to(value);
     }
 
     /// Returns the value that follows the input.
     #[must_use]
     pub const fn value(&self) -> f32 {
-        self.value
+        self.follower.value
     }
 
     /// Returns its rate of change a second.
     #[must_use]
     pub const fn rate(&self) -> f32 {
-        self.rate
+        self.follower.rate
     }
 
     /// Returns the number of steps that were refused; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.follower.rejected
     }
 }
 
@@ -100,11 +89,14 @@ impl LinearDifferentiator {
 /// ```text
 /// value' = rate,   rate' = fhan(value - input, rate, r, h0)
 /// ```
-/// `h0`, at least the time step, is the width over which the switching is smoothed: larger filters more noise.
+/// `h0`, at least 1.25 time steps, is the width over which the switching is smoothed: larger filters more noise.
+/// From rest, it comes to rest at a constant input without overshoot.
 /// Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions on Industrial Electronics 56 (2009), section IV.A.
 ///
 /// # Edge behaviour
-/// As for [`LinearDifferentiator`].
+/// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
+/// [`rejected`](Self::rejected) grows. `dt_s` above the maximum: counts as the maximum. Starts from zero at rest; see [`reset_to`](Self::reset_to).
+/// What overflows `f32` stays at its largest number.
 ///
 /// # Examples
 /// ```
@@ -123,69 +115,95 @@ impl LinearDifferentiator {
 pub struct OptimalDifferentiator {
     r: f32,
     h0_s: f32,
+    follower: Follower,
+}
+
+impl OptimalDifferentiator {
+    const LEAST_STEPS: f32 = 1.25;
+
+    /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds.
+    ///
+    /// # Errors
+    /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below 1.25 `max_step_s`: at
+    /// 1.0 a step of `3 r h0²` overshoots by 4 %, from 1.15 on none does.
+    pub const fn new(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("r", r));
+        check!(positive("h0", h0_s));
+        check!(positive("max_step", max_step_s));
+        if h0_s < Self::LEAST_STEPS * max_step_s {
+            return Err(ConfigError::new("h0", ConfigFault::Unstable));
+        }
+        Ok(Self { r, h0_s, follower: Follower::new(max_step_s) })
+    }
+
+    /// Steps by `dt_s` seconds towards `input` and returns the new value.
+    pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
+        let (r, h0_s) = (self.r, self.h0_s);
+        let step = TimeStep::new(dt_s, self.follower.max_step_s);
+        self.follower.step(input, &step, |error, rate| fhan(error, rate, r, h0_s))
+    }
+
+    /// Puts the value at `value`, at rest. NaN and infinity count as zero.
+    pub const fn reset_to(&mut self, value: f32) {
+        self.follower.reset_to(value);
+    }
+
+    /// Returns the value that follows the input.
+    #[must_use]
+    pub const fn value(&self) -> f32 {
+        self.follower.value
+    }
+
+    /// Returns its rate of change a second.
+    #[must_use]
+    pub const fn rate(&self) -> f32 {
+        self.follower.rate
+    }
+
+    /// Returns the number of steps that were refused; stays at 65535.
+    #[must_use]
+    pub const fn rejected(&self) -> u16 {
+        self.follower.rejected
+    }
+}
+
+/// A value and its rate that follow an input, stepped by Euler's rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Follower {
     max_step_s: f32,
     value: f32,
     rate: f32,
     rejected: u16,
 }
 
-impl OptimalDifferentiator {
-    /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds.
-    ///
-    /// # Errors
-    /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below `max_step_s`, where the result
-    /// would swing about the input.
-    pub const fn new(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
-        check!(positive("r", r));
-        check!(positive("h0", h0_s));
-        check!(positive("max_step", max_step_s));
-        if h0_s < max_step_s {
-            return Err(ConfigError::new("h0", ConfigFault::Unstable));
-        }
-        Ok(Self { r, h0_s, max_step_s, value: 0.0, rate: 0.0, rejected: 0 })
+impl Follower {
+    const fn new(max_step_s: f32) -> Self {
+        Self { max_step_s, value: 0.0, rate: 0.0, rejected: 0 }
     }
 
-    /// Steps by `dt_s` seconds towards `input` and returns the new value.
-    pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::new(dt_s, self.max_step_s);
-        if !step.is_hold() && input.is_finite() {
-            let acceleration = fhan(finite(self.value - input), self.rate, self.r, self.h0_s);
-            self.value = finite(self.value + step.dt_s * self.rate);
-            self.rate = finite(self.rate + step.dt_s * acceleration);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
+    /// Steps by the acceleration that `pull` makes of the error and the rate.
+    #[inline]
+    fn step(&mut self, input: f32, step: &TimeStep, pull: impl FnOnce(f32, f32) -> f32) -> f32 {
+        if step.admits(input.is_finite(), &mut self.rejected) {
+            let dt_s = limited(step.dt_s, 0.0, self.max_step_s);
+            let acceleration = pull(finite(self.value - input), self.rate);
+            self.value = finite(self.value + dt_s * self.rate);
+            self.rate = finite(self.rate + dt_s * acceleration);
         }
         self.value
     }
 
-    /// Puts the value at `value`, at rest. NaN and infinity count as zero.
-    pub const fn reset_to(&mut self, value: f32) {
+    const fn reset_to(&mut self, value: f32) {
         self.value = if value.is_finite() { value } else { 0.0 };
         self.rate = 0.0;
-    }
-
-    /// Returns the value that follows the input.
-    #[must_use]
-    pub const fn value(&self) -> f32 {
-        self.value
-    }
-
-    /// Returns its rate of change a second.
-    #[must_use]
-    pub const fn rate(&self) -> f32 {
-        self.rate
-    }
-
-    /// Returns the number of steps that were refused; stays at 65535.
-    #[must_use]
-    pub const fn rejected(&self) -> u16 {
-        self.rejected
     }
 }
 
 /// Returns Han's time-optimal acceleration, in ±`r`, that brings the discrete double integrator (`x1`, `x2`) to rest at zero.
 ///
-/// `r` is the largest acceleration and `h` the step in seconds, both more than zero.
+/// `r` is the largest acceleration and `h` the step in seconds, both more than zero. Where an argument is NaN, or the result
+/// would be, it is 0.
 ///
 /// # Examples
 /// ```
@@ -206,7 +224,8 @@ pub fn fhan(x1: f32, x2: f32, r: f32, h: f32) -> f32 {
         let root = math::sqrt(d) * math::sqrt(d + 8.0 * y.abs());
         drift + (0.5 * (root - d)).copysign(y)
     };
-    if a.abs() < d { -r * (a / d) } else { -r.copysign(a) }
+    let pull = if a.abs() < d { -r * (a / d) } else { -r.copysign(a) };
+    if a.is_nan() || pull.is_nan() { 0.0 } else { pull }
 }
 
 #[cfg(test)]
@@ -216,6 +235,7 @@ mod tests {
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
+    const WIDTH_S: f32 = 1.25 * DT_S;
     const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
     #[test]
@@ -250,14 +270,14 @@ mod tests {
                 "max_step"
             );
         }
-        let narrow = OptimalDifferentiator::new(1.0, 0.0005, DT_S).unwrap_err();
+        let narrow = OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).unwrap_err();
         assert_eq!((narrow.parameter(), narrow.fault()), ("h0", ConfigFault::Unstable));
     }
 
     #[test]
     fn bad_inputs_and_bad_times_change_nothing() {
         let mut linear = LinearDifferentiator::new(100.0, DT_S).unwrap();
-        let mut optimal = OptimalDifferentiator::new(10.0, DT_S, DT_S).unwrap();
+        let mut optimal = OptimalDifferentiator::new(10.0, WIDTH_S, DT_S).unwrap();
         linear.update(1.0, DT_S);
         optimal.update(1.0, DT_S);
         let before = (linear, optimal);
@@ -272,7 +292,7 @@ mod tests {
             optimal.update(1.0, no_time);
         }
         assert_eq!((linear.rejected(), optimal.rejected()), (8, 8));
-        (linear.rejected, optimal.rejected) = (0, 0);
+        (linear.follower.rejected, optimal.follower.rejected) = (0, 0);
         assert_eq!((linear, optimal), before);
     }
 
@@ -285,6 +305,23 @@ mod tests {
         for _ in 0..20 {
             assert_eq!(paused.update(1.0, 10.0), steady.update(1.0, DT_S));
         }
+    }
+
+    #[test]
+    fn a_long_pause_counts_as_the_longest_step_for_the_optimal_one_too() {
+        let new = || OptimalDifferentiator::new(10.0, WIDTH_S, DT_S).unwrap();
+        let (mut paused, mut steady) = (new(), new());
+        for _ in 0..20 {
+            assert_eq!(paused.update(1.0, 10.0), steady.update(1.0, DT_S));
+        }
+    }
+
+    #[test]
+    fn fhan_of_nan_is_no_acceleration() {
+        for (x1, x2) in [(f32::NAN, 0.0), (0.0, f32::NAN), (f32::INFINITY, f32::NEG_INFINITY)] {
+            assert_eq!(fhan(x1, x2, 2.0, 0.01), 0.0);
+        }
+        assert_eq!(fhan(f32::INFINITY, 0.0, 2.0, 0.01), -2.0);
     }
 
     #[test]
@@ -324,16 +361,32 @@ mod tests {
 
         #[test]
         fn optimal_arrives_without_overshoot_and_within_its_acceleration(
-            r in 0.1_f32..1000.0, target in -100.0_f32..100.0, width in 1.0_f32..5.0,
+            r in 0.1_f32..1000.0, widths in -3.0_f32..3.0, width in 1.25_f32..5.0,
+            parts in prop::collection::vec(1e-3_f32..=1.0, 1..8),
         ) {
-            let mut follow = OptimalDifferentiator::new(r, width * DT_S, DT_S).unwrap();
+            let width_s = width * DT_S;
+            // From a thousandth to a thousand times what one width of time reaches.
+            let target = r * width_s * width_s * 10.0_f32.powf(widths);
+            let mut follow = OptimalDifferentiator::new(r, width_s, DT_S).unwrap();
             let mut rate = 0.0;
-            for _ in 0..2000 {
-                let value = follow.update(target, DT_S);
-                prop_assert!((follow.rate() - rate).abs() <= r * DT_S * 1.001 + 1e-5);
-                // One step of smoothing either way.
-                prop_assert!(value.abs() <= target.abs() + r * (width * DT_S) * (width * DT_S) + 1e-4);
+            for part in parts.iter().chain(&[1.0, 1.0]).cycle().take(3000) {
+                let value = follow.update(target, part * DT_S);
+                prop_assert!((follow.rate() - rate).abs() <= r * DT_S * 1.001);
+                prop_assert!(value >= 0.0 && value <= target * 1.000_01, "{} of {}", value, target);
                 rate = follow.rate();
+            }
+            prop_assert!((follow.value() - target).abs() <= 1e-3 * target);
+        }
+
+        #[test]
+        fn a_narrow_width_overshoots_or_is_an_error(width in 0.1_f32..1.5, sizes in 1.0_f32..100.0) {
+            if let Ok(mut follow) = OptimalDifferentiator::new(1.0, width * DT_S, DT_S) {
+                let target = sizes * (width * DT_S) * (width * DT_S);
+                for _ in 0..200 {
+                    prop_assert!(follow.update(target, DT_S) <= target * 1.000_01);
+                }
+            } else {
+                prop_assert!(width < 1.2501);
             }
         }
 
@@ -347,7 +400,7 @@ mod tests {
         #[test]
         fn huge_values_stay_finite(samples in prop::collection::vec(-f32::MAX..f32::MAX, 1..20)) {
             let mut linear = LinearDifferentiator::new(1000.0, DT_S).unwrap();
-            let mut optimal = OptimalDifferentiator::new(1e30, DT_S, DT_S).unwrap();
+            let mut optimal = OptimalDifferentiator::new(1e30, WIDTH_S, DT_S).unwrap();
             for input in samples {
                 prop_assert!(linear.update(input, DT_S).is_finite() && linear.rate().is_finite());
                 prop_assert!(optimal.update(input, DT_S).is_finite() && optimal.rate().is_finite());

@@ -33,6 +33,10 @@ pub enum ConfigFault {
     Unstable,
     /// It is NaN or infinite.
     NotFinite,
+    /// It does not go together with another parameter.
+    Conflict,
+    /// It is where the change starts, so that there is none.
+    NoChange,
 }
 
 impl ConfigError {
@@ -62,11 +66,23 @@ impl fmt::Display for ConfigError {
             ConfigFault::Reversed => ": the lower end must lie below the upper one",
             ConfigFault::Unstable => ": too fast for this time step",
             ConfigFault::NotFinite => ": must be finite",
+            ConfigFault::Conflict => ": does not go together with another parameter",
+            ConfigFault::NoChange => ": must differ from the start",
         })
     }
 }
 
 impl core::error::Error for ConfigError {}
+
+/// `?` for a `const fn`.
+macro_rules! check {
+    ($result:expr) => {
+        if let Err(error) = $result {
+            return Err(error);
+        }
+    };
+}
+pub(crate) use check;
 
 /// Refuses what is negative, NaN or infinite.
 pub(crate) const fn not_negative(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
@@ -84,6 +100,30 @@ pub(crate) const fn positive(parameter: &'static str, value: f32) -> Result<(), 
     } else {
         Err(ConfigError::new(parameter, ConfigFault::NotPositive))
     }
+}
+
+/// As [`positive`], for an option that is off when zero.
+pub(crate) const fn off_or_positive(
+    parameter: &'static str,
+    value: f32,
+) -> Result<(), ConfigError> {
+    if value == 0.0 { Ok(()) } else { positive(parameter, value) }
+}
+
+/// Refuses what is NaN or infinite.
+pub(crate) const fn finite(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(ConfigError::new(parameter, ConfigFault::NotFinite))
+    }
+}
+
+/// Refuses the gains of a controller when one is negative, NaN or infinite.
+pub(crate) const fn gains(kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
+    check!(not_negative("kp", kp));
+    check!(not_negative("ki", ki));
+    not_negative("kd", kd)
 }
 
 /// Refuses an interval whose lower end is not below its upper end.
@@ -107,13 +147,3 @@ pub(crate) const fn output_ends(lower: f32, upper: f32) -> Result<(), ConfigErro
         ordered("output_range", lower, upper)
     }
 }
-
-/// `?` for a `const fn`.
-macro_rules! check {
-    ($result:expr) => {
-        if let Err(error) = $result {
-            return Err(error);
-        }
-    };
-}
-pub(crate) use check;

@@ -7,6 +7,7 @@
 //! | speed, and the setpoint jumps | [`IncrementalPid`] | `with_tracking` |
 //! | arm or lift position | [`PositionActuator`] | P over PI, the angle loop's output limit is the speed limit |
 //! | gimbal or swerve angle | [`PositionActuator`] | `with_period(360.0)`: the shortest way round |
+//! | the same, with an error from integers | [`Cascade`] | as the motors of a bus do |
 //! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
 //! | a target from a stick or another computer | [`SlewLimiter`], [`OptimalDifferentiator`] | the acceleration the mechanism can take |
 //! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
@@ -46,7 +47,9 @@ mod shaping;
 mod step;
 mod tuning;
 
-pub use actuator::{PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig};
+pub use actuator::{
+    Cascade, PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig,
+};
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::{ConfigError, ConfigFault};
 pub use filter::{Biquad, LowPass, Median, MovingAverage};

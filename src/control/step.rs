@@ -24,6 +24,23 @@ pub struct TimeStep {
 }
 
 impl TimeStep {
+    /// The longest step in seconds that is believed, unless [`new`](Self::new) says otherwise.
+    pub const MAX_S: f32 = 0.1;
+
+    /// Takes the seconds since the step before, of which up to [`MAX_S`](Self::MAX_S) are believed.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::TimeStep;
+    ///
+    /// assert_eq!(TimeStep::of(0.001), TimeStep::new(0.001, 0.1));
+    /// ```
+    #[must_use]
+    #[inline]
+    pub const fn of(dt_s: f32) -> Self {
+        Self::new(dt_s, Self::MAX_S)
+    }
+
     /// Takes the seconds since the step before and the longest step that is still believed.
     ///
     /// A `dt_max_s` that is NaN counts as infinite; with one of zero or less every step holds.
@@ -51,6 +68,15 @@ impl TimeStep {
     #[must_use]
     pub const fn is_hold(&self) -> bool {
         self.dt_s <= 0.0
+    }
+
+    /// Tells whether there is time and the inputs are finite; what is refused is counted, up to 65535.
+    pub(super) const fn admits(&self, finite: bool, rejected: &mut u16) -> bool {
+        let admitted = finite && !self.is_hold();
+        if !admitted {
+            *rejected = rejected.saturating_add(1);
+        }
+        admitted
     }
 
     /// Tells whether integral and derivative stay for this step: `dt_s` was above the maximum.

@@ -231,7 +231,8 @@ impl Outbox {
     }
 
     /// Returns the word that a motor was given last.
-    pub(super) fn word(&self, place: Place) -> i16 {
+    #[inline]
+    pub(super) fn get(&self, place: Place) -> i16 {
         let word = self.words.0.as_flattened().get(usize::from(place.0 & 31));
         word.map_or(0, |word| i16::from_le_bytes(*word))
     }

@@ -153,7 +153,7 @@ impl<B> Bus<B> {
             return self.rounds.begin(self.now);
         };
         self.rounds.next = motor + 1;
-        let word = self.outbox.word(slot.place);
+        let word = self.outbox.get(slot.place);
         if self.rounds.closes_window || !slot.is_well(word) {
             self.check_closely(motor, word);
         }

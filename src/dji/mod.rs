@@ -92,6 +92,7 @@ mod error;
 mod feedback;
 mod handle;
 mod health;
+mod limit;
 mod model;
 mod range;
 mod rare;

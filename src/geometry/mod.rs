@@ -43,6 +43,8 @@ mod point;
 mod pose;
 mod rotation2;
 mod rotation3;
+#[cfg(feature = "serde")]
+mod stored;
 mod transform2;
 mod transform3;
 mod twist;

@@ -5,7 +5,8 @@ use crate::units::Angle;
 /// A turn in the plane, kept as a unit vector (cosine, sine): no trigonometry when it is applied.
 ///
 /// Counter-clockwise is positive. Every composition rounds: after 10^6 with the same small turn the vector's length is
-/// 2 % off and its angle 1e-4 rad. [`normalized`](Self::normalized), once in some thousand, keeps the length.
+/// 2 % off and its angle 1e-4 rad. [`normalized`](Self::normalized), once in some thousand, keeps the length. What is
+/// read with `serde` is brought back to length 1; without a length it is refused.
 ///
 /// # Examples
 /// ```
@@ -19,6 +20,7 @@ use crate::units::Angle;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredRotation2"))]
 pub struct Rotation2 {
     cos: f32,
     sin: f32,
@@ -115,7 +117,7 @@ pub(super) fn angle_of(sin: f32, cos: f32) -> f32 {
 /// The direction that the chassis faces in the world, with its sine and cosine at hand.
 ///
 /// Make it once a tick from the gyroscope's yaw: every conversion of that tick then costs four products.
-/// The angle may have any number of turns.
+/// The angle may have any number of turns. With `serde` it is the angle alone.
 ///
 /// # Examples
 /// ```
@@ -128,6 +130,7 @@ pub(super) fn angle_of(sin: f32, cos: f32) -> f32 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "Angle", into = "Angle"))]
 pub struct Heading {
     angle: Angle,
     rotation: Rotation2,
@@ -159,6 +162,18 @@ impl Heading {
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.angle.is_finite()
+    }
+}
+
+impl From<Angle> for Heading {
+    fn from(angle: Angle) -> Self {
+        Self::new(angle)
+    }
+}
+
+impl From<Heading> for Angle {
+    fn from(heading: Heading) -> Self {
+        heading.angle()
     }
 }
 

@@ -4,7 +4,8 @@ use super::{MatrixError, Vec3};
 use crate::math::{sin_cos, sqrt};
 use crate::units::Angle;
 
-/// A turn in space, kept as a unit quaternion; every composition brings its length back to 1.
+/// A turn in space, kept as a unit quaternion; every composition brings its length back to 1, and so does reading it with
+/// `serde`, which refuses one without a length.
 ///
 /// # Examples
 /// ```
@@ -18,6 +19,7 @@ use crate::units::Angle;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "super::stored::StoredRotation3"))]
 pub struct Rotation3 {
     w: f32,
     vector: Vec3,
@@ -178,17 +180,27 @@ impl Rotation3 {
     /// [`MatrixError`] when a number is not finite, or the rows are not perpendicular and of length 1 (to 1e-3) or
     /// mirror.
     pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, MatrixError> {
-        if !matrix.as_flattened().iter().all(|number| number.is_finite()) {
+        Self::check_rows(matrix.map(|[a, b, c]| Vec3::new(a, b, c)))?;
+        Ok(Self::from_rows(matrix))
+    }
+
+    /// Lets rows pass that are those of a rotation, to 1e-3.
+    pub(super) fn check_rows([x, y, z]: [Vec3; 3]) -> Result<(), MatrixError> {
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(MatrixError::NotFinite);
         }
-        let [x, y, z] = matrix.map(|[a, b, c]| Vec3::new(a, b, c));
         // The third row is the cross product of the others exactly when nothing is skewed, scaled or mirrored.
         let third = x.cross(y) - z;
         let lengths = [x.dot(x) - 1.0, y.dot(y) - 1.0, x.dot(y), third.norm()];
         if lengths.iter().any(|error| error.abs() > 2.0 * TOLERANCE) {
             return Err(MatrixError::NotRotation);
         }
-        Ok(Self::from_rows(matrix))
+        Ok(())
+    }
+
+    #[cfg(feature = "serde")]
+    pub(super) const fn from_parts(w: f32, vector: Vec3) -> Self {
+        Self { w, vector }
     }
 
     /// Divides by the largest of w, x, y, z (Shepperd), so that nothing cancels. The rows are trusted.

@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn facing_left_world_forward_is_body_right_and_back_again() {
-        // The second seed turns by R(theta) here; world to body is R(-theta).
+        // The third seed turns by R(theta) here; world to body is R(-theta).
         let heading = Heading::new(Angle::from_degrees(90.0));
         let body = Twist::<World>::new(1.0, 0.0, 0.0).to_body(heading);
         close(body.linear(), 0.0, -1.0);

@@ -214,11 +214,24 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     }
 
     /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`.
-    pub fn tick_with(&mut self, tick: Tick, mut evicted: impl FnMut(&CanFrame)) {
+    pub fn tick_with(&mut self, tick: Tick, evicted: impl FnMut(&CanFrame)) {
+        self.step(tick, |_| {}, evicted);
+    }
+
+    /// Runs one step: update, then `limit`, then send. In between, all that the loops ask for is known and nothing of it
+    /// is on the wire: see [`scale_outputs`](crate::dji::Bus::scale_outputs) of a bus.
+    ///
+    /// For a limit over motors on two buses, nest the one call in the other's `limit`.
+    pub fn tick_limited(&mut self, tick: Tick, limit: impl FnOnce(&mut D)) {
+        self.step(tick, limit, |_| {});
+    }
+
+    fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
         self.device.update(tick);
+        limit(&mut self.device);
         self.turn = self.turn.wrapping_add(1);
         for _ in 0..FRAMES_A_TICK {
             let Some(frame) = self.device.next_frame(self.turn) else { break };

@@ -1,32 +1,36 @@
-use super::MotorKey;
-use super::body::{Body, Velocity};
-use crate::chassis::{MecanumGeometry, MecanumWheels};
+use super::body::{Body, Contact, Rolling, Velocity};
+use super::esc::Esc;
+use super::{MotorKey, Wheel};
 use crate::geometry::{self, Twist};
 
-/// A mecanum chassis to attach to a [`World`](super::World): a rigid body on four wheels that can slip.
+/// A chassis to attach to a [`World`](super::World): a rigid body on wheels of any layout, all of which can slip.
 ///
-/// The rollers that touch the floor form an O. The motors sit inside with their shafts outward, so those on the
-/// right turn clockwise to drive forward. The weight rests on all wheels alike.
-///
-/// The ground holds a wheel along the axis of the roller that touches it, with a force of at most friction times
-/// load; below that the slip is some millimetres a second. Friction of motors and gearboxes is the motors' own.
+/// The weight rests on all wheels alike. The floor holds each [`Wheel`] as its kind says, with a force of at most
+/// friction times load, in all directions together; below that the slip is some millimetres a second. Castors are no
+/// wheels: they roll freely and carry nothing. Friction of motors and gearboxes is the motors' own.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{MecanumGeometry, MecanumWheels};
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::{ChassisConfig, Model, MotorConfig, World};
+/// use drivetrain::geometry::Vec2;
+/// use drivetrain::sim::{AttachError, ChassisConfig, Model, MotorConfig, Wheel, World};
 /// use drivetrain::time::Duration;
 /// use embedded_can::nb::Can;
 ///
 /// let world = World::new(1);
-/// let ids = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
-/// let wheels = ids.try_map(|id| world.attach(MotorConfig::new(Model::M3508, id)))?;
-/// let geometry =
-///     MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
-/// world.attach_chassis(ChassisConfig::new(geometry).with_mass_kg(20.0), wheels)?;
+/// let wheel = |id, x, y| -> Result<Wheel, AttachError> {
+///     Ok(Wheel::mecanum(world.attach(MotorConfig::new(Model::M3508, id))?, 0.076, Vec2::new(x, y)))
+/// };
+/// // The motors sit inside with their shafts outward: those on the right turn clockwise to drive forward.
+/// let wheels = [
+///     wheel(2, 0.2, 0.18)?,
+///     wheel(1, 0.2, -0.18)?.reversed(),
+///     wheel(3, -0.2, 0.18)?,
+///     wheel(4, -0.2, -0.18)?.reversed(),
+/// ];
+/// world.attach_chassis(ChassisConfig::new(&wheels).with_mass_kg(20.0))?;
 ///
-/// // 2 A forward on every wheel: on the right the motors turn the other way.
+/// // 2 A forward on every wheel.
 /// let forward = CanFrame::standard(0x200, [0xF9, 0x9A, 6, 0x66, 6, 0x66, 0xF9, 0x9A]).ok_or("id")?;
 /// world.controller().transmit(&forward).map_err(|_| "refused")?;
 /// world.advance(Duration::from_millis(500));
@@ -37,17 +41,26 @@ use crate::geometry::{self, Twist};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChassisConfig {
-    geometry: MecanumGeometry,
+    wheels: [Option<Wheel>; Self::MAX_WHEELS],
+    too_many: bool,
     mass_kg: f32,
     yaw_inertia_kg_m2: f32,
     friction: f32,
 }
 
 impl ChassisConfig {
-    /// Takes the dimensions. The body weighs 20 kg, turns with 0.8 kg m² and grips with 0.8, until told otherwise.
+    /// The number of wheels that a chassis can have.
+    pub const MAX_WHEELS: usize = 8;
+
+    /// Takes the wheels. The body weighs 20 kg, turns with 0.8 kg m² and grips with 0.8, until told otherwise.
     #[must_use]
-    pub const fn new(geometry: MecanumGeometry) -> Self {
-        Self { geometry, mass_kg: 20.0, yaw_inertia_kg_m2: 0.8, friction: 0.8 }
+    pub fn new(wheels: &[Wheel]) -> Self {
+        let mut places = [None; Self::MAX_WHEELS];
+        for (place, wheel) in places.iter_mut().zip(wheels) {
+            *place = Some(*wheel);
+        }
+        let too_many = wheels.len() > Self::MAX_WHEELS;
+        Self { wheels: places, too_many, mass_kg: 20.0, yaw_inertia_kg_m2: 0.8, friction: 0.8 }
     }
 
     /// Sets the mass in kg, wheels included.
@@ -62,7 +75,7 @@ impl ChassisConfig {
         Self { yaw_inertia_kg_m2, ..self }
     }
 
-    /// Sets the friction of rollers on the floor, as force over load.
+    /// Sets the friction of wheels on the floor, as force over load.
     #[must_use]
     pub const fn with_friction(self, friction: f32) -> Self {
         Self { friction, ..self }
@@ -71,36 +84,26 @@ impl ChassisConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// The name of the first that is not above zero and at most 1000.
-    pub const fn validate(&self) -> Result<(), &'static str> {
-        const fn bad(value: f32) -> bool {
-            !(value > 0.0 && value <= 1e3)
+    /// The name of the first that makes no sense: no wheel or more than eight, a length, mass, inertia or friction that
+    /// is not above zero and at most 1000, a direction that is not finite, a roller that lies nearly across its wheel.
+    pub fn validate(&self) -> Result<(), &'static str> {
+        if self.too_many || self.wheels().next().is_none() {
+            return Err("number of wheels");
         }
-        Err(if bad(self.geometry.wheel_radius_m) {
-            "wheel_radius_m"
-        } else if bad(self.geometry.half_wheelbase_m) {
-            "half_wheelbase_m"
-        } else if bad(self.geometry.half_track_m) {
-            "half_track_m"
-        } else if bad(self.mass_kg) {
-            "mass_kg"
-        } else if bad(self.yaw_inertia_kg_m2) {
-            "yaw_inertia_kg_m2"
-        } else if bad(self.friction) {
-            "friction"
-        } else {
-            return Ok(());
-        })
+        self.wheels().try_for_each(Wheel::validate)?;
+        let named = [
+            (self.mass_kg, "mass_kg"),
+            (self.yaw_inertia_kg_m2, "yaw_inertia_kg_m2"),
+            (self.friction, "friction"),
+        ];
+        match named.into_iter().find(|(value, _)| !(*value > 0.0 && *value <= 1e3)) {
+            Some((_, name)) => Err(name),
+            None => Ok(()),
+        }
     }
 
-    pub(crate) const fn body(&self) -> Body {
-        Body::new(
-            self.geometry.wheel_radius_m,
-            self.geometry.half_wheelbase_m + self.geometry.half_track_m,
-            self.mass_kg,
-            self.yaw_inertia_kg_m2,
-            self.friction,
-        )
+    fn wheels(&self) -> impl Iterator<Item = &Wheel> + Clone {
+        self.wheels.iter().flatten()
     }
 }
 
@@ -125,17 +128,65 @@ pub struct ChassisState {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Chassis {
     pub(crate) body: Body,
-    pub(crate) wheels: MecanumWheels<MotorKey>,
+    wheels: [Option<Mounted>; ChassisConfig::MAX_WHEELS],
 }
 
-/// The direction in which each motor turns to drive forward.
-const FORWARD: MecanumWheels<f32> =
-    MecanumWheels { front_left: 1.0, front_right: -1.0, rear_left: 1.0, rear_right: -1.0 };
+/// A wheel with what does not change while it rolls.
+#[derive(Debug, Clone, Copy)]
+struct Mounted {
+    wheel: Wheel,
+    /// As it stands now; turns with the steering motor only.
+    contact: Contact,
+    /// Its part of its motor's inertia: one, unless the motor drives others too.
+    share: f32,
+}
 
 impl Chassis {
-    /// Returns every wheel's motor with the direction in which it turns to drive forward.
-    pub(crate) fn mounted(&self) -> [(MotorKey, f32); 4] {
-        self.wheels.zip(FORWARD).into_array()
+    /// Takes a configuration that makes sense.
+    pub(crate) fn new(config: &ChassisConfig) -> Self {
+        let contacts = config.wheels().map(|wheel| wheel.contact(None));
+        let ChassisConfig { mass_kg, yaw_inertia_kg_m2, friction, .. } = *config;
+        let on_motor_of = |wheel: &Wheel| {
+            let same = config.wheels().filter(|other| other.motor() == wheel.motor());
+            same.fold(0.0, |count, _| count + 1.0_f32)
+        };
+        Self {
+            body: Body::new(contacts, mass_kg, yaw_inertia_kg_m2, friction),
+            wheels: config.wheels.map(|wheel| {
+                let wheel = wheel?;
+                let (contact, share) = (wheel.contact(None), 1.0 / on_motor_of(&wheel));
+                Some(Mounted { wheel, contact, share })
+            }),
+        }
+    }
+
+    /// Moves the chassis on its motors by one step, and returns the torque of the ground on each motor. A wheel
+    /// without one stands still.
+    pub(crate) fn step(&mut self, escs: &Escs, dt_s: f32) -> [f32; MotorKey::CAPACITY] {
+        let esc = |motor: MotorKey| escs.get(usize::from(motor.0))?.as_ref();
+        let mut rolling = [NONE; ChassisConfig::MAX_WHEELS];
+        let mut count = 0;
+        for (place, mounted) in rolling.iter_mut().zip(self.wheels.iter_mut().flatten()) {
+            let Mounted { wheel, contact, share } = mounted;
+            if let Some(steering) = wheel.steering_motor().and_then(esc) {
+                *contact = wheel.contact(Some(steering.rotor.shaft_rad()));
+            }
+            let (velocity, inertia) = match esc(wheel.motor()) {
+                Some(esc) => (wheel.sign() * esc.rotor.velocity(), *share * esc.rotor.inertia()),
+                None => (0.0, 1.0),
+            };
+            *place = Rolling { contact: *contact, velocity, inertia, torque: 0.0 };
+            count += 1;
+        }
+        let rolling = rolling.get_mut(..count).unwrap_or_default();
+        self.body.step(rolling, dt_s);
+        let mut ground_nm = [0.0; MotorKey::CAPACITY];
+        for (rolling, mounted) in rolling.iter().zip(self.wheels.iter().flatten()) {
+            if let Some(sum) = ground_nm.get_mut(usize::from(mounted.wheel.motor().0)) {
+                *sum += mounted.wheel.sign() * rolling.torque;
+            }
+        }
+        ground_nm
     }
 
     pub(crate) fn state(&self) -> ChassisState {
@@ -145,29 +196,65 @@ impl Chassis {
     }
 }
 
+/// The motors of a world.
+pub(crate) type Escs = [Option<Esc>; MotorKey::CAPACITY];
+
+const NONE: Rolling = Rolling {
+    contact: Contact {
+        position: geometry::Vec2::ZERO,
+        along: geometry::Vec2::ZERO,
+        reach: 0.0,
+        holds_across: false,
+    },
+    velocity: 0.0,
+    inertia: 1.0,
+    torque: 0.0,
+};
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{AttachError, World};
+    use crate::frame::CanFrame;
+    use crate::geometry::Vec2;
+    use crate::sim::{AttachError, Model, MotorConfig, World};
+    use crate::time::Duration;
+    use crate::units::Angle;
+    use embedded_can::nb::Can;
     use std::string::ToString;
 
-    const GEOMETRY: MecanumGeometry =
-        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
+    fn corner(motor: MotorKey) -> Wheel {
+        Wheel::mecanum(motor, 0.076, Vec2::new(0.2, 0.18))
+    }
+
+    fn four(motor: MotorKey) -> [Wheel; 4] {
+        [(0.2, 0.18), (0.2, -0.18), (-0.2, 0.18), (-0.2, -0.18)]
+            .map(|(x, y)| Wheel::mecanum(motor, 0.076, Vec2::new(x, y)))
+    }
 
     #[test]
     fn a_parameter_that_makes_no_sense_is_named() {
-        let config = ChassisConfig::new(GEOMETRY);
+        let motor = MotorKey(0);
+        let config = ChassisConfig::new(&four(motor));
         assert_eq!(config.validate(), Ok(()));
-        let flat = MecanumGeometry { wheel_radius_m: 0.0, ..GEOMETRY };
+        let one = |wheel| ChassisConfig::new(&[wheel]);
+        let nan = Angle::from_radians(f32::NAN);
         let table = [
-            (ChassisConfig::new(flat), "wheel_radius_m"),
+            (ChassisConfig::new(&[]), "number of wheels"),
+            (ChassisConfig::new(&[corner(motor); 9]), "number of wheels"),
+            (one(Wheel::plain(motor, 0.0, Vec2::ZERO)), "wheel_radius_m"),
+            (one(Wheel::plain(motor, f32::INFINITY, Vec2::ZERO)), "wheel_radius_m"),
+            (one(Wheel::plain(motor, 0.1, Vec2::new(f32::NAN, 0.0))), "position_m"),
+            (one(Wheel::omni(motor, 0.1, Vec2::ZERO, nan)), "direction"),
+            (one(Wheel::steered(motor, 0.1, Vec2::ZERO, motor, nan)), "direction"),
+            (one(corner(motor).with_roller_axis(Angle::from_degrees(90.0))), "roller_axis"),
+            (one(corner(motor).with_roller_axis(nan)), "roller_axis"),
             (config.with_mass_kg(-1.0), "mass_kg"),
             (config.with_yaw_inertia_kg_m2(f32::NAN), "yaw_inertia_kg_m2"),
             (config.with_friction(f32::INFINITY), "friction"),
         ];
         for (config, name) in table {
             assert_eq!(config.validate(), Err(name));
-            let error = World::new(1).attach_chassis(config, MecanumWheels::splat(MotorKey(0)));
+            let error = World::new(1).attach_chassis(config);
             assert_eq!(error, Err(AttachError::Chassis(name)));
             assert!(AttachError::Chassis(name).to_string().starts_with(name));
         }
@@ -176,12 +263,58 @@ mod tests {
     #[test]
     fn a_chassis_on_motors_of_another_world_stands_and_can_be_pushed() {
         let world = World::new(1);
-        let wheels = MecanumWheels::splat(MotorKey(15));
-        world.attach_chassis(ChassisConfig::new(GEOMETRY), wheels).unwrap();
+        world.attach_chassis(ChassisConfig::new(&four(MotorKey(15)))).unwrap();
         world.push_chassis(0.0, 1_000.0, f32::NAN);
-        world.advance(crate::time::Duration::from_millis(100));
+        world.advance(Duration::from_millis(100));
         let state = world.chassis().unwrap();
         assert!(state.y_m > 0.1 && state.x_m.abs() < 1e-3, "{state:?}");
         assert!(state.twist.wz_rad_s.abs() < 1e-3);
+    }
+
+    fn amperes(world: &World, per_slot: [i16; 4]) {
+        let words = per_slot.map(|amperes| (amperes * 819).to_be_bytes());
+        let data = words.as_flattened().try_into().unwrap();
+        let frame = CanFrame::standard(0x200, data).unwrap();
+        assert_eq!(world.controller().transmit(&frame), Ok(None));
+        world.advance(Duration::from_millis(500));
+    }
+
+    #[test]
+    fn a_motor_that_drives_two_wheels_of_its_side_drives_both() {
+        let world = World::new(1);
+        let left = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+        let right = world.attach(MotorConfig::new(Model::M3508, 2)).unwrap();
+        let wheel = |motor, x, y| Wheel::plain(motor, 0.076, Vec2::new(x, y));
+        let tracks = [
+            wheel(left, 0.1, 0.2),
+            wheel(left, -0.1, 0.2),
+            wheel(right, 0.1, -0.2).reversed(),
+            wheel(right, -0.1, -0.2).reversed(),
+        ];
+        world.attach_chassis(ChassisConfig::new(&tracks)).unwrap();
+        amperes(&world, [5, -5, 0, 0]);
+        // Twice 1.5 Nm less friction, on 20 kg and the wheels.
+        let (torque, mass) = (2.0 * (1.5 - 0.14), 20.0 + 2.0 * 8e-3 / (0.076 * 0.076));
+        let expected = torque / 0.076 / mass * 0.5;
+        let twist = world.chassis().unwrap().twist;
+        assert!((twist.vx_m_s / expected - 1.0).abs() < 0.05, "{twist:?} and not {expected}");
+        assert!(twist.vy_m_s.abs() < 1e-3 && twist.wz_rad_s.abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_module_drives_where_its_steering_motor_points_from_its_zero() {
+        let world = World::new(1);
+        let wheel = |id: u8, x, y| {
+            let drive = world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+            // 90 degrees on the encoder of a module whose zero is at 45.
+            let steering = MotorConfig::new(Model::Gm6020Voltage, id).with_rotor_angle(2048);
+            let steering = world.attach(steering).unwrap();
+            Wheel::steered(drive, 0.06, Vec2::new(x, y), steering, Angle::from_degrees(45.0))
+        };
+        let modules = [(1, 0.2), (2, -0.2)].map(|(id, x)| wheel(id, x, 0.1));
+        world.attach_chassis(ChassisConfig::new(&modules)).unwrap();
+        amperes(&world, [2, 2, 0, 0]);
+        let twist = world.chassis().unwrap().twist;
+        assert!(twist.vx_m_s > 0.1 && (twist.vx_m_s - twist.vy_m_s).abs() < 0.01, "{twist:?}");
     }
 }

@@ -1,4 +1,4 @@
-use super::chassis::Chassis;
+use super::chassis::{Chassis, Escs};
 use super::esc::Esc;
 use super::fault::Faults;
 use super::line::{Line, Record, Sender, Wire};
@@ -33,7 +33,7 @@ pub(crate) struct Engine {
     stepped_ns: u64,
     steps: u64,
     wires: [Wire; 2],
-    escs: [Option<Esc>; MotorKey::CAPACITY],
+    escs: Escs,
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
     /// Frames that passed while a blocking call waited.
@@ -164,33 +164,14 @@ impl Engine {
             esc.rotor.mechanics = self.faults.mechanics(key, self.now_ns);
             esc.step_current(self.now_ns, STEP_S);
         }
-        let ground = self.step_chassis();
-        for (esc, ground_nm) in self.escs.iter_mut().zip(ground) {
+        let ground = self.chassis.as_mut().map(|chassis| chassis.step(&self.escs, STEP_S));
+        for (esc, ground_nm) in self.escs.iter_mut().zip(ground.unwrap_or_default()) {
             let Some(esc) = esc else { continue };
             esc.rotor.step_motion(ground_nm, STEP_S);
             if self.steps.is_multiple_of(STEPS_A_WARMING) {
                 esc.rotor.step_temperature(STEP_S * STEPS_A_WARMING as f32);
             }
         }
-    }
-
-    /// Moves the chassis by one step, and returns the torque of the ground on each motor.
-    fn step_chassis(&mut self) -> [f32; MotorKey::CAPACITY] {
-        let mut ground_nm = [0.0; MotorKey::CAPACITY];
-        let Some(chassis) = &mut self.chassis else { return ground_nm };
-        let mut wheels = [(0.0, 1.0); 4];
-        for (wheel, (key, forward)) in wheels.iter_mut().zip(chassis.mounted()) {
-            if let Some(Some(esc)) = self.escs.get(usize::from(key.0)) {
-                *wheel = (forward * esc.rotor.velocity(), esc.rotor.inertia());
-            }
-        }
-        let torques = chassis.body.step(wheels, STEP_S);
-        for (torque, (key, forward)) in torques.into_iter().zip(chassis.mounted()) {
-            if let Some(sum) = ground_nm.get_mut(usize::from(key.0)) {
-                *sum += forward * torque;
-            }
-        }
-        ground_nm
     }
 
     /// Lets an ESC hand its feedback to its mailboxes.

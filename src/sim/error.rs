@@ -14,7 +14,7 @@ pub enum AttachError {
         /// The id that was asked for.
         id: u8,
     },
-    /// A parameter of the chassis, by its name, is not above zero and at most 1000.
+    /// A parameter of the chassis, by its name, makes no sense; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
     Chassis(&'static str),
 }
 
@@ -23,7 +23,7 @@ impl core::fmt::Display for AttachError {
         match self {
             Self::Full => write!(f, "a world holds {} motors", MotorKey::CAPACITY),
             Self::Id { model, id } => write!(f, "{model:?} has no id {id}"),
-            Self::Chassis(name) => write!(f, "{name} of the chassis is not between 0 and 1000"),
+            Self::Chassis(name) => write!(f, "{name} of the chassis makes no sense"),
         }
     }
 }

@@ -199,6 +199,7 @@ impl Esc {
             velocity: AngularVelocity::from_rad_per_s(self.rotor.velocity()),
             current: Current::from_amperes(self.rotor.current()),
             torque_nm: self.rotor.torque_nm(),
+            power_w: self.rotor.power_w(),
             temperature_c: self.rotor.temperature(),
             command: self.command,
         }

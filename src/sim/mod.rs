@@ -20,7 +20,7 @@
 //! | [`World`] | the two buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
-//! | [`ChassisConfig`], [`ChassisState`] | a mecanum body on four of them |
+//! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
 //! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
 //! | [`Record`], [`Traffic`] | every frame with its time, as a line of candump; bus load and counters |
@@ -58,7 +58,8 @@
 //! torque than that makes it spin, as on a real floor.
 //!
 //! Not simulated: error frames and error counters, two senders of one id at the same bit, cogging, the
-//! supply's sag, and the weight that moves to other wheels when a chassis accelerates. Motors move in steps of 100 µs; in between, the feedback continues their angle in a line.
+//! supply's sag, the weight that moves to other wheels when a chassis accelerates, and what a turning module does to the
+//! floor, to its wheel's drive and to the body. Motors move in steps of 100 µs; in between, the feedback continues their angle in a line.
 //!
 //! # A node of your own
 //! Anything that talks on a bus can be played by the test: look at each frame in
@@ -79,6 +80,7 @@ mod motor;
 mod random;
 mod ring;
 mod rotor;
+mod wheel;
 mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
@@ -89,4 +91,5 @@ pub use error::AttachError;
 pub use fault::{Fault, FaultsFull};
 pub use line::{Line, Record, Sender, Traffic};
 pub use motor::{LostCommand, Model, MotorConfig, MotorKey, MotorState};
+pub use wheel::Wheel;
 pub use world::{SimClock, World};

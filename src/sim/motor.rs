@@ -190,6 +190,9 @@ pub struct MotorState {
     pub current: Current,
     /// The torque of the motor at the output shaft, friction not taken off, in Nm.
     pub torque_nm: f32,
+    /// The electric power that it takes from the supply, in W: what moves it and the heat in its winding. Below zero while
+    /// it feeds back.
+    pub power_w: f32,
     /// The temperature that the ESC measures, in °C.
     pub temperature_c: f32,
     /// The command that the ESC acts on, as on the wire.

@@ -97,6 +97,11 @@ impl Rotor {
         if self.mechanics.reversed { -volts } else { volts }
     }
 
+    /// Returns the electric power in W: current times back-EMF and voltage over the winding.
+    pub(crate) fn power_w(&self) -> f32 {
+        self.current * (self.generated() + self.constants.resistance * self.current)
+    }
+
     /// Moves speed and angle by one step of `dt_s`, with one more torque at the output shaft.
     pub(crate) fn step_motion(&mut self, other_torque_nm: f32, dt_s: f32) {
         if self.mechanics.blocked {
@@ -133,6 +138,14 @@ impl Rotor {
     /// Returns the rotor's angle `dt_s` after the last step, in counts of which a turn has 8192.
     pub(crate) fn counts(&self, dt_s: f32) -> i64 {
         self.angle.wrapping_add(self.travel(dt_s)) >> 19
+    }
+
+    /// Returns the angle of the output shaft within a turn in rad, from that of the rotor's zero at the start.
+    #[expect(clippy::cast_possible_truncation, reason = "within a turn")]
+    pub(crate) fn shaft_rad(&self) -> f32 {
+        let turns = self.angle as f64 / f64::from(TURN) / f64::from(self.gear);
+        let within = turns - (turns as i64) as f64;
+        (within * core::f64::consts::TAU) as f32
     }
 
     /// Returns the velocity of the output shaft in rad/s.
@@ -328,11 +341,33 @@ mod tests {
     }
 
     #[test]
+    fn the_power_of_a_held_shaft_is_heat_and_at_full_speed_it_is_what_friction_takes() {
+        for model in MODELS {
+            let facts = model.facts();
+            let mut held = rotor(model);
+            (0..1_000).for_each(|_| held.step_current(Drive::Amperes(2.0), STEP));
+            let heat = 4.0 * Constants::of(model).resistance;
+            assert!((held.power_w() / heat - 1.0).abs() < 1e-3, "{model:?}");
+            let mut free = rotor(model);
+            run(&mut free, full(model), 20_000);
+            // At 24 V and the current of friction.
+            let friction =
+                Constants::of(model).coulomb + Constants::of(model).viscous * free.velocity();
+            let expected = 24.0 * friction / facts.torque_constant_nm_per_a;
+            assert!(
+                (free.power_w() / expected - 1.0).abs() < 0.01,
+                "{model:?}: {}",
+                free.power_w()
+            );
+        }
+    }
+
+    #[test]
     fn a_motor_driven_above_its_no_load_speed_brakes() {
         let mut rotor = rotor(Model::M3508);
         rotor.load_nm = 10.0;
         run(&mut rotor, Drive::Amperes(0.0), 20_000);
-        assert!(rotor.current() < 0.0 && rpm(&rotor) > 482.0);
+        assert!(rotor.current() < 0.0 && rpm(&rotor) > 482.0 && rotor.power_w() < 0.0);
     }
 
     #[test]

@@ -4,7 +4,6 @@ use super::{
     AttachError, ChassisConfig, ChassisState, Controller, Fault, FaultsFull, Line, MotorConfig,
     MotorKey, MotorState, Record, Traffic,
 };
-use crate::chassis::MecanumWheels;
 use crate::frame::CanFrame;
 use crate::time::{Clock, Duration, Instant};
 use core::cell::RefCell;
@@ -145,18 +144,14 @@ impl World {
         self.with(|engine| engine.motor(motor))
     }
 
-    /// Puts four motors under a chassis; their shafts then carry it. They may sit on both buses. A second chassis
+    /// Puts a chassis on its motors; their shafts then carry it. They may sit on both buses. A second chassis
     /// replaces the first.
     ///
     /// # Errors
     /// Names the parameter that makes no sense.
-    pub fn attach_chassis(
-        &self,
-        config: ChassisConfig,
-        wheels: MecanumWheels<MotorKey>,
-    ) -> Result<(), AttachError> {
+    pub fn attach_chassis(&self, config: ChassisConfig) -> Result<(), AttachError> {
         config.validate().map_err(AttachError::Chassis)?;
-        let chassis = Chassis { body: config.body(), wheels };
+        let chassis = Chassis::new(&config);
         self.with(|engine| engine.chassis = Some(chassis));
         Ok(())
     }

@@ -138,6 +138,7 @@ fn frame() {
 
 fn control() {
     TimeStep::new.call();
+    TimeStep::of.call();
     TimeStep::dt_s.call();
     TimeStep::is_hold.call();
     TimeStep::is_frozen.call();
@@ -157,11 +158,11 @@ fn control() {
     PidConfig::with_period.call();
     PidConfig::with_derivative_filter.call();
     PidConfig::with_derivative_on_error.call();
-    PidConfig::with_max_step.call();
     PidConfig::with_gains.call();
     PidConfig::gains.call();
     PidConfig::output_range.call();
     PidConfig::validate.call();
+    PidConfig::period.call();
     Pid::new.call();
     Pid::update.call();
     Pid::step.call();
@@ -371,6 +372,11 @@ fn dji() {
     (|bus: &mut Bus, motor: AnyHandle, to: Angle| Bus::set_angle(bus, motor, to)).call();
     (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_position(bus, motor, to)).call();
     (|bus: &mut Bus, motor: AnyHandle| Bus::relax(bus, motor)).call();
+    Bus::<()>::commanded_current::<M3508>.call();
+    (|bus: &mut Bus, motors: [AnyHandle; 4], factor: f32| {
+        Bus::scale_outputs(bus, motors, factor);
+    })
+    .call();
     (|bus: &mut Bus, motor: AnyHandle| Bus::zero(bus, motor)).call();
     (|bus: &mut Bus, motor: AnyHandle, to: Position| Bus::set_present_position(bus, motor, to))
         .call();
@@ -471,6 +477,10 @@ fn runner() {
         Runner::tick_with(runner, tick, |frame| {
             black_box(frame);
         })
+    })
+    .call();
+    (|runner: &mut Shell, tick: Tick, motors: [AnyHandle; 4], factor: f32| {
+        Runner::tick_limited(runner, tick, |bus| bus.scale_outputs(motors, factor));
     })
     .call();
     Shell::statistics.call();

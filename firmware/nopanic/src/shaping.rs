@@ -4,6 +4,17 @@ use crate::opaque::Function;
 use drivetrain::control::*;
 
 pub fn call_all() {
+    Cascade::new.call();
+    Cascade::step.call();
+    Cascade::step_position.call();
+    Cascade::step_speed.call();
+    Cascade::reset.call();
+    Cascade::interrupt.call();
+    Cascade::output.call();
+    Cascade::position.call();
+    Cascade::position_mut.call();
+    Cascade::speed.call();
+    Cascade::speed_mut.call();
     PositionActuatorConfig::new.call();
     PositionActuatorConfig::with_angle_filter.call();
     PositionActuatorConfig::with_outer_divider.call();
@@ -13,10 +24,8 @@ pub fn call_all() {
     PositionActuator::reset.call();
     PositionActuator::output.call();
     PositionActuator::speed_setpoint.call();
-    PositionActuator::angle_pid.call();
-    PositionActuator::angle_pid_mut.call();
-    PositionActuator::speed.call();
-    PositionActuator::speed_mut.call();
+    PositionActuator::cascade.call();
+    PositionActuator::cascade_mut.call();
     PositionActuator::rejected.call();
     SpeedActuatorConfig::new.call();
     SpeedActuatorConfig::with_feedback_filter.call();
@@ -56,7 +65,6 @@ pub fn call_all() {
     Median::<5>::reset.call();
     Median::<5>::value.call();
     Median::<5>::rejected.call();
-    Pid::time_step.call();
     Pid::interrupt.call();
     FeedForward::new.call();
     FeedForward::effort.call();

@@ -1,13 +1,14 @@
 //! The rows of the controllers beside `Pid`, each through its checked `update`.
 
-use crate::meter::instructions;
+use crate::meter::{CALLS, instructions};
 use crate::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
-    Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
-    MotionLimits, MovingAverage, OptimalDifferentiator, PidConfig, PositionActuator,
-    PositionActuatorConfig, Profile, ProfileState, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
+    Biquad, Cascade, ConfigError, FeedForward, IncrementalPid, IncrementalPidConfig,
+    LinearDifferentiator, LowPass, Median, MotionLimits, MovingAverage, OptimalDifferentiator,
+    PidConfig, PositionActuator, PositionActuatorConfig, Profile, ProfileState, RelayTuner,
+    RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep,
 };
 
 const DT_S: f32 = 0.001;
@@ -37,6 +38,16 @@ functions! {
     control_optimal(differentiator: &mut OptimalDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
     control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
     control_profile(profile: &Profile, time_s) -> ProfileState = profile.at(time_s);
+    control_plan(limits: &MotionLimits, start, end) -> Result<Profile, ConfigError> = Profile::plan(start, end, limits);
+    control_feed_forward(gains: &FeedForward, velocity, acceleration) -> f32 = gains.effort(velocity, acceleration);
+    control_relay(tuner: &mut RelayTuner, setpoint, measurement, dt_s) -> f32 = tuner.update(setpoint, measurement, dt_s);
+    control_step_response(response: &mut StepResponse, value, dt_s) -> () = response.record(value, dt_s);
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn control_cascade(cascade: &mut Cascade, error: f32, velocity: f32, step: &TimeStep) -> f32 {
+    cascade.step(error, velocity, step)
 }
 
 type Step<C> = fn(&mut C, f32, f32, f32) -> f32;
@@ -54,13 +65,38 @@ pub fn rows() {
     sampled("median_5", control_median, &mut Median::new());
     let mut differentiator = LinearDifferentiator::new(black_box(100.0), 0.005).unwrap();
     timed("differentiator_linear", control_linear, &mut differentiator);
-    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.005, 0.005).unwrap();
+    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.006, 0.004).unwrap();
     timed("differentiator_optimal", control_optimal, &mut differentiator);
     let mut limiter = SlewLimiter::new(black_box(100.0), 50.0).unwrap();
     timed("slew_limiter", control_slew, &mut limiter);
     let limits = MotionLimits::new(2.0, 8.0);
-    profile("profile_trapezoid", limits);
-    profile("profile_s_curve", limits.with_jerk(80.0));
+    profile("profile_trapezoid", "profile_plan_trapezoid", limits);
+    profile("profile_s_curve", "profile_plan_s_curve", limits.with_jerk(80.0));
+    let effort = FeedForward::new(black_box(0.3), 0.05, 0.01).unwrap();
+    let each = |effort_of: fn(&FeedForward, f32, f32) -> f32, call| {
+        _ = effort_of(&effort, swinging(call), swinging(call + 1));
+    };
+    row("feed_forward", &[instructions(control_feed_forward as _, each)]);
+    tuning();
+}
+
+/// While they work: neither is done within the calls of a row.
+fn tuning() {
+    let config = RelayTunerConfig::new(3.0, 0.1).with_cycles(255);
+    let mut tuner = RelayTuner::new(black_box(config)).unwrap();
+    row(
+        "relay_tuner",
+        &[instructions(control_relay as Step<_>, |update, call| {
+            update(&mut tuner, 1.0, swinging(call), DT_S);
+        })],
+    );
+    assert!(!tuner.is_complete());
+    let mut response = StepResponse::new(0.0, black_box(1.0), 1.5, 0.02).unwrap();
+    let each = |record: fn(&mut StepResponse, f32, f32), call| {
+        record(&mut response, swinging(call), DT_S);
+    };
+    row("step_response", &[instructions(control_step_response as _, each)]);
+    assert!(!response.is_complete());
 }
 
 fn loops() {
@@ -84,6 +120,17 @@ fn loops() {
             })],
         );
     }
+    let mut cascade = Cascade::new(black_box(pid), pid).unwrap();
+    let step = TimeStep::of(DT_S);
+    row(
+        "cascade",
+        &[instructions(
+            control_cascade as fn(&mut Cascade, f32, f32, &TimeStep) -> f32,
+            |update, call| {
+                update(&mut cascade, 0.5 - swinging(call), swinging(call + 1), &step);
+            },
+        )],
+    );
     let mut actuator =
         PositionActuator::new(black_box(PositionActuatorConfig::new(pid, bare))).unwrap();
     row(
@@ -107,11 +154,17 @@ fn sampled<C>(name: &str, update: Sampler<C>, controller: &mut C) {
     row(name, &[instructions(update, each)]);
 }
 
-/// Over all parts of a move that takes about a second.
-fn profile(name: &str, limits: MotionLimits) {
+/// Planning a move that takes about a second, and asking for a moment: over all of its parts.
+fn profile(name: &str, plan: &str, limits: MotionLimits) {
     let profile = Profile::plan(0.0, black_box(1.5), &limits).unwrap();
+    let call_s = profile.duration_s() / CALLS as f32;
     let each = |at: fn(&Profile, f32) -> ProfileState, call: u32| {
-        _ = at(&profile, call as f32 * DT_S);
+        _ = at(&profile, call as f32 * call_s);
     };
     row(name, &[instructions(control_profile as fn(&Profile, f32) -> ProfileState, each)]);
+    // Moves that reach full speed, and shorter ones that do not.
+    let each = |plan: fn(&MotionLimits, f32, f32) -> Result<Profile, ConfigError>, call| {
+        _ = plan(&limits, 0.0, swinging(call) - 0.5);
+    };
+    row(plan, &[instructions(control_plan as _, each)]);
 }

@@ -254,8 +254,11 @@ pub fn control() {
     row("pid_circle_step", &[pid_step(all.with_period(360.0))]);
     row("pid_circle_update", &[pid_update(all.with_period(360.0))]);
     row("pid_circle_across", &[pid_step_to(361.0, all.with_period(360.0))]);
-    // Every error and every change of the measurement is more than half a period.
-    row("pid_circle_wrap", &[pid_step(all.with_period(0.375))]);
+    // The measurement passes the end of the circle in every step, and the setpoint is on the other side of it.
+    let across = |call| if call % 2 == 0 { (0.1, 1.9) } else { (1.9, 0.1) };
+    row("pid_circle_wrap", &[pid_step_through(all.with_period(2.0), across)]);
+    // Errors and changes of the measurement of up to three turns.
+    row("pid_circle_turns", &[pid_step(all.with_period(0.375))]);
 }
 
 pub fn swinging(call: u32) -> f32 {
@@ -267,11 +270,17 @@ fn pid_step(config: PidConfig) -> u32 {
 }
 
 fn pid_step_to(setpoint: f32, config: PidConfig) -> u32 {
+    pid_step_through(config, |call| (setpoint, swinging(call)))
+}
+
+fn pid_step_through(config: PidConfig, way: impl Fn(u32) -> (f32, f32)) -> u32 {
     let mut pid = Pid::new(black_box(config)).unwrap();
     let step = TimeStep::new(0.001, 0.1);
-    pid.step(setpoint, 0.5, &step);
+    let (setpoint, measurement) = way(3);
+    pid.step(setpoint, measurement, &step);
     instructions(row_pid_step as fn(&mut Pid, f32, f32, &TimeStep) -> f32, |pid_step, call| {
-        pid_step(&mut pid, setpoint, swinging(call), &step);
+        let (setpoint, measurement) = way(call);
+        pid_step(&mut pid, setpoint, measurement, &step);
     })
 }
 

@@ -7,10 +7,13 @@
 //!                                                                     |
 //!                    speed -> low-pass ------------------------> PID -+-> low-pass -> output
 //! ```
+//! The two PIDs of the latter are a [`Cascade`], which the motors of a bus use without filters.
 
+mod cascade;
 mod position;
 mod speed;
 
+pub use cascade::Cascade;
 pub use position::{PositionActuator, PositionActuatorConfig};
 pub use speed::{SpeedActuator, SpeedActuatorConfig};
 
@@ -18,30 +21,34 @@ use super::error::ConfigError;
 use super::filter::LowPass;
 use super::step::TimeStep;
 
-/// Makes the filter, if one was asked for, and calls its cut-off by the name it has here.
-const fn optional_filter(
-    name: &'static str,
-    cutoff_hz: Option<f32>,
-) -> Result<Option<LowPass>, ConfigError> {
-    match cutoff_hz {
-        None => Ok(None),
-        Some(cutoff_hz) => match LowPass::new(cutoff_hz) {
-            Ok(filter) => Ok(Some(filter)),
-            Err(error) => Err(ConfigError::new(name, error.fault())),
-        },
-    }
-}
+/// A low-pass that may be absent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct OptionalFilter(Option<LowPass>);
 
-const fn through(filter: &mut Option<LowPass>, value: f32, step: &TimeStep) -> f32 {
-    match filter {
-        Some(filter) => filter.step(value, step),
-        None => value,
+impl OptionalFilter {
+    /// Makes the filter, if one was asked for, and calls its cut-off by the name it has here.
+    const fn new(name: &'static str, cutoff_hz: Option<f32>) -> Result<Self, ConfigError> {
+        match cutoff_hz {
+            None => Ok(Self(None)),
+            Some(cutoff_hz) => match LowPass::new(cutoff_hz) {
+                Ok(filter) => Ok(Self(Some(filter))),
+                Err(error) => Err(ConfigError::new(name, error.fault())),
+            },
+        }
     }
-}
 
-/// Lets the next value through a filter as if it were the first.
-const fn restart(filter: &mut Option<LowPass>) {
-    if let Some(filter) = filter {
-        filter.reset();
+    const fn pass(&mut self, value: f32, step: &TimeStep) -> f32 {
+        match &mut self.0 {
+            Some(filter) => filter.step(value, step),
+            None => value,
+        }
+    }
+
+    /// Lets the next value through as if it were the first.
+    const fn reset(&mut self) {
+        if let Some(filter) = &mut self.0 {
+            filter.reset();
+        }
     }
 }

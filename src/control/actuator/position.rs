@@ -1,8 +1,8 @@
-use super::speed::{SpeedActuator, SpeedActuatorConfig};
-use super::{optional_filter, restart, through};
-use crate::control::error::{ConfigError, ConfigFault, check};
-use crate::control::filter::LowPass;
-use crate::control::pid::{Pid, PidConfig};
+use super::speed::{SpeedActuatorConfig, SpeedFilters};
+use super::{Cascade, OptionalFilter};
+use crate::control::error::{ConfigError, ConfigFault};
+use crate::control::number::limited;
+use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 
 /// What a [`PositionActuator`] is made from: an angle loop over a speed loop, and options that are off until named.
@@ -37,7 +37,7 @@ impl PositionActuatorConfig {
 
     /// Filters the measured angle with a first-order low-pass of this cut-off, more than zero. Off by default.
     ///
-    /// Not for an angle that jumps at the end of a turn.
+    /// Not with a period of the angle loop: the mean of 359° and 1° is not 180°.
     #[must_use]
     pub const fn with_angle_filter(self, cutoff_hz: f32) -> Self {
         Self { angle_cutoff_hz: Some(cutoff_hz), ..self }
@@ -50,12 +50,15 @@ impl PositionActuatorConfig {
     }
 }
 
-/// An angle loop over a speed loop, with their filters.
+/// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`]: a bad time, setpoint, angle or speed changes nothing, the last output is returned and
-/// [`rejected`](Self::rejected) grows. With a divider, the angle loop runs on the first step and then on every n-th, with the
-/// time that has passed for it; a longest step of its own applies to that sum.
+/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward. A `dt_s` that is zero, negative, NaN or
+/// infinite, and a setpoint, angle or speed that is NaN or infinite, change nothing: the last output is returned and
+/// [`rejected`](Self::rejected) grows. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D of both loops, and
+/// counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
+/// time that has passed for it; if one of the steps since was above the maximum, that freezes it too. Without `ki` an
+/// integral stays zero. Huge gains end at the output limits.
 ///
 /// # Examples
 /// ```
@@ -71,9 +74,10 @@ impl PositionActuatorConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionActuator {
-    filter: Option<LowPass>,
-    angle: Pid,
-    speed: SpeedActuator,
+    filter: OptionalFilter,
+    cascade: Cascade,
+    filters: SpeedFilters,
+    /// Since the last step of the angle loop; `f32::MAX` when one step since was above the maximum.
     passed_s: f32,
     rejected: u16,
     outer_divider: u8,
@@ -84,102 +88,90 @@ impl PositionActuator {
     /// Takes and checks the configuration.
     ///
     /// # Errors
-    /// Names the parameter of a loop as [`Pid::new`] does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
-    /// is NaN, infinite, zero or negative, `outer_divider` when zero.
+    /// Names the parameter of a loop as [`Pid::new`](crate::control::Pid::new) does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
+    /// is NaN, infinite, zero or negative, `angle_filter` when the angle loop has a period, `outer_divider` when zero.
     pub const fn new(config: PositionActuatorConfig) -> Result<Self, ConfigError> {
         if config.outer_divider == 0 {
             return Err(ConfigError::new("outer_divider", ConfigFault::NotPositive));
         }
-        check!(config.angle.validate());
-        let filter = match optional_filter("angle_filter", config.angle_cutoff_hz) {
+        if config.angle_cutoff_hz.is_some() && config.angle.period() > 0.0 {
+            return Err(ConfigError::new("angle_filter", ConfigFault::Conflict));
+        }
+        let filter = match OptionalFilter::new("angle_filter", config.angle_cutoff_hz) {
             Ok(filter) => filter,
             Err(error) => return Err(error),
         };
-        let angle = match Pid::new(config.angle) {
-            Ok(pid) => pid,
-            Err(error) => return Err(error),
-        };
-        match SpeedActuator::new(config.speed) {
-            Ok(speed) => Ok(Self {
+        match (Cascade::new(config.angle, config.speed.pid()), config.speed.filters()) {
+            (Ok(cascade), Ok(filters)) => Ok(Self {
                 filter,
-                angle,
-                speed,
+                cascade,
+                filters,
                 passed_s: 0.0,
                 rejected: 0,
                 outer_divider: config.outer_divider,
                 until_outer: 0,
             }),
-            Err(error) => Err(error),
+            (Err(error), _) | (_, Err(error)) => Err(error),
         }
     }
 
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.speed.pid().time_step(dt_s);
-        if !(setpoint.is_finite() && angle.is_finite() && speed.is_finite()) || step.is_hold() {
-            return self.reject();
+        let step = TimeStep::of(dt_s);
+        let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
+        if !step.admits(finite, &mut self.rejected) {
+            return self.output();
         }
-        let angle = through(&mut self.filter, angle, &step);
-        if let Some(outer) = self.outer_step(dt_s) {
-            self.angle.step(setpoint, angle, &outer);
+        let angle = self.filter.pass(angle, &step);
+        if let Some(outer) = self.outer_step(&step) {
+            self.cascade.position_mut().step(setpoint, angle, &outer);
         }
-        self.speed.step(self.angle.output(), speed, &step)
+        self.step_speed(speed, &step)
     }
 
     /// Steps with an angle error that was formed elsewhere (from integers, on a circle): the measured speed is its rate.
     ///
     /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right. The angle filter does not apply.
     pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.speed.pid().time_step(dt_s);
-        if !(error.is_finite() && speed.is_finite()) || step.is_hold() {
-            return self.reject();
+        let step = TimeStep::of(dt_s);
+        if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
+            return self.output();
         }
-        if let Some(outer) = self.outer_step(dt_s) {
-            self.angle.step_error(error, speed, &outer);
+        if let Some(outer) = self.outer_step(&step) {
+            self.cascade.step_position(error, speed, &outer);
         }
-        self.speed.step(self.angle.output(), speed, &step)
+        self.step_speed(speed, &step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps.
     pub const fn reset(&mut self) {
-        restart(&mut self.filter);
-        self.angle.reset();
-        self.speed.reset();
+        self.filter.reset();
+        self.cascade.reset();
+        self.filters.reset();
         (self.passed_s, self.until_outer) = (0.0, 0);
     }
 
     /// Returns the last output.
     #[must_use]
     pub const fn output(&self) -> f32 {
-        self.speed.output()
+        self.filters.value()
     }
 
     /// Returns the last output of the angle loop.
     #[must_use]
     pub const fn speed_setpoint(&self) -> f32 {
-        self.angle.output()
+        self.cascade.position().output()
     }
 
-    /// Returns the angle loop, for its terms and its configuration.
+    /// Returns the two loops, for their terms and their configurations.
     #[must_use]
-    pub const fn angle_pid(&self) -> &Pid {
-        &self.angle
+    pub const fn cascade(&self) -> &Cascade {
+        &self.cascade
     }
 
-    /// Returns the angle loop, for changing its gains.
-    pub const fn angle_pid_mut(&mut self) -> &mut Pid {
-        &mut self.angle
-    }
-
-    /// Returns the speed loop with its filters.
-    #[must_use]
-    pub const fn speed(&self) -> &SpeedActuator {
-        &self.speed
-    }
-
-    /// Returns the speed loop with its filters, for changing its gains.
-    pub const fn speed_mut(&mut self) -> &mut SpeedActuator {
-        &mut self.speed
+    /// Returns the two loops, for changing their gains.
+    pub const fn cascade_mut(&mut self) -> &mut Cascade {
+        &mut self.cascade
     }
 
     /// Returns the number of steps that were refused; stays at 65535.
@@ -188,21 +180,26 @@ impl PositionActuator {
         self.rejected
     }
 
+    fn step_speed(&mut self, speed: f32, step: &TimeStep) -> f32 {
+        let wanted = self.speed_setpoint();
+        self.filters.around(speed, step, |speed| self.cascade.step_speed(wanted, speed, step))
+    }
+
     /// Returns the time for the angle loop when it is its turn.
-    fn outer_step(&mut self, dt_s: f32) -> Option<TimeStep> {
-        self.passed_s += dt_s;
+    fn outer_step(&mut self, step: &TimeStep) -> Option<TimeStep> {
+        self.passed_s = if step.is_frozen() { f32::MAX } else { self.passed_s + step.dt_s() };
         if self.until_outer > 0 {
             self.until_outer -= 1;
             return None;
         }
-        let outer = self.angle.time_step(self.passed_s);
+        let longest_s = f32::from(self.outer_divider) * TimeStep::MAX_S;
+        let passed_s = match self.passed_s {
+            f32::MAX => f32::MAX,
+            // The rounding of a sum freezes nothing.
+            passed_s => limited(passed_s, 0.0, longest_s),
+        };
         (self.passed_s, self.until_outer) = (0.0, self.outer_divider - 1);
-        Some(outer)
-    }
-
-    const fn reject(&mut self) -> f32 {
-        self.rejected = self.rejected.saturating_add(1);
-        self.output()
+        Some(TimeStep::new(passed_s, longest_s))
     }
 }
 

@@ -1,6 +1,5 @@
-use super::{optional_filter, restart, through};
-use crate::control::error::{ConfigError, check};
-use crate::control::filter::LowPass;
+use super::OptionalFilter;
+use crate::control::error::ConfigError;
 use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
 
@@ -42,13 +41,24 @@ impl SpeedActuatorConfig {
     pub const fn with_output_filter(self, cutoff_hz: f32) -> Self {
         Self { output_cutoff_hz: Some(cutoff_hz), ..self }
     }
+
+    pub(super) const fn pid(&self) -> PidConfig {
+        self.pid
+    }
+
+    pub(super) const fn filters(&self) -> Result<SpeedFilters, ConfigError> {
+        SpeedFilters::new(self)
+    }
 }
 
 /// A speed loop with its filters: speed, low-pass, [`Pid`], low-pass, output.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`]: a bad time, setpoint or speed changes nothing, the last output is returned and
-/// [`rejected`](Self::rejected) grows. The output is within the limits of the loop.
+/// That of the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward.
+/// A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or infinite, change nothing: the last output is
+/// returned and [`rejected`](Self::rejected) grows. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and
+/// counts as that maximum for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold
+/// behind the filter too.
 ///
 /// # Examples
 /// ```
@@ -61,10 +71,52 @@ impl SpeedActuatorConfig {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedActuator {
-    feedback: Option<LowPass>,
     pid: Pid,
-    filter: Option<LowPass>,
-    output: f32,
+    filters: SpeedFilters,
+}
+
+/// The filters about a speed loop, and what comes out of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct SpeedFilters {
+    feedback: OptionalFilter,
+    output: OptionalFilter,
+    value: f32,
+}
+
+impl SpeedFilters {
+    const fn new(config: &SpeedActuatorConfig) -> Result<Self, ConfigError> {
+        match (
+            OptionalFilter::new("feedback_filter", config.feedback_cutoff_hz),
+            OptionalFilter::new("output_filter", config.output_cutoff_hz),
+        ) {
+            (Ok(feedback), Ok(output)) => Ok(Self { feedback, output, value: 0.0 }),
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// Runs the loop on the filtered speed, and returns what it gives, filtered.
+    #[inline]
+    pub(super) fn around(
+        &mut self,
+        speed: f32,
+        step: &TimeStep,
+        run: impl FnOnce(f32) -> f32,
+    ) -> f32 {
+        let wanted = run(self.feedback.pass(speed, step));
+        self.value = self.output.pass(wanted, step);
+        self.value
+    }
+
+    pub(super) const fn reset(&mut self) {
+        self.feedback.reset();
+        self.output.reset();
+        self.value = 0.0;
+    }
+
+    pub(super) const fn value(&self) -> f32 {
+        self.value
+    }
 }
 
 impl SpeedActuator {
@@ -74,58 +126,48 @@ impl SpeedActuator {
     /// Names the parameter of the loop as [`Pid::new`] does, or `feedback_filter` or `output_filter` when the cut-off is NaN,
     /// infinite, zero or negative.
     pub const fn new(config: SpeedActuatorConfig) -> Result<Self, ConfigError> {
-        check!(config.pid.validate());
-        let feedback = match optional_filter("feedback_filter", config.feedback_cutoff_hz) {
-            Ok(filter) => filter,
-            Err(error) => return Err(error),
-        };
-        let filter = match optional_filter("output_filter", config.output_cutoff_hz) {
-            Ok(filter) => filter,
+        let filters = match config.filters() {
+            Ok(filters) => filters,
             Err(error) => return Err(error),
         };
         match Pid::new(config.pid) {
-            Ok(pid) => Ok(Self { feedback, pid, filter, output: 0.0 }),
+            Ok(pid) => Ok(Self { pid, filters }),
             Err(error) => Err(error),
         }
     }
 
     /// Steps by `dt_s` seconds and returns the output.
     pub fn update(&mut self, setpoint: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = self.pid.time_step(dt_s);
+        let step = TimeStep::of(dt_s);
         self.step(setpoint, speed, &step)
     }
 
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
-        let refused = self.pid.rejected();
-        let usable = !step.is_hold() && setpoint.is_finite() && speed.is_finite();
-        let speed = if usable { through(&mut self.feedback, speed, step) } else { speed };
-        let wanted = self.pid.step(setpoint, speed, step);
-        if usable && self.pid.rejected() == refused {
-            self.output = through(&mut self.filter, wanted, step);
+        if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
+            self.pid.refuse();
+            return self.output();
         }
-        self.output
+        self.filters.around(speed, step, |speed| self.pid.step(setpoint, speed, step))
     }
 
     /// Forgets everything but the configuration and the count of rejected steps.
     pub const fn reset(&mut self) {
-        restart(&mut self.feedback);
-        restart(&mut self.filter);
+        self.filters.reset();
         self.pid.reset();
-        self.output = 0.0;
     }
 
     /// Resets, and lets the first call return `output` as [`Pid::reset_to`] does.
     pub fn reset_to(&mut self, output: f32) {
         self.reset();
         self.pid.reset_to(output);
-        self.output = self.pid.output();
+        self.filters.value = self.pid.output();
     }
 
     /// Returns the last output.
     #[must_use]
     pub const fn output(&self) -> f32 {
-        self.output
+        self.filters.value
     }
 
     /// Returns the loop, for its terms and its configuration.

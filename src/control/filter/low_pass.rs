@@ -59,13 +59,13 @@ impl LowPass {
     /// Steps by a time that was validated before, and returns the new value.
     #[inline]
     pub const fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
-        if !(step.dt_s > 0.0 && input.is_finite()) {
-            self.rejected = self.rejected.saturating_add(1);
-        } else if self.started {
-            let gain = step.dt_s / (step.dt_s + self.time_constant_s);
-            self.value += gain * finite(input - self.value);
-        } else {
-            self.reset_to(input);
+        if step.admits(input.is_finite(), &mut self.rejected) {
+            if self.started {
+                let gain = step.dt_s / (step.dt_s + self.time_constant_s);
+                self.value += gain * finite(input - self.value);
+            } else {
+                self.reset_to(input);
+            }
         }
         self.value
     }

@@ -1,3 +1,5 @@
+use crate::control::number::finite;
+
 /// The mean of the last `N` samples.
 ///
 /// Every call adds `N` numbers, so there is no running sum that could drift. Takes out a disturbance whose period is `N` samples.
@@ -99,7 +101,8 @@ impl<const N: usize> MovingAverage<N> {
             self.value = if sum.is_finite() {
                 sum * part
             } else {
-                self.window.held().map(|sample| sample * part).sum()
+                // Rounding may pass the largest number.
+                finite(self.window.held().map(|sample| sample * part).sum())
             };
         }
         self.value
@@ -196,8 +199,8 @@ mod tests {
 
     #[test]
     fn the_mean_of_huge_samples_is_finite() {
-        let mut average = MovingAverage::<4>::new();
-        for _ in 0..4 {
+        let mut average = MovingAverage::<10>::new();
+        for _ in 0..10 {
             average.update(f32::MAX);
         }
         assert_eq!(average.value(), f32::MAX);

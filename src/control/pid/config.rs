@@ -1,16 +1,6 @@
-use crate::control::error::{ConfigError, check, not_negative, ordered, output_ends, positive};
-
-/// An option that is a threshold or a rate, and off.
-const OFF: f32 = f32::MAX;
-
-pub(super) const DERIVATIVE_ON_ERROR: u8 = 1;
-const INTEGRAL_WEIGHT: u8 = 1 << 1;
-const DEAD_BAND: u8 = 1 << 2;
-pub(super) const FEED_FORWARD: u8 = 1 << 3;
-pub(super) const SLEW_LIMIT: u8 = 1 << 4;
-pub(super) const CIRCLE: u8 = 1 << 5;
-pub(super) const DERIVATIVE_FILTER: u8 = 1 << 6;
-const ASYMMETRIC: u8 = 1 << 7;
+use crate::control::error::{
+    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
+};
 
 /// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
 ///
@@ -50,14 +40,13 @@ pub struct PidConfig {
     pub(super) period: f32,
     pub(super) derivative_time_s: f32,
     pub(super) tracking_time_s: f32,
-    pub(super) max_step_s: f32,
     pub(super) derivative_on_error: bool,
     pub(super) wind_up: bool,
 }
 
 impl PidConfig {
-    /// The longest step in seconds that is believed unless [`with_max_step`](Self::with_max_step) says otherwise.
-    pub const MAX_STEP_S: f32 = 0.1;
+    /// An option that is a threshold or a rate, and off.
+    pub(super) const OFF: f32 = f32::MAX;
 
     /// Takes the gains: proportional, integral (1/s times the unit of `kp`) and derivative (s times the unit of `kp`).
     ///
@@ -68,20 +57,19 @@ impl PidConfig {
             kp,
             ki,
             kd,
-            output_lower: -OFF,
-            output_upper: OFF,
-            integral_limit: OFF,
-            integral_separation: OFF,
-            full_rate_below: OFF,
-            no_rate_above: OFF,
+            output_lower: -Self::OFF,
+            output_upper: Self::OFF,
+            integral_limit: Self::OFF,
+            integral_separation: Self::OFF,
+            full_rate_below: Self::OFF,
+            no_rate_above: Self::OFF,
             dead_band: 0.0,
             static_gain: 0.0,
             velocity_gain: 0.0,
-            slew_per_s: OFF,
+            slew_per_s: Self::OFF,
             period: 0.0,
             derivative_time_s: 0.0,
             tracking_time_s: 0.0,
-            max_step_s: Self::MAX_STEP_S,
             derivative_on_error: false,
             wind_up: false,
         }
@@ -125,12 +113,7 @@ impl PidConfig {
     /// integral with the time constant `tracking_time_s`, more than zero.
     #[must_use]
     pub const fn with_back_calculation(self, tracking_time_s: f32) -> Self {
-        Self {
-            // Zero means off, so a zero given here is kept as the NaN that is refused.
-            tracking_time_s: if tracking_time_s > 0.0 { tracking_time_s } else { f32::NAN },
-            wind_up: false,
-            ..self
-        }
+        Self { tracking_time_s: not_off(tracking_time_s), wind_up: false, ..self }
     }
 
     /// Lets the integral grow while the output is at its limit, as far as its own limit.
@@ -170,13 +153,13 @@ impl PidConfig {
     /// The error and the derivative go by the shortest way. Off by default.
     #[must_use]
     pub const fn with_period(self, period: f32) -> Self {
-        Self { period: if period > 0.0 { period } else { f32::NAN }, ..self }
+        Self { period: not_off(period), ..self }
     }
 
     /// Filters the derivative with a first-order low-pass of this cut-off frequency, more than zero. Off by default.
     #[must_use]
     pub const fn with_derivative_filter(self, cutoff_hz: f32) -> Self {
-        Self { derivative_time_s: 1.0 / (core::f32::consts::TAU * cutoff_hz), ..self }
+        Self { derivative_time_s: not_off(1.0 / (core::f32::consts::TAU * cutoff_hz)), ..self }
     }
 
     /// Takes the derivative of the error, so that D answers changes of the setpoint too.
@@ -185,12 +168,6 @@ impl PidConfig {
     #[must_use]
     pub const fn with_derivative_on_error(self) -> Self {
         Self { derivative_on_error: true, ..self }
-    }
-
-    /// Sets the longest step of [`Pid::update`](super::Pid::update) in seconds, more than zero; the default is 0.1.
-    #[must_use]
-    pub const fn with_max_step(self, max_step_s: f32) -> Self {
-        Self { max_step_s, ..self }
     }
 
     /// Replaces the three gains.
@@ -211,19 +188,23 @@ impl PidConfig {
         (self.output_lower, self.output_upper)
     }
 
+    /// Returns the period of the circle; zero without one.
+    #[must_use]
+    pub const fn period(&self) -> f32 {
+        self.period
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
     /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, or reversed.
     pub const fn validate(&self) -> Result<(), ConfigError> {
-        check!(not_negative("kp", self.kp));
-        check!(not_negative("ki", self.ki));
-        check!(not_negative("kd", self.kd));
+        check!(gains(self.kp, self.ki, self.kd));
         check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("integral_limit", self.integral_limit));
         check!(positive("integral_separation", self.integral_separation));
         check!(not_negative("variable_integral", self.full_rate_below));
-        if self.no_rate_above < OFF || self.full_rate_below < OFF {
+        if self.no_rate_above < Self::OFF || self.full_rate_below < Self::OFF {
             check!(ordered("variable_integral", self.full_rate_below, self.no_rate_above));
         } else {
             check!(positive("variable_integral", self.no_rate_above));
@@ -232,50 +213,16 @@ impl PidConfig {
         check!(not_negative("static_gain", self.static_gain));
         check!(not_negative("velocity_gain", self.velocity_gain));
         check!(positive("slew_limit", self.slew_per_s));
-        check!(not_negative("period", self.period));
-        check!(not_negative("derivative_filter", self.derivative_time_s));
-        check!(not_negative("back_calculation", self.tracking_time_s));
-        positive("max_step", self.max_step_s)
+        check!(off_or_positive("period", self.period));
+        check!(off_or_positive("derivative_filter", self.derivative_time_s));
+        off_or_positive("back_calculation", self.tracking_time_s)
     }
+}
 
-    /// Returns the error up to which the integral works at full rate.
-    pub(super) const fn full_weight_to(&self) -> f32 {
-        if self.integral_separation < self.full_rate_below {
-            self.integral_separation
-        } else {
-            self.full_rate_below
-        }
-    }
-
-    /// Returns the options that are in use; gains, limits that are symmetric, and anti-windup are none.
-    pub(super) const fn options(&self) -> u8 {
-        let mut options = 0;
-        if self.output_lower + self.output_upper != 0.0 {
-            options |= ASYMMETRIC;
-        }
-        if self.integral_separation < OFF || self.no_rate_above < OFF {
-            options |= INTEGRAL_WEIGHT;
-        }
-        if self.dead_band > 0.0 {
-            options |= DEAD_BAND;
-        }
-        if self.static_gain > 0.0 || self.velocity_gain > 0.0 {
-            options |= FEED_FORWARD;
-        }
-        if self.slew_per_s < OFF {
-            options |= SLEW_LIMIT;
-        }
-        if self.period > 0.0 {
-            options |= CIRCLE;
-        }
-        if self.derivative_time_s > 0.0 {
-            options |= DERIVATIVE_FILTER;
-        }
-        if self.derivative_on_error {
-            options |= DERIVATIVE_ON_ERROR;
-        }
-        options
-    }
+/// Zero means off: what is no more than that, but was given, is kept as the NaN that is refused.
+const fn not_off(value: f32) -> f32 {
+    // Half a period must be a normal number too.
+    if value >= 2.0 * f32::MIN_POSITIVE { value } else { f32::NAN }
 }
 
 #[cfg(all(test, feature = "serde"))]

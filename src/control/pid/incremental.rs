@@ -1,6 +1,6 @@
 use super::work::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
-use crate::control::error::{ConfigError, check, not_negative, output_ends, positive};
+use crate::control::error::{ConfigError, check, gains, output_ends, positive};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
@@ -42,7 +42,7 @@ impl IncrementalPidConfig {
             output_lower: -f32::MAX,
             output_upper: f32::MAX,
             tracking_r: None,
-            max_step_s: super::PidConfig::MAX_STEP_S,
+            max_step_s: TimeStep::MAX_S,
         }
     }
 
@@ -78,9 +78,7 @@ impl IncrementalPidConfig {
     /// # Errors
     /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, reversed, or too fast for the step.
     pub const fn validate(&self) -> Result<(), ConfigError> {
-        check!(not_negative("kp", self.kp));
-        check!(not_negative("ki", self.ki));
-        check!(not_negative("kd", self.kd));
+        check!(gains(self.kp, self.ki, self.kd));
         check!(output_ends(self.output_lower, self.output_upper));
         check!(positive("max_step", self.max_step_s));
         if let Some(r) = self.tracking_r {
@@ -161,8 +159,7 @@ impl IncrementalPid {
 
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
+        if !step.admits(setpoint.is_finite() && measurement.is_finite(), &mut self.rejected) {
             return self.output;
         }
         let config = &self.config;
@@ -239,9 +236,7 @@ impl IncrementalPid {
     /// # Errors
     /// Names the gain that is NaN, infinite or negative; then nothing changes.
     pub const fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
-        check!(not_negative("kp", kp));
-        check!(not_negative("ki", ki));
-        check!(not_negative("kd", kd));
+        check!(gains(kp, ki, kd));
         self.config.kp = kp;
         self.config.ki = ki;
         self.config.kd = kd;

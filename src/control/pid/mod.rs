@@ -1,8 +1,10 @@
 //! The positional and the incremental PID controller.
 
 mod config;
+mod cut;
 mod incremental;
 mod positional;
+mod settings;
 mod work;
 
 pub use config::PidConfig;

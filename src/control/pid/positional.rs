@@ -1,6 +1,7 @@
 use super::PidConfig;
-use super::work::{CLOSED, UNKNOWN, gate, open_gate, passes};
-use crate::control::error::{ConfigError, not_negative};
+use super::settings::{Settings, TRACK_OUTPUT};
+use super::work::{CLOSED, UNKNOWN, passes};
+use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
@@ -53,28 +54,29 @@ pub struct Pid {
     pub(super) error: f32,
     pub(super) rate: f32,
     pub(super) integral: f32,
-    pub(super) integral_gate: u32,
-    /// Of the output; with options on, of half the period.
-    pub(super) output_gate: u32,
-    pub(super) full_weight_to: f32,
-    pub(super) config: PidConfig,
+    pub(super) settings: Settings,
+    pub(super) options: u16,
     pub(super) rejected: u16,
-    pub(super) track_output: bool,
-    pub(super) options: u8,
 }
 
-/// The parts of an output, in its unit. Their sum is the output before limits.
+#[cfg(target_pointer_width = "32")]
+const _: () = assert!(size_of::<Pid>() <= 92, "two for each motor of a bus");
+
+/// The parts of the last output, in its unit.
+///
+/// Their sum is the output, as long as that is within its limits and its slew limit. Beyond them, `i` is the integral that
+/// anti-windup has left for the next step.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Terms {
-    /// Proportional: `kp` times the error.
+    /// Proportional: `kp` times the error; zero in the dead band.
     pub p: f32,
-    /// Integral.
+    /// Integral, within its limit.
     pub i: f32,
-    /// Derivative: `-kd` times the rate of the measurement.
+    /// Derivative: `-kd` times the rate of the measurement, filtered where that was asked for.
     pub d: f32,
-    /// Feed-forward: `kS sign(setpoint) + kV setpoint`.
+    /// Feed-forward: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the measurement.
     pub feed_forward: f32,
 }
 
@@ -87,35 +89,25 @@ impl Pid {
         if let Err(error) = config.validate() {
             return Err(error);
         }
-        let mut pid = Self {
+        let options = config.options();
+        Ok(Self {
             output: 0.0,
             measurement: UNKNOWN,
             error: UNKNOWN,
             rate: 0.0,
             integral: 0.0,
-            integral_gate: CLOSED,
-            output_gate: CLOSED,
-            full_weight_to: 0.0,
-            config,
+            settings: Settings::new(&config, options),
+            options,
             rejected: 0,
-            track_output: false,
-            options: 0,
-        };
-        pid.configure(config);
-        Ok(pid)
+        })
     }
 
-    /// Steps by `dt_s` seconds and returns the output.
+    /// Steps by `dt_s` seconds, of which [`TimeStep::MAX_S`] are believed, and returns the output.
+    ///
+    /// For another maximum, make a [`TimeStep`] and call [`step`](Self::step).
     #[inline]
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
-        self.step(setpoint, measurement, &self.time_step(dt_s))
-    }
-
-    /// Validates `dt_s` against the longest step of this controller.
-    #[must_use]
-    #[inline]
-    pub const fn time_step(&self, dt_s: f32) -> TimeStep {
-        TimeStep::new(dt_s, self.config.max_step_s)
+        self.step(setpoint, measurement, &TimeStep::of(dt_s))
     }
 
     /// Steps by a time that was validated before, and returns the output.
@@ -123,14 +115,14 @@ impl Pid {
     /// The same as [`update`](Self::update) for several loops that share a tick.
     #[inline]
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        if self.integral_gate == CLOSED {
+        if self.settings.integral_gate == CLOSED {
             return self.step_with_options(setpoint, measurement, step);
         }
         let error = setpoint - measurement;
         let rate = (measurement - self.measurement) * step.per_dt;
         let integral = self.integral + self.growth(error, step);
         // The first call, a step that is not normal, NaN and overflow: none of them passes.
-        if !passes(integral, self.integral_gate) {
+        if !passes(integral, self.settings.integral_gate) {
             return self.step_with_options(setpoint, measurement, step);
         }
         self.finish(measurement, error, rate, integral, step)
@@ -143,7 +135,7 @@ impl Pid {
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let integral = self.integral + self.growth(error, step);
-        if !passes(integral, self.integral_gate) {
+        if !passes(integral, self.settings.integral_gate) {
             return self.work_with_options(0.0, UNKNOWN, error, rate, step);
         }
         self.finish(UNKNOWN, error, rate, integral, step)
@@ -158,8 +150,8 @@ impl Pid {
         integral: f32,
         step: &TimeStep,
     ) -> f32 {
-        let output = self.config.kp * error + integral - self.config.kd * rate;
-        if !passes(output, self.output_gate) {
+        let output = self.settings.kp * error + integral - self.settings.kd * rate;
+        if !passes(output, self.settings.output_gate) {
             return self.saturate(output, measurement, error, rate, integral, step);
         }
         self.output = output;
@@ -177,7 +169,7 @@ impl Pid {
         self.measurement = UNKNOWN;
         self.rate = 0.0;
         self.output = 0.0;
-        self.track_output = false;
+        self.options &= !TRACK_OUTPUT;
     }
 
     /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
@@ -210,10 +202,10 @@ impl Pid {
         self.reset();
         self.output = limited(
             if output.is_finite() { output } else { 0.0 },
-            self.config.output_lower,
-            self.config.output_upper,
+            self.settings.output_lower,
+            self.settings.output_upper,
         );
-        self.track_output = true;
+        self.options |= TRACK_OUTPUT;
     }
 
     /// Changes the gains without a jump of the output: the integral takes up the difference.
@@ -223,10 +215,8 @@ impl Pid {
     /// # Errors
     /// Names the gain that is NaN, infinite or negative; then nothing changes.
     pub fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
-        not_negative("kp", kp)?;
-        not_negative("ki", ki)?;
-        not_negative("kd", kd)?;
-        self.change(self.config.with_gains(kp, ki, kd));
+        gains(kp, ki, kd)?;
+        self.change(self.config().with_gains(kp, ki, kd));
         Ok(())
     }
 
@@ -244,16 +234,16 @@ impl Pid {
     /// Returns the parts of the last output.
     #[must_use]
     pub fn terms(&self) -> Terms {
-        let config = &self.config;
-        let error = if self.error == UNKNOWN || self.error.abs() < config.dead_band {
+        let settings = &self.settings;
+        let error = if self.error == UNKNOWN || passes(self.error, settings.dead_band_gate) {
             0.0
         } else {
             self.error
         };
         Terms {
-            p: config.kp * error,
+            p: settings.kp * error,
             i: self.integral,
-            d: -(config.kd * self.rate),
+            d: -(settings.kd * self.rate),
             feed_forward: self.feed_forward(self.setpoint()),
         }
     }
@@ -266,8 +256,8 @@ impl Pid {
 
     /// Returns the configuration.
     #[must_use]
-    pub const fn config(&self) -> &PidConfig {
-        &self.config
+    pub const fn config(&self) -> PidConfig {
+        self.settings.config(self.options)
     }
 
     /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite; stays at 65535.
@@ -276,19 +266,11 @@ impl Pid {
         self.rejected
     }
 
-    const fn configure(&mut self, config: PidConfig) {
-        self.config = config;
-        self.options = config.options();
-        self.full_weight_to = config.full_weight_to();
-        let plain = self.options == 0;
-        self.integral_gate = if plain { gate(config.integral_limit) } else { CLOSED };
-        self.output_gate =
-            if plain { gate(config.output_upper) } else { open_gate(0.5 * config.period) };
-    }
-
     fn change(&mut self, config: PidConfig) {
         let before = self.terms();
-        self.configure(config);
+        let options = config.options();
+        self.settings = Settings::new(&config, options);
+        self.options = options | self.options & TRACK_OUTPUT;
         let after = self.terms();
         let carried = before.i
             + (before.p - after.p)
@@ -309,11 +291,11 @@ impl Pid {
 
     #[inline]
     pub(super) const fn feed_forward(&self, setpoint: f32) -> f32 {
-        let moving = self.config.velocity_gain * setpoint;
+        let moving = self.settings.velocity_gain * setpoint;
         if setpoint > 0.0 {
-            moving + self.config.static_gain
+            moving + self.settings.static_gain
         } else if setpoint < 0.0 {
-            moving - self.config.static_gain
+            moving - self.settings.static_gain
         } else {
             moving
         }
@@ -349,11 +331,6 @@ mod tests {
     }
 
     #[test]
-    fn two_loops_of_a_motor_fit_its_slot() {
-        assert!(size_of::<Pid>() <= 108, "{}", size_of::<Pid>());
-    }
-
-    #[test]
     fn first_call_after_a_long_time_is_proportional_only() {
         for dt_s in [DT_S, 0.09, 10.0] {
             let mut pid = pid(PidConfig::new(2.0, 100.0, 100.0));
@@ -381,7 +358,7 @@ mod tests {
 
     #[test]
     fn a_dt_above_the_maximum_freezes_integral_and_derivative() {
-        let mut pid = pid(PidConfig::new(2.0, 10.0, 0.01).with_max_step(0.02));
+        let mut pid = pid(PidConfig::new(2.0, 10.0, 0.01));
         pid.update(1.0, 0.0, DT_S);
         pid.update(1.0, 0.001, DT_S);
         let before = pid.terms();
@@ -447,18 +424,21 @@ mod tests {
             (new.with_variable_integral(2.0, 1.0), "variable_integral", ConfigFault::Reversed),
             (new.with_variable_integral(-1.0, 1.0), "variable_integral", ConfigFault::Negative),
             (new.with_variable_integral(1.0, f32::NAN), "variable_integral", ConfigFault::Reversed),
-            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::Negative),
-            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::Negative),
+            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::NotPositive),
+            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::NotPositive),
             (new.with_dead_band(-1.0), "dead_band", ConfigFault::Negative),
             (new.with_feed_forward(-1.0, 0.0), "static_gain", ConfigFault::Negative),
             (new.with_feed_forward(0.0, f32::NAN), "velocity_gain", ConfigFault::Negative),
             (new.with_slew_limit(0.0), "slew_limit", ConfigFault::NotPositive),
-            (new.with_period(0.0), "period", ConfigFault::Negative),
-            (new.with_period(-360.0), "period", ConfigFault::Negative),
-            (new.with_period(f32::INFINITY), "period", ConfigFault::Negative),
-            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::Negative),
-            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::Negative),
-            (new.with_max_step(0.0), "max_step", ConfigFault::NotPositive),
+            (new.with_period(0.0), "period", ConfigFault::NotPositive),
+            (new.with_period(-360.0), "period", ConfigFault::NotPositive),
+            (new.with_period(f32::INFINITY), "period", ConfigFault::NotPositive),
+            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(BAD[0]), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_derivative_filter(BAD[1]), "derivative_filter", ConfigFault::NotPositive),
+            (new.with_back_calculation(BAD[1]), "back_calculation", ConfigFault::NotPositive),
+            (new.with_period(1e-40), "period", ConfigFault::NotPositive),
         ];
         for (config, parameter, fault) in cases {
             assert_eq!(Pid::new(config), Err(ConfigError::new(parameter, fault)));
@@ -476,6 +456,19 @@ mod tests {
             pid.update(100.0, 0.0, DT_S);
         }
         assert_eq!((pid.terms().i, pid.update(0.0, 0.0, DT_S)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn without_ki_back_calculation_has_nothing_to_drain() {
+        let config =
+            PidConfig::new(1.0, 0.0, 0.0).with_output_limit(5.0).with_back_calculation(0.1);
+        for config in [config, config.with_slew_limit(1e6)] {
+            let mut pid = pid(config);
+            for _ in 0..1000 {
+                pid.update(100.0, 0.0, DT_S);
+            }
+            assert_eq!((pid.terms().i, pid.update(1.0, 0.0, DT_S)), (0.0, 1.0));
+        }
     }
 
     #[test]
@@ -780,6 +773,23 @@ mod tests {
                 // Before the first good sample the output is zero.
                 prop_assert!(output == 0.0 || (config.output_lower..=config.output_upper).contains(&output));
                 prop_assert!(pid.terms().i.abs() <= config.integral_limit);
+            }
+        }
+
+        #[test]
+        fn within_the_limits_the_terms_add_up_to_the_output(
+            config in any_config(),
+            samples in prop::collection::vec((0.0_f32..180.0, 0.0_f32..179.0), 1..40),
+        ) {
+            let mut pid = pid(config);
+            for (setpoint, measurement) in samples {
+                let output = pid.update(setpoint, measurement, DT_S);
+                let Terms { p, i, d, feed_forward } = pid.terms();
+                let sum = p + i + d + feed_forward;
+                let (lower, upper) = config.output_range();
+                let free = lower < output && output < upper && config.slew_per_s == PidConfig::OFF;
+                let largest = p.abs().max(d.abs()).max(1.0);
+                prop_assert!(!free || (sum - output).abs() < 1e-5 * largest, "{} {}", sum, output);
             }
         }
 

@@ -7,8 +7,11 @@
 //!        └─ *_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
 //! ```
 
-use super::config::{CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SLEW_LIMIT};
 use super::positional::{Pid, Terms};
+use super::settings::{
+    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SEPARATION_INSIDE, SLEW_LIMIT,
+    TRACK_OUTPUT, WIND_UP,
+};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 use crate::math;
@@ -21,12 +24,18 @@ pub(super) const CLOSED: u32 = 0;
 
 /// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
 pub(super) const fn gate(limit: f32) -> u32 {
-    (limit.to_bits() << 1) + 1
+    open_gate(limit) + 1
 }
 
 /// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
 pub(super) const fn open_gate(limit: f32) -> u32 {
     limit.to_bits() << 1
+}
+
+/// Returns the limit that a gate encodes.
+#[inline]
+pub(super) const fn limit_of(gate: u32) -> f32 {
+    f32::from_bits(gate >> 1)
 }
 
 #[inline]
@@ -59,7 +68,7 @@ impl Pid {
             let rate = self.rate_at(measurement, error, step);
             return self.work_carefully(0.0, measurement, error, rate, step);
         }
-        let output = self.config.output_upper.copysign(wanted);
+        let output = self.settings.output_upper.copysign(wanted);
         let growth = integral - self.integral;
         self.integral = self.without_windup(wanted - output, integral, growth, step);
         self.output = output;
@@ -92,19 +101,41 @@ impl Pid {
     fn step_by(&mut self, setpoint: f32, measurement: f32, travel: f32, step: &TimeStep) -> f32 {
         let (mut error, mut travel) = (setpoint - measurement, travel);
         if self.has(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
-            return self.step_carefully(setpoint, measurement, step);
+            return self.step_by_turns(setpoint, measurement, step);
         }
         self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
     }
 
-    /// Takes the shorter way round, and tells whether that is certain: half a turn and overflow need a second look.
+    /// Takes the shorter way round if that is at most one turn off, and tells whether it was.
     #[inline]
     fn shorten(&self, way: &mut f32) -> bool {
-        if passes(*way, self.output_gate) {
+        if self.is_short(*way) {
             return true;
         }
-        *way = math::rest(*way, self.config.period);
-        passes(*way, self.output_gate)
+        *way -= self.settings.period_towards(*way); // exact, if the result is short
+        self.is_short(*way)
+    }
+
+    /// Tells whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
+    #[inline]
+    const fn is_short(&self, way: f32) -> bool {
+        passes(way, self.settings.output_gate)
+    }
+
+    /// Setpoint and measurement, or two measurements, are turns apart.
+    #[inline(never)]
+    fn step_by_turns(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        let (way, period) = (setpoint - measurement, self.settings.period());
+        let travel = if self.has(DERIVATIVE_ON_ERROR) {
+            self.error - way
+        } else {
+            measurement - self.measurement
+        };
+        let (error, travel) = (math::rest(way, period), math::rest(travel, period));
+        if !(self.is_short(error) && self.is_short(travel)) {
+            return self.step_carefully(setpoint, measurement, step);
+        }
+        self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
     }
 
     /// Works on an error that was formed elsewhere when the measurement is [`UNKNOWN`].
@@ -145,7 +176,7 @@ impl Pid {
         self.work_carefully(0.0, UNKNOWN, error, rate, step)
     }
 
-    const fn refuse(&mut self) -> f32 {
+    pub(in crate::control) const fn refuse(&mut self) -> f32 {
         self.rejected = self.rejected.saturating_add(1);
         self.output
     }
@@ -164,7 +195,7 @@ impl Pid {
         if step.is_frozen() {
             (rate, step.half_dt_s) = (self.rate, 0.0);
         }
-        if self.track_output {
+        if self.has(TRACK_OUTPUT) {
             self.take_over(measurement, error, self.filtered(rate, &step));
         }
         if self.error == UNKNOWN {
@@ -175,7 +206,7 @@ impl Pid {
 
     /// A way on the circle, exact and finite.
     fn shortest(&self, way: f32) -> f32 {
-        finite(if self.has(CIRCLE) { math::wrap(way, self.config.period) } else { way })
+        finite(if self.has(CIRCLE) { math::wrap(way, self.settings.period()) } else { way })
     }
 
     /// The rate by way of sums that are finite.
@@ -192,8 +223,8 @@ impl Pid {
     fn take_over(&mut self, measurement: f32, error: f32, rate: f32) {
         let next = Self { measurement, error, rate, ..*self };
         let Terms { p, d, feed_forward, .. } = next.terms();
-        self.track_output = false;
-        if self.config.ki > 0.0 {
+        self.options &= !TRACK_OUTPUT;
+        if self.settings.ki > 0.0 {
             self.integral = finite(self.output - finite(p + d + feed_forward));
         }
     }
@@ -209,39 +240,39 @@ impl Pid {
         step: &TimeStep,
     ) -> Option<f32> {
         let finite = |value| if CAREFUL { finite(value) } else { value };
-        let config = &self.config;
+        let settings = &self.settings;
         let rate = finite(self.filtered(rate, step));
-        let mut proportional = finite(config.kp * error);
+        let mut proportional = finite(settings.kp * error);
         let mut growth = finite(self.growth(error, step));
-        if magnitude(error) > magnitude(self.full_weight_to) {
+        if !passes(error, settings.full_weight_gate) {
             growth *= self.weight(error);
         }
-        if magnitude(error) < magnitude(config.dead_band) {
+        if passes(error, settings.dead_band_gate) {
             proportional = 0.0;
             let shrinks = growth * self.integral < 0.0;
             if !shrinks {
                 growth *= 0.0; // and not simply zero: what is not finite must show below
             }
         }
-        let mut others = finite(proportional - finite(config.kd * rate));
+        let mut others = finite(proportional - finite(settings.kd * rate));
         if self.has(FEED_FORWARD) {
             others = finite(others + self.feed_forward(setpoint));
         }
         let mut integral = finite(self.integral + growth);
         let mut wanted = others + integral;
-        if integral.abs() > config.integral_limit {
+        if !passes(integral, settings.integral_limit_gate) {
             if !CAREFUL && !integral.is_finite() {
                 return None;
             }
-            integral = config.integral_limit.copysign(integral);
+            integral = limit_of(settings.integral_limit_gate).copysign(integral);
             wanted = others + integral;
         }
         let mut output = wanted;
         // Written so that NaN is not free, nor is what is infinite.
-        let free = wanted <= config.output_upper
-            && wanted >= config.output_lower
+        let free = wanted <= settings.output_upper
+            && wanted >= settings.output_lower
             && !(self.has(SLEW_LIMIT)
-                && (wanted - self.output).abs() > config.slew_per_s * step.dt_s);
+                && (wanted - self.output).abs() > settings.slew_per_s * step.dt_s);
         if !free {
             if !CAREFUL && !wanted.is_finite() {
                 return None;
@@ -259,60 +290,63 @@ impl Pid {
     /// The output within its limits, and the integral after anti-windup.
     #[inline]
     fn saturated(&self, wanted: f32, integral: f32, growth: f32, step: &TimeStep) -> (f32, f32) {
-        let config = &self.config;
+        let settings = &self.settings;
         let mut output = wanted;
         if self.has(SLEW_LIMIT) {
-            let reach = config.slew_per_s * step.dt_s;
+            let reach = settings.slew_per_s * step.dt_s;
             output = limited(output, self.output - reach, self.output + reach);
         }
-        output = limited(output, config.output_lower, config.output_upper);
+        output = limited(output, settings.output_lower, settings.output_upper);
         (output, self.without_windup(wanted - output, integral, growth, step))
     }
 
     /// The integral after anti-windup, for an `excess` that the limits cut off the output.
     #[inline]
     fn without_windup(&self, excess: f32, integral: f32, growth: f32, step: &TimeStep) -> f32 {
-        let config = &self.config;
-        if config.tracking_time_s > 0.0 {
-            let part = limited(step.dt_s / config.tracking_time_s, 0.0, 1.0);
+        let settings = &self.settings;
+        if settings.tracking_time_s > 0.0 && settings.ki > 0.0 {
+            let part = limited(step.dt_s / settings.tracking_time_s, 0.0, 1.0);
             let drained = finite(integral - finite(excess) * part);
-            return limited(drained, -config.integral_limit, config.integral_limit);
+            let limit = limit_of(settings.integral_limit_gate);
+            return limited(drained, -limit, limit);
         }
         let outward = excess * growth > 0.0;
-        if outward && !config.wind_up { self.integral } else { integral }
+        if outward && !self.has(WIND_UP) { self.integral } else { integral }
     }
 
     #[inline]
     pub(super) fn growth(&self, error: f32, step: &TimeStep) -> f32 {
-        self.config.ki * step.half_dt_s * (error + self.error)
+        self.settings.ki * step.half_dt_s * (error + self.error)
     }
 
     #[inline]
     fn filtered(&self, rate: f32, step: &TimeStep) -> f32 {
         if self.has(DERIVATIVE_FILTER) {
-            let gain = step.dt_s / (step.dt_s + self.config.derivative_time_s);
+            let gain = step.dt_s / (step.dt_s + self.settings.derivative_time_s);
             self.rate + gain * (rate - self.rate)
         } else {
             rate
         }
     }
 
-    /// The part of its rate at which the integral works at this error.
+    /// The part of its rate at which the integral works at an error beyond the first edge.
     #[inline]
     fn weight(&self, error: f32) -> f32 {
-        let config = &self.config;
+        let settings = &self.settings;
         let size = error.abs();
-        if size > config.integral_separation || size >= config.no_rate_above {
+        if self.has(SEPARATION_INSIDE)
+            || size > settings.other_edge
+            || size >= settings.no_rate_above
+        {
             0.0
-        } else if size > config.full_rate_below {
-            (config.no_rate_above - size) / (config.no_rate_above - config.full_rate_below)
         } else {
-            1.0
+            let full_rate_below = limit_of(settings.full_weight_gate);
+            (settings.no_rate_above - size) / (settings.no_rate_above - full_rate_below)
         }
     }
 
     #[inline]
-    pub(super) const fn has(&self, option: u8) -> bool {
+    pub(super) const fn has(&self, option: u16) -> bool {
         self.options & option != 0
     }
 }

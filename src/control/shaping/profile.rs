@@ -1,4 +1,4 @@
-use crate::control::error::{ConfigError, ConfigFault, check, positive};
+use crate::control::error::{ConfigError, check, finite, positive};
 use crate::math;
 
 /// How fast a [`Profile`] may go.
@@ -252,10 +252,6 @@ fn jerk_limited(distance: f32, velocity: f32, acceleration: f32, jerk: f32) -> (
     let half = 0.5 * to_full_acceleration_s;
     let full_s = math::sqrt(half * half + distance / acceleration) - 3.0 * half;
     (to_full_acceleration_s, if full_s > 0.0 { full_s } else { 0.0 })
-}
-
-const fn finite(name: &'static str, value: f32) -> Result<(), ConfigError> {
-    if value.is_finite() { Ok(()) } else { Err(ConfigError::new(name, ConfigFault::NotFinite)) }
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 use crate::control::error::{ConfigError, check, positive};
 use crate::control::number::limited;
-use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 
 /// Bounds the rate at which a value rises and falls.
@@ -37,7 +36,7 @@ impl SlewLimiter {
     pub const fn new(up_per_s: f32, down_per_s: f32) -> Result<Self, ConfigError> {
         check!(positive("up", up_per_s));
         check!(positive("down", down_per_s));
-        let max_step_s = PidConfig::MAX_STEP_S;
+        let max_step_s = TimeStep::MAX_S;
         Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rejected: 0 })
     }
 
@@ -52,12 +51,10 @@ impl SlewLimiter {
 
     /// Steps by `dt_s` seconds towards `target` and returns the new value.
     pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
-        let dt_s = TimeStep::new(dt_s, self.max_step_s).dt_s;
-        if dt_s > 0.0 && target.is_finite() {
-            let lowest = self.value - self.down_per_s * dt_s;
-            self.value = limited(target, lowest, self.value + self.up_per_s * dt_s);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
+        let step = TimeStep::new(dt_s, self.max_step_s);
+        if step.admits(target.is_finite(), &mut self.rejected) {
+            let lowest = self.value - self.down_per_s * step.dt_s;
+            self.value = limited(target, lowest, self.value + self.up_per_s * step.dt_s);
         }
         self.value
     }

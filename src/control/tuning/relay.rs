@@ -1,11 +1,12 @@
-use crate::control::error::{ConfigError, check, not_negative, positive};
+use crate::control::error::{ConfigError, check, finite, not_negative, positive};
+use crate::control::number;
 use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 use crate::math;
 use core::f32::consts::PI;
 
-/// The gains of a PID, in its units: `kp`, `ki` a second, `kd` seconds.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
+/// The gains of a PID, in its units: `kp`, `ki` a second, `kd` seconds; and the rule that they follow.
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gains {
@@ -15,6 +16,8 @@ pub struct Gains {
     pub ki: f32,
     /// Derivative gain, s times the unit of `kp`.
     pub kd: f32,
+    /// What they follow from the ultimate gain and period by.
+    pub rule: TuningRule,
 }
 
 impl Gains {
@@ -64,6 +67,7 @@ pub enum TuningRule {
 /// let found = Oscillation { ultimate_gain: 10.0, ultimate_period_s: 0.2 };
 /// let gains = found.gains(TuningRule::ZieglerNicholsPid);
 /// assert_eq!((gains.kp, gains.ki, gains.kd), (6.0, 60.0, 0.15));
+/// assert_eq!(gains.rule, TuningRule::ZieglerNicholsPid);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -80,19 +84,14 @@ impl Oscillation {
     #[must_use]
     pub const fn gains(&self, rule: TuningRule) -> Gains {
         let (ku, tu) = (self.ultimate_gain, self.ultimate_period_s);
-        match rule {
-            TuningRule::ZieglerNicholsP => Gains { kp: 0.5 * ku, ki: 0.0, kd: 0.0 },
-            TuningRule::ZieglerNicholsPi => Gains { kp: 0.45 * ku, ki: 0.54 * ku / tu, kd: 0.0 },
-            TuningRule::ZieglerNicholsPid => {
-                Gains { kp: 0.6 * ku, ki: 1.2 * ku / tu, kd: 0.075 * ku * tu }
-            }
-            TuningRule::TyreusLuybenPi => {
-                Gains { kp: ku / 3.2, ki: ku / (3.2 * 2.2 * tu), kd: 0.0 }
-            }
-            TuningRule::TyreusLuybenPid => {
-                Gains { kp: ku / 2.2, ki: ku / (2.2 * 2.2 * tu), kd: ku * tu / (2.2 * 6.3) }
-            }
-        }
+        let (kp, ki, kd) = match rule {
+            TuningRule::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
+            TuningRule::ZieglerNicholsPi => (0.45 * ku, 0.54 * ku / tu, 0.0),
+            TuningRule::ZieglerNicholsPid => (0.6 * ku, 1.2 * ku / tu, 0.075 * ku * tu),
+            TuningRule::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
+            TuningRule::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
+        };
+        Gains { kp, ki, kd, rule }
     }
 }
 
@@ -148,11 +147,12 @@ impl RelayTunerConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names `amplitude`, `time_limit` or `cycles` when not more than zero, `hysteresis` when negative, `bias` when not finite.
+    /// Names `amplitude`, `time_limit` or `cycles` when not more than zero, `hysteresis` when negative, `bias`
+    /// when it, or the output with it, is not finite.
     pub const fn validate(&self) -> Result<(), ConfigError> {
         check!(positive("amplitude", self.amplitude));
         check!(not_negative("hysteresis", self.hysteresis));
-        check!(not_negative("bias", self.bias.abs()));
+        check!(finite("bias", self.bias.abs() + self.amplitude));
         check!(positive("cycles", self.cycles as f32));
         positive("time_limit", self.time_limit_s)
     }
@@ -169,7 +169,8 @@ impl RelayTunerConfig {
 ///
 /// # Edge behaviour
 /// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned,
-/// nothing changes and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s spoils the measurement: it starts anew. When done or out of time, the output is the bias.
+/// nothing changes and [`rejected`](Self::rejected) grows. The first call starts the measurement, whenever it comes; a `dt_s` above
+/// [`TimeStep::MAX_S`] spoils it: it starts anew. When done or out of time, the output is the bias. A swing beyond `f32` gives no result.
 ///
 /// # Examples
 /// ```
@@ -244,13 +245,10 @@ impl RelayTuner {
 
     /// Steps by `dt_s` seconds and returns the output for the plant.
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::new(dt_s, PidConfig::MAX_STEP_S);
-        let error = setpoint - measurement;
-        if step.is_hold() || !error.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
-            return self.output();
-        }
-        if self.is_complete() {
+        let step = TimeStep::of(dt_s);
+        let error = number::finite(setpoint - measurement);
+        let finite = setpoint.is_finite() && measurement.is_finite();
+        if !step.admits(finite, &mut self.rejected) || self.is_complete() {
             return self.output();
         }
         self.passed_s += step.dt_s();
@@ -287,7 +285,7 @@ impl RelayTuner {
     }
 
     fn end_period(&mut self) {
-        let swing = 0.5 * (self.highest - self.lowest);
+        let swing = 0.5 * self.highest - 0.5 * self.lowest;
         if (swing - self.last_swing).abs() <= STEADY * swing {
             self.sum_of_periods_s += self.period_s;
             self.sum_of_swings += swing;
@@ -339,7 +337,7 @@ impl RelayTuner {
         let hysteresis = self.config.hysteresis;
         let effective = math::sqrt((swing - hysteresis) * (swing + hysteresis));
         let ultimate_gain = 4.0 * self.config.amplitude / (PI * effective);
-        if ultimate_gain.is_finite() && effective > 0.0 {
+        if ultimate_gain.is_finite() && ultimate_gain > 0.0 {
             Some(Oscillation { ultimate_gain, ultimate_period_s: self.sum_of_periods_s / cycles })
         } else {
             None
@@ -480,6 +478,7 @@ mod tests {
             (RelayTunerConfig::new(-1.0, 0.1), "amplitude"),
             (RelayTunerConfig::new(1.0, f32::NAN), "hysteresis"),
             (new.with_bias(f32::INFINITY), "bias"),
+            (RelayTunerConfig::new(f32::MAX, 0.1).with_bias(f32::MIN), "bias"),
             (new.with_cycles(0), "cycles"),
             (new.with_time_limit(0.0), "time_limit"),
         ] {

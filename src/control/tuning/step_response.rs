@@ -1,4 +1,4 @@
-use crate::control::error::{ConfigError, ConfigFault, check, positive};
+use crate::control::error::{self, ConfigError, ConfigFault, check, positive};
 use crate::control::number::finite;
 use crate::control::step::TimeStep;
 
@@ -20,8 +20,8 @@ pub struct StepMeasures {
 /// Measures the answer of a loop to a step, sample by sample, without storing it.
 ///
 /// # Edge behaviour
-/// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. Samples after
-/// the end are left out.
+/// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. A long `dt_s`
+/// counts in full: no time is lost, but what the value did in it is not seen. Samples after the end are left out.
 ///
 /// # Examples
 /// A first-order lag of 0.1 s rises in `0.1 ln 9` = 0.22 s and settles to 2 % in `0.1 ln 50` = 0.39 s.
@@ -70,8 +70,9 @@ impl StepResponse {
         duration_s: f32,
         tolerance: f32,
     ) -> Result<Self, ConfigError> {
-        if !(target - start).is_finite() || target - start == 0.0 {
-            return Err(ConfigError::new("target", ConfigFault::NotFinite));
+        check!(error::finite("target", target - start));
+        if target - start == 0.0 {
+            return Err(ConfigError::new("target", ConfigFault::NoChange));
         }
         check!(positive("duration", duration_s));
         check!(positive("tolerance", tolerance));
@@ -97,8 +98,7 @@ impl StepResponse {
         if self.is_complete() {
             return;
         }
-        if TimeStep::new(dt_s, f32::MAX).is_hold() || !value.is_finite() {
-            self.rejected = self.rejected.saturating_add(1);
+        if !TimeStep::new(dt_s, f32::MAX).admits(value.is_finite(), &mut self.rejected) {
             return;
         }
         self.passed_s += dt_s;
@@ -156,6 +156,7 @@ impl StepResponse {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     /// The step response of `w² / (s² + 2 z w s + w²)` with w = 10 rad/s, scaled.
     fn second_order(damping: f32, start: f32, target: f32) -> StepMeasures {
@@ -206,7 +207,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_measured_is_named() {
-        assert_eq!(StepResponse::new(1.0, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");
+        let none = StepResponse::new(1.0, 1.0, 1.0, 0.02).unwrap_err();
+        assert_eq!(none.to_string(), "target: must differ from the start");
         assert_eq!(StepResponse::new(f32::NAN, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");
         assert_eq!(StepResponse::new(0.0, 1.0, 0.0, 0.02).unwrap_err().parameter(), "duration");
         assert_eq!(StepResponse::new(0.0, 1.0, 1.0, -1.0).unwrap_err().parameter(), "tolerance");

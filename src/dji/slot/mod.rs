@@ -282,6 +282,15 @@ impl Slot {
         Ok(())
     }
 
+    /// Returns a raw command in A or V, in the direction of the shaft.
+    pub(super) fn in_units(&self, raw: i16) -> f32 {
+        f32::from(raw) / self.raw_per_unit
+    }
+
+    pub(super) const fn speed_loop_mut(&mut self) -> &mut Pid {
+        &mut self.speed
+    }
+
     fn direction(&self) -> f32 {
         1.0_f32.copysign(self.raw_per_unit)
     }

@@ -66,7 +66,9 @@ for name, wheels in LAYOUTS.items():
     for motion in MOTIONS:
         values = " ".join(f"{wheel(*motion):.6f}" for wheel in wheels)
         print(f"{name} | {' '.join(map(str, motion))} | {values}")
-for motion in MOTIONS:
-    velocities = [contact(p, *motion) for p in CORNERS]
-    values = " ".join(f"{abs(v) / R:.6f} {math.degrees(cmath.phase(v)):.4f}" for v in velocities)
-    print(f"swerve | {' '.join(map(str, motion))} | {values}")
+SWERVES = {"swerve": CORNERS, "swerve_off_centre": [complex(0.3, 0.1), complex(0.0, -0.2), complex(-0.1, 0.3)]}
+for name, places in SWERVES.items():
+    for motion in MOTIONS:
+        velocities = [contact(p, *motion) for p in places]
+        values = " ".join(f"{abs(v) / R:.6f} {math.degrees(cmath.phase(v)):.4f}" for v in velocities)
+        print(f"{name} | {' '.join(map(str, motion))} | {values}")

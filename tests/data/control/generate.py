@@ -259,6 +259,7 @@ def profiles():
         slope = top / jerk if jerk else 0.0
         segments = [(jerk, slope), (full, 0.0), (jerk, -slope), (cruise, 0.0), (jerk, -slope), (full, 0.0), (jerk, slope)]
         total = sum(length for length, _ in segments)
+        edges = [sum(length for length, _ in segments[:count]) for count in range(8)]
         for part in range(33):
             time = total * part / 32
             s = speed = 0.0
@@ -275,9 +276,32 @@ def profiles():
                 if left <= 0:
                     break
             way = math.copysign(1.0, end - start)
-            rows.append((start, end, v, a, j, time, total, start + way * s, way * speed))
+            # A trapezoid's acceleration jumps between its parts: there it is not compared.
+            jumps = not jerk and min(abs(time - edge) for edge in edges) < 1e-5 * total
+            rows.append((start, end, v, a, j, time, total, start + way * s, way * speed,
+                         "jumps" if jumps else way * acceleration))
     write("profile.csv",
-          ("start", "end", "velocity", "acceleration", "jerk", "time_s", "duration_s", "position", "speed"), rows)
+          ("start", "end", "velocity", "acceleration", "jerk", "time_s", "duration_s", "position", "speed", "rate"), rows)
+
+
+# Gain over the ultimate gain, integral and derivative time over the ultimate period, as the papers print them.
+RULES = {
+    "ZieglerNicholsP": (0.5, None, 0.0),
+    "ZieglerNicholsPi": (0.45, 1 / 1.2, 0.0),
+    "ZieglerNicholsPid": (0.6, 1 / 2, 1 / 8),
+    "TyreusLuybenPi": (1 / 3.2, 2.2, 0.0),
+    "TyreusLuybenPid": (1 / 2.2, 2.2, 1 / 6.3),
+}
+
+
+def tuning():
+    rows = []
+    for name, (gain, integral, derivative) in RULES.items():
+        for ultimate, period in ((0.75, 0.0625), (12.0, 2.5)):
+            kp = gain * ultimate
+            ki = kp / (integral * period) if integral else 0.0
+            rows.append((name, ultimate, period, kp, ki, kp * derivative * period))
+    write("tuning.csv", ("rule", "ultimate_gain", "ultimate_period_s", "kp", "ki", "kd"), rows)
 
 
 if __name__ == "__main__":
@@ -285,3 +309,4 @@ if __name__ == "__main__":
     differentiators()
     filters()
     profiles()
+    tuning()

@@ -1,0 +1,184 @@
+//! What the examples `omni` and `swerve` share: a course to drive, what came of it, and its picture.
+
+use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
+use drivetrain::sim;
+use drivetrain::units::Angle;
+use plotters::prelude::*;
+use std::error::Error;
+use std::f32::consts::TAU;
+use std::path::Path;
+
+/// A square of 1.5 m, with a turn of the body all the while; ends where it began.
+const SIDE_M: f32 = 1.5;
+const SIDE_S: f32 = 2.0;
+const TURNS: f32 = 2.0;
+/// How fast an error of the position is driven off, 1/s.
+const FOLLOW: f32 = 4.0;
+
+/// How far the robot may be off. Its loops lag by some 20 ms, at up to 1.5 m/s and a turn of 3 rad/s.
+const BOUND_M: f32 = 0.03;
+
+/// How many steps of 100 us the whole takes: a little to arm, the square, and rest.
+pub(crate) const STEPS: u32 = 90_000;
+
+/// One millisecond.
+pub(crate) struct Sample<const WHEELS: usize> {
+    pub(crate) time_s: f32,
+    /// Where the robot was to be, truly is, and believes to be.
+    pub(crate) planned_m: Vec2,
+    pub(crate) driven_m: Vec2,
+    pub(crate) believed_m: Vec2,
+    pub(crate) target_rpm: [f32; WHEELS],
+    pub(crate) measured_rpm: [f32; WHEELS],
+}
+
+/// Where the robot is to be, and how it is to move, `time_s` after the start.
+pub(crate) fn plan(time_s: f32) -> (Vec2, Twist<World>) {
+    const CORNERS: [Vec2; 5] = [
+        Vec2::new(0.0, 0.0),
+        Vec2::new(SIDE_M, 0.0),
+        Vec2::new(SIDE_M, SIDE_M),
+        Vec2::new(0.0, SIDE_M),
+        Vec2::new(0.0, 0.0),
+    ];
+    let within = |side: f32| (time_s / SIDE_S - side).clamp(0.0, 1.0);
+    let turning = (time_s / (4.0 * SIDE_S)).clamp(0.0, 1.0);
+    let yaw_rad_s = TURNS * TAU / (4.0 * SIDE_S) * speed(turning);
+    let mut position = Vec2::ZERO;
+    let mut velocity = Vec2::ZERO;
+    for (pair, side) in CORNERS.windows(2).zip([0.0, 1.0, 2.0, 3.0]) {
+        if let [from, to] = pair {
+            let way = *to - *from;
+            position = position + way * progress(within(side));
+            velocity = velocity + way * (speed(within(side)) / SIDE_S);
+        }
+    }
+    (position, Twist::new(velocity.x, velocity.y, yaw_rad_s))
+}
+
+/// From 0 to 1 without a jump in speed or acceleration, and the speed of it.
+fn progress(t: f32) -> f32 {
+    t - (TAU * t).sin() / TAU
+}
+
+fn speed(t: f32) -> f32 {
+    1.0 - (TAU * t).cos()
+}
+
+/// The planned motion, and what drives off the error of the believed position.
+pub(crate) fn command(time_s: f32, believed: Pose2<World>) -> Twist<World> {
+    let (position, motion) = plan(time_s);
+    let error = (position - place(believed)) * FOLLOW;
+    motion + Twist::new(error.x, error.y, 0.0)
+}
+
+pub(crate) fn place(pose: Pose2<World>) -> Vec2 {
+    Vec2::new(pose.x_m, pose.y_m)
+}
+
+/// Where the robot truly is, and which way it faces; stands for the IMU.
+#[expect(clippy::cast_possible_truncation, reason = "some radians and metres")]
+pub(crate) fn truth(world: &sim::World) -> Result<(Vec2, Heading), Box<dyn Error>> {
+    let state = world.chassis().ok_or("no chassis")?;
+    let heading = Heading::new(Angle::from_radians(state.heading_rad as f32));
+    Ok((Vec2::new(state.x_m as f32, state.y_m as f32), heading))
+}
+
+/// Prints how far the robot was off.
+///
+/// # Errors
+/// When that is more than it may be.
+pub(crate) fn judge<const WHEELS: usize>(samples: &[Sample<WHEELS>]) -> Result<(), Box<dyn Error>> {
+    let last = samples.last().ok_or("no samples")?;
+    let off = |sample: &Sample<WHEELS>| (sample.driven_m - sample.planned_m).norm();
+    let most = samples.iter().map(off).fold(0.0, f32::max);
+    let odometry = (last.believed_m - last.driven_m).norm();
+    let wheels = samples
+        .iter()
+        .flat_map(|sample| sample.measured_rpm)
+        .fold(0.0_f32, |fastest, rpm| fastest.max(rpm.abs()));
+    println!("tracking     {:.1} mm off at most, {:.1} mm at the end", most * 1e3, off(last) * 1e3);
+    println!("odometry     {:.1} mm off at the end", odometry * 1e3);
+    println!("wheels       {wheels:.0} rpm at most");
+    if most <= BOUND_M {
+        Ok(())
+    } else {
+        Err(format!("{most:.3} m off the plan, {BOUND_M} m are allowed").into())
+    }
+}
+
+const COLORS: [RGBColor; 4] =
+    [RGBColor(200, 60, 40), RGBColor(30, 80, 180), RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
+
+/// Draws target (pale) and speed of every wheel, and the path.
+pub(crate) fn plot<const WHEELS: usize>(
+    path: &Path,
+    names: [&str; WHEELS],
+    samples: &[Sample<WHEELS>],
+) -> Result<(), Box<dyn Error>> {
+    // Created first: a path that cannot be written is an error of the file, not of the drawing.
+    std::fs::File::create(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let root = SVGBackend::new(path, (1200, 560)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (speeds, map) = root.split_horizontally(680);
+    let end = samples.last().map_or(1.0, |sample| sample.time_s);
+    let reach = samples
+        .iter()
+        .flat_map(|sample| sample.target_rpm.into_iter().chain(sample.measured_rpm))
+        .fold(10.0_f32, |reach, rpm| reach.max(1.1 * rpm.abs()));
+    let mut chart = ChartBuilder::on(&speeds)
+        .caption("wheels, rpm (pale: target)", ("sans-serif", 16))
+        .margin(8)
+        .x_label_area_size(24)
+        .y_label_area_size(46)
+        .build_cartesian_2d(0.0..end, -reach..reach)?;
+    chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
+    for ((wheel, name), color) in names.into_iter().enumerate().zip(COLORS) {
+        let line = |rpm: fn(&Sample<WHEELS>) -> &[f32; WHEELS]| {
+            samples
+                .iter()
+                .step_by(5)
+                .filter_map(move |sample| Some((sample.time_s, *rpm(sample).get(wheel)?)))
+        };
+        chart.draw_series(LineSeries::new(line(|sample| &sample.target_rpm), color.mix(0.3)))?;
+        chart
+            .draw_series(LineSeries::new(line(|sample| &sample.measured_rpm), color))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .background_style(WHITE.mix(0.8))
+        .draw()?;
+    let mut chart = ChartBuilder::on(&map)
+        .caption("path, m (red: planned, blue: driven)", ("sans-serif", 16))
+        .margin(8)
+        .x_label_area_size(24)
+        .y_label_area_size(46)
+        .build_cartesian_2d(-0.2..SIDE_M + 0.2, -0.2..SIDE_M + 0.2)?;
+    chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
+    for (color, place) in COLORS
+        .into_iter()
+        .zip([(|sample| sample.planned_m) as fn(&Sample<WHEELS>) -> Vec2, |sample| sample.driven_m])
+    {
+        let points = samples.iter().step_by(5).map(place).map(|place| (place.x, place.y));
+        chart.draw_series(LineSeries::new(points, color))?;
+    }
+    root.present()?;
+    println!("plot         {}", path.display());
+    Ok(())
+}
+
+/// The only argument: where the picture goes.
+///
+/// # Errors
+/// Says how the example is called when there is anything else.
+pub(crate) fn output(example: &str) -> Result<std::path::PathBuf, Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
+    if path.starts_with('-') || arguments.next().is_some() {
+        return Err(format!("usage: {example} [FILE.svg]").into());
+    }
+    Ok(path.into())
+}

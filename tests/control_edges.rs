@@ -1,0 +1,493 @@
+//! What every type of `control` does at the edges of its inputs: one table of types, one test for each rule.
+
+#![cfg(test)]
+#![expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+
+use drivetrain::control::*;
+use std::fmt::Debug;
+
+const DT_S: f32 = 0.001;
+const NO_TIME: [f32; 7] =
+    [0.0, -0.0, -DT_S, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MIN_POSITIVE / 4.0];
+const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+const HUGE: [f32; 8] = [f32::MAX, f32::MIN, 1.0, f32::MAX, 0.0, f32::MIN, 1e30, -1e30];
+
+/// What a type does with a time step above its maximum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Long {
+    /// Integral and derivative stay: with the same inputs the output stays.
+    Freezes,
+    /// The same behind a filter or a differentiator, for which it counts as their maximum.
+    FreezesBehindFilter,
+    /// It counts as this many seconds.
+    CountsAs(f32),
+    /// It counts in full.
+    InFull,
+    /// It starts anew.
+    StartsAnew,
+    /// There is no time step.
+    NoTime,
+}
+
+trait Subject: Debug {
+    /// Steps with a setpoint, or an input, and one or two measurements; what a type has not is left out.
+    fn step(&mut self, inputs: [f32; 3], dt_s: f32) -> f32;
+    fn refused(&self) -> u16;
+    /// How many of the inputs it takes.
+    fn inputs(&self) -> usize;
+}
+
+macro_rules! subjects {
+    ($($kind:ty, $inputs:literal, $it:ident, $values:pat, $dt_s:pat => $step:expr, $refused:expr;)*) => {
+        $(impl Subject for $kind {
+            fn step(&mut self, $values: [f32; 3], $dt_s: f32) -> f32 {
+                let $it = self;
+                $step
+            }
+
+            fn refused(&self) -> u16 {
+                let $it = self;
+                $refused
+            }
+
+            fn inputs(&self) -> usize {
+                $inputs
+            }
+        })*
+    };
+}
+
+/// A [`PositionActuator`] that is given errors.
+#[derive(Debug)]
+struct ByError(PositionActuator);
+
+subjects! {
+    Pid, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
+    IncrementalPid, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
+    Cascade, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.position().rejected().max(it.speed().rejected());
+    SpeedActuator, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
+    PositionActuator, 3, it, [a, b, c], dt_s => it.update(a, b, c, dt_s), it.rejected();
+    ByError, 2, it, [a, b, _], dt_s => it.0.update_error(a, b, dt_s), it.0.rejected();
+    LinearDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    OptimalDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    LowPass, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    SlewLimiter, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    Biquad, 1, it, [a, ..], _ => it.update(a), it.rejected();
+    MovingAverage<5>, 1, it, [a, ..], _ => it.update(a), it.rejected();
+    Median<5>, 1, it, [a, ..], _ => it.update(a), it.rejected();
+    RelayTuner, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
+    StepResponse, 1, it, [a, ..], dt_s => {
+        it.record(a, dt_s);
+        it.measures().overshoot
+    }, it.rejected();
+}
+
+const GAINS: PidConfig =
+    PidConfig::new(2.0, 10.0, 0.01).with_output_limit(50.0).with_integral_limit(20.0);
+
+const fn every_option() -> PidConfig {
+    GAINS
+        .with_output_range(-40.0, 50.0)
+        .with_integral_separation(100.0)
+        .with_variable_integral(20.0, 80.0)
+        .with_dead_band(0.001)
+        .with_feed_forward(0.5, 0.01)
+        .with_slew_limit(4e5)
+        .with_period(360.0)
+        .with_derivative_filter(100.0)
+        .with_back_calculation(0.05)
+}
+
+fn position(angle: PidConfig, speed: PidConfig) -> PositionActuator {
+    let speed = SpeedActuatorConfig::new(speed).with_output_filter(300.0);
+    let config = PositionActuatorConfig::new(angle, speed).with_outer_divider(3);
+    PositionActuator::new(config.with_angle_filter(200.0)).unwrap()
+}
+
+fn bare(angle: PidConfig, speed: PidConfig) -> PositionActuator {
+    PositionActuator::new(PositionActuatorConfig::new(angle, SpeedActuatorConfig::new(speed)))
+        .unwrap()
+}
+
+type Row = (Long, Box<dyn Subject>);
+
+/// Every type with the loop gains given, twice where its options change what it does.
+fn table(gains: PidConfig) -> Vec<Row> {
+    let (kp, ki, kd) = gains.gains();
+    let incremental = IncrementalPidConfig::new(kp, ki, kd).with_output_limit(50.0);
+    let tracking = incremental.with_max_step(0.01).with_tracking(80.0);
+    let filtered = SpeedActuatorConfig::new(gains).with_feedback_filter(100.0);
+    let options = every_option().with_gains(kp, ki, kd);
+    use Long::{CountsAs, Freezes, FreezesBehindFilter, InFull, NoTime, StartsAnew};
+    vec![
+        (Freezes, Box::new(Pid::new(gains).unwrap())),
+        (Freezes, Box::new(Pid::new(gains.with_derivative_on_error()).unwrap())),
+        (Freezes, Box::new(Pid::new(options).unwrap())),
+        (Freezes, Box::new(IncrementalPid::new(incremental).unwrap())),
+        (CountsAs(0.01), Box::new(LinearDifferentiator::new(100.0, 0.01).unwrap())),
+        (CountsAs(0.01), Box::new(OptimalDifferentiator::new(1e4, 0.0125, 0.01).unwrap())),
+        (CountsAs(0.1), Box::new(SlewLimiter::new(30.0, 60.0).unwrap())),
+        (Freezes, Box::new(Cascade::new(gains, gains).unwrap())),
+        (Freezes, Box::new(SpeedActuator::new(SpeedActuatorConfig::new(gains)).unwrap())),
+        (Freezes, Box::new(bare(gains, gains))),
+        (Freezes, Box::new(ByError(bare(gains, gains)))),
+        (FreezesBehindFilter, Box::new(SpeedActuator::new(filtered).unwrap())),
+        (FreezesBehindFilter, Box::new(position(gains, gains))),
+        (FreezesBehindFilter, Box::new(IncrementalPid::new(tracking).unwrap())),
+        (InFull, Box::new(LowPass::new(10.0).unwrap())),
+        (InFull, Box::new(StepResponse::new(0.0, 1.0, 100.0, 0.02).unwrap())),
+        (StartsAnew, Box::new(RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).unwrap())),
+        (NoTime, Box::new(Biquad::low_pass(30.0, Biquad::BUTTERWORTH, 1000.0).unwrap())),
+        (NoTime, Box::new(Biquad::notch(60.0, 2.0, 1000.0).unwrap())),
+        (NoTime, Box::new(MovingAverage::<5>::new())),
+        (NoTime, Box::new(Median::<5>::new())),
+    ]
+}
+
+/// Inputs that keep everything moving and nothing at a limit.
+fn moving(sample: u8) -> [f32; 3] {
+    let time = f32::from(sample);
+    [1.0 + 0.5 * (0.7 * time).sin(), 0.02 * time, 0.3 * (0.4 * time).cos()]
+}
+
+/// Runs two of each type; `disturb` one of them before every sample, and it must leave no trace.
+fn leaves_no_trace(disturb: impl Fn(&mut dyn Subject, Long, [f32; 3]) -> u16) {
+    for ((long, mut clean), (_, mut hit)) in table(GAINS).into_iter().zip(table(GAINS)) {
+        let mut refused = 0;
+        for sample in 0..20 {
+            refused += disturb(&mut *hit, long, moving(sample));
+            let expected = clean.step(moving(sample), DT_S);
+            assert_eq!(hit.step(moving(sample), DT_S), expected, "{clean:?}");
+        }
+        assert_eq!(hit.refused(), refused, "{hit:?}");
+        assert_eq!(clean.refused(), 0, "{clean:?}");
+    }
+}
+
+#[test]
+fn a_time_step_that_is_no_time_holds_the_output_and_is_counted() {
+    leaves_no_trace(|subject, long, [a, b, c]| {
+        if long == Long::NoTime {
+            return 0;
+        }
+        let mut held = None;
+        for dt_s in NO_TIME {
+            let output = subject.step([a + 1.0, b + 1.0, c + 1.0], dt_s);
+            assert_eq!(*held.get_or_insert(output), output, "{subject:?}");
+        }
+        7
+    });
+}
+
+#[test]
+fn an_input_that_is_not_finite_holds_the_output_and_is_counted() {
+    leaves_no_trace(|subject, _, inputs| {
+        let mut refused = 0;
+        for input in 0..subject.inputs() {
+            for bad in NOT_FINITE {
+                let mut inputs = inputs;
+                inputs[input] = bad;
+                // A cascade whose position loop holds runs its speed loop on: a law of its own, below.
+                if input == 0 && format!("{subject:?}").starts_with("Cascade") {
+                    continue;
+                }
+                assert!(subject.step(inputs, DT_S).is_finite(), "{subject:?}");
+                refused += 1;
+            }
+        }
+        refused
+    });
+}
+
+#[test]
+fn the_output_that_is_held_is_the_last_one() {
+    for (long, mut subject) in table(GAINS) {
+        let mut last = 0.0; // before the first good sample
+        for sample in 0..10 {
+            let mut bad = moving(sample);
+            bad[subject.inputs() - 1] = f32::NAN;
+            assert_eq!(subject.step(bad, DT_S), last, "{subject:?}");
+            if long != Long::NoTime {
+                assert_eq!(subject.step(moving(sample), 0.0), last, "{subject:?}");
+            }
+            last = subject.step(moving(sample), DT_S);
+        }
+    }
+}
+
+#[test]
+fn a_cascade_with_a_bad_error_holds_the_speed_that_is_wanted() {
+    let mut cascade = Cascade::new(GAINS, GAINS).unwrap();
+    let step = TimeStep::of(DT_S);
+    cascade.step(1.0, 0.0, &step);
+    let (wanted, mut speed) = (cascade.position().output(), *cascade.speed());
+    for bad in NOT_FINITE {
+        assert_eq!(cascade.step(bad, 0.5, &step), speed.step(wanted, 0.5, &step));
+    }
+    assert_eq!((cascade.position().rejected(), cascade.speed().rejected()), (3, 0));
+}
+
+#[test]
+fn the_first_call_may_come_after_any_time() {
+    for ((long, mut early), (_, mut late)) in table(GAINS).into_iter().zip(table(GAINS)) {
+        let inputs = [3.0, 1.0, 0.0];
+        let dt_s = if let Long::CountsAs(most) = long { most } else { DT_S };
+        // By error, the rate of the first call is known: D rests in a long step, so let it be zero.
+        let inputs = if early.inputs() == 2 && format!("{early:?}").contains("Cascade") {
+            [3.0, 0.0, 0.0]
+        } else {
+            inputs
+        };
+        let expected = early.step(inputs, dt_s);
+        assert_eq!(late.step(inputs, 1000.0), expected, "{early:?}");
+    }
+}
+
+#[test]
+fn a_time_step_above_the_maximum_does_what_the_documentation_says() {
+    for ((long, mut subject), (_, mut steady)) in table(GAINS).into_iter().zip(table(GAINS)) {
+        let inputs = [3.0, 1.0, 0.5];
+        let (mut before, mut slow) = (0.0, 0.0);
+        for _ in 0..5 {
+            before = subject.step(inputs, DT_S);
+            slow = steady.step(inputs, DT_S);
+        }
+        assert_eq!(before, slow, "{subject:?}");
+        let after = subject.step(inputs, 1000.0);
+        match long {
+            Long::Freezes => assert_eq!(after, before, "{subject:?}"),
+            // P follows what is in front, at most all of the error of 2; an integral of 1000 s would be at its limit of 20.
+            Long::FreezesBehindFilter => assert!((after - before).abs() < 4.0, "{subject:?}"),
+            Long::CountsAs(most) => assert_eq!(after, steady.step(inputs, most), "{subject:?}"),
+            Long::InFull => assert!(after == before || (after - inputs[0]).abs() < 1e-3),
+            Long::StartsAnew => assert_eq!(after, 3.0), // the setpoint is above
+            Long::NoTime => {}
+        }
+        assert_eq!(subject.refused(), 0, "{subject:?}");
+    }
+}
+
+#[test]
+fn huge_gains_and_huge_inputs_end_at_a_limit_and_never_in_nan() {
+    let huge = PidConfig::new(1e30, 1e30, 1e30).with_output_limit(50.0);
+    for dt_s in [1e-6, DT_S, 0.1, 1e3] {
+        for (_, mut subject) in table(huge) {
+            for round in 0..24 {
+                let at = |shift: usize| HUGE[(round * (shift + 1) + shift) % HUGE.len()];
+                let output = subject.step([at(0), at(1), at(2)], dt_s);
+                assert!(output.is_finite(), "{subject:?}");
+            }
+            for _ in 0..2_000 {
+                subject.step([0.0; 3], DT_S);
+            }
+            assert!(subject.step([0.0; 3], DT_S).is_finite(), "{subject:?}");
+        }
+    }
+}
+
+#[test]
+fn controllers_stay_within_their_output_limit_with_huge_gains() {
+    let huge = PidConfig::new(1e30, 1e30, 1e30).with_output_limit(50.0);
+    for (_, mut subject) in table(huge) {
+        let kind = format!("{subject:?}");
+        if !["Pid", "IncrementalPid", "Cascade", "SpeedA", "PositionA", "ByError"]
+            .iter()
+            .any(|name| kind.starts_with(name))
+        {
+            continue;
+        }
+        for sample in 0..40 {
+            let output = subject.step(moving(sample), DT_S);
+            assert!((-50.0..=50.0).contains(&output), "{kind}: {output}");
+        }
+    }
+}
+
+#[test]
+fn without_ki_nothing_is_wound_up() {
+    let proportional = PidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0);
+    let actuator = SpeedActuatorConfig::new(proportional);
+    let loops: [Box<dyn Subject>; 6] = [
+        Box::new(Pid::new(proportional).unwrap()),
+        Box::new(Pid::new(every_option().with_gains(2.0, 0.0, 0.0)).unwrap()),
+        Box::new(Cascade::new(proportional, proportional).unwrap()),
+        Box::new(SpeedActuator::new(actuator).unwrap()),
+        Box::new(bare(proportional, proportional)),
+        Box::new(ByError(bare(proportional, proportional))),
+    ];
+    for mut subject in loops {
+        for _ in 0..1000 {
+            subject.step([100.0, 0.0, 0.0], DT_S);
+        }
+        subject.step([0.0; 3], DT_S);
+        assert_eq!(subject.step([0.0; 3], DT_S), 0.0, "{subject:?}");
+    }
+    // Without `ki`, what the limit cut off the incremental form stays off: 200 was cut to 50, and -200 comes on top.
+    let config = IncrementalPidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0);
+    let mut incremental = IncrementalPid::new(config).unwrap();
+    assert_eq!(incremental.update(100.0, 0.0, DT_S), 50.0);
+    assert_eq!(incremental.update(90.0, 0.0, DT_S), 30.0);
+    assert_eq!(incremental.update(0.0, 0.0, DT_S), -50.0);
+}
+
+#[test]
+fn the_angle_loop_rests_when_one_of_its_steps_was_too_long() {
+    let integral = PidConfig::new(0.0, 1.0, 0.0);
+    let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+    let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(4);
+    let mut actuator = PositionActuator::new(config).unwrap();
+    for step in 0..=8 {
+        let dt_s = if step == 6 { 10.0 } else { 0.1 };
+        actuator.update(1.0, 0.0, 0.0, dt_s);
+    }
+    // Four steps of 0.1 s on the first turn; none on the second, though three of its four were good.
+    assert!((actuator.speed_setpoint() - 0.4).abs() < 1e-6, "{}", actuator.speed_setpoint());
+}
+
+#[test]
+fn the_integral_of_the_angle_loop_works_at_every_divider() {
+    for divider in [1, 5, 120, 255] {
+        let integral = PidConfig::new(0.0, 1.0, 0.0);
+        let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+        let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(divider);
+        let mut actuator = PositionActuator::new(config).unwrap();
+        for _ in 0..=10 * u32::from(divider) {
+            actuator.update(1.0, 0.0, 0.0, DT_S);
+        }
+        let expected = 10.0 * f32::from(divider) * DT_S;
+        assert!((actuator.speed_setpoint() - expected).abs() < 1e-4, "{divider}");
+    }
+}
+
+#[test]
+fn what_has_no_state_answers_bad_arguments_with_rest() {
+    let effort = FeedForward::new(0.3, 0.05, 0.01).unwrap();
+    let profile = Profile::plan(1.0, 2.0, &MotionLimits::new(1.0, 1.0)).unwrap();
+    for bad in NOT_FINITE {
+        assert_eq!((effort.effort(bad, 1.0), effort.effort(1.0, bad)), (0.0, 0.0));
+        assert_eq!(profile.at(bad).velocity, 0.0);
+        assert!(fhan(bad, 1.0, 2.0, 0.01).abs() <= 2.0 && fhan(1.0, bad, 2.0, 0.01).abs() <= 2.0);
+    }
+    assert_eq!((profile.at(f32::NAN).position, profile.at(f32::INFINITY).position), (1.0, 2.0));
+    assert_eq!((fhan(f32::NAN, 0.0, 2.0, 0.01), fhan(1.0, 0.0, 2.0, f32::NAN)), (0.0, 0.0));
+}
+
+type Make = fn(f32) -> Option<ConfigError>;
+type Parameters = &'static [(&'static str, Make)];
+
+/// Every parameter of every constructor; what is made of a bad value must be an error of this name.
+const MORE_THAN_ZERO: Parameters = &[
+    ("output_limit", |x| Pid::new(GAINS.with_output_limit(x)).err()),
+    ("integral_limit", |x| Pid::new(GAINS.with_integral_limit(x)).err()),
+    ("integral_separation", |x| Pid::new(GAINS.with_integral_separation(x)).err()),
+    ("back_calculation", |x| Pid::new(GAINS.with_back_calculation(x)).err()),
+    ("slew_limit", |x| Pid::new(GAINS.with_slew_limit(x)).err()),
+    ("period", |x| Pid::new(GAINS.with_period(x)).err()),
+    ("derivative_filter", |x| Pid::new(GAINS.with_derivative_filter(x)).err()),
+    ("output_limit", |x| incremental(|config| config.with_output_limit(x))),
+    ("max_step", |x| incremental(|config| config.with_max_step(x))),
+    ("r", |x| incremental(|config| config.with_tracking(x))),
+    ("r", |x| LinearDifferentiator::new(x, DT_S).err()),
+    ("max_step", |x| LinearDifferentiator::new(1.0, x).err()),
+    ("r", |x| OptimalDifferentiator::new(x, 0.002, DT_S).err()),
+    ("h0", |x| OptimalDifferentiator::new(1.0, x, DT_S).err()),
+    ("max_step", |x| OptimalDifferentiator::new(1.0, 0.002, x).err()),
+    ("cutoff", |x| LowPass::new(x).err()),
+    ("cutoff", |x| Biquad::low_pass(x, 1.0, 1000.0).err()),
+    ("q", |x| Biquad::low_pass(10.0, x, 1000.0).err()),
+    ("sample_hz", |x| Biquad::low_pass(10.0, 1.0, x).err()),
+    ("center", |x| Biquad::notch(x, 1.0, 1000.0).err()),
+    ("q", |x| Biquad::notch(10.0, x, 1000.0).err()),
+    ("sample_hz", |x| Biquad::notch(10.0, 1.0, x).err()),
+    ("up", |x| SlewLimiter::new(x, 1.0).err()),
+    ("down", |x| SlewLimiter::new(1.0, x).err()),
+    ("max_step", |x| SlewLimiter::new(1.0, 1.0).ok()?.with_max_step(x).err()),
+    ("velocity", |x| Profile::plan(0.0, 1.0, &MotionLimits::new(x, 1.0)).err()),
+    ("acceleration", |x| Profile::plan(0.0, 1.0, &MotionLimits::new(1.0, x)).err()),
+    ("jerk", |x| Profile::plan(0.0, 1.0, &MotionLimits::new(1.0, 1.0).with_jerk(x)).err()),
+    ("feedback_filter", |x| speed(|config| config.with_feedback_filter(x))),
+    ("output_filter", |x| speed(|config| config.with_output_filter(x))),
+    ("angle_filter", |x| angle(|config| config.with_angle_filter(x))),
+    ("amplitude", |x| RelayTuner::new(RelayTunerConfig::new(x, 0.1)).err()),
+    ("time_limit", |x| RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_time_limit(x)).err()),
+    ("duration", |x| StepResponse::new(0.0, 1.0, x, 0.02).err()),
+    ("tolerance", |x| StepResponse::new(0.0, 1.0, 1.0, x).err()),
+];
+
+/// The same for those that may be zero.
+const ZERO_OR_MORE: Parameters = &[
+    ("kp", |x| Pid::new(PidConfig::new(x, 0.0, 0.0)).err()),
+    ("ki", |x| Pid::new(PidConfig::new(0.0, x, 0.0)).err()),
+    ("kd", |x| Pid::new(PidConfig::new(0.0, 0.0, x)).err()),
+    ("kp", |x| Pid::new(GAINS).ok()?.set_gains(x, 0.0, 0.0).err()),
+    ("ki", |x| IncrementalPid::new(IncrementalPidConfig::new(0.0, x, 0.0)).err()),
+    ("kd", |x| Cascade::new(GAINS.with_gains(0.0, 0.0, x), GAINS).err()),
+    ("kd", |x| Cascade::new(GAINS, GAINS.with_gains(0.0, 0.0, x)).err()),
+    ("variable_integral", |x| Pid::new(GAINS.with_variable_integral(x, 10.0)).err()),
+    ("dead_band", |x| Pid::new(GAINS.with_dead_band(x)).err()),
+    ("static_gain", |x| Pid::new(GAINS.with_feed_forward(x, 0.0)).err()),
+    ("velocity_gain", |x| Pid::new(GAINS.with_feed_forward(0.0, x)).err()),
+    ("ks", |x| FeedForward::new(x, 0.0, 0.0).err()),
+    ("kv", |x| FeedForward::new(0.0, x, 0.0).err()),
+    ("ka", |x| FeedForward::new(0.0, 0.0, x).err()),
+    ("hysteresis", |x| RelayTuner::new(RelayTunerConfig::new(1.0, x)).err()),
+];
+
+/// What no pair of values, or no value of its kind, can mean.
+const CONTRADICTIONS: Parameters = &[
+    ("output_range", |_| Pid::new(GAINS.with_output_range(5.0, 4.0)).err()),
+    ("output_range", |_| Pid::new(GAINS.with_output_range(5.0, 5.0)).err()),
+    ("output_range", |_| incremental(|config| config.with_output_range(1.0, -2.0))),
+    ("variable_integral", |_| Pid::new(GAINS.with_variable_integral(3.0, 2.0)).err()),
+    ("r", |_| LinearDifferentiator::new(1001.0, DT_S).err()),
+    ("h0", |_| OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).err()),
+    ("cutoff", |_| Biquad::low_pass(500.0, 1.0, 1000.0).err()),
+    ("center", |_| Biquad::notch(500.0, 1.0, 1000.0).err()),
+    ("outer_divider", |_| angle(|config| config.with_outer_divider(0))),
+    ("angle_filter", |_| {
+        let circle =
+            PositionActuatorConfig::new(GAINS.with_period(360.0), SpeedActuatorConfig::new(GAINS));
+        PositionActuator::new(circle.with_angle_filter(10.0)).err()
+    }),
+    ("cycles", |_| RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_cycles(0)).err()),
+    ("bias", |_| RelayTuner::new(RelayTunerConfig::new(f32::MAX, 0.1).with_bias(f32::MAX)).err()),
+    ("target", |_| StepResponse::new(1.0, 1.0, 1.0, 0.02).err()),
+    ("start", |_| Profile::plan(f32::NAN, 1.0, &MotionLimits::new(1.0, 1.0)).err()),
+    ("distance", |_| Profile::plan(f32::MIN, f32::MAX, &MotionLimits::new(1.0, 1.0)).err()),
+];
+
+fn incremental(with: impl Fn(IncrementalPidConfig) -> IncrementalPidConfig) -> Option<ConfigError> {
+    IncrementalPid::new(with(IncrementalPidConfig::new(1.0, 1.0, 1.0))).err()
+}
+
+fn speed(with: impl Fn(SpeedActuatorConfig) -> SpeedActuatorConfig) -> Option<ConfigError> {
+    SpeedActuator::new(with(SpeedActuatorConfig::new(GAINS))).err()
+}
+
+fn angle(with: impl Fn(PositionActuatorConfig) -> PositionActuatorConfig) -> Option<ConfigError> {
+    let config = PositionActuatorConfig::new(GAINS, SpeedActuatorConfig::new(GAINS));
+    PositionActuator::new(with(config)).err()
+}
+
+#[test]
+fn a_parameter_that_cannot_work_is_named() {
+    let bad = [-1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let tables: [(Parameters, &[f32]); 4] = [
+        (MORE_THAN_ZERO, &bad),
+        (MORE_THAN_ZERO, &[0.0, -0.0]),
+        (ZERO_OR_MORE, &bad),
+        (CONTRADICTIONS, &[0.0]),
+    ];
+    for (table, values) in tables {
+        for (index, (name, make)) in table.iter().enumerate() {
+            for &value in values {
+                let error =
+                    make(value).unwrap_or_else(|| panic!("{index}: {name} {value} is taken"));
+                assert_eq!(error.parameter(), *name, "{index}: {value}");
+            }
+        }
+    }
+    for (index, (name, make)) in ZERO_OR_MORE.iter().enumerate() {
+        assert_eq!(make(0.0), None, "{index}: {name}");
+    }
+}
