@@ -274,7 +274,21 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
         }
         assert_eq!((hear(&mut bus, 0, 20), edges(&mut bus)), (100, vec![(expected, false)]));
     }
-    // An error that comes and goes at 1 kHz, unread for a second, is one edge; a change from code to code is one, too.
+    // From one fault to another: an edge of its own, and no end between.
+    let (mut bus, _) = armed([Config::new(1)]);
+    let mut hear = |code: u8, from: u64| {
+        for ms in from..from + 20 {
+            let mut data = *feedback(0x201, 0, 0).bytes();
+            data[7] = code;
+            _ = bus.ingest(&CanFrame::standard(0x201, data).unwrap(), at_ms(ms));
+            step(&mut bus, ms);
+        }
+        edges(&mut bus)
+    };
+    assert_eq!(hear(3, 2), [(fault, true)]);
+    assert_eq!(hear(4, 22), [(fault, true)]);
+    assert_eq!(hear(8, 42), [(warning, true), (fault, false)]);
+    // An error that comes and goes all the time, unread for a second, is one edge.
     let (mut bus, [wheel]) = armed([Config::new(1)]);
     for ms in 2..1_002 {
         let mut data = *feedback(0x201, 0, 0).bytes();
