@@ -15,6 +15,8 @@ mod case;
 mod catalogue;
 #[path = "../../tests/faults/commands.rs"]
 mod commands;
+#[path = "../../tests/faults/health.rs"]
+mod health;
 #[path = "../../tests/faults/plausibility.rs"]
 mod plausibility;
 #[path = "../../tests/faults/receive.rs"]

@@ -98,9 +98,11 @@ impl<B> Bus<B> {
 
     /// Detaches a motor. Its command slot is sent as zero once more, then the frame stops when nobody else uses it.
     pub fn detach(&mut self, motor: impl Into<AnyHandle<B>>) {
-        let Some(slot) = self.slot_mut(motor.into()) else { return };
+        let motor = motor.into();
+        let Some(slot) = self.slot_mut(motor) else { return };
         let place = slot.place;
         slot.free();
+        self.journal.forget(motor.key().place());
         self.outbox.put(place, 0);
         let shared = self
             .slots

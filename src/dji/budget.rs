@@ -7,7 +7,7 @@ use crate::motor::BusLoad;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     bit_rate: u32,
-    feedback_hz: u32,
+    pub(super) feedback_hz: u32,
     tick_hz: u32,
     pub(super) ceiling_percent: Option<u16>,
 }

@@ -1,5 +1,6 @@
 //! Command frames: values to wire words, and the box they wait in.
 
+use super::range::Range;
 use crate::frame::CanFrame;
 
 /// One of the five command frames: four motors each.
@@ -44,7 +45,7 @@ impl CommandFrame {
         1 << self as u8
     }
 
-    fn with_id(id: u32) -> Option<Self> {
+    pub(super) fn with_id(id: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|frame| u32::from(frame.id()) == id)
     }
 }
@@ -64,20 +65,20 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     #[expect(clippy::cast_possible_truncation, reason = "saturates, NaN gives 0")]
     let halves = (scaled + scaled) as i32;
     // Half of it, ties away from zero: the shift rounds down, which is away for what is negative.
-    saturate((halves >> 1) + (halves & !(halves >> 31) & 1), limit)
+    saturate((halves >> 1) + (halves & !(halves >> 31) & 1), Range::within(limit))
 }
 
 /// As [`to_raw`], for what a loop gives in every update: half a count goes to the even neighbour.
 #[inline]
-pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
+pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
     // From 2^23 to 2^24 floats are the whole numbers: this sum is rounded, and its last bits count from here.
     const WHOLE: f32 = 1.5 * 8_388_608.0;
     let sum = value * raw_per_unit + WHOLE;
     let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
-    if !is_within(raw, limit) {
-        return beyond(value, raw_per_unit, limit);
+    if !range.contains(raw) {
+        return beyond(value, raw_per_unit, range);
     }
-    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+    #[expect(clippy::cast_possible_truncation, reason = "within the range")]
     let raw = raw as i16;
     raw
 }
@@ -85,33 +86,26 @@ pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i1
 /// Out of the line of [`loop_to_raw`]: also for what is no number, or too large for its sum.
 #[cold]
 #[inline(never)]
-const fn beyond(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
-    to_raw(value, raw_per_unit, limit)
+const fn beyond(value: f32, raw_per_unit: f32, range: Range) -> i16 {
+    range.nearest(to_raw(value, raw_per_unit, i16::MAX) as i32)
 }
 
-/// Limits a raw command to ±`limit`, which is not negative.
+/// Limits a raw command.
 #[inline]
-pub(super) const fn saturate(raw: i32, limit: i16) -> i16 {
-    if !is_within(raw, limit) {
-        return at_the_limit(raw, limit);
+pub(super) const fn saturate(raw: i32, range: Range) -> i16 {
+    if !range.contains(raw) {
+        return at_the_limit(raw, range);
     }
-    #[expect(clippy::cast_possible_truncation, reason = "within ±limit")]
+    #[expect(clippy::cast_possible_truncation, reason = "within the range")]
     let raw = raw as i16;
     raw
-}
-
-#[inline]
-const fn is_within(raw: i32, limit: i16) -> bool {
-    // One comparison for both ends: below -limit is far above, unsigned.
-    let end = limit as i32;
-    raw.wrapping_add(end).cast_unsigned() <= 2 * end.cast_unsigned()
 }
 
 /// Out of the line of [`saturate`].
 #[cold]
 #[inline(never)]
-const fn at_the_limit(raw: i32, limit: i16) -> i16 {
-    if raw < 0 { -limit } else { limit }
+const fn at_the_limit(raw: i32, range: Range) -> i16 {
+    range.nearest(raw)
 }
 
 /// Counts the frames in a set; a Cortex-M has no instruction for it.
@@ -236,10 +230,16 @@ impl Outbox {
         }
     }
 
+    /// Returns the word that a motor was given last.
     #[inline]
     pub(super) fn get(&self, place: Place) -> i16 {
         let word = self.words.0.as_flattened().get(usize::from(place.0 & 31));
         word.map_or(0, |word| i16::from_le_bytes(*word))
+    }
+
+    /// Tells whether a frame is sent.
+    pub(super) const fn is_in_use(&self, frame: CommandFrame) -> bool {
+        self.in_use & frame.bit() != 0
     }
 
     /// Sets every word to zero, and has every frame in use sent.
@@ -409,10 +409,11 @@ mod tests {
         #[test]
         fn loop_to_raw_is_to_raw_but_for_ties(value in any::<f32>(), near in -40_000.0_f32..40_000.0, limit in 0_i16..=i16::MAX, scale in -2000.0_f32..2000.0) {
             for value in [value, near / scale, near.round() / scale, (near.round() + 0.5) / scale] {
-                let (raw, other) = (loop_to_raw(value, scale, limit), to_raw(value, scale, limit));
+                let range = Range::within(limit);
+                let (raw, other) = (loop_to_raw(value, scale, range), to_raw(value, scale, limit));
                 let is_tie = (value * scale).fract().abs().to_bits() == 0.5_f32.to_bits();
                 prop_assert!(raw == other || is_tie && raw % 2 == 0 && raw.abs_diff(other) == 1, "{} {} {}", value, raw, other);
-                prop_assert_eq!(loop_to_raw(-value, scale, limit), -raw);
+                prop_assert_eq!(loop_to_raw(-value, scale, range), -raw);
             }
         }
 

@@ -1,7 +1,7 @@
 use super::{CurrentControlled, Facts, Gm6020Voltage, Model, VoltageControlled};
 use crate::control::PidConfig;
 use crate::encoder::GearRatio;
-use crate::motor::Recovery;
+use crate::motor::{HealthConfig, Recovery};
 use crate::units::{Current, Voltage};
 use core::marker::PhantomData;
 
@@ -41,7 +41,11 @@ pub(super) struct PlainConfig {
     pub(super) speed: Option<PidConfig>,
     pub(super) position: Option<PidConfig>,
     pub(super) recovery: Recovery,
+    pub(super) health: &'static HealthConfig,
 }
+
+/// What is looked for unless it is set.
+pub(super) static USUAL: HealthConfig = HealthConfig::new();
 
 impl<M: Model> Config<M> {
     /// Takes the id that is set on the ESC: 1..=8 for C610 and C620, 1..=7 for GM6020.
@@ -62,6 +66,7 @@ impl<M: Model> Config<M> {
                 speed: None,
                 position: None,
                 recovery: Recovery::Rearm,
+                health: &USUAL,
             },
             model: PhantomData,
         }
@@ -114,6 +119,25 @@ impl<M: Model> Config<M> {
     #[must_use]
     pub const fn with_recovery(mut self, recovery: Recovery) -> Self {
         self.plain.recovery = recovery;
+        self
+    }
+
+    /// Sets what is looked for in the motor and what follows. What makes no sense is refused by `attach`.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Config, M2006};
+    /// use drivetrain::motor::{Condition, HealthConfig, Reaction};
+    ///
+    /// static FEEDER: HealthConfig = HealthConfig::new()
+    ///     .with_stall_hold(0.2)
+    ///     .with_reaction(Condition::Fault, Reaction::Report);
+    /// let feeder = Config::<M2006>::new(7).with_health(&FEEDER);
+    /// assert_eq!(feeder.id(), 7);
+    /// ```
+    #[must_use]
+    pub const fn with_health(mut self, health: &'static HealthConfig) -> Self {
+        self.plain.health = health;
         self
     }
 

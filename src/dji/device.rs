@@ -4,7 +4,7 @@ use super::bus::LONGEST_PAUSE;
 use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Claim, Ingest, Link, Missing, MotorName, Role};
+use crate::motor::{ArmError, CanDevice, Claim, Edge, Ingest, Link, Missing, MotorName, Role};
 use crate::time::{Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_can::StandardId;
@@ -51,12 +51,25 @@ impl<B> CanDevice for Bus<B> {
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.slots.iter().filter(|slot| slot.is_faulty()).filter_map(Slot::name)
+    }
+
+    fn second_master(&self) -> Option<Claim> {
+        self.rival_among(self.slots.iter())
+    }
+
+    fn next_edge(&mut self) -> Option<Edge> {
+        Self::next_edge(self)
+    }
+
     fn engage(&mut self, now: Instant) {
         if !self.stopped {
             self.now = now.stamp();
             self.disturb();
-            let timeouts = self.timeouts;
-            self.slots.iter_mut().for_each(|slot| slot.engage(now.stamp(), &timeouts));
+            for motor in 0..self.used {
+                self.engage_slot(motor, now);
+            }
         }
     }
 
@@ -90,7 +103,7 @@ impl<B> Bus<B> {
     /// Arms these motors only, whatever the others do.
     ///
     /// # Errors
-    /// As [`CanDevice::arm`], which arms all: names those of `motors` that are not heard.
+    /// As [`CanDevice::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
     ///
     /// # Examples
     /// ```
@@ -121,15 +134,28 @@ impl<B> Bus<B> {
         if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
             return Err(ArmError::Missing(missing));
         }
+        if let Some(claim) = self.rival_among(chosen()) {
+            return Err(ArmError::SecondMaster(claim));
+        }
+        let faulty = chosen().filter(|slot| slot.is_faulty());
+        if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
+            return Err(ArmError::Faulty(faulty));
+        }
         self.now = now.stamp();
         self.disturb();
-        let timeouts = self.timeouts;
         for motor in motors {
-            if let Some(slot) = self.slot_mut(*motor) {
-                slot.engage(now.stamp(), &timeouts);
+            if self.slot(*motor).is_some() {
+                self.engage_slot(motor.key().place(), now);
             }
         }
         Ok(())
+    }
+
+    fn engage_slot(&mut self, motor: u8, now: Instant) {
+        let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
+        let before = slot.conditions;
+        slot.engage(now.stamp(), &self.timeouts);
+        self.journal.note(motor, &before, &slot.conditions, now);
     }
 
     /// Returns the measured velocity of a motor that is online.
@@ -139,6 +165,6 @@ impl<B> Bus<B> {
     }
 }
 
-fn claim(id: u16, role: Role, motor: MotorName) -> Option<Claim> {
+pub(super) fn claim(id: u16, role: Role, motor: MotorName) -> Option<Claim> {
     Some(Claim::new(StandardId::new(id)?, role, motor))
 }

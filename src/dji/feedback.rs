@@ -1,4 +1,5 @@
 use crate::frame::CanFrame;
+use crate::motor::Severity;
 
 /// A feedback frame in integers, as it was on the wire.
 ///
@@ -198,6 +199,19 @@ impl ErrorTable {
     }
 }
 
+impl ErrorTable {
+    /// Returns how bad a code is. The C620's 8 is a warning, all others are faults, as in public drivers; also unlisted
+    /// ones. The C610's 6 (stalled) is a warning here: a jammed feeder frees itself by turning back, which it could not
+    /// when a fault relaxed it. Where no list is known, nobody knows how bad a code is, and it is a warning.
+    pub(crate) const fn severity(self, code: u8) -> Option<Severity> {
+        Some(match (code, self) {
+            (0, _) => return None,
+            (8, Self::C620) | (6, Self::C610) | (_, Self::None) => Severity::Warning,
+            _ => Severity::Fault,
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,6 +234,18 @@ mod tests {
             assert_eq!(ErrorTable::C610.read(code), Some(ErrorCode::Unlisted(code)));
         }
         assert_eq!((ErrorTable::C610.read(0), ErrorTable::C620.read(0)), (None, None));
+    }
+
+    #[test]
+    fn warnings_are_few_and_everything_else_is_a_fault() {
+        for code in 1..=255 {
+            let severity = |table: ErrorTable| table.severity(code);
+            let warns = |warning| if warning { Severity::Warning } else { Severity::Fault };
+            assert_eq!(severity(ErrorTable::C620), Some(warns(code == 8)));
+            assert_eq!(severity(ErrorTable::C610), Some(warns(code == 6)));
+            assert_eq!(severity(ErrorTable::None), Some(Severity::Warning));
+        }
+        assert_eq!(ErrorTable::C620.severity(0), None);
     }
 
     proptest! {

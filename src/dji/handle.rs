@@ -33,6 +33,11 @@ impl Key {
         (self.0 & 15) as usize
     }
 
+    /// Returns the index as it is kept in small places.
+    pub(super) const fn place(self) -> u8 {
+        self.0 & 15
+    }
+
     pub(super) const fn generation(self) -> u8 {
         self.0 >> 4
     }

@@ -41,6 +41,11 @@ pub struct Facts {
     pub no_load_rpm: f32,
     /// Whether byte 6 of the feedback is a temperature.
     pub has_temperature: bool,
+    /// From which temperature on the motor gets less output, and at which none, in °C; unless its
+    /// [`HealthConfig`](crate::motor::HealthConfig) says otherwise.
+    pub temperatures_c: (i16, i16),
+    /// No-load speed of the rotor.
+    pub(crate) rotor_rpm: u16,
     pub(crate) errors: ErrorTable,
 }
 
@@ -48,13 +53,7 @@ impl Facts {
     /// Returns the no-load speed of the rotor in rpm, rounded.
     #[must_use]
     pub const fn rotor_no_load_rpm(&self) -> u16 {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "facts are below 20 000"
-        )]
-        let rpm = (self.no_load_rpm * self.gear.as_f32() + 0.5) as u16;
-        rpm
+        self.rotor_rpm
     }
 
     /// Returns command frame and slot of an id, or `None` when the model has no such id.
@@ -69,8 +68,21 @@ impl Facts {
     }
 }
 
+const M2006_RPM: f32 = 500.0;
+const M3508_RPM: f32 = 482.0;
+const GM6020_RPM: f32 = 320.0;
+
 const M2006_GEAR: GearRatio = known_gear(36, 1);
 const M3508_GEAR: GearRatio = known_gear(3591, 187);
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "facts are below 20 000"
+)]
+const fn rotor_rpm(output_rpm: f32, gear: GearRatio) -> u16 {
+    (output_rpm * gear.as_f32() + 0.5) as u16
+}
 
 const fn known_gear(rotor: u16, output: u16) -> GearRatio {
     match GearRatio::new(rotor, output) {
@@ -80,7 +92,7 @@ const fn known_gear(rotor: u16, output: u16) -> GearRatio {
 }
 
 // Ids, slots and scale: C610 user guide, pages 8 and 9. Gear, torque constant: taproot, hcs, IFR. No-load speed:
-// one public source (500 rpm at the output).
+// one public source (500 rpm at the output). It reports no temperature, so those of the C620 are never looked at.
 static M2006_FACTS: Facts = Facts {
     name: "M2006",
     ids: 8,
@@ -93,12 +105,15 @@ static M2006_FACTS: Facts = Facts {
     current_full_scale_a: 10.0,
     gear: M2006_GEAR,
     torque_constant_nm_per_a: 0.18,
-    no_load_rpm: 500.0,
+    no_load_rpm: M2006_RPM,
     has_temperature: false,
+    temperatures_c: (125, 180),
+    rotor_rpm: rotor_rpm(M2006_RPM, M2006_GEAR),
     errors: ErrorTable::C610,
 };
 
-// Scale: librm, IFR. Gear, torque constant: taproot, hcs, IFR. No-load speed: two public sources.
+// Scale: librm, IFR. Gear, torque constant: taproot, hcs, IFR. No-load speed: two public sources. Temperatures: what the
+// ESC itself calls a warning and a fault, its error codes 8 and 5.
 static M3508_FACTS: Facts = Facts {
     name: "M3508",
     ids: 8,
@@ -111,13 +126,15 @@ static M3508_FACTS: Facts = Facts {
     current_full_scale_a: 20.0,
     gear: M3508_GEAR,
     torque_constant_nm_per_a: 0.3,
-    no_load_rpm: 482.0,
+    no_load_rpm: M3508_RPM,
     has_temperature: true,
+    temperatures_c: (125, 180),
+    rotor_rpm: rotor_rpm(M3508_RPM, M3508_GEAR),
     errors: ErrorTable::C620,
 };
 
 // Limit 25000: taproot and current manuals. Volts: nominal. Torque constant, no-load speed: hcs, devrm. No error
-// list was found.
+// list was found, nor a limit of the temperature: 25 K less than where the C620 warns is an estimate, and so is 125.
 static GM6020_VOLTAGE_FACTS: Facts = Facts {
     name: "GM6020 (voltage)",
     ids: 7,
@@ -130,8 +147,10 @@ static GM6020_VOLTAGE_FACTS: Facts = Facts {
     current_full_scale_a: 3.0,
     gear: GearRatio::DIRECT,
     torque_constant_nm_per_a: 0.741,
-    no_load_rpm: 320.0,
+    no_load_rpm: GM6020_RPM,
     has_temperature: true,
+    temperatures_c: (100, 125),
+    rotor_rpm: rotor_rpm(GM6020_RPM, GearRatio::DIRECT),
     errors: ErrorTable::None,
 };
 

@@ -2,7 +2,7 @@
 
 use super::Feedback;
 use super::bus::{Bus, FIRST_FEEDBACK_ID, LONGEST_PAUSE};
-use super::slot::{Ages, Slot};
+use super::slot::Ages;
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Malformed};
 use crate::time::{Duration, Instant};
@@ -13,7 +13,12 @@ impl<B> Bus<B> {
     #[inline(never)]
     pub(super) fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
+        let Some(slot) = self.slots.get_mut(index) else {
+            self.ingest_command(frame, now);
+            return Ingest::Unrelated;
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
+        let motor = index as u8;
         let Some(facts) = slot.facts() else {
             self.rejects.unattached = self.rejects.unattached.saturating_add(1);
             return Ingest::Unrelated;
@@ -26,7 +31,9 @@ impl<B> Bus<B> {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };
+        let before = slot.conditions;
         slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
+        self.journal.note(motor, &before, &slot.conditions, now);
         self.disturb();
         Ingest::Taken
     }
@@ -70,8 +77,10 @@ impl<B> Bus<B> {
     fn see_to_motors(&mut self) {
         let (now, timeouts) = (self.now, self.timeouts);
         self.is_disturbed = false;
-        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
+        for (motor, slot) in (0..self.used).zip(&mut self.slots) {
+            let before = slot.conditions;
             self.is_disturbed |= !slot.see_to(now, &timeouts);
+            self.journal.note(motor, &before, &slot.conditions, self.updated);
         }
     }
 
@@ -79,7 +88,11 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     fn lose_all(&mut self) {
-        self.slots.iter_mut().for_each(Slot::lose);
+        for (motor, slot) in (0..).zip(&mut self.slots) {
+            let before = slot.conditions;
+            slot.lose();
+            self.journal.note(motor, &before, &slot.conditions, self.updated);
+        }
     }
 
     /// Ends an update whose time is not usable: the last commands stay once, then zeros.

@@ -1,6 +1,6 @@
 use super::{ErrorCode, Feedback};
 use crate::encoder::{Homing, Position};
-use crate::motor::{Link, MotorName};
+use crate::motor::{Conditions, Link, MotorName};
 use crate::units::{AngularVelocity, Current};
 
 /// What is known of a motor, at its output shaft.
@@ -36,6 +36,8 @@ pub struct State {
     pub refused_targets: u16,
     /// How often the motor was relaxed because no target came in time, saturating.
     pub forgotten_targets: u16,
+    /// What is wrong with the motor.
+    pub conditions: Conditions,
     /// Whether it is heard, as of the last update or frame.
     pub link: Link,
     /// The last frame as it came.

@@ -73,7 +73,7 @@ impl<B> Bus<B> {
         self.set(motor.into(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
-    /// Sets the multi-turn position that the position loop goes to.
+    /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
     ///
     /// # Errors
     /// See above.
@@ -111,7 +111,13 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, _| slot.set_present_position(position))
+        let motor = motor.into();
+        let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
+        let before = slot.conditions;
+        let outcome = slot.set_present_position(position);
+        let after = slot.conditions;
+        self.journal.note(motor.key().place(), &before, &after, self.updated);
+        outcome
     }
 
     /// Changes the speed loop of a motor while it runs, without a jump of its output.

@@ -1,6 +1,6 @@
 use super::{Claim, MotorName};
 
-/// The motors whose feedback is missing.
+/// The motors that stand in the way of arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Missing {
@@ -52,7 +52,6 @@ impl core::fmt::Display for Missing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-#[expect(clippy::large_enum_variant, reason = "no heap, and arming is rare")]
 pub enum ArmError {
     /// These motors send no fresh feedback.
     Missing(Missing),
@@ -60,6 +59,10 @@ pub enum ArmError {
     Clash(Claim, Claim),
     /// The emergency stop is still set: clear it first.
     Stopped,
+    /// Another node sends a command frame of this device.
+    SecondMaster(Claim),
+    /// These motors report a fault, or run away, or share an id with another.
+    Faulty(Missing),
     /// There is no motor to arm.
     NoMotors,
     /// The driver takes no frames.
@@ -71,6 +74,8 @@ impl core::fmt::Display for ArmError {
         match self {
             Self::Missing(missing) => write!(f, "no feedback from {missing}"),
             Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
+            Self::SecondMaster(claim) => write!(f, "another node sends the {claim}"),
+            Self::Faulty(motors) => write!(f, "not fit to be driven: {motors}"),
             Self::Stopped => f.write_str("the emergency stop is set"),
             Self::NoMotors => f.write_str("no motor is attached"),
             Self::BusDown => f.write_str("the CAN driver takes no frames"),

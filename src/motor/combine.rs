@@ -1,6 +1,6 @@
 //! Devices made of devices.
 
-use super::{CanDevice, Claim, Ingest, MotorName};
+use super::{CanDevice, Claim, Edge, Ingest, MotorName};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
@@ -26,6 +26,15 @@ impl<D: CanDevice> CanDevice for &mut D {
     }
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
         (**self).missing(now)
+    }
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        (**self).faulty()
+    }
+    fn second_master(&self) -> Option<Claim> {
+        (**self).second_master()
+    }
+    fn next_edge(&mut self) -> Option<Edge> {
+        (**self).next_edge()
     }
     fn engage(&mut self, now: Instant) {
         (**self).engage(now);
@@ -73,6 +82,15 @@ impl<D: CanDevice, const N: usize> CanDevice for [D; N] {
     }
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
         self.iter().flat_map(move |device| device.missing(now))
+    }
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.iter().flat_map(CanDevice::faulty)
+    }
+    fn second_master(&self) -> Option<Claim> {
+        self.iter().find_map(CanDevice::second_master)
+    }
+    fn next_edge(&mut self) -> Option<Edge> {
+        self.iter_mut().find_map(CanDevice::next_edge)
     }
     fn engage(&mut self, now: Instant) {
         self.iter_mut().for_each(|device| device.engage(now));
@@ -127,6 +145,15 @@ macro_rules! tuple {
             }
             fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
                 core::iter::empty()$(.chain(self.$index.missing(now)))+
+            }
+            fn faulty(&self) -> impl Iterator<Item = MotorName> {
+                core::iter::empty()$(.chain(self.$index.faulty()))+
+            }
+            fn second_master(&self) -> Option<Claim> {
+                None$(.or_else(|| self.$index.second_master()))+
+            }
+            fn next_edge(&mut self) -> Option<Edge> {
+                None$(.or_else(|| self.$index.next_edge()))+
             }
             fn engage(&mut self, now: Instant) {
                 $(self.$index.engage(now);)+

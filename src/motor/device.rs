@@ -1,4 +1,4 @@
-use super::{ArmError, Claim, Missing, MotorName};
+use super::{ArmError, Claim, Edge, Missing, MotorName};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
@@ -83,6 +83,25 @@ pub trait CanDevice {
     /// Lists the motors without fresh feedback at `now`.
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
+    /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say. None unless said
+    /// otherwise.
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        core::iter::empty()
+    }
+
+    /// Returns a command of this device that another node has sent within the last second; `None` for a device that does
+    /// not look for it.
+    fn second_master(&self) -> Option<Claim> {
+        None
+    }
+
+    /// Returns the oldest change of a motor's condition that was not read yet. None for a device that notes none.
+    ///
+    /// Changes wait until they are read, so it can be called as often or as seldom as is convenient.
+    fn next_edge(&mut self) -> Option<Edge> {
+        None
+    }
+
     /// Lets targets through from now on, for the motors that are heard; one that takes them already goes on
     /// undisturbed. Called by [`arm`](Self::arm) when all of its conditions hold; without effect while the emergency
     /// stop is set.
@@ -107,7 +126,8 @@ pub trait CanDevice {
     /// Arms the device: nothing moves before.
     ///
     /// # Errors
-    /// Names what stands in the way: motors without feedback, a CAN id with two owners, a set emergency stop.
+    /// Names what stands in the way: motors without feedback, a CAN id with two owners or
+    /// two senders, a fault, a set emergency stop.
     #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         if self.is_stopped() {
@@ -121,6 +141,12 @@ pub trait CanDevice {
         }
         if let Some(missing) = Missing::collect(self.missing(now)) {
             return Err(ArmError::Missing(missing));
+        }
+        if let Some(claim) = self.second_master() {
+            return Err(ArmError::SecondMaster(claim));
+        }
+        if let Some(faulty) = Missing::collect(self.faulty()) {
+            return Err(ArmError::Faulty(faulty));
         }
         self.engage(now);
         Ok(())

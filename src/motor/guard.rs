@@ -1,4 +1,4 @@
-use super::{Link, TargetError, Timeouts};
+use super::{Condition, Conditions, Edge, Journal, Latch, Link, MotorName, TargetError, Timeouts};
 use crate::time::Instant;
 
 /// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
@@ -41,6 +41,8 @@ pub struct Guard {
     refused_targets: u16,
     forgotten_targets: u16,
     reversals: u16,
+    latch: Latch,
+    journal: Journal<6>,
 }
 
 impl Guard {
@@ -61,6 +63,8 @@ impl Guard {
             refused_targets: 0,
             forgotten_targets: 0,
             reversals: 0,
+            latch: Latch::NONE,
+            journal: Journal::EMPTY,
         }
     }
 
@@ -90,13 +94,17 @@ impl Guard {
                 if enough { Link::Online } else { Link::Recovering }
             }
         };
+        if self.link == Link::Online {
+            self.note(Condition::Late, false, now);
+            self.note(Condition::Offline, false, now);
+        }
     }
 
     /// Tells whether a new target may be taken, and notes its time when it is.
     ///
     /// # Errors
     /// Says why not. A target that is not finite takes the present one away, and is counted.
-    pub const fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+    pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         if !self.armed {
             return Err(TargetError::Disarmed);
         }
@@ -112,6 +120,7 @@ impl Guard {
             return Err(TargetError::NotFinite);
         }
         self.commanded = Some(self.now);
+        self.note(Condition::CommandLost, false, self.now);
         Ok(())
     }
 
@@ -131,6 +140,7 @@ impl Guard {
             if now.since(commanded) > self.timeouts.command() {
                 self.commanded = None;
                 self.forgotten_targets = self.forgotten_targets.saturating_add(1);
+                self.note(Condition::CommandLost, true, now);
             }
         }
         self.is_armed() && self.link == Link::Online && self.commanded.is_some()
@@ -147,6 +157,7 @@ impl Guard {
             self.lose();
         } else if (ahead || age > self.timeouts.late()) && self.link == Link::Online {
             self.link = Link::Late;
+            self.note(Condition::Late, true, now);
         }
     }
 
@@ -154,9 +165,66 @@ impl Guard {
     fn lose(&mut self) {
         if matches!(self.link, Link::Online | Link::Late | Link::Recovering) && self.listens {
             self.link = Link::Offline;
+            self.note(Condition::Late, true, self.now);
+            self.note(Condition::Offline, true, self.now);
         }
+        self.relax_until_armed();
+    }
+
+    /// Takes the target away and refuses others until it is engaged again: a fault.
+    pub const fn relax_until_armed(&mut self) {
         self.latched = true;
         self.commanded = None;
+    }
+
+    /// Says whether a condition of the motor holds. A change is an edge, and waits to be read.
+    ///
+    /// Late and lost feedback and old targets are noted by the guard itself.
+    pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
+        self.look(now, |latch| latch.set(condition, holds));
+    }
+
+    /// Lets conditions change.
+    pub(super) fn look<T>(&mut self, now: Instant, look: impl FnOnce(&mut Latch) -> T) -> T {
+        let before = self.latch;
+        let seen = look(&mut self.latch);
+        self.journal.note(0, &before, &self.latch, now);
+        seen
+    }
+
+    /// Returns what is wrong with the motor.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.latch.active()
+    }
+
+    /// Returns the oldest change of a condition that was not read yet; the guard does not know its motor's name.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::{Condition, Guard, MotorName};
+    /// use drivetrain::time::Instant;
+    ///
+    /// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+    /// let mut guard = Guard::new();
+    /// guard.hear(at_ms(1));
+    /// assert!(!guard.drives(at_ms(12)));
+    /// let edge = guard.next_edge(MotorName::new("mine", 1)).ok_or("none")?;
+    /// assert_eq!((edge.condition, edge.began), (Condition::Late, true));
+    /// assert_eq!(guard.next_edge(MotorName::new("mine", 1)), None);
+    /// # Ok::<(), &str>(())
+    /// ```
+    pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge> {
+        while let Some(entry) = self.journal.pop() {
+            if self.latch.take(entry.condition, entry.began) {
+                let at = self.journal.time_of(&entry, self.now);
+                let (condition, began) = (entry.condition, entry.began);
+                return Some(Edge { motor, condition, began, at });
+            }
+        }
+        let (condition, began) = self.latch.next()?;
+        self.latch.take(condition, began);
+        Some(Edge { motor, condition, began, at: self.journal.last_time(self.now) })
     }
 
     /// Tells whether there is a target that still counts.
@@ -185,6 +253,7 @@ impl Guard {
             return false;
         }
         self.now = self.now.max(now);
+        self.note(Condition::CommandLost, false, self.now);
         self.commanded = None;
         self.latched = false;
         self.armed = true;

@@ -1,6 +1,6 @@
 use super::{
-    CanDevice, Capabilities, Capability, Claim, Guard, Ingest, Malformed, MotorName, Role,
-    TargetError, Timeouts, VelocityDrive,
+    CanDevice, Capabilities, Capability, Claim, Edge, Guard, Health, HealthConfig, Ingest,
+    Malformed, MotorName, Role, TargetError, Timeouts, VelocityDrive, Vitals, Watch,
 };
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -44,6 +44,15 @@ pub trait OwnMotor {
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Velocity, Capability::Feedback])
     }
+
+    /// Returns what else it knows of itself. Nothing unless said otherwise.
+    fn vitals(&self) -> Vitals {
+        Vitals::default()
+    }
+
+    /// Keeps its output within this share of its full command, 0 to 1, from now on: it is warm, or stalled. Without
+    /// effect unless said otherwise; a motor that is too hot gets zero anyway.
+    fn limit(&mut self, _share: f32) {}
 }
 
 /// A motor of your own as a device of the runner, beside all others.
@@ -101,6 +110,7 @@ pub struct Own<M> {
     held_steps: u8,
     waits: bool,
     superseded: u32,
+    watch: Watch,
 }
 
 impl<M: OwnMotor> Own<M> {
@@ -116,7 +126,23 @@ impl<M: OwnMotor> Own<M> {
             held_steps: 0,
             waits: false,
             superseded: 0,
+            watch: Watch::new(),
         }
+    }
+
+    /// Sets what is looked for and what follows, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
+    ///
+    /// # Errors
+    /// Names the parameter that makes no sense.
+    pub fn with_health(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
+        let watch = self.watch.with_config(config)?;
+        Ok(Self { watch, ..self })
+    }
+
+    /// Returns how the motor is.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.health(self.motor.name(), &self.guard, &self.motor.vitals())
     }
 
     /// Sets when feedback and commands count as lost.
@@ -135,6 +161,15 @@ impl<M: OwnMotor> Own<M> {
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard
+    }
+
+    /// Looks after the motor: it may be relaxed for what is found, or left with less.
+    fn look(&mut self, now: Instant) {
+        let share = self.watch.look(&mut self.guard, &self.motor.vitals(), now);
+        self.motor.limit(share);
+        if share <= 0.0 {
+            self.guard.relax();
+        }
     }
 
     /// Returns the command that this step asks for.
@@ -179,10 +214,14 @@ impl<M: OwnMotor> Own<M> {
 impl<M: OwnMotor> CanDevice for Own<M> {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         if frame.id() != self.motor.feedback_id() || frame.is_remote_frame() {
+            if frame.id() == self.motor.command_id() && frame.is_data_frame() {
+                self.watch.hear_rival(now);
+            }
             return Ingest::Unrelated;
         }
         match self.motor.decode(frame) {
             Ok(()) => {
+                self.watch.hear(now);
                 self.guard.hear(now);
                 Ingest::Taken
             }
@@ -191,6 +230,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 
     fn update(&mut self, tick: Tick) {
+        self.look(tick.now());
         let output = self.command(tick);
         self.offer(output);
     }
@@ -224,8 +264,22 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.guard.is_missing(now).then(|| self.motor.name()).into_iter()
     }
 
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.watch.is_faulty(&self.guard).then(|| self.motor.name()).into_iter()
+    }
+
+    fn second_master(&self) -> Option<Claim> {
+        let claim = || Claim::new(self.motor.command_id(), Role::Command, self.motor.name());
+        self.watch.has_rival().then(claim)
+    }
+
+    fn next_edge(&mut self) -> Option<Edge> {
+        self.guard.next_edge(self.motor.name())
+    }
+
     fn engage(&mut self, now: Instant) {
-        if self.guard.engage(now) {
+        if !self.watch.is_faulty(&self.guard) && self.guard.engage(now) {
+            self.watch.start(&mut self.guard, now);
             self.rest();
         }
     }

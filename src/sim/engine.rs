@@ -198,6 +198,7 @@ impl Engine {
             let (Some(esc), Some(key)) = (slot, MotorKey::new(index)) else { continue };
             let dead = self.faults.power_loss(key, self.now_ns);
             esc.set_powered(dead, self.now_ns);
+            esc.rotor.mechanics = self.faults.mechanics(key, self.now_ns);
             esc.step_current(self.now_ns, STEP_S);
         }
         for (index, slot) in self.joints.iter_mut().enumerate() {

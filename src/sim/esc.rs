@@ -16,6 +16,7 @@ const CLOCK_PPM: u32 = 50;
 pub(crate) struct Tampering {
     pub(crate) silent: bool,
     pub(crate) stuck: bool,
+    pub(crate) frozen: bool,
     pub(crate) angle: Option<u16>,
     pub(crate) error: u8,
     pub(crate) length: Option<u8>,
@@ -43,8 +44,8 @@ pub(crate) struct Esc {
     commanded_ns: u64,
     /// Counts that are taken off the angle before it is sent.
     zero: i64,
-    /// Angle and speed as last sent.
-    sent: [u8; 4],
+    /// The feedback as last sent.
+    sent: [u8; 8],
 }
 
 impl Esc {
@@ -76,7 +77,7 @@ impl Esc {
             command: 0,
             commanded_ns: now_ns,
             zero: 0,
-            sent: [0; 4],
+            sent: [0; 8],
         };
         esc.due_ns = esc.grid_ns + u64::from(esc.random.below(JITTER_NS));
         Some(esc)
@@ -151,18 +152,14 @@ impl Esc {
         if tampering.silent {
             return None;
         }
+        let [mut angle_high, mut angle_low, mut speed_high, mut speed_low, ..] = self.sent;
         if !tampering.stuck {
-            let [angle_high, angle_low] = self.angle(since_step_s).to_be_bytes();
-            let [speed_high, speed_low] = nearest_i16(self.rotor.rotor_rpm()).to_be_bytes();
-            self.sent = [angle_high, angle_low, speed_high, speed_low];
-        }
-        let [mut angle_high, mut angle_low, speed_high, speed_low] = self.sent;
-        if let Some(angle) = tampering.angle {
-            [angle_high, angle_low] = angle.to_be_bytes();
+            [angle_high, angle_low] = self.angle(since_step_s).to_be_bytes();
+            [speed_high, speed_low] = nearest_i16(self.rotor.rotor_rpm()).to_be_bytes();
         }
         let scale = f32::from(self.facts.current_raw) / self.facts.current_full_scale_a;
         let [current_high, current_low] = nearest_i16(self.rotor.current() * scale).to_be_bytes();
-        let data = [
+        let live = [
             angle_high,
             angle_low,
             speed_high,
@@ -172,6 +169,13 @@ impl Esc {
             if self.facts.has_temperature { nearest_u8(self.rotor.temperature()) } else { 0 },
             tampering.error,
         ];
+        if !tampering.frozen {
+            self.sent = live;
+        }
+        let mut data = self.sent;
+        if let (Some(angle), [high, low, ..]) = (tampering.angle, &mut data) {
+            [*high, *low] = angle.to_be_bytes();
+        }
         let id = self.facts.feedback_base + u16::from(self.config.id);
         let frame = CanFrame::standard(id, data)?;
         match tampering.length {

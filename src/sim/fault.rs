@@ -1,5 +1,6 @@
 use super::esc::Tampering;
 use super::random::Random;
+use super::rotor::Mechanics;
 use super::{JointKey, Line, MotorKey};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
@@ -11,7 +12,7 @@ use embedded_can::{Frame, Id};
 /// What needs no fault: a second master ([`World::inject`](super::World::inject) of a command frame), two motors with
 /// one id (attach both), a burst after a stall (advance without receiving), an overrun (the same, with
 /// [`World::with_receive_depth`](super::World::with_receive_depth)), heat
-/// ([`World::set_temperature_c`](super::World::set_temperature_c)), a blocked shaft or a runaway
+/// ([`World::set_temperature_c`](super::World::set_temperature_c)), a push from outside
 /// ([`World::set_load_nm`](super::World::set_load_nm)), a full bus (eight motors).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -72,6 +73,12 @@ pub enum Fault {
     JointPowerLoss(JointKey),
     /// Angle and speed in the feedback stay what they were.
     StuckEncoder(MotorKey),
+    /// The ESC sends the same feedback again and again, and goes on otherwise.
+    FrozenFeedback(MotorKey),
+    /// Nothing turns the shaft.
+    BlockedShaft(MotorKey),
+    /// The motor turns against its command, and reports that it does: torque and back-EMF have the wrong sign.
+    ReversedTorque(MotorKey),
     /// The angle field of the feedback has this value; above 8191 it is not valid.
     WrongAngle {
         /// The motor.
@@ -101,6 +108,9 @@ impl Fault {
         match self {
             Self::Silent(motor)
             | Self::StuckEncoder(motor)
+            | Self::FrozenFeedback(motor)
+            | Self::BlockedShaft(motor)
+            | Self::ReversedTorque(motor)
             | Self::PowerLoss { motor, .. }
             | Self::WrongAngle { motor, .. }
             | Self::WrongLength { motor, .. }
@@ -199,6 +209,7 @@ impl Faults {
             match *fault {
                 Fault::Silent(_) => tampering.silent = true,
                 Fault::StuckEncoder(_) => tampering.stuck = true,
+                Fault::FrozenFeedback(_) => tampering.frozen = true,
                 Fault::WrongAngle { raw, .. } => tampering.angle = Some(raw),
                 Fault::WrongLength { length, .. } => tampering.length = Some(length),
                 Fault::ErrorCode { code, .. } => tampering.error = code,
@@ -216,6 +227,15 @@ impl Faults {
             }
             _ => None,
         })
+    }
+
+    /// Returns what faults do to the mechanics of a motor.
+    pub(crate) fn mechanics(&self, motor: MotorKey, now_ns: u64) -> Mechanics {
+        let has = |fault| self.is_active(fault, now_ns);
+        Mechanics {
+            blocked: has(Fault::BlockedShaft(motor)),
+            reversed: has(Fault::ReversedTorque(motor)),
+        }
     }
 
     /// Draws how often a frame reaches the others: 0, 1 or 2 times.

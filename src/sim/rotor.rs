@@ -13,6 +13,13 @@ pub(crate) enum Drive {
     Volts(f32),
 }
 
+/// What a fault does to the mechanics of one motor.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Mechanics {
+    pub(crate) blocked: bool,
+    pub(crate) reversed: bool,
+}
+
 /// The electrical and mechanical part of a motor: winding, rotor, gearbox, friction.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rotor {
@@ -34,6 +41,7 @@ pub(crate) struct Rotor {
     current: f32,
     /// Nm at the output shaft, from outside; positive turns counter-clockwise.
     pub(crate) load_nm: f32,
+    pub(crate) mechanics: Mechanics,
     temperature: f64,
 }
 
@@ -62,6 +70,7 @@ impl Rotor {
             velocity: 0.0,
             current: 0.0,
             load_nm: 0.0,
+            mechanics: Mechanics { blocked: false, reversed: false },
             temperature: AMBIENT_C as f64,
         }
     }
@@ -78,12 +87,12 @@ impl Rotor {
             Drive::Amperes(target) => target,
             Drive::Volts(target) => {
                 let volts = target.clamp(-self.supply_v, self.supply_v);
-                (volts - self.back_emf * self.velocity) / self.constants.resistance
+                (volts - self.generated()) / self.constants.resistance
             }
         };
         let current = self.current + (settled - self.current) * share;
         // What the supply can drive against the back-EMF; between the two, what the ESC allows.
-        let generated = self.back_emf * self.velocity;
+        let generated = self.generated();
         let highest = (self.supply_v - generated) / self.constants.resistance;
         let lowest = (-self.supply_v - generated) / self.constants.resistance;
         self.current =
@@ -95,14 +104,26 @@ impl Rotor {
         self.torque_constant * self.current
     }
 
+    /// Returns the back-EMF in V.
+    fn generated(&self) -> f32 {
+        let volts = self.back_emf * self.velocity;
+        if self.mechanics.reversed { -volts } else { volts }
+    }
+
     /// Returns the electric power in W: current times back-EMF and voltage over the winding.
     pub(crate) fn power_w(&self) -> f32 {
-        self.current * (self.back_emf * self.velocity + self.constants.resistance * self.current)
+        self.current * (self.generated() + self.constants.resistance * self.current)
     }
 
     /// Moves speed and angle by one step of `dt_s`, with one more torque at the output shaft.
     pub(crate) fn step_motion(&mut self, other_torque_nm: f32, dt_s: f32) {
-        let impulse = (self.torque_nm() + self.load_nm + other_torque_nm) * dt_s;
+        if self.mechanics.blocked {
+            self.velocity = 0.0;
+            return;
+        }
+        let torque = self.torque_nm();
+        let torque = if self.mechanics.reversed { -torque } else { torque };
+        let impulse = (torque + self.load_nm + other_torque_nm) * dt_s;
         let moving = (self.inertia * self.velocity + impulse)
             / (self.inertia + self.constants.viscous * dt_s);
         // Dry friction takes speed away, and never more than there is.

@@ -439,11 +439,32 @@ mod tests {
         assert!(code.iter().all(|frame| frame.bytes()[7] == 8));
         let stuck = within(&feedback_around(Fault::StuckEncoder));
         assert!(stuck.iter().all(|frame| frame.bytes()[..4] == stuck[0].bytes()[..4]));
+        let frozen = within(&feedback_around(Fault::FrozenFeedback));
+        assert!(frozen.iter().all(|frame| *frame == frozen[0]));
         let sound = within(&feedback_around(|_| Fault::Silent(MotorKey(9))));
         assert!(!sound.windows(2).any(|pair| pair[0].bytes()[..2] == pair[1].bytes()[..2]));
-        for heard in [wrong, short, code, stuck, sound] {
+        for heard in [wrong, short, code, stuck, frozen, sound] {
             assert!((27..=29).contains(&heard.len()));
         }
+    }
+
+    #[test]
+    fn a_blocked_shaft_stands_and_a_reversed_torque_drives_it_the_other_way_up_to_its_no_load_speed()
+     {
+        let end = |fault: fn(MotorKey) -> Fault| {
+            let world = World::new(5);
+            let key = world.attach(m3508(1)).unwrap();
+            assert_eq!(world.controller().transmit(&command(8_192)), Ok(None));
+            world.advance(Duration::from_millis(20));
+            world.fault(fault(key), ..).unwrap();
+            world.advance(Duration::from_secs(2));
+            world.motor(key).unwrap()
+        };
+        let blocked = end(Fault::BlockedShaft);
+        assert_eq!(blocked.velocity.as_rad_per_s().to_bits(), 0);
+        assert!((blocked.current.as_amperes() - 10.0).abs() < 0.01);
+        let reversed = end(Fault::ReversedTorque).velocity.as_rpm();
+        assert!((-485.0..-470.0).contains(&reversed), "{reversed}");
     }
 
     #[test]

@@ -8,6 +8,7 @@
 mod case;
 mod catalogue;
 mod commands;
+mod health;
 mod plausibility;
 mod receive;
 mod registration;

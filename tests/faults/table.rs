@@ -5,13 +5,14 @@ use crate::rows::{Row, TABLE, rows};
 use std::collections::BTreeSet;
 
 /// The files of [`CATALOGUE`], in its order.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 7] = [
     include_str!("receive.rs"),
     include_str!("plausibility.rs"),
     include_str!("timing.rs"),
     include_str!("commands.rs"),
     include_str!("registration.rs"),
     include_str!("transmit.rs"),
+    include_str!("health.rs"),
 ];
 
 fn problems(table: &str, cases: &BTreeSet<&str>) -> Vec<String> {

@@ -36,6 +36,7 @@ pub fn call_all() {
     dji();
     runner();
     crate::geometry::call_all();
+    crate::health::call_all();
     crate::chassis::call_all();
     crate::pwm::call_all();
     crate::snake::call_all();
@@ -304,6 +305,8 @@ fn motor() {
     Own::<AnyMotor>::with_timeouts.call();
     Own::<AnyMotor>::motor.call();
     Own::<AnyMotor>::guard.call();
+    Own::<AnyMotor>::with_health.call();
+    Own::<AnyMotor>::health.call();
     device::<Own<AnyMotor>>();
     MotorName::new.call();
     MotorName::model.call();
@@ -321,6 +324,8 @@ fn device<D: CanDevice + 'static>() {
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
     (|device: &D| device.claims().count()).call();
     (|device: &D, now: Instant| device.missing(now).count()).call();
+    (|device: &D| (device.faulty().count(), device.second_master())).call();
+    (|device: &mut D| device.next_edge()).call();
     (|device: &mut D, now: Instant| device.engage(now)).call();
     (|device: &mut D, now: Instant| device.arm(now).is_ok()).call();
     (|device: &D| device.clash()).call();

@@ -10,6 +10,7 @@
 mod chassis;
 mod functions;
 mod geometry;
+mod health;
 mod opaque;
 mod pwm;
 mod shaping;

@@ -1,14 +1,17 @@
-use super::{Slot, age, is_near};
+use super::{Slot, is_near};
 use crate::dji::command::to_raw;
-use crate::motor::{Link, Timeouts};
+use crate::dji::range::Range;
+use crate::motor::{Condition, Link, Monitor, Timeouts};
 
 /// Whether the motor takes targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arming {
     Disarmed,
     Armed,
-    /// Relaxed by a fault since it was armed.
+    /// Relaxed since it was armed, because it was lost.
     Latched,
+    /// Relaxed since it was armed, for something else.
+    Tripped,
 }
 
 impl Slot {
@@ -21,12 +24,16 @@ impl Slot {
     /// Takes targets from now on, starting from rest, if the motor is heard. One that takes them already goes on
     /// undisturbed.
     pub(in crate::dji) fn engage(&mut self, now: u32, timeouts: &Timeouts) {
-        if self.facts.is_none() || self.is_armed() || self.is_missing(now, timeouts) {
+        let refuses = self.is_armed() || self.is_missing(now, timeouts) || self.is_faulty();
+        if self.facts.is_none() || refuses {
             return;
         }
         self.relax();
+        self.conditions.set(Condition::Runaway, false);
+        self.monitor = Monitor::NEW;
         self.arming = Arming::Armed;
-        self.limit = self.full_limit;
+        self.is_ramping = false;
+        self.keep_inside(0);
         self.commanded = now;
     }
 
@@ -46,38 +53,55 @@ impl Slot {
         }
     }
 
+    /// Relaxes the motor, and refuses targets until it is armed again.
+    pub(super) fn trip(&mut self) {
+        if self.arming != Arming::Disarmed {
+            self.arming = Arming::Tripped;
+        }
+        self.relax();
+    }
+
     /// Starts again from zero output after a recovery, where that is configured.
     pub(super) fn start_ramp(&mut self) {
         if self.arming == Arming::Latched && self.ramp_ms.is_some() {
             self.arming = Arming::Armed;
-            self.limit = 0;
-            self.ramp_started = self.heard;
+            self.range = Range::ZERO;
+            self.is_ramping = true;
+            self.ramp_started = coarse(self.heard);
         }
     }
 
-    /// Lets the output limit rise; to be called every few milliseconds.
-    pub(in crate::dji) fn ramp(&mut self, now: u32) {
-        if self.limit == self.full_limit {
-            return;
+    /// Returns the share of the output that a ramp leaves.
+    pub(super) fn ramp(&mut self, now: u32) -> f32 {
+        if !self.is_ramping {
+            return 1.0;
         }
-        let elapsed_ms = age(now, self.ramp_started) / 1_000;
-        self.limit = match self.ramp_ms.map(|time| u32::from(time.get())) {
-            Some(time_ms) if elapsed_ms < time_ms => to_raw(
-                elapsed_ms as f32 / time_ms as f32,
-                f32::from(self.full_limit),
-                self.full_limit,
-            ),
-            _ => self.full_limit,
-        };
-        self.hold_back();
+        // An interrupt may have stamped the frame just after the tick read its clock.
+        const AHEAD: u16 = 64_500;
+        let elapsed = coarse(now).wrapping_sub(self.ramp_started);
+        let elapsed_ms = if elapsed < AHEAD { f32::from(elapsed) * 1.024 } else { 0.0 };
+        match self.ramp_ms.map(|time| f32::from(time.get())) {
+            Some(time_ms) if elapsed_ms < time_ms => elapsed_ms / time_ms,
+            _ => {
+                self.is_ramping = false;
+                1.0
+            }
+        }
     }
 
-    /// Keeps the speed loop within the limit that rises: it knows only the full one, and would wind up.
-    fn hold_back(&mut self) {
-        let limit = f32::from(self.limit) / self.raw_per_unit.abs();
+    /// Keeps the speed loop within what is left of the output: it knows only the full limit, and would wind up.
+    pub(super) fn hold_back(&mut self) {
         let output = self.speed.output();
-        if output.abs() > limit {
-            self.speed.reset_to(limit.copysign(output));
+        let raw = to_raw(output, self.raw_per_unit, i16::MAX);
+        let nearest = self.range.nearest(raw.into());
+        if nearest != raw {
+            self.speed.reset_to(f32::from(nearest) / self.raw_per_unit);
         }
     }
+}
+
+/// In units of 1.024 ms, up to 67 s; a ramp takes no longer than 65.
+#[expect(clippy::cast_possible_truncation, reason = "compared by wrapping difference")]
+const fn coarse(stamp: u32) -> u16 {
+    (stamp >> 10) as u16
 }

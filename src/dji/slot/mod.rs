@@ -2,22 +2,27 @@
 
 mod arming;
 mod capability;
+mod health;
 mod measured;
 mod receive;
 mod target;
 mod update;
 
 use super::command::{Place, to_raw};
-use super::config::PlainConfig;
+use super::config::{PlainConfig, USUAL};
 use super::handle::Key;
+use super::range::Range;
 use super::{AttachError, Facts, Feedback, State};
 use crate::control::{Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft};
-use crate::motor::{Link, MotorName, Recovery, TargetError};
+use crate::motor::{
+    Condition, HealthConfig, Latch, Link, Monitor, MotorName, Recovery, TargetError, Traffic,
+};
 use crate::units::{AngularVelocity, Current};
 use arming::Arming;
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
+pub(super) use health::Look;
 use target::{Action, Goal};
 pub(super) use update::Ages;
 
@@ -36,7 +41,8 @@ pub(super) struct Slot {
     asked: Action,
     pub(super) place: Place,
     link: Link,
-    limit: i16,
+    /// What is left of the full limit.
+    range: Range,
     full_limit: i16,
     raw_per_unit: f32,
     goal: Goal,
@@ -45,7 +51,7 @@ pub(super) struct Slot {
     position: Pid,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
-    ramp_started: u32,
+    ramp_started: u16,
     ramp_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
     refused_targets: u16,
@@ -54,6 +60,16 @@ pub(super) struct Slot {
     homing: Homing,
     good_frames: u8,
     generation: u8,
+    is_ramping: bool,
+    error_code: u8,
+    /// Below this temperature byte and this command the motor need not be looked at closely.
+    cool_below: u8,
+    calm_word: u16,
+    saturated: u16,
+    pub(super) conditions: Latch,
+    health: &'static HealthConfig,
+    monitor: Monitor,
+    traffic: Traffic,
 }
 
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
@@ -77,7 +93,7 @@ impl Slot {
         rad_per_s_per_rpm: 0.0,
         raw_per_unit: 0.0,
         nm_per_a: 0.0,
-        limit: 0,
+        range: Range::ZERO,
         full_limit: 0,
         ramp_ms: None,
         ramp_started: 0,
@@ -92,6 +108,15 @@ impl Slot {
         good_frames: 0,
         homing: Homing::Relative,
         arming: Arming::Disarmed,
+        is_ramping: false,
+        error_code: 0,
+        cool_below: 0,
+        calm_word: 0,
+        saturated: 0,
+        conditions: Latch::NONE,
+        health: &USUAL,
+        monitor: Monitor::NEW,
+        traffic: Traffic::NONE,
     };
 
     /// Makes the slot of a motor, validating its configuration.
@@ -138,6 +163,10 @@ impl Slot {
             Ok(position) => position,
             Err(name) => return Err(parameter!(name)),
         };
+        if let Err(name) = config.health.validate() {
+            return Err(parameter!(name));
+        }
+        let (calm_word, cool_below) = Self::calm(facts, config.health, limit_raw);
         let direct = config.gear.rotor() == config.gear.output();
         Ok(Self {
             facts: Some(facts),
@@ -145,13 +174,16 @@ impl Slot {
             rad_per_s_per_rpm,
             raw_per_unit: sign * raw_per_unit,
             nm_per_a,
-            limit: limit_raw,
+            range: Range::within(limit_raw),
             full_limit: limit_raw,
             ramp_ms: ramp_time(config.recovery),
             speed,
             position,
             generation,
             place,
+            health: config.health,
+            calm_word,
+            cool_below,
             homing: if direct { Homing::Absolute } else { Homing::Relative },
             ..Self::FREE
         })
@@ -221,6 +253,7 @@ impl Slot {
             ambiguous_gaps: self.ambiguous_gaps,
             refused_targets: self.refused_targets,
             forgotten_targets: self.forgotten_targets,
+            conditions: self.conditions.active(),
             link: self.link,
             feedback: self.feedback,
         })
@@ -246,6 +279,8 @@ impl Slot {
         }
         self.shaft.set_position(position);
         self.homing = Homing::Homed;
+        self.conditions.set(Condition::PositionUncertain, false);
+        self.keep_inside(0);
         Ok(())
     }
 

@@ -1,8 +1,8 @@
 use super::target::Action;
 use super::{Slot, age, is_near};
 use crate::dji::{Facts, Feedback};
-use crate::encoder::{Gap, Homing, shortest};
-use crate::motor::{Link, Timeouts};
+use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
+use crate::motor::{Condition, Link, Timeouts};
 
 impl Slot {
     /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
@@ -11,6 +11,7 @@ impl Slot {
     pub(in crate::dji) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
         let in_time = now.wrapping_sub(self.heard) < self.trusted_gap_us;
         if in_time {
+            self.traffic.count();
             self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
             self.feedback = feedback;
             self.heard = now;
@@ -26,23 +27,17 @@ impl Slot {
         now: u32,
         timeouts: &Timeouts,
     ) {
+        if self.link != Link::Unheard {
+            self.traffic.gap(age(now, self.heard));
+        }
+        self.traffic.count();
         match self.link {
             Link::Unheard => {
                 self.shaft.seed(feedback.angle());
                 self.set_online(facts);
             }
             Link::Online | Link::Late => {
-                let (before, after) = (self.feedback, feedback);
-                let gap = Gap::resolve(
-                    (before.angle(), before.rpm()),
-                    (after.angle(), after.rpm()),
-                    age(now, self.heard),
-                    facts.rotor_no_load_rpm(),
-                );
-                self.shaft.advance_far(gap.counts);
-                if gap.ambiguous {
-                    self.doubt_position();
-                }
+                self.follow(facts, feedback, age(now, self.heard));
                 self.set_online(facts);
             }
             Link::Offline => {
@@ -63,6 +58,44 @@ impl Slot {
         self.heard = now;
     }
 
+    /// Follows the angle of a motor that was heard `gap_us` ago.
+    fn follow(&mut self, facts: &Facts, feedback: Feedback, gap_us: u32) {
+        let (before, after) = (self.feedback, feedback);
+        if self.traffic.is_crowded() && gap_us < trusted_gap_us(facts) {
+            self.compare(feedback, gap_us);
+            return self.move_shortest(feedback);
+        }
+        let no_load_rpm = facts.rotor_no_load_rpm();
+        let absurd = |rpm: i16| u32::from(rpm.unsigned_abs()) > 2 * u32::from(no_load_rpm);
+        if absurd(before.rpm()) || absurd(after.rpm()) {
+            self.move_shortest(feedback);
+            return self.doubt_position();
+        }
+        let (before, after) = ((before.angle(), before.rpm()), (after.angle(), after.rpm()));
+        let gap = Gap::resolve(before, after, gap_us, no_load_rpm);
+        self.shaft.advance_far(gap.counts);
+        if gap.ambiguous {
+            self.doubt_position();
+        }
+    }
+
+    /// Looks whether two motors take turns, when more frames come than one motor sends.
+    fn compare(&mut self, feedback: Feedback, gap_us: u32) {
+        const COUNTS_PER_RPM_MS: f32 = COUNTS_PER_TURN as f32 / 60_000.0;
+        let (one, other) = (f32::from(self.feedback.rpm()), f32::from(feedback.rpm()));
+        let predicted = (one + other) * 0.5 * COUNTS_PER_RPM_MS * (gap_us as f32 * 1e-3);
+        // A sample is up to a period old, and so is the one before.
+        let tolerance = 200.0 + 2.0 * COUNTS_PER_RPM_MS * one.abs().max(other.abs());
+        let counts = shortest(self.feedback.angle(), feedback.angle());
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        self.traffic.compare(counts, predicted as i32, tolerance as i32);
+        if self.traffic.is_double() && !self.health.ignores(Condition::DuplicateId) {
+            let before = self.conditions.active();
+            self.conditions.set(Condition::DuplicateId, true);
+            self.react(before);
+        }
+    }
+
     /// Follows the angle without counting turns that nobody saw.
     fn move_shortest(&mut self, feedback: Feedback) {
         self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
@@ -70,6 +103,7 @@ impl Slot {
 
     fn doubt_position(&mut self) {
         self.ambiguous_gaps = self.ambiguous_gaps.saturating_add(1);
+        self.conditions.set(Condition::PositionUncertain, true);
         if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
@@ -85,14 +119,15 @@ impl Slot {
     fn set_online(&mut self, facts: &Facts) {
         self.link = Link::Online;
         self.action = self.asked;
-        // Half a rotor turn at no-load speed, 30 s / rpm, less what frames may be delayed by others on the bus.
-        let half_turn_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
-        self.trusted_gap_us = half_turn_us.saturating_sub(500);
+        self.trusted_gap_us = if self.traffic.is_crowded() { 0 } else { trusted_gap_us(facts) };
+        self.conditions.set(Condition::Late, false);
+        self.conditions.set(Condition::Offline, false);
     }
 
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
+        self.conditions.set(Condition::Late, true);
         self.action = Action::Rest;
         self.trusted_gap_us = 0;
         self.speed.interrupt();
@@ -110,8 +145,16 @@ impl Slot {
     /// The motor is lost: relaxed, and latched until it is armed again or ramps back.
     pub(super) fn set_offline(&mut self) {
         self.link = Link::Offline;
+        self.conditions.set(Condition::Late, true);
+        self.conditions.set(Condition::Offline, true);
         self.trusted_gap_us = 0;
         self.latch();
         self.relax();
     }
+}
+
+/// Half a rotor turn at no-load speed, 30 s / rpm, less what frames may be delayed by others on the bus.
+fn trusted_gap_us(facts: &Facts) -> u32 {
+    let half_turn_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
+    half_turn_us.saturating_sub(500)
 }

@@ -136,7 +136,7 @@ impl Slot {
     ) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
         needs(&self.position)?;
-        let (turns, phase) = self.shaft.locate(position);
+        let (turns, phase) = self.shaft.locate(self.inside(position));
         self.enter_position_loop();
         self.start(Action::Position, Goal { turns, value: phase }, now);
         Ok(())
@@ -165,7 +165,7 @@ impl Slot {
         }
         match self.arming {
             Arming::Disarmed => return Err(TargetError::Disarmed),
-            Arming::Latched => return Err(TargetError::Relaxed),
+            Arming::Latched | Arming::Tripped => return Err(TargetError::Relaxed),
             Arming::Armed => {}
         }
         if self.link != Link::Online {

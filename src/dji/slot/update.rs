@@ -2,7 +2,7 @@ use super::target::Action;
 use super::{Slot, age, is_near};
 use crate::control::TimeStep;
 use crate::dji::command::{loop_to_raw, saturate};
-use crate::motor::{Link, Timeouts};
+use crate::motor::{Condition, Link, Timeouts};
 
 /// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
 /// limit a stamp is near.
@@ -43,12 +43,12 @@ impl Slot {
                     velocity = self.goal.rate();
                     self.goal.way()
                 }
-                Action::Raw => return saturate(self.goal.raw(), self.limit),
+                Action::Raw => return saturate(self.goal.raw(), self.range),
                 Action::Rest | Action::Velocity => return 0,
             };
             self.position.step_error(way, velocity, step)
         };
-        loop_to_raw(self.speed.step(goal, velocity, step), self.raw_per_unit, self.limit)
+        loop_to_raw(self.speed.step(goal, velocity, step), self.raw_per_unit, self.range)
     }
 
     /// Adds the ages of this motor's feedback and target, when it is heard.
@@ -66,10 +66,9 @@ impl Slot {
         }
     }
 
-    /// Sees to what grew old or rises with time; `false` when there may be more to see to at the next update, whatever
+    /// Sees to what grew old; `false` when there may be more to see to at the next update, whatever
     /// comes or does not come until then.
     pub(in crate::dji) fn see_to(&mut self, now: u32, timeouts: &Timeouts) -> bool {
-        self.ramp(now);
         match self.link {
             Link::Unheard | Link::Offline => return true,
             Link::Online if is_near(now, self.heard, timeouts.late_us()) => {}
@@ -81,7 +80,7 @@ impl Slot {
         if self.asked != Action::Rest && !is_near(now, self.commanded, timeouts.command_us()) {
             self.forget_target();
         }
-        self.limit == self.full_limit
+        true
     }
 
     /// The last feedback is not fresh; its age decides how far that goes.
@@ -96,6 +95,7 @@ impl Slot {
     /// The application has not set a target for too long.
     pub(super) fn forget_target(&mut self) {
         self.relax();
+        self.conditions.set(Condition::CommandLost, true);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 }

@@ -1,0 +1,77 @@
+/// The raw commands that a motor may be given: 0, and what lies between it and two ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Range {
+    lowest: i16,
+    span: u16,
+}
+
+impl Range {
+    /// Nothing but 0.
+    pub(super) const ZERO: Self = Self::within(0);
+
+    /// Both directions up to `limit`, which is not negative.
+    pub(super) const fn within(limit: i16) -> Self {
+        Self { lowest: -limit, span: 2 * limit.cast_unsigned() }
+    }
+
+    pub(super) const fn without_negative(self) -> Self {
+        Self { lowest: 0, span: self.highest().cast_unsigned() }
+    }
+
+    pub(super) const fn without_positive(self) -> Self {
+        Self { lowest: self.lowest, span: self.lowest.unsigned_abs() }
+    }
+
+    /// Tells whether a command is within, with one comparison for both ends: below the lowest is far above, unsigned.
+    #[inline]
+    pub(super) const fn contains(self, raw: i32) -> bool {
+        raw.wrapping_sub(self.lowest as i32).cast_unsigned() <= self.span as u32
+    }
+
+    /// Tells whether a command that is not 0 is as large as it may be.
+    pub(super) const fn is_end(self, raw: i16) -> bool {
+        (raw < 0 && raw <= self.lowest) || (raw > 0 && raw >= self.highest())
+    }
+
+    /// Returns the nearest command that is within.
+    pub(super) const fn nearest(self, raw: i32) -> i16 {
+        if raw < self.lowest as i32 {
+            return self.lowest;
+        }
+        if raw > self.highest() as i32 {
+            return self.highest();
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "between two of 16 bits")]
+        let raw = raw as i16;
+        raw
+    }
+
+    const fn highest(self) -> i16 {
+        self.lowest.wrapping_add_unsigned(self.span)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Law: the nearest command is within, 0 always is, and what is within is kept.
+        #[test]
+        fn the_nearest_is_within(limit in 0..=i16::MAX, raw: i32, negative: bool, positive: bool) {
+            let range = Range::within(limit);
+            let range = if negative { range } else { range.without_negative() };
+            let range = if positive { range } else { range.without_positive() };
+            let nearest = range.nearest(raw);
+            prop_assert!(range.contains(nearest.into()) && range.contains(0));
+            prop_assert!(nearest >= 0 || negative);
+            prop_assert!(nearest <= 0 || positive);
+            prop_assert_eq!(range.contains(raw), i32::from(nearest) == raw);
+            let end = i32::from(limit);
+            let allowed = (if negative { -end } else { 0 })..=(if positive { end } else { 0 });
+            prop_assert_eq!(range.contains(raw), allowed.contains(&raw));
+            prop_assert_eq!(range.is_end(nearest), nearest != 0 && !allowed.contains(&(i32::from(nearest) + i32::from(nearest.signum()))));
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What is looked at in one motor a tick.
+
+use super::target::Action;
+use super::{Slot, age};
+use crate::dji::Facts;
+use crate::dji::command::to_raw;
+use crate::dji::range::Range;
+use crate::encoder::{Homing, Position};
+use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample};
+use crate::time::Duration;
+use crate::units::Angle;
+
+/// Inside of a soft limit by this much the motor is no longer at it.
+const CLEAR_RAD: f32 = 0.01;
+
+/// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
+const CALM_CURRENT: u16 = 2_000;
+
+/// The temperature byte that stands for -40 °C.
+const FIRST_BELOW_ZERO: u8 = 216;
+
+/// A motor with one of these is not armed.
+const OBSTACLES: Conditions = Conditions::NONE.with(Condition::Fault).with(Condition::DuplicateId);
+
+/// What a look at a motor has to know of its bus.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::dji) struct Look {
+    pub(in crate::dji) now: u32,
+    /// Time since the look before, in units of 1.024 ms.
+    pub(in crate::dji) elapsed: u8,
+    /// The command that was sent.
+    pub(in crate::dji) word: i16,
+    /// Its length in units of 1.024 ms, when a window in which frames are counted ends.
+    pub(in crate::dji) window: Option<u16>,
+    pub(in crate::dji) feedback_hz: u32,
+    /// Nobody else sends commands any more.
+    pub(in crate::dji) is_alone: bool,
+}
+
+impl Slot {
+    /// Tells at a glance whether all is well, as it is nearly always: online, cool, turning, moderately driven, nothing
+    /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
+    #[inline]
+    pub(in crate::dji) fn is_well(&mut self, word: i16) -> bool {
+        let (feedback, driven) = (self.feedback, word.unsigned_abs());
+        let Some(facts) = self.facts else { return true };
+        let is_calm = driven < self.calm_word
+            && (feedback.current().unsigned_abs() < CALM_CURRENT || driven > self.calm_word / 4)
+            && feedback.rpm().unsigned_abs() <= facts.rotor_no_load_rpm();
+        is_calm
+            && self.conditions.active().is_empty()
+            && self.link == Link::Online
+            && !self.is_ramping
+            && feedback.error() | self.error_code == 0
+            && feedback.temperature() < self.cool_below
+            && self.monitor.glance(feedback.angle(), coarse(word))
+    }
+
+    /// Returns below which command and which temperature a motor need not be looked at closely.
+    pub(super) const fn calm(facts: &Facts, health: &HealthConfig, full_limit: i16) -> (u16, u8) {
+        if health.soft_limits().is_some() {
+            return (0, 0);
+        }
+        // A stall, and half of the command for a runaway.
+        let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
+        let word = to_raw(effort, full_limit as f32, full_limit).unsigned_abs();
+        let (warning, _) = temperatures(facts, health);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 216")]
+        let cool_below = if !facts.has_temperature || warning > FIRST_BELOW_ZERO as i16 {
+            FIRST_BELOW_ZERO
+        } else if warning < 0 {
+            0
+        } else {
+            warning as u8
+        };
+        (word, cool_below)
+    }
+
+    /// Looks at everything that need not be looked at in every tick.
+    pub(in crate::dji) fn check(&mut self, look: &Look) {
+        let Some(facts) = self.facts else { return };
+        let before = self.conditions.active();
+        if let Some(window) = look.window {
+            self.close_window(window, look.feedback_hz);
+        }
+        if !before.is_empty() {
+            self.end_what_is_over(look);
+        }
+        if self.link == Link::Online {
+            let share = self.examine(facts, look);
+            self.narrow(share, look.elapsed, look.now);
+        } else {
+            self.monitor = Monitor::NEW;
+        }
+        if !self.conditions.active().is_empty() {
+            self.react(before);
+        }
+    }
+
+    fn examine(&mut self, facts: &Facts, look: &Look) -> f32 {
+        let feedback = self.feedback;
+        let code = feedback.error();
+        if code | self.error_code != 0 {
+            let changed = code != self.error_code;
+            self.error_code = code;
+            self.conditions.report(facts.errors.severity(code), changed, self.health);
+        }
+        let at_limit = look.word != 0 && self.range.is_end(look.word);
+        self.saturated = self.saturated.saturating_add(u16::from(at_limit));
+        let sample = Sample {
+            elapsed: look.elapsed,
+            fresh: age(look.now, self.heard) <= u32::from(look.elapsed) << 10,
+            effort: f32::from(look.word) / f32::from(self.full_limit),
+            speed: f32::from(feedback.rpm()) / f32::from(facts.rotor_no_load_rpm()),
+            current: f32::from(feedback.current()) / f32::from(facts.current_raw),
+            word: coarse(look.word),
+            // A fifth of the motor's limit.
+            word_change: (coarse(self.full_limit) / 5).max(1).unsigned_abs(),
+            angle: feedback.angle(),
+            rest: mixed(feedback.current().cast_unsigned(), feedback.rpm().cast_unsigned()),
+            temperature: facts
+                .has_temperature
+                .then(|| (celsius(feedback.temperature()), temperatures(facts, self.health))),
+        };
+        self.monitor.look(&mut self.conditions, &sample, self.health)
+    }
+
+    /// Narrows the output to the share that is left, in the directions that are left.
+    fn narrow(&mut self, share: f32, elapsed: u8, now: u32) {
+        let share = share.min(self.ramp(now));
+        let limit = to_raw(share, f32::from(self.full_limit), self.full_limit);
+        self.range = Range::within(limit);
+        self.keep_inside(elapsed);
+        if self.range != Range::within(self.full_limit) {
+            self.hold_back();
+        }
+    }
+
+    /// Takes the outward direction away at a soft limit. `ahead` is how far to look, in units of 1.024 ms.
+    pub(super) fn keep_inside(&mut self, ahead: u8) {
+        let (up_only, down_only) = self.soft_limits(ahead);
+        let upward = self.raw_per_unit > 0.0;
+        let (positive_only, negative_only) =
+            if upward { (up_only, down_only) } else { (down_only, up_only) };
+        if positive_only {
+            self.range = self.range.without_negative();
+        }
+        if negative_only {
+            self.range = self.range.without_positive();
+        }
+    }
+
+    /// Returns whether the shaft may turn up only, and whether down only.
+    fn soft_limits(&mut self, ahead: u8) -> (bool, bool) {
+        let Some((lower, upper)) = self.health.soft_limits() else { return (false, false) };
+        if self.homing == Homing::Relative {
+            self.conditions.set(Condition::SoftLimit, false);
+            return (false, false);
+        }
+        let here = self.shaft.position().as_angle().as_radians();
+        // Where it is when it is looked at next.
+        let there = here + self.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
+        let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
+        let lingers = self.conditions.has(Condition::SoftLimit)
+            && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
+        self.conditions.set(Condition::SoftLimit, below || above || lingers);
+        (below, above)
+    }
+
+    /// Returns the nearest position that is within the soft limits.
+    pub(super) fn inside(&self, position: Position) -> Position {
+        let Some((lower, upper)) = self.health.soft_limits() else { return position };
+        let radians = position.as_angle().as_radians();
+        if radians < lower {
+            Position::from_angle(Angle::from_radians(lower))
+        } else if radians > upper {
+            Position::from_angle(Angle::from_radians(upper))
+        } else {
+            position
+        }
+    }
+
+    fn end_what_is_over(&mut self, look: &Look) {
+        if self.asked != Action::Rest {
+            self.conditions.set(Condition::CommandLost, false);
+        }
+        if look.is_alone {
+            self.conditions.set(Condition::SecondMaster, false);
+        }
+    }
+
+    fn close_window(&mut self, window: u16, feedback_hz: u32) {
+        let was_crowded = self.traffic.is_crowded();
+        let double = self.traffic.is_double();
+        self.traffic.close(window, feedback_hz);
+        if self.traffic.is_crowded() {
+            // Every frame is compared from now on.
+            self.trusted_gap_us = 0;
+        }
+        if was_crowded && !double {
+            self.conditions.set(Condition::DuplicateId, false);
+        }
+    }
+
+    /// Relaxes the motor when something began, or still holds, for which it has to be.
+    pub(super) fn react(&mut self, before: Conditions) {
+        let active = self.conditions.active();
+        let begun = active.minus(before).and(self.health.relaxing());
+        if !begun.is_empty() || self.is_faulty() {
+            self.trip();
+        }
+    }
+
+    /// Another node has sent the motor's command frame.
+    pub(in crate::dji) fn hear_rival(&mut self) {
+        if !self.health.ignores(Condition::SecondMaster) {
+            let before = self.conditions.active();
+            self.conditions.set(Condition::SecondMaster, true);
+            self.react(before);
+        }
+    }
+
+    /// Returns how the motor is.
+    pub(in crate::dji) fn health(&self) -> Option<Health> {
+        let facts = self.facts?;
+        let heard = self.link != Link::Unheard;
+        let celsius = celsius(self.feedback.temperature());
+        Some(Health {
+            motor: self.name()?,
+            link: self.link,
+            armed: self.is_armed(),
+            conditions: self.conditions.active(),
+            feedback_hz: self.traffic.rate_hz(),
+            longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
+            temperature_c: (heard && facts.has_temperature).then_some(celsius),
+            error_code: self.feedback.error(),
+            saturated: self.saturated,
+            refused_targets: self.refused_targets,
+            forgotten_targets: self.forgotten_targets,
+            ambiguous_gaps: self.ambiguous_gaps,
+        })
+    }
+
+    /// Tells whether the motor must not be armed.
+    pub(in crate::dji) fn is_faulty(&self) -> bool {
+        !self.conditions.active().and(OBSTACLES).and(self.health.relaxing()).is_empty()
+    }
+}
+
+/// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).
+const fn mixed(one: u16, other: u16) -> u16 {
+    one.wrapping_mul(0x9E37) ^ other.wrapping_mul(0x79B9)
+}
+
+/// A command in units of 256.
+const fn coarse(word: i16) -> i8 {
+    let [high, _] = word.to_be_bytes();
+    high.cast_signed()
+}
+
+/// Returns from which temperature on the motor is warm, and from which on it is hot.
+const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
+    match health.temperatures_c() {
+        Some(temperatures) => temperatures,
+        None => facts.temperatures_c,
+    }
+}
+
+/// The byte is signed in some drivers and unsigned in others: -40 to -1 is meant rather than 216 to 255.
+fn celsius(byte: u8) -> i16 {
+    if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
+}

@@ -1,0 +1,241 @@
+use super::{Condition, Conditions};
+use crate::time::Duration;
+use crate::units::Angle;
+
+/// What follows when a condition begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reaction {
+    /// Nothing: it is not looked for.
+    Ignore,
+    /// An [`Edge`](super::Edge).
+    Report,
+    /// An edge, and zero output with the loops reset until the motor is armed again.
+    Relax,
+}
+
+/// What is looked for in a motor, and what follows from it.
+///
+/// A motor keeps a reference to it, so it stands in a `static` or a `const`, one for all motors that are alike.
+///
+/// | looked for | at first |
+/// |---|---|
+/// | heat | the temperatures of the model: less output from the warning on, none from the limit on |
+/// | stall | half of the full command and more, at 2 % of the no-load speed and less, for 0.5 s: reported |
+/// | runaway | 30 % of the no-load speed gained against half of the full command: relaxed |
+/// | frozen feedback | 0.1 s of it: reported |
+/// | speed beyond twice that without load | reported |
+/// | faults of the ESC, two motors with one id | relaxed |
+/// | warnings of the ESC, a second master | reported |
+/// | soft limits | none |
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Condition, HealthConfig, Reaction};
+/// use drivetrain::units::Angle;
+///
+/// static FEEDER: HealthConfig = HealthConfig::new()
+///     .with_stall_hold(0.2)
+///     .with_temperatures(70, 90);
+/// static PITCH: HealthConfig = HealthConfig::new()
+///     .with_soft_limits(Angle::from_degrees(-20.0), Angle::from_degrees(35.0))
+///     .with_reaction(Condition::Stalled, Reaction::Relax);
+/// assert_eq!(FEEDER.validate(), Ok(()));
+/// assert_eq!(PITCH.with_temperatures(90, 70).validate(), Err("health temperatures"));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HealthConfig {
+    ignored: Conditions,
+    relaxing: Conditions,
+    temperatures_c: Option<(i16, i16)>,
+    stall_effort: f32,
+    stall_speed: f32,
+    stall_window: u16,
+    stall_hold: f32,
+    soft_limits: Option<(f32, f32)>,
+}
+
+impl HealthConfig {
+    /// Looks for everything, as in the table above.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            ignored: Conditions::NONE,
+            relaxing: Conditions::NONE
+                .with(Condition::Fault)
+                .with(Condition::Runaway)
+                .with(Condition::DuplicateId),
+            temperatures_c: None,
+            stall_effort: 0.5,
+            stall_speed: 0.02,
+            stall_window: units(500_000),
+            stall_hold: 1.0,
+            soft_limits: None,
+        }
+    }
+
+    /// Sets what follows when a condition begins.
+    ///
+    /// Feedback that is late or lost, targets that are too old and soft limits have their own rules; for them, and for
+    /// [`Condition::PositionUncertain`], this has no effect. [`Condition::Warm`] ignored is no derating,
+    /// [`Condition::Hot`] ignored is no limit.
+    #[must_use]
+    pub const fn with_reaction(mut self, condition: Condition, reaction: Reaction) -> Self {
+        self.ignored = self.ignored.without(condition);
+        self.relaxing = self.relaxing.without(condition);
+        match reaction {
+            Reaction::Ignore => self.ignored = self.ignored.with(condition),
+            Reaction::Report => {}
+            Reaction::Relax => self.relaxing = self.relaxing.with(condition),
+        }
+        self
+    }
+
+    /// Sets from which temperature on the output falls, and at which it is zero, in °C; both end 5 K lower. Instead of
+    /// those of the model; a motor that reports no temperature has none.
+    #[must_use]
+    pub const fn with_temperatures(self, warning_c: i16, limit_c: i16) -> Self {
+        Self { temperatures_c: Some((warning_c, limit_c)), ..self }
+    }
+
+    /// Sets what counts as a stall: at least this share of the full command and at most this share of the no-load speed,
+    /// for this time of up to 60 s.
+    #[must_use]
+    pub const fn with_stall(self, effort: f32, speed: f32, window: Duration) -> Self {
+        let window = match window.micros_u32() {
+            Some(micros) if micros <= 60_000_000 => units(micros),
+            _ => units(60_000_000),
+        };
+        Self { stall_effort: effort, stall_speed: speed, stall_window: window, ..self }
+    }
+
+    /// Limits the output while the motor is stalled, to this share of the full command: 0 to 1; 1 at first. It is full
+    /// again when the motor turns, or when less than half of that is asked for.
+    #[must_use]
+    pub const fn with_stall_hold(self, share: f32) -> Self {
+        Self { stall_hold: share, ..self }
+    }
+
+    /// Sets within which positions of the output shaft the motor may be driven outward. They count turns: a limit of
+    /// 720° lies two turns from zero.
+    ///
+    /// Outside it is driven inward only, also when it starts there; at speed, a little before. Without effect as long as
+    /// the absolute position is unknown: for a geared motor, until it is set.
+    #[must_use]
+    pub const fn with_soft_limits(self, lower: Angle, upper: Angle) -> Self {
+        Self { soft_limits: Some((lower.as_radians(), upper.as_radians())), ..self }
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// Names the first that makes no sense.
+    pub const fn validate(&self) -> Result<(), &'static str> {
+        if let Some((warning, limit)) = self.temperatures_c {
+            if warning >= limit {
+                return Err("health temperatures");
+            }
+        }
+        if !(self.stall_effort > 0.0 && self.stall_effort <= 1.0) {
+            return Err("stall effort");
+        }
+        if !(self.stall_speed > 0.0 && self.stall_speed <= 1.0) {
+            return Err("stall speed");
+        }
+        if !(self.stall_hold >= 0.0 && self.stall_hold <= 1.0) {
+            return Err("stall hold");
+        }
+        if let Some((lower, upper)) = self.soft_limits {
+            // A million turns is where f32 loses the angle.
+            if !(lower < upper && lower > -6e6 && upper < 6e6) {
+                return Err("soft limits");
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) const fn ignores(&self, condition: Condition) -> bool {
+        self.ignored.contains(condition)
+    }
+
+    pub(crate) const fn relaxing(&self) -> Conditions {
+        self.relaxing
+    }
+
+    pub(crate) const fn temperatures_c(&self) -> Option<(i16, i16)> {
+        self.temperatures_c
+    }
+
+    /// Radians of the output shaft.
+    pub(crate) const fn soft_limits(&self) -> Option<(f32, f32)> {
+        self.soft_limits
+    }
+
+    pub(crate) const fn stall_effort(&self) -> f32 {
+        self.stall_effort
+    }
+
+    pub(super) const fn stall_speed(&self) -> f32 {
+        self.stall_speed
+    }
+
+    pub(super) const fn stall_window(&self) -> u16 {
+        self.stall_window
+    }
+
+    pub(super) const fn stall_hold(&self) -> f32 {
+        self.stall_hold
+    }
+}
+
+impl Default for HealthConfig {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Times of the checks are in units of 1.024 ms.
+#[expect(clippy::cast_possible_truncation, reason = "60 s at most")]
+const fn units(micros: u32) -> u16 {
+    (micros >> 10) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_makes_no_sense_is_named() {
+        let config = HealthConfig::new;
+        let angle = Angle::from_degrees;
+        let window = Duration::from_millis(100);
+        for (config, name) in [
+            (config().with_temperatures(80, 80), "health temperatures"),
+            (config().with_stall(0.0, 0.1, window), "stall effort"),
+            (config().with_stall(1.1, 0.1, window), "stall effort"),
+            (config().with_stall(f32::NAN, 0.1, window), "stall effort"),
+            (config().with_stall(0.5, -0.1, window), "stall speed"),
+            (config().with_stall(0.5, f32::NAN, window), "stall speed"),
+            (config().with_stall_hold(1.5), "stall hold"),
+            (config().with_stall_hold(f32::NAN), "stall hold"),
+            (config().with_soft_limits(angle(10.0), angle(10.0)), "soft limits"),
+            (config().with_soft_limits(angle(f32::NAN), angle(10.0)), "soft limits"),
+            (config().with_soft_limits(angle(0.0), angle(f32::INFINITY)), "soft limits"),
+        ] {
+            assert_eq!(config.validate(), Err(name));
+        }
+        assert_eq!(config().validate(), Ok(()));
+        assert_eq!(config().with_stall(1.0, 0.5, Duration::MAX).validate(), Ok(()));
+    }
+
+    #[test]
+    fn the_last_reaction_counts() {
+        let stalled = Condition::Stalled;
+        let config = HealthConfig::new().with_reaction(stalled, Reaction::Relax);
+        assert!(config.relaxing().contains(stalled));
+        let config = config.with_reaction(stalled, Reaction::Ignore);
+        assert!(!config.relaxing().contains(stalled) && config.ignores(stalled));
+        let config = config.with_reaction(stalled, Reaction::Report);
+        assert!(!config.ignores(stalled));
+    }
+}

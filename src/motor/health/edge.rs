@@ -1,0 +1,363 @@
+use super::{Condition, Conditions, HealthConfig};
+use crate::motor::{MotorName, Severity};
+use crate::time::Instant;
+
+/// One change of a condition of one motor.
+///
+/// Latched until it is read, so none is lost; and as long as it waits, the same change is not noted again, so that an
+/// error that comes and goes at 1 kHz is one edge. It is read once.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Condition, Edge, MotorName};
+/// use drivetrain::time::Instant;
+///
+/// let motor = MotorName::new("M3508", 2);
+/// let edge = Edge { motor, condition: Condition::Late, began: true, at: Instant::from_micros(11_264) };
+/// assert_eq!(edge.to_string(), "M3508 #2: late began at 11264 us");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Edge {
+    /// The motor.
+    pub motor: MotorName,
+    /// What changed.
+    pub condition: Condition,
+    /// Whether it began; otherwise it ended.
+    pub began: bool,
+    /// When it was noticed, rounded down to 1.024 ms. Where more edges wait than the owner of the motor keeps times of
+    /// (12 for a [`Bus`](crate::dji::Bus)), the later ones have the time of the last that was kept: they came after it.
+    pub at: Instant,
+}
+
+impl core::fmt::Display for Edge {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let phase = if self.began { "began" } else { "ended" };
+        write!(f, "{}: {} {phase} at {} us", self.motor, self.condition, self.at.as_micros())
+    }
+}
+
+/// The conditions of a motor, and which of their changes wait to be read.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Latch {
+    active: Conditions,
+    began: Conditions,
+    ended: Conditions,
+}
+
+impl Latch {
+    pub(crate) const NONE: Self =
+        Self { active: Conditions::NONE, began: Conditions::NONE, ended: Conditions::NONE };
+
+    /// Returns what holds now.
+    pub(crate) const fn active(&self) -> Conditions {
+        self.active
+    }
+
+    pub(crate) const fn has(&self, condition: Condition) -> bool {
+        self.active.contains(condition)
+    }
+
+    /// Says whether a condition holds now; a change waits to be read.
+    pub(crate) const fn set(&mut self, condition: Condition, holds: bool) {
+        if self.active.contains(condition) == holds {
+            return;
+        }
+        if holds {
+            self.active = self.active.with(condition);
+            self.began = self.began.with(condition);
+        } else {
+            self.active = self.active.without(condition);
+            self.ended = self.ended.with(condition);
+        }
+    }
+
+    /// Says what an ESC reports now; another code of the same weight begins once more.
+    pub(crate) fn report(&mut self, error: Option<Severity>, changed: bool, config: &HealthConfig) {
+        for (condition, severity) in
+            [(Condition::Warning, Severity::Warning), (Condition::Fault, Severity::Fault)]
+        {
+            let holds = error == Some(severity) && !config.ignores(condition);
+            self.set(condition, holds);
+            if holds && changed {
+                self.began = self.began.with(condition);
+            }
+        }
+    }
+
+    /// Forgets a change that waits; `false` when it does not wait.
+    pub(crate) const fn take(&mut self, condition: Condition, began: bool) -> bool {
+        let waiting = if began { &mut self.began } else { &mut self.ended };
+        let waits = waiting.contains(condition);
+        *waiting = waiting.without(condition);
+        waits
+    }
+
+    /// Returns a change that waits. Of a condition that began and ended, the earlier one comes first.
+    pub(crate) fn next(&self) -> Option<(Condition, bool)> {
+        if self.began.is_empty() && self.ended.is_empty() {
+            return None;
+        }
+        let waits = |condition: &Condition| {
+            self.began.contains(*condition) || self.ended.contains(*condition)
+        };
+        let condition = Condition::ALL.into_iter().find(waits)?;
+        let both = self.began.contains(condition) && self.ended.contains(condition);
+        let began = if both { !self.has(condition) } else { self.began.contains(condition) };
+        Some((condition, began))
+    }
+
+    /// Returns the changes that wait now and did not before.
+    pub(crate) fn news(&self, before: &Self) -> impl Iterator<Item = (Condition, bool)> + use<> {
+        let began = self.began.minus(before.began).iter().map(|condition| (condition, true));
+        let ended = self.ended.minus(before.ended).iter().map(|condition| (condition, false));
+        began.chain(ended)
+    }
+}
+
+/// The times of the changes that wait, in the order in which they came, as long as there is room.
+///
+/// A change whose time found no room stays latched: only its time is lost.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Journal<const N: usize> {
+    at: [u32; N],
+    /// Which motor, which condition, whether it began.
+    what: [u16; N],
+    first: u8,
+    length: u8,
+    /// The time of the entry that was written last.
+    last: u32,
+}
+
+/// An entry of a [`Journal`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Entry {
+    pub(crate) motor: u8,
+    pub(crate) condition: Condition,
+    pub(crate) began: bool,
+    at: u32,
+}
+
+impl<const N: usize> Journal<N> {
+    pub(crate) const EMPTY: Self = Self { at: [0; N], what: [0; N], first: 0, length: 0, last: 0 };
+
+    /// Notes the changes of a motor since `before`.
+    #[inline]
+    pub(crate) fn note(&mut self, motor: u8, before: &Latch, after: &Latch, now: Instant) {
+        if before != after {
+            self.note_changes(motor, before, after, now);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_changes(&mut self, motor: u8, before: &Latch, after: &Latch, now: Instant) {
+        for (condition, began) in after.news(before) {
+            self.push(motor, condition, began, coarse(now));
+        }
+    }
+
+    fn push(&mut self, motor: u8, condition: Condition, began: bool, at: u32) {
+        let index = self.index(self.length);
+        if usize::from(self.length) >= N {
+            return;
+        }
+        if let (Some(time), Some(what)) = (self.at.get_mut(index), self.what.get_mut(index)) {
+            *time = at;
+            *what = u16::from(motor) << 8 | (condition as u16) << 1 | u16::from(began);
+            self.length += 1;
+            self.last = at;
+        }
+    }
+
+    /// Takes the oldest entry.
+    pub(crate) fn pop(&mut self) -> Option<Entry> {
+        if self.length == 0 {
+            return None;
+        }
+        let index = usize::from(self.first);
+        let (at, what) = (*self.at.get(index)?, *self.what.get(index)?);
+        self.first = u8::try_from(self.index(1)).unwrap_or(0);
+        self.length -= 1;
+        let [motor, rest] = what.to_be_bytes();
+        let condition = *Condition::ALL.get(usize::from(rest >> 1))?;
+        Some(Entry { motor, condition, began: rest & 1 != 0, at })
+    }
+
+    /// Forgets the entries of a motor that is no longer there.
+    pub(crate) fn forget(&mut self, motor: u8) {
+        for what in &mut self.what {
+            if *what >> 8 == u16::from(motor) {
+                *what |= 0xFF00;
+            }
+        }
+    }
+
+    /// Returns the time of an entry, seen from a `now` that may lie a little before it: exact to 1.024 ms, up to an age
+    /// of 25 days.
+    pub(crate) fn time_of(&self, entry: &Entry, now: Instant) -> Instant {
+        fine(entry.at, now)
+    }
+
+    /// Returns the time of the last entry: what found no room came after it.
+    pub(crate) fn last_time(&self, now: Instant) -> Instant {
+        fine(self.last, now)
+    }
+
+    /// Returns the place `ahead` of the oldest entry.
+    fn index(&self, ahead: u8) -> usize {
+        let index = usize::from(self.first) + usize::from(ahead);
+        if index >= N { index - N } else { index }
+    }
+}
+
+/// 1024 µs: a shift, where milliseconds would need a division of 64 bits.
+#[expect(clippy::cast_possible_truncation, reason = "ages are told by wrapping difference")]
+const fn coarse(now: Instant) -> u32 {
+    (now.as_micros() >> 10) as u32
+}
+
+fn fine(at: u32, now: Instant) -> Instant {
+    let age = i64::from(coarse(now).wrapping_sub(at).cast_signed()) << 10;
+    let rounded = now.as_micros() & !1023;
+    Instant::from_micros(rounded.saturating_add_signed(-age))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+    use std::vec::Vec;
+
+    const NOW: Instant = Instant::from_micros(5_000_000);
+
+    #[test]
+    fn a_change_waits_once_however_often_it_comes() {
+        let mut latch = Latch::NONE;
+        for _ in 0..1_000 {
+            latch.set(Condition::Fault, true);
+            latch.set(Condition::Fault, false);
+        }
+        assert_eq!(latch.next(), Some((Condition::Fault, true)));
+        assert!(latch.take(Condition::Fault, true) && !latch.take(Condition::Fault, true));
+        assert_eq!(latch.next(), Some((Condition::Fault, false)));
+        assert!(latch.take(Condition::Fault, false));
+        assert_eq!((latch.next(), latch.active()), (None, Conditions::NONE));
+    }
+
+    #[test]
+    fn what_ended_and_began_again_is_read_in_that_order() {
+        let mut latch = Latch::NONE;
+        latch.set(Condition::Late, true);
+        assert!(latch.take(Condition::Late, true));
+        latch.set(Condition::Late, false);
+        latch.set(Condition::Late, true);
+        assert_eq!(latch.next(), Some((Condition::Late, false)));
+        latch.take(Condition::Late, false);
+        assert_eq!(latch.next(), Some((Condition::Late, true)));
+    }
+
+    #[test]
+    fn the_journal_keeps_the_order_and_the_times_that_it_has_room_for() {
+        let mut journal = Journal::<4>::EMPTY;
+        for (millis, condition) in (0..).zip(Condition::ALL) {
+            let mut after = Latch::NONE;
+            after.set(condition, true);
+            journal.note(
+                7,
+                &Latch::NONE,
+                &after,
+                Instant::from_micros(1_000_000 + millis * 10_000),
+            );
+        }
+        for (millis, expected) in (0..4_u64).zip(Condition::ALL) {
+            let entry = journal.pop().unwrap();
+            assert_eq!((entry.motor, entry.began), (7, true));
+            assert_eq!(entry.condition, expected);
+            let off = Instant::from_micros(1_000_000 + millis * 10_000)
+                .since(journal.time_of(&entry, NOW));
+            assert!(off < Duration::from_micros(1_024));
+        }
+        assert_eq!(journal.pop(), None);
+        let last = journal.last_time(NOW).as_micros();
+        assert!((1_028_000..=1_030_000).contains(&last), "{last}");
+    }
+
+    #[test]
+    fn a_time_of_24_days_ago_is_still_told_and_one_that_lies_ahead_is_too() {
+        let mut journal = Journal::<1>::EMPTY;
+        let mut after = Latch::NONE;
+        after.set(Condition::Hot, true);
+        let start = Instant::from_micros(1 << 40);
+        journal.note(0, &Latch::NONE, &after, start);
+        let entry = journal.pop().unwrap();
+        for later in
+            [start + Duration::from_secs(24 * 86_400), Instant::from_micros((1 << 40) - 900)]
+        {
+            assert_eq!(journal.time_of(&entry, later), start);
+        }
+    }
+
+    #[test]
+    fn what_a_motor_left_behind_is_no_other_motors() {
+        let mut journal = Journal::<4>::EMPTY;
+        let mut after = Latch::NONE;
+        after.set(Condition::Hot, true);
+        journal.note(1, &Latch::NONE, &after, NOW);
+        journal.note(2, &Latch::NONE, &after, NOW);
+        journal.forget(1);
+        assert_eq!(
+            [journal.pop(), journal.pop()].map(|e| e.map(|e| e.motor)),
+            [Some(255), Some(2)]
+        );
+    }
+
+    proptest! {
+        /// Law: whatever changes and whenever it is read, each kind of change that happened since it was last read is
+        /// read exactly once more, the states that are told follow from the edges, and no edge waits when all are read.
+        #[test]
+        fn no_change_is_lost_and_none_is_told_twice(
+            steps in proptest::collection::vec((0_usize..3, 0_usize..4, any::<bool>(), 0_u8..6), 1..300),
+        ) {
+            let mut latches = [Latch::NONE; 3];
+            let mut journal = Journal::<4>::EMPTY;
+            let mut expected = BTreeSet::new();
+            let mut told: Vec<(usize, usize, bool)> = Vec::new();
+            let read = |latches: &mut [Latch; 3], journal: &mut Journal<4>| {
+                while let Some(entry) = journal.pop() {
+                    let motor = usize::from(entry.motor);
+                    if latches[motor].take(entry.condition, entry.began) {
+                        return Some((motor, entry.condition as usize, entry.began));
+                    }
+                }
+                let motor = latches.iter().position(|latch| latch.next().is_some())?;
+                let (condition, began) = latches[motor].next()?;
+                latches[motor].take(condition, began);
+                Some((motor, condition as usize, began))
+            };
+            for (motor, condition, holds, reads) in steps {
+                let before = latches[motor];
+                let kind = Condition::ALL[condition];
+                latches[motor].set(kind, holds);
+                if before.has(kind) != holds {
+                    expected.insert((motor, condition, holds));
+                }
+                journal.note(u8::try_from(motor).unwrap(), &before, &latches[motor], NOW);
+                for _ in 0..reads {
+                    if let Some(edge) = read(&mut latches, &mut journal) {
+                        prop_assert!(expected.remove(&edge), "{edge:?} was told before");
+                        told.push(edge);
+                    }
+                }
+            }
+            while let Some(edge) = read(&mut latches, &mut journal) {
+                prop_assert!(expected.remove(&edge), "{edge:?} was told before");
+                told.push(edge);
+            }
+            prop_assert!(expected.is_empty(), "lost: {expected:?}");
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! A motor of one's own is watched with the same checks as the others, as far as it tells what it knows.
+
+#![cfg(test)]
+
+use drivetrain::control::TimeStep;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{
+    ArmError, CanDevice, Condition, HealthConfig, Ingest, Malformed, MotorName, Own, OwnMotor,
+    Reaction, Severity, TargetError, VelocityDrive, Vitals,
+};
+use drivetrain::time::{Instant, Tick};
+use drivetrain::units::AngularVelocity;
+use embedded_can::{Frame, Id, StandardId};
+
+/// Reports what the last frame said: temperature, error code, effort and speed in percent.
+struct Talker {
+    vitals: Vitals,
+    share: f32,
+}
+
+fn id(raw: u16) -> Id {
+    StandardId::new(raw).unwrap().into()
+}
+
+impl OwnMotor for Talker {
+    fn name(&self) -> MotorName {
+        MotorName::new("talker", 1)
+    }
+    fn command_id(&self) -> Id {
+        id(0x123)
+    }
+    fn feedback_id(&self) -> Id {
+        id(0x124)
+    }
+    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+        let [celsius, code, effort, speed] = *frame.data() else {
+            return Err(Malformed::Length(frame.length()));
+        };
+        self.vitals = Vitals {
+            temperature_c: Some(celsius.into()),
+            error: match code {
+                0 => None,
+                1..10 => Some(Severity::Warning),
+                _ => Some(Severity::Fault),
+            },
+            error_code: code,
+            effort: f32::from(effort.cast_signed()) / 100.0,
+            speed: f32::from(speed.cast_signed()) / 100.0,
+            current: 0.0,
+        };
+        Ok(())
+    }
+    fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::ZERO
+    }
+    fn control(&mut self, _: AngularVelocity, _: &TimeStep) -> [u8; 8] {
+        [100; 8]
+    }
+    fn reset(&mut self) {}
+    fn vitals(&self) -> Vitals {
+        self.vitals
+    }
+    fn limit(&mut self, share: f32) {
+        self.share = share;
+    }
+}
+
+struct Bench {
+    own: Own<Talker>,
+    ms: u64,
+}
+
+impl Bench {
+    fn new(config: &'static HealthConfig) -> Self {
+        let talker = Talker { vitals: Vitals::default(), share: 1.0 };
+        let mut bench = Self { own: Own::new(talker).with_health(config).unwrap(), ms: 0 };
+        bench.step([30, 0, 0, 0]);
+        bench.own.arm(bench.now()).unwrap();
+        bench
+    }
+
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.ms * 1_000)
+    }
+
+    /// A millisecond with this feedback; whether the command that follows drives.
+    fn step(&mut self, feedback: [u8; 4]) -> bool {
+        self.ms += 1;
+        let frame = CanFrame::new(id(0x124), &feedback).unwrap();
+        assert_eq!(self.own.ingest(&frame, self.now()), Ingest::Taken);
+        _ = self.own.set_velocity((), AngularVelocity::from_rad_per_s(1.0));
+        self.own.update(Tick::new(self.now(), 0.001));
+        self.own.next_frame(0).is_some_and(|frame| *frame.bytes() != [0; 8])
+    }
+
+    /// Until a temperature has been looked at.
+    fn wait(&mut self, celsius: u8) {
+        for _ in 0..8 {
+            self.step([celsius, 0, 0, 0]);
+        }
+    }
+
+    fn edges(&mut self) -> Vec<(Condition, bool)> {
+        std::iter::from_fn(|| self.own.next_edge())
+            .map(|edge| (edge.condition, edge.began))
+            .collect()
+    }
+}
+
+static USUAL: HealthConfig = HealthConfig::new().with_temperatures(80, 100);
+
+#[test]
+fn heat_takes_output_away_and_then_all_of_it() {
+    let mut bench = Bench::new(&USUAL);
+    for (celsius, drives, share) in [(79, true, 1.0), (90, true, 0.5), (100, false, 0.0)] {
+        bench.wait(celsius);
+        assert_eq!(bench.step([celsius, 0, 0, 0]), drives, "{celsius}");
+        assert!((bench.own.motor().share - share).abs() < 1e-6, "{celsius}");
+    }
+    bench.wait(95);
+    assert!(!bench.step([95, 0, 0, 0]), "hysteresis");
+    bench.wait(94);
+    assert!(bench.step([94, 0, 0, 0]));
+    let edges = bench.edges();
+    let expected = [(Condition::Warm, true), (Condition::Hot, true), (Condition::Hot, false)];
+    assert_eq!(edges, expected);
+}
+
+#[test]
+fn a_fault_relaxes_until_it_is_gone_and_armed_and_a_warning_does_not() {
+    let mut bench = Bench::new(&USUAL);
+    assert!(bench.step([30, 3, 0, 0]) && bench.step([30, 0, 0, 0]));
+    assert_eq!(bench.edges(), [(Condition::Warning, true), (Condition::Warning, false)]);
+    assert!(!bench.step([30, 10, 0, 0]) && !bench.step([30, 11, 0, 0]));
+    assert!(matches!(bench.own.arm(bench.now()), Err(ArmError::Faulty(_))));
+    assert!(!bench.step([30, 0, 0, 0]), "latched");
+    assert_eq!(bench.own.set_velocity((), AngularVelocity::ZERO), Err(TargetError::Relaxed));
+    assert_eq!(bench.own.arm(bench.now()), Ok(()));
+    assert!(bench.step([30, 0, 0, 0]));
+    let edges = bench.edges();
+    assert_eq!(edges, [(Condition::Fault, true), (Condition::Fault, false)]);
+}
+
+#[test]
+fn a_stall_is_reported_or_relaxes() {
+    static RELAX: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
+    for (config, relaxes) in [(&USUAL, false), (&RELAX, true)] {
+        let mut bench = Bench::new(config);
+        let driven = (0..600).filter(|_| bench.step([30, 0, 90, 1])).count();
+        assert_eq!(driven < 600, relaxes, "{driven}");
+        assert_eq!(bench.edges(), [(Condition::Stalled, true)]);
+    }
+}
+
+#[test]
+fn a_second_master_refuses_arming_names_the_frame_and_is_forgotten() {
+    let mut bench = Bench::new(&USUAL);
+    let rival = CanFrame::new(id(0x123), &[7; 8]).unwrap();
+    assert_eq!(bench.own.ingest(&rival, bench.now()), Ingest::Unrelated);
+    assert!(bench.step([30, 0, 0, 0]), "reported only");
+    assert_eq!(bench.edges(), [(Condition::SecondMaster, true)]);
+    bench.own.disarm();
+    let refused = bench.own.arm(bench.now()).map_err(|error| error.to_string());
+    assert_eq!(refused, Err("another node sends the command of talker #1 on 0x123".into()));
+    for _ in 0..1_001 {
+        bench.step([30, 0, 0, 0]);
+    }
+    assert_eq!(bench.edges(), [(Condition::SecondMaster, false)]);
+    assert_eq!(bench.own.arm(bench.now()), Ok(()));
+}
+
+#[test]
+fn silence_is_an_edge_and_health_fits_a_line() {
+    let mut bench = Bench::new(&USUAL);
+    for _ in 0..2_500 {
+        bench.step([30, 0, 0, 0]);
+    }
+    assert_eq!(bench.edges(), []);
+    for _ in 0..110 {
+        bench.ms += 1;
+        bench.own.update(Tick::new(bench.now(), 0.001));
+    }
+    let edges: Vec<_> = std::iter::from_fn(|| bench.own.next_edge())
+        .map(|edge| (edge.condition, edge.at))
+        .collect();
+    let [(Condition::Late, late), (Condition::CommandLost, _), (Condition::Offline, offline)] =
+        edges[..]
+    else {
+        panic!("{edges:?}")
+    };
+    assert_eq!(late.as_micros() / 1_024, 2_512_000 / 1_024);
+    assert_eq!(offline.as_micros() / 1_024, 2_602_000 / 1_024);
+    let line = bench.own.health().to_string();
+    let start = "talker #1: offline, disarmed, late, offline, command lost; 1000 Hz, gap 992 us, 30 C, error 0;";
+    assert!(line.starts_with(start), "{line}");
+}
