@@ -68,9 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
 
             // The 1 kHz task.
-            while let Some((frame, arrived)) = received.pop() {
-                _ = runner.ingest(&frame, arrived);
-            }
+            runner.poll_queue(&mut received, 32);
             let Some(tick) = runner.due() else { continue };
             if !runner.is_armed() {
                 _ = runner.arm(tick);
@@ -88,7 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         drop(wire);
-        println!("{} frames dropped by the queue", received.dropped());
+        println!("{} frames dropped by the queue", runner.statistics().lost);
         if (reached - 200.0).abs() > 4.0 || runner.is_armed() {
             return Err(
                 format!("reached {reached:.1} rpm of 200, armed {}", runner.is_armed()).into()

@@ -27,6 +27,7 @@ pub mod dji;
 pub mod pwm;
 #[cfg(feature = "sim")]
 pub mod sim;
+pub mod snake;
 
 // F4: the only part that does I/O
 pub mod runner;

@@ -5,7 +5,7 @@
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{BusLoad, CanDevice};
-use drivetrain::runner::{Nb, Runner};
+use drivetrain::runner::{MeasuredLoad, Nb, Runner};
 use drivetrain::sim::{
     Line, Model, MotorConfig, Sender, World, frame_bits, nominal_bits, worst_case_bits,
 };
@@ -25,6 +25,11 @@ proptest! {
 fn the_bounds_are_those_of_the_simulator() {
     assert_eq!(BusLoad::NOMINAL_BITS, nominal_bits(false, 8));
     assert_eq!(BusLoad::WORST_CASE_BITS, worst_case_bits(false, 8));
+    for length in 0..=9 {
+        let load = BusLoad::new(1_000_000).with_frames_of(length, 1, 1_000_000);
+        let bits = [nominal_bits(false, length), worst_case_bits(false, length)];
+        assert_eq!(load.to_string(), format!("{} % to {} %", bits[0] * 100, bits[1] * 100));
+    }
 }
 
 /// Runs motors with raw commands for a second; returns the reckoned and the measured load.
@@ -66,6 +71,69 @@ fn the_measured_load_lies_between_nominal_and_worst_case() {
             assert!((low..=high).contains(&measured), "{motors} motors: {measured} not in {load}");
         }
     }
+}
+
+/// Law: the bounds that the runner counts by are those of the simulator, for any frame.
+#[test]
+fn frames_of_every_kind_are_counted_by_their_length() {
+    use embedded_can::{ExtendedId, Frame, Id, StandardId};
+    let (short, long) = (StandardId::new(0x7A).unwrap(), ExtendedId::new(0x1ABC_DEF0).unwrap());
+    for (id, is_long) in [(Id::from(short), false), (Id::from(long), true)] {
+        for length in 0..=8 {
+            let frame = CanFrame::new(id, &[0; 8][..usize::from(length)]).unwrap();
+            let bounds = (nominal_bits(is_long, length), worst_case_bits(is_long, length));
+            assert_eq!(BusLoad::frame_bits(&frame), bounds);
+        }
+        let remote = CanFrame::new_remote(id, 8).unwrap();
+        let bounds = (nominal_bits(is_long, 0), worst_case_bits(is_long, 0));
+        assert_eq!(BusLoad::frame_bits(&remote), bounds);
+    }
+}
+
+/// The runner's load beside what the simulated bus carried, from 2 s to 5 s; and the frames a second.
+fn runner_and_truth(world: &World, motors: u8) -> (MeasuredLoad, f32, f32) {
+    use embedded_can::{ExtendedId, Frame};
+    let mut bus = Bus::new();
+    for id in 1..=motors {
+        world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        bus.attach(Config::<M3508>::new(id)).unwrap();
+    }
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let other = CanFrame::new(ExtendedId::new(0x1234_5678).unwrap(), &[1, 2, 3]).unwrap();
+    let mut before = world.traffic(Line::Can1);
+    for step in 0..50_500 {
+        world.advance(Duration::from_micros(100));
+        if step % 50 == 0 {
+            world.inject(Line::Can1, other).unwrap();
+        }
+        if step == 20_000 {
+            before = world.traffic(Line::Can1);
+        }
+        runner.poll(16);
+        if let Some(tick) = runner.due() {
+            runner.tick(tick);
+        }
+        assert!(runner.measured_load().is_none() || step >= 9_999, "not before a second is over");
+    }
+    let truth = world.traffic(Line::Can1).since(&before);
+    (runner.measured_load().unwrap(), truth.load(), truth.frames as f32 / 3.05)
+}
+
+#[test]
+fn the_load_that_the_runner_counts_is_that_of_the_bus() {
+    for motors in [1, 3, 5] {
+        let (load, truth, frames) = runner_and_truth(&World::new(9), motors);
+        let (low, high) = (load.nominal() * 0.995, load.worst_case() * 1.005);
+        assert!((low..=high).contains(&truth), "{motors} motors: {truth} not in {load}");
+        assert!((load.frames_per_s() as f32 / frames - 1.0).abs() < 0.005, "{load:?}, {frames}");
+        assert!(load.worst_case() - load.nominal() < 0.16, "the bounds say something");
+    }
+    // What the filter drops is not seen: the foreign frames, 200 a second of 91 bits.
+    let (all, ..) = runner_and_truth(&World::new(9), 2);
+    let (seen, truth, _) =
+        runner_and_truth(&World::new(9).with_filter(Line::Can1, 0x200, 0x7F0), 2);
+    assert!((all.nominal() - seen.nominal() - 200.0 * 91e-6).abs() < 1e-3, "{all:?} {seen:?}");
+    assert!(truth > seen.nominal());
 }
 
 #[test]

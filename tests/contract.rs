@@ -7,13 +7,15 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{
     AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
+use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     CanDevice, Claim, Ingest, MotorName, Own, Recovery, TargetError, VelocityDrive,
 };
 use drivetrain::sim::{Rule, Subject, Violation, check_contract};
+use drivetrain::snake::{Command, Config as JointConfig, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
-use drivetrain::units::AngularVelocity;
+use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
@@ -22,7 +24,7 @@ mod custom_motor;
 use custom_motor::MyMotor;
 
 const SPEED: PidConfig = PidConfig::new(1.0, 4.0, 0.0);
-const RULES: usize = 19;
+const RULES: usize = 20;
 
 fn velocity(share: f32) -> AngularVelocity {
     AngularVelocity::from_rad_per_s(5.0 * share)
@@ -56,6 +58,10 @@ impl<M: Model, const N: usize> Subject for OneModel<M, N> {
     }
     fn drive(&mut self, share: f32) -> Result<(), TargetError> {
         self.0.drive(self.1.map(|handle| (handle, velocity(share))))
+    }
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        let positions = self.1.map(|handle| self.0.set_position(handle, Position::ZERO));
+        positions.into_iter().collect()
     }
 }
 
@@ -155,6 +161,56 @@ fn the_motor_of_the_example_keeps_the_contract_alone_and_beside_dji_motors() {
         },
     };
     assert_eq!(check_contract(beside), Ok(RULES));
+}
+
+/// Joints that answer what they are asked.
+struct Snake(Joints, Vec<Joint>);
+
+impl Snake {
+    fn new(ids: impl IntoIterator<Item = u8>, config: fn(JointConfig) -> JointConfig) -> Self {
+        let mut joints = Joints::new();
+        let ids = ids.into_iter();
+        let handles = ids.map(|id| joints.attach(config(JointConfig::new(id))).unwrap()).collect();
+        Self(joints, handles)
+    }
+}
+
+impl Subject for Snake {
+    type Device = Joints;
+    fn device(&mut self) -> &mut Joints {
+        &mut self.0
+    }
+    fn motors(&self) -> usize {
+        self.1.len()
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        let (joint, name) = self.0.joints().nth(motor)?;
+        let register = self.0.awaited(joint).unwrap_or(Register::ActualPosition);
+        let value = i32::from(register == Register::Enable);
+        CanFrame::new(id(u16::from(name.id())), &Reply::new(register, value).encode())
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        let position = Position::from_angle(Angle::from_turns(share));
+        let outcomes = self.1.iter().map(|joint| self.0.set_position(*joint, position));
+        outcomes.fold(Ok(()), Result::and)
+    }
+    fn is_zero(&self, command: &CanFrame) -> bool {
+        Command::decode(command.data()).is_some_and(Command::is_safe)
+    }
+    fn late_ms(&self) -> u64 {
+        41
+    }
+    /// A joint that owes an answer is left alone for 2 ms.
+    fn stop_ms(&self) -> u64 {
+        3
+    }
+}
+
+#[test]
+fn joints_with_a_position_loop_of_their_own_keep_the_contract() {
+    assert_eq!(check_contract(|| Snake::new(1..=12, |config| config)), Ok(RULES));
+    assert_eq!(check_contract(|| Snake::new([3, 7], JointConfig::reversed)), Ok(RULES));
+    assert_eq!(check_contract(|| Snake::new([12], |config| config)), Ok(RULES));
 }
 
 /// What a careless device gets wrong.
@@ -272,6 +328,37 @@ fn careless(mistake: Mistake) -> Result<usize, Violation> {
             Ok(())
         },
     })
+}
+
+/// A wheel that takes another target for one that it does not offer; and says so, or not.
+struct Obliging(OneModel<M3508, 1>, Result<(), TargetError>);
+
+impl Subject for Obliging {
+    type Device = Bus;
+    fn device(&mut self) -> &mut Bus {
+        self.0.device()
+    }
+    fn motors(&self) -> usize {
+        1
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        self.0.feedback(motor)
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        self.0.drive(share)
+    }
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        self.0.drive(0.5)?;
+        self.1
+    }
+}
+
+#[test]
+fn the_check_finds_a_target_that_is_taken_without_being_offered() {
+    for answer in [Ok(()), Err(TargetError::Unsupported)] {
+        let found = check_contract(|| Obliging(OneModel::new([1], |config| config), answer));
+        assert_eq!(found.map_err(|violation| violation.rule), Err(Rule::UnsupportedIsAnError));
+    }
 }
 
 #[test]

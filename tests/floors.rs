@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 13] = [
+const FLOORS: [(&str, u32); 14] = [
     ("units", 0),
     ("time", 0),
     ("math", 0),
@@ -18,6 +18,7 @@ const FLOORS: [(&str, u32); 13] = [
     ("wire", 20),
     ("chassis", 21),
     ("dji", 30),
+    ("snake", 30),
     ("pwm", 30),
     ("runner", 40),
 ];
@@ -113,18 +114,27 @@ const FACTS: [&str; 12] = [
     "dji",
 ];
 
+/// The same of the joints.
+const JOINT_FACTS: [&str; 4] = ["IDS", "PULSES_PER_TURN", "Register", "self"];
+
 fn strangers(text: &str) -> Vec<String> {
+    let mut found = other_than("dji", &FACTS, text);
+    found.extend(other_than("snake", &JOINT_FACTS, text));
+    found
+}
+
+fn other_than(family: &str, facts: &[&str], text: &str) -> Vec<String> {
     let mut found = Vec::new();
     for (number, line) in joined(text) {
-        for rest in line.split("crate::dji::").skip(1) {
+        for rest in line.split(&format!("crate::{family}::")).skip(1) {
             let list = rest.split(&['}', ';', '(', '<', ' '][..]).next().unwrap_or_default();
             let words = list
                 .split(|c: char| !c.is_alphanumeric() && c != '_')
                 .filter(|word| !word.is_empty());
             found.extend(
                 words
-                    .filter(|word| !FACTS.contains(word))
-                    .map(|word| format!("line {number}: dji::{word}")),
+                    .filter(|word| !facts.contains(word))
+                    .map(|word| format!("line {number}: {family}::{word}")),
             );
         }
     }
@@ -235,6 +245,8 @@ fn the_check_itself_finds_what_it_should() {
     assert_eq!(violations("chassis", "use crate::dji::Bus;").len(), 1);
     assert!(knows_chassis("use crate::{geometry::Vec2, chassis::Mecanum};"));
     assert!(!knows_chassis("use super::chassis::Chassis;"));
+    assert_eq!(strangers("use crate::snake::{Joints, Register};").len(), 1);
+    assert_eq!(strangers("use crate::dji::{Bus, Facts};").len(), 1);
     assert!(
         violations(
             "dji",

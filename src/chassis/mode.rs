@@ -264,7 +264,8 @@ impl Modes {
 
     /// Returns the motion that the command means in this mode; `None` when the motors should be relaxed.
     ///
-    /// A `gimbal_yaw` that is not finite counts as none. A command that is NaN or infinite counts as standing still.
+    /// A `gimbal_yaw` that is not finite counts as none. A command that is NaN or infinite, or so large that its motion
+    /// overflows, counts as standing still.
     /// A `dt_s` that is zero, negative, NaN or infinite counts as zero.
     pub fn update(
         &mut self,
@@ -291,7 +292,8 @@ impl Modes {
             (Mode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),
             _ => Twist::new(command.vx_m_s, command.vy_m_s, command.wz_rad_s),
         };
-        self.output = self.blend(wanted, dt_s);
+        let output = self.blend(wanted, dt_s);
+        self.output = if output.is_finite() { output } else { Twist::ZERO };
         Some(self.output)
     }
 
@@ -512,6 +514,8 @@ mod tests {
             let twist = modes.update(Twist::new(f32::NAN, 0.0, 0.0), yaw(10.0), dt);
             assert!(twist.is_some_and(Twist::is_finite));
         }
+        let command = Twist::new(f32::MIN, f32::MAX, -1.0);
+        assert_eq!(modes.update(command, yaw(45.0), 1.0), Some(Twist::ZERO));
     }
 
     #[test]

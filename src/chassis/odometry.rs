@@ -123,9 +123,13 @@ impl Sum {
         Self { value, rest: 0.0 }
     }
 
+    /// Adds a term; one with which the sum would overflow is left out.
     const fn add(&mut self, term: f32) {
         let term = term + self.rest;
         let sum = self.value + term;
+        if !sum.is_finite() {
+            return;
+        }
         self.rest = term - (sum - self.value);
         self.value = sum;
     }
@@ -232,5 +236,19 @@ mod tests {
             let angle = odometry.pose().angle.as_radians().abs();
             prop_assert!(angle < 1e-4 || (angle - TAU).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn a_way_that_overflows_is_left_out_and_the_position_stays_a_number() {
+        let mut odometry = Odometry::default();
+        for _ in 0..4 {
+            odometry.advance(Twist::new(f32::MAX, 0.0, 0.0), None, 0.5);
+            odometry.advance(Twist::new(f32::MAX, f32::MIN, 1e38), None, 0.5);
+        }
+        let pose = odometry.pose();
+        assert!(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite(), "{pose:?}");
+        odometry.set_position_m(Vec2::new(0.0, 0.0));
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
+        assert!(odometry.pose().x_m.is_finite());
     }
 }

@@ -93,6 +93,7 @@ mod feedback;
 mod handle;
 mod health;
 mod limit;
+mod measured;
 mod model;
 mod range;
 mod rare;

@@ -4,7 +4,7 @@ use super::slot::Slot;
 use super::{AnyHandle, Bus, CurrentControlled, Handle, Model, VoltageControlled};
 use crate::control::PidConfig;
 use crate::encoder::Position;
-use crate::motor::{TargetError, VelocityDrive};
+use crate::motor::{Capabilities, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
 
 /// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
@@ -146,6 +146,27 @@ impl<B> Bus<B> {
         slot.set_position_loop(config)
     }
 
+    /// Returns what a motor offers with the loops that it was attached with; nothing once it is detached.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::PidConfig;
+    /// use drivetrain::dji::{Bus, Config, Gm6020Voltage, M3508};
+    ///
+    /// let speed = PidConfig::new(0.6, 6.0, 0.0);
+    /// let mut bus = Bus::new();
+    /// let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(speed))?;
+    /// let yaw = bus.attach(Config::<Gm6020Voltage>::new(1))?;
+    /// let offered = bus.capabilities(wheel).to_string();
+    /// assert_eq!(offered, "raw, current, velocity, feedback, temperature, error codes");
+    /// assert_eq!(bus.capabilities(yaw).to_string(), "raw, voltage, feedback, temperature, absolute angle");
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub fn capabilities(&self, motor: impl Into<AnyHandle<B>>) -> Capabilities {
+        self.slot(motor.into()).map_or(Capabilities::NONE, Slot::capabilities)
+    }
+
     #[inline]
     fn set(
         &mut self,
@@ -187,6 +208,10 @@ impl<M: Model, B> VelocityDrive<Handle<M, B>> for Bus<B> {
         self.fresh_velocity(motor.into())
     }
 
+    fn capabilities(&self, motor: Handle<M, B>) -> Capabilities {
+        Self::capabilities(self, motor)
+    }
+
     fn set_velocity(
         &mut self,
         motor: Handle<M, B>,
@@ -199,6 +224,10 @@ impl<M: Model, B> VelocityDrive<Handle<M, B>> for Bus<B> {
 impl<B> VelocityDrive<AnyHandle<B>> for Bus<B> {
     fn velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
         self.fresh_velocity(motor)
+    }
+
+    fn capabilities(&self, motor: AnyHandle<B>) -> Capabilities {
+        Self::capabilities(self, motor)
     }
 
     fn set_velocity(

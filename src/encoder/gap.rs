@@ -96,6 +96,24 @@ mod tests {
     }
 
     #[test]
+    fn what_the_speed_may_have_done_in_between_is_allowed_for_and_no_more() {
+        // From 0 to 3000 rpm in 4 ms, or back: 819.2 counts on the mean, and as many for an early or a late change;
+        // 101.1 for a rise and fall in between; 409.6 for 1 ms at the faster speed: 1329.9.
+        for (before, after) in [(0, 3000), (3000, 0)] {
+            let gap = |counts| Gap::resolve((0, before), (counts, after), 4_000, 9256);
+            assert_eq!(gap(819 + 1325), Gap { counts: 819 + 1325, ambiguous: false });
+            assert!(gap(819 + 1335).ambiguous);
+        }
+    }
+
+    #[test]
+    fn one_count_of_rounding_is_allowed_for() {
+        let gap = |counts| Gap::resolve((0, 0), (counts, 0), 1_000, 0);
+        assert_eq!(gap(1), Gap { counts: 1, ambiguous: false });
+        assert_eq!(gap(2), Gap { counts: 2, ambiguous: true });
+    }
+
+    #[test]
     fn a_gap_of_any_length_is_finite() {
         for elapsed in [0, 1, u32::MAX] {
             let gap = Gap::resolve((0, i16::MIN), (8191, i16::MAX), elapsed, u16::MAX);

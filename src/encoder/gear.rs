@@ -97,4 +97,12 @@ mod tests {
         assert!(GearRatio::new(4096, 1).is_ok());
         assert!(GearRatio::new(u16::MAX, u16::MAX).is_ok_and(|ratio| ratio == GearRatio::DIRECT));
     }
+
+    #[test]
+    fn a_refused_ratio_is_named_in_words() {
+        let error = GearRatio::new(4099, 1).unwrap_err();
+        assert!(
+            std::format!("{error}").starts_with("gear ratio 4099:1 is not between 1:2 and 4096:1")
+        );
+    }
 }

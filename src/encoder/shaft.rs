@@ -48,6 +48,11 @@ impl Turns {
         Self { high: (turns >> 32) as i32, low: turns.cast_unsigned() as u32 }
     }
 
+    /// Returns the lower half, for what is kept in the place of turns.
+    pub(crate) const fn low(self) -> u32 {
+        self.low
+    }
+
     pub(crate) const fn get(self) -> i64 {
         (self.high as i64) << 32 | self.low as i64
     }
@@ -255,6 +260,53 @@ mod tests {
                 shaft.seed(angle);
                 assert_eq!((shaft.position().turns(), shaft.rotor_counts()), (0, i64::from(angle)));
             }
+        }
+    }
+
+    #[test]
+    fn only_a_shaft_without_gear_is_direct() {
+        for reversed in [false, true] {
+            assert!(shaft((1, 1), reversed).is_direct());
+            for gear in [(1, 2), (2, 1), (36, 1), M3508] {
+                assert!(!shaft(gear, reversed).is_direct(), "{gear:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_reversed_geared_shaft_starts_within_its_first_rotor_turn() {
+        let mut shaft = shaft(M2006, true);
+        shaft.seed(2048); // three quarters of a rotor turn are left to zero
+        assert!((shaft.angle().as_degrees() - 270.0 / 36.0).abs() < 1e-4);
+        assert_eq!(shaft.rotor_counts(), 6144);
+    }
+
+    #[test]
+    fn a_whole_turn_ends_at_zero_of_the_next() {
+        let mut shaft = shaft((1, 1), false);
+        shaft.advance(4096);
+        shaft.advance(4096);
+        assert_eq!((shaft.position().turns(), shaft.angle()), (1, Angle::ZERO));
+        shaft.set_position(Position::from_angle(Angle::from_radians(TAU.next_down())));
+        assert_eq!((shaft.position().turns(), shaft.angle()), (1, Angle::ZERO));
+    }
+
+    #[test]
+    fn the_shortest_way_is_at_most_half_a_turn_and_there_it_is_down() {
+        for (from, to, way) in [
+            (0, 100, 100_i16),
+            (0, 8092, -100),
+            (0, 4095, 4095),
+            (0, 4096, -4096),
+            (4096, 0, -4096),
+            (4097, 0, 4095),
+            (8000, 100, 292),
+            (100, 0, -100),
+        ] {
+            let mut shaft = shaft((1, 1), false);
+            shaft.seed(from);
+            let counts = shaft.shortest_way_to(to) / shaft.radians_per_fine;
+            assert!((counts - f32::from(way)).abs() < 0.1, "from {from} to {to}: {counts}");
         }
     }
 

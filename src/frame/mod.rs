@@ -81,6 +81,16 @@ impl CanFrame {
         self.length
     }
 
+    /// [`Frame::is_remote_frame`], for `const` code.
+    pub(crate) const fn is_remote(&self) -> bool {
+        self.header & REMOTE != 0
+    }
+
+    /// [`Frame::is_extended`], for `const` code.
+    pub(crate) const fn has_extended_id(&self) -> bool {
+        self.header & EXTENDED != 0
+    }
+
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
         let mut frame = Self { header, data: [0; 8], length: u8::try_from(data.len()).ok()? };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
@@ -106,11 +116,11 @@ impl Frame for CanFrame {
     }
 
     fn is_extended(&self) -> bool {
-        self.header & EXTENDED != 0
+        self.has_extended_id()
     }
 
     fn is_remote_frame(&self) -> bool {
-        self.header & REMOTE != 0
+        self.is_remote()
     }
 
     fn id(&self) -> Id {

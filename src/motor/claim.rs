@@ -46,9 +46,13 @@ impl Claim {
         Self { mask, ..self }
     }
 
-    /// Tells whether some id belongs to both claims.
+    /// Tells whether some id belongs to both claims, and they are not the two directions of one motor: some protocols
+    /// send command and feedback with one id.
     #[must_use]
     pub fn clashes_with(&self, other: &Self) -> bool {
+        if self.motor == other.motor && self.role != other.role {
+            return false;
+        }
         let (extended, raw) = raw(self.id);
         let (other_extended, other_raw) = self::raw(other.id);
         extended == other_extended && (raw ^ other_raw) & self.mask & other.mask == 0
@@ -94,5 +98,21 @@ impl core::fmt::Display for Claim {
 impl defmt::Format for Claim {
     fn format(&self, f: defmt::Formatter<'_>) {
         defmt::write!(f, "{} of {} on {=u32:#x}", self.role, self.motor, raw(self.id).1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embedded_can::StandardId;
+
+    #[test]
+    fn one_motor_may_use_an_id_in_both_directions_and_two_may_not() {
+        let id = StandardId::new(5).unwrap();
+        let claim = |role, name| Claim::new(id, role, MotorName::new(name, 5));
+        let command = claim(Role::Command, "joint");
+        assert!(!command.clashes_with(&claim(Role::Feedback, "joint")));
+        assert!(command.clashes_with(&command)); // attached twice
+        assert!(command.clashes_with(&claim(Role::Feedback, "another")));
     }
 }

@@ -1,3 +1,4 @@
+use super::{Capabilities, Capability};
 use crate::units::AngularVelocity;
 
 /// An owner of motors whose output shafts follow a velocity.
@@ -6,6 +7,12 @@ use crate::units::AngularVelocity;
 pub trait VelocityDrive<H: Copy> {
     /// Returns the measured velocity of the output shaft; `None` when there is no fresh feedback.
     fn velocity(&self, motor: H) -> Option<AngularVelocity>;
+
+    /// Returns what a motor offers as it is configured; at least velocities, unless said otherwise.
+    fn capabilities(&self, motor: H) -> Capabilities {
+        let _ = motor;
+        Capabilities::of(&[Capability::Velocity])
+    }
 
     /// Sets the velocity that the output shaft is to follow.
     ///
@@ -35,6 +42,10 @@ impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
         (**self).velocity(motor)
     }
 
+    fn capabilities(&self, motor: H) -> Capabilities {
+        (**self).capabilities(motor)
+    }
+
     fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError> {
         (**self).set_velocity(motor, target)
     }
@@ -61,6 +72,8 @@ pub enum TargetError {
     NotHomed,
     /// This motor does not offer this kind of target.
     Unsupported,
+    /// The measurement that the target goes with is too old, or lies ahead. The motor goes to its safe output at once.
+    StaleMeasurement,
 }
 
 impl core::fmt::Display for TargetError {
@@ -74,6 +87,7 @@ impl core::fmt::Display for TargetError {
             Self::NoLoop => "the motor was attached without the loop for this target",
             Self::NotHomed => "the output angle is unknown until the position is zeroed",
             Self::Unsupported => "the motor does not offer this kind of target",
+            Self::StaleMeasurement => "the measurement is too old",
         })
     }
 }

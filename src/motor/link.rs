@@ -36,14 +36,23 @@ pub struct Timeouts {
     late_us: u32,
     offline_us: u32,
     command_us: u32,
+    /// In ms, where it takes no more room.
+    measured_ms: u16,
     good_frames: u8,
 }
 
 impl Timeouts {
-    /// Feedback late after 10 ms and offline after 100 ms, command deadline 100 ms, back after 10 good frames.
+    /// Feedback late after 10 ms and offline after 100 ms, command deadline 100 ms, measurements of another sensor too old
+    /// after 20 ms, back after 10 good frames.
     #[must_use]
     pub const fn new() -> Self {
-        Self { late_us: 10_000, offline_us: 100_000, command_us: 100_000, good_frames: 10 }
+        Self {
+            late_us: 10_000,
+            offline_us: 100_000,
+            command_us: 100_000,
+            measured_ms: 20,
+            good_frames: 10,
+        }
     }
 
     /// Sets the age from which feedback is late: at most 10 s.
@@ -63,6 +72,15 @@ impl Timeouts {
     #[must_use]
     pub const fn with_command(self, command: Duration) -> Self {
         Self { command_us: limited(command), ..self }
+    }
+
+    /// Sets the age from which a [measurement of another sensor](super::Measured) is too old to be followed: at most 10 s, in
+    /// whole milliseconds, at least one. It never counts for longer than the command deadline.
+    #[must_use]
+    pub const fn with_measured(self, measured: Duration) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "at most 10 000")]
+        let millis = (limited(measured) / 1_000) as u16;
+        Self { measured_ms: if millis == 0 { 1 } else { millis }, ..self }
     }
 
     /// Sets how many frames in a row bring an offline motor back: at least 1.
@@ -89,6 +107,12 @@ impl Timeouts {
         Duration::from_micros(self.command_us as u64)
     }
 
+    /// Returns the age from which a measurement of another sensor is too old.
+    #[must_use]
+    pub const fn measured(&self) -> Duration {
+        Duration::from_millis(self.measured_ms as u64)
+    }
+
     /// Returns how many frames in a row bring an offline motor back.
     #[must_use]
     pub const fn good_frames(&self) -> u8 {
@@ -101,6 +125,10 @@ impl Timeouts {
 
     pub(crate) const fn offline_us(&self) -> u32 {
         if self.offline_us > self.late_us { self.offline_us } else { self.late_us }
+    }
+
+    pub(crate) const fn measured_us(&self) -> u32 {
+        self.measured_ms as u32 * 1_000
     }
 
     pub(crate) const fn command_us(&self) -> u32 {

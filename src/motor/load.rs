@@ -1,9 +1,9 @@
+use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 
 /// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
 ///
-/// Counts standard data frames of 8 bytes, the only ones that DJI motors use, each with the pause of three bits after
-/// it:
+/// Counts standard data frames, each with the pause of three bits after it; for the 8 bytes that DJI motors use:
 ///
 /// | | bits | |
 /// |---|---|---|
@@ -13,11 +13,21 @@ use core::num::NonZeroU32;
 /// The load is `bits * frames a second / bit rate`. What a bus carries lies between the two, and depends on the
 /// content. Above 1 the frames of lowest priority, those with the highest ids, do not get through.
 ///
+/// Feedback of DJI motors at 1 kHz, and a command frame for every four of them at the same rate, at 1 Mbit/s:
+///
+/// | motors | 4 | 5 | 6 | 7 | 8 |
+/// |---|--:|--:|--:|--:|--:|
+/// | nominal, % | 55.5 | 77.7 | 88.8 | 99.9 | 111.0 |
+/// | worst case, % | 67.5 | 94.5 | 108.0 | 121.5 | 135.0 |
+///
+/// On such a bus the commands 0x1FE, 0x1FF and 0x200 win over all feedback (0x201 to 0x20B), but **0x2FE and 0x2FF, the
+/// commands of GM6020 #5..=7, lose to it**: when feedback alone fills the bus, these motors never get a new command.
+///
 /// Sources: Bosch CAN specification 2.0 (1991), part B, chapters 3.1 and 5; for the worst case T. Nolte, H. Hansson,
 /// C. Norström, "Minimizing CAN response-time jitter by message manipulation" (2002), equation 1.
 ///
 /// # Examples
-/// Feedback at 1 kHz from four to eight motors, and a command frame for every four at the same rate:
+/// The table above:
 /// ```
 /// use drivetrain::motor::BusLoad;
 ///
@@ -40,26 +50,113 @@ use core::num::NonZeroU32;
 pub struct BusLoad {
     frames_per_s: u32,
     bit_rate: u32,
+    nominal_bits_per_s: u64,
+    worst_bits_per_s: u64,
 }
 
 impl BusLoad {
     /// Bits of a standard data frame of 8 bytes without stuff bits, with the pause after it.
-    pub const NOMINAL_BITS: u32 = 111;
+    pub const NOMINAL_BITS: u32 = Self::nominal_bits(8);
 
     /// Bits of a standard data frame of 8 bytes with as many stuff bits as can be, with the pause after it.
-    pub const WORST_CASE_BITS: u32 = 135;
+    pub const WORST_CASE_BITS: u32 = Self::worst_bits(8);
+
+    /// CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
+    const UNSTUFFED_BITS: u32 = 13;
+
+    /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with as many as can be.
+    ///
+    /// What is really sent lies between the two. A remote frame carries no data, whatever length it asks for.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::motor::BusLoad;
+    /// use embedded_can::{ExtendedId, Frame};
+    ///
+    /// let command = CanFrame::standard(0x200, [0; 8]).ok_or("not an 11-bit id")?;
+    /// assert_eq!(BusLoad::frame_bits(&command), (111, 135));
+    /// let id = ExtendedId::new(0x1234).ok_or("not a 29-bit id")?;
+    /// let empty = CanFrame::new(id, &[]).ok_or("more than 8 bytes")?;
+    /// assert_eq!(BusLoad::frame_bits(&empty), (67, 80));
+    /// # Ok::<(), &str>(())
+    /// ```
+    #[must_use]
+    pub const fn frame_bits(frame: &CanFrame) -> (u32, u32) {
+        let data = if frame.is_remote() { 0 } else { 8 * frame.length() as u32 };
+        let stuffable = data + if frame.has_extended_id() { 54 } else { 34 };
+        let nominal = stuffable + Self::UNSTUFFED_BITS;
+        (nominal, nominal + (stuffable - 1) / 4)
+    }
 
     /// Takes the bit rate of a bus, in bits a second: 1 000 000 for DJI motors. 0 counts as 1.
     #[must_use]
     pub const fn new(bit_rate: u32) -> Self {
-        Self { frames_per_s: 0, bit_rate: if bit_rate == 0 { 1 } else { bit_rate } }
+        Self {
+            frames_per_s: 0,
+            bit_rate: if bit_rate == 0 { 1 } else { bit_rate },
+            nominal_bits_per_s: 0,
+            worst_bits_per_s: 0,
+        }
     }
 
-    /// Adds a number of frames, each at a rate in frames a second; saturates.
+    /// Adds a number of frames of 8 bytes, each at a rate in frames a second; saturates.
     #[must_use]
     pub const fn with_frames(self, frames: u32, rate_hz: u32) -> Self {
+        self.with_frames_of(8, frames, rate_hz)
+    }
+
+    /// Adds a number of frames of `length` bytes, each at a rate in frames a second; saturates. A length above 8 counts
+    /// as 8.
+    ///
+    /// # Examples
+    /// A request of 2 bytes and its answer of 6, each millisecond:
+    /// ```
+    /// use drivetrain::motor::BusLoad;
+    ///
+    /// let load = BusLoad::new(1_000_000).with_frames_of(2, 1, 1_000).with_frames_of(6, 1, 1_000);
+    /// assert!((load.nominal() - 0.158).abs() < 1e-6); // 63 and 95 bits
+    /// assert!((load.worst_case() - 0.190).abs() < 1e-6); // 75 and 115 bits
+    /// ```
+    #[must_use]
+    pub const fn with_frames_of(self, length: u8, frames: u32, rate_hz: u32) -> Self {
         let more = rate_hz.saturating_mul(frames);
-        Self { frames_per_s: self.frames_per_s.saturating_add(more), ..self }
+        let nominal = more as u64 * Self::nominal_bits(length) as u64;
+        let worst = more as u64 * Self::worst_bits(length) as u64;
+        Self {
+            frames_per_s: self.frames_per_s.saturating_add(more),
+            nominal_bits_per_s: self.nominal_bits_per_s.saturating_add(nominal),
+            worst_bits_per_s: self.worst_bits_per_s.saturating_add(worst),
+            ..self
+        }
+    }
+
+    /// Adds what others send on the same bus: another device family, say. The bit rate stays.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::BusLoad;
+    ///
+    /// let one = BusLoad::new(1_000_000).with_frames(1, 1_000);
+    /// assert_eq!(one.and(&one), BusLoad::new(1_000_000).with_frames(2, 1_000));
+    /// ```
+    #[must_use]
+    pub const fn and(self, other: &Self) -> Self {
+        Self {
+            frames_per_s: self.frames_per_s.saturating_add(other.frames_per_s),
+            nominal_bits_per_s: self.nominal_bits_per_s.saturating_add(other.nominal_bits_per_s),
+            worst_bits_per_s: self.worst_bits_per_s.saturating_add(other.worst_bits_per_s),
+            ..self
+        }
+    }
+
+    const fn nominal_bits(length: u8) -> u32 {
+        47 + 8 * if length > 8 { 8 } else { length as u32 }
+    }
+
+    const fn worst_bits(length: u8) -> u32 {
+        let nominal = Self::nominal_bits(length);
+        nominal + (nominal - 14) / 4
     }
 
     /// Returns the number of frames a second.
@@ -77,16 +174,16 @@ impl BusLoad {
     /// Returns the load without stuff bits; 1 is a full bus.
     #[must_use]
     pub const fn nominal(&self) -> f32 {
-        self.share(Self::NOMINAL_BITS)
+        self.nominal_bits_per_s as f32 / self.bit_rate as f32
     }
 
     /// Returns the load with as many stuff bits as can be; 1 is a full bus.
     #[must_use]
     pub const fn worst_case(&self) -> f32 {
-        self.share(Self::WORST_CASE_BITS)
+        self.worst_bits_per_s as f32 / self.bit_rate as f32
     }
 
-    /// Returns how many frames a second fit below a ceiling of the worst case, rounded down. A ceiling that is NaN or
+    /// Returns how many frames of 8 bytes a second fit below a ceiling of the worst case, rounded down. A ceiling that is NaN or
     /// negative counts as 0.
     ///
     /// # Examples
@@ -108,17 +205,14 @@ impl BusLoad {
 
     /// Returns the worst case in percent, rounded up.
     pub(crate) const fn worst_percent(&self) -> u32 {
-        self.percent(Self::WORST_CASE_BITS)
-    }
-
-    const fn share(&self, bits: u32) -> f32 {
-        self.frames_per_s as f32 * bits as f32 / self.bit_rate as f32
+        self.percent(self.worst_bits_per_s)
     }
 
     /// Returns a load in percent, rounded up; saturates. With 32-bit divisions only, which small cores have.
-    const fn percent(&self, bits: u32) -> u32 {
+    const fn percent(&self, bits_per_s: u64) -> u32 {
         let Some(rate) = NonZeroU32::new(self.bit_rate) else { return u32::MAX };
-        let bits_per_s = self.frames_per_s.saturating_mul(bits);
+        #[expect(clippy::cast_possible_truncation, reason = "limited right here")]
+        let bits_per_s = if bits_per_s > u32::MAX as u64 { u32::MAX } else { bits_per_s as u32 };
         let (whole, rest) = (bits_per_s / rate.get(), bits_per_s % rate.get());
         // A hundredth of the rate is exact enough where the rest in percent would not fit.
         let part = match rest.checked_mul(100) {
@@ -135,7 +229,7 @@ impl BusLoad {
 /// Writes both loads in percent, rounded up.
 impl core::fmt::Display for BusLoad {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} % to {} %", self.percent(Self::NOMINAL_BITS), self.worst_percent())
+        write!(f, "{} % to {} %", self.percent(self.nominal_bits_per_s), self.worst_percent())
     }
 }
 

@@ -14,11 +14,13 @@
 //! |---|---|
 //! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
+//! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
 //! | [`OwnMotor`], [`Own`], [`Guard`], [`Vitals`] | a motor of your own, and the rules that make it safe |
 //! | [`Condition`], [`Edge`], [`Health`] | what is wrong with a motor, each change of it, and all of it in a line |
 //! | [`HealthConfig`] | what is looked for, and what follows |
+//! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
 //! | [`BusLoad`] | how full the bus is |
 //!
 //! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. Whatever
@@ -26,28 +28,34 @@
 //! arrays and `&mut`, so an own struct needs only to forward to a tuple of its fields.
 
 mod arming;
+mod capability;
 mod claim;
 mod combine;
 mod device;
 mod drive;
 mod guard;
 mod health;
+mod homing;
 mod link;
 mod load;
+mod measured;
 mod name;
 mod own;
 mod vitals;
 mod watch;
 
 pub use arming::{ArmError, Missing};
+pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use drive::{TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
+pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
 pub use link::{Link, Recovery, Timeouts};
 pub use load::BusLoad;
+pub use measured::Measured;
 pub use name::MotorName;
 pub use own::{Own, OwnMotor};
 pub use vitals::{Severity, Vitals};

@@ -1,6 +1,6 @@
 use super::{
-    CanDevice, Claim, Edge, Guard, Health, HealthConfig, Ingest, Malformed, MotorName, Role,
-    TargetError, Timeouts, VelocityDrive, Vitals, Watch,
+    CanDevice, Capabilities, Capability, Claim, Edge, Guard, Health, HealthConfig, Ingest,
+    Malformed, MotorName, Role, TargetError, Timeouts, VelocityDrive, Vitals, Watch,
 };
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -48,6 +48,11 @@ pub trait OwnMotor {
     /// Keeps its output within this share of its full command, 0 to 1, from now on: it is warm, or stalled. Without
     /// effect unless said otherwise; a motor that is too hot gets zero anyway.
     fn limit(&mut self, _share: f32) {}
+
+    /// Returns what the motor offers: velocities and feedback, unless said otherwise.
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::of(&[Capability::Velocity, Capability::Feedback])
+    }
 }
 
 /// A motor of your own as a device of the runner, beside all others.
@@ -306,6 +311,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
         (self.guard.link() == super::Link::Online).then(|| self.motor.velocity())
+    }
+
+    fn capabilities(&self, (): ()) -> Capabilities {
+        self.motor.capabilities()
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {

@@ -1,11 +1,10 @@
+mod drive;
+
 use super::rc::duty;
 use super::{Direction, Way};
 use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
-use crate::motor::{
-    ArmError, Guard, Link, Missing, MotorName, TargetError, Timeouts, VelocityDrive,
-};
+use crate::motor::{ArmError, Guard, Missing, MotorName, TargetError, Timeouts};
 use crate::time::{Instant, Tick};
-use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
 
@@ -376,25 +375,5 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard
-    }
-}
-
-impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
-    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
-        let fresh = self.config.counts_per_turn.is_some() && self.guard.link() == Link::Online;
-        fresh.then(|| AngularVelocity::from_rad_per_s(self.rad_per_s))
-    }
-
-    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
-        if self.speed.is_none() {
-            return Err(TargetError::NoLoop);
-        }
-        self.guard.admit(target.as_rad_per_s().is_finite())?;
-        let goal = target.as_rad_per_s();
-        if let (Target::Duty(share), Some(speed)) = (self.target, &mut self.speed) {
-            speed.reset_to(share);
-        }
-        self.target = Target::Velocity(goal);
-        Ok(())
     }
 }

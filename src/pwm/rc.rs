@@ -1,4 +1,4 @@
-use crate::motor::{Guard, TargetError, Timeouts, VelocityDrive};
+use crate::motor::{Capabilities, Capability, Guard, TargetError, Timeouts, VelocityDrive};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
@@ -285,6 +285,11 @@ impl<P: SetDutyCycle> VelocityDrive<()> for RcPwm<P> {
     /// Always `None`.
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
         None
+    }
+
+    fn capabilities(&self, (): ()) -> Capabilities {
+        let set = Capabilities::of(&[Capability::Raw]);
+        if self.config.full_speed.is_some() { set.with(Capability::Velocity) } else { set }
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {

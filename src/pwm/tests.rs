@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::control::PidConfig;
-use crate::motor::{ArmError, TargetError, VelocityDrive};
+use crate::motor::{ArmError, Capability, TargetError, VelocityDrive};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
 use core::cell::{Cell, RefCell};
@@ -172,10 +172,12 @@ mod rc {
         let mut esc = armed(&log, RcConfig::new());
         let rpm = AngularVelocity::from_rpm;
         assert_eq!(esc.set_velocity((), rpm(10.0)), Err(TargetError::Unsupported));
+        assert_eq!(esc.capabilities(()).to_string(), "raw");
         let mut esc = armed(&log, RcConfig::new().with_full_speed(rpm(1_000.0)));
         esc.set_velocity((), rpm(-250.0)).unwrap();
         esc.update(tick(6)).unwrap();
         assert_eq!((last(&log), esc.velocity(())), (1_375, None));
+        assert_eq!(esc.capabilities(()).to_string(), "raw, velocity");
     }
 
     #[test]
@@ -288,6 +290,28 @@ mod brushed {
         assert_eq!((last(&log), motor.velocity(())), (0, None));
         motor.update(tick(102)).unwrap();
         assert_eq!(motor.set_duty(0.5), Err(TargetError::Relaxed));
+    }
+
+    #[test]
+    fn what_it_offers_is_what_it_takes() {
+        let bare = BrushedConfig::new(1);
+        let heard = bare.with_encoder(1_320.0, 16);
+        for (config, text) in [
+            (bare, "raw"),
+            (heard, "raw, feedback"),
+            (heard.with_speed_loop(PidConfig::new(0.02, 0.3, 0.0)), "raw, velocity, feedback"),
+        ] {
+            let log = Log::default();
+            let mut motor = motor(&log, config);
+            motor.ingest_counts(0, at_ms(0));
+            motor.arm(at_ms(0)).unwrap();
+            let offered = motor.capabilities(());
+            assert_eq!(offered.to_string(), text);
+            let taken = motor.set_velocity((), AngularVelocity::ZERO);
+            let expected =
+                if offered.has(Capability::Velocity) { Ok(()) } else { Err(TargetError::NoLoop) };
+            assert_eq!((taken, motor.set_duty(0.1)), (expected, Ok(())));
+        }
     }
 
     #[test]

@@ -12,16 +12,28 @@
 //! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver that can abort
 //! them is reached with [`Runner::port_mut`].
 //!
+//! # What it watches
+//! A bus that is down or silent, overruns and a clock that does not go on are latched as [`BusEdge`]s beside those of
+//! the motors; [`Runner::next_edge`] hands them out. [`Runner::heartbeat`] is for the hardware watchdog, which alone
+//! can help when the loop itself stops.
+//!
 //! Nothing here is needed: a program can call [`CanDevice`] itself, as the examples `sans_io` and `async_sans_io` do.
 
+mod edge;
+mod meter;
 mod port;
 #[cfg(feature = "queue")]
 mod queue;
+mod receive;
+mod send;
 mod statistics;
 mod stop;
 #[cfg(test)]
 mod tests;
+mod watch;
 
+pub use edge::{BusCondition, BusEdge};
+pub use meter::MeasuredLoad;
 pub use port::{BlockingTx, Nb, Port, Received, Sent};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
@@ -29,15 +41,11 @@ pub use statistics::{ErrorCounts, Statistics};
 pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Ingest};
+use crate::motor::{ArmError, CanDevice};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use meter::Meter;
 use statistics::increment;
-
-/// Without a frame accepted for this long, although some wait, the bus counts as lost.
-const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
-
-/// A bound on the frames of one tick, for devices that would offer frames for ever.
-const FRAMES_A_TICK: usize = 64;
+use watch::Watch;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
 ///
@@ -79,8 +87,10 @@ pub struct Runner<P, K, D> {
     turn: u32,
     statistics: Statistics,
     stop: Option<&'static EmergencyStop>,
-    unsent_since: Option<Instant>,
-    bus_down: bool,
+    watch: Watch,
+    meter: Meter,
+    /// The frame that goes last in the next tick, because it failed as the first one.
+    yields: Option<u32>,
 }
 
 impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
@@ -106,12 +116,16 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
                 evicted: 0,
                 evicted_unrelated: 0,
                 superseded: 0,
+                lost: 0,
                 overruns: 0,
                 bus_losses: 0,
+                clock_standstills: 0,
+                clock_reversals: 0,
             },
             stop: None,
-            unsent_since: None,
-            bus_down: false,
+            watch: Watch::new(),
+            meter: Meter::new(),
+            yields: None,
         }
     }
 
@@ -122,6 +136,13 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self
     }
 
+    /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
+    #[must_use]
+    pub fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
+        self.meter.set_bit_rate(bits_per_s);
+        self
+    }
+
     /// Watches an emergency stop.
     #[must_use]
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
@@ -129,54 +150,21 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self
     }
 
-    /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
-    pub fn poll(&mut self, budget: usize) -> usize {
-        self.poll_with(budget, |_| {})
-    }
-
-    /// Takes at most `budget` received frames from the driver and hands those of others to `unrelated`. Returns how
-    /// many came.
-    ///
-    /// Never waits, goes on after errors, and ends: an error counts against the budget as well.
-    pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
-        let mut frames = 0;
-        for _ in 0..budget {
-            match self.port.try_receive() {
-                Received::Frame(frame) => {
-                    frames += 1;
-                    let now = self.clock.now();
-                    if self.ingest(&frame, now) == Ingest::Unrelated {
-                        unrelated(&frame);
-                    }
-                }
-                Received::Foreign => {
-                    frames += 1;
-                    increment(&mut self.statistics.received);
-                    increment(&mut self.statistics.unrelated);
-                }
-                Received::Empty => break,
-                Received::Failed(kind) => self.statistics.receive_errors.count(kind),
-            }
-        }
-        frames
-    }
-
-    /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
-    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        increment(&mut self.statistics.received);
-        let outcome = self.device.ingest(frame, now);
-        increment(match outcome {
-            Ingest::Taken => &mut self.statistics.taken,
-            Ingest::Unrelated => &mut self.statistics.unrelated,
-            Ingest::Malformed(_) => &mut self.statistics.malformed,
-        });
-        outcome
+    fn read_clock(&mut self) -> Instant {
+        let now = self.clock.now();
+        self.watch.read(now);
+        now
     }
 
     /// Reads the clock and returns the step that is due, if any.
     pub fn due(&mut self) -> Option<Tick> {
-        let now = self.clock.now();
-        self.ticker.due(now)
+        let now = self.read_clock();
+        let before = self.ticker.overruns();
+        let tick = self.ticker.due(now);
+        if self.ticker.overruns() != before {
+            self.watch.edges.begin(BusCondition::TickOverrun, now);
+        }
+        tick
     }
 
     /// Arms the device: nothing moves before.
@@ -188,7 +176,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         if self.stop.is_some_and(EmergencyStop::is_set) {
             return Err(ArmError::Stopped);
         }
-        if self.bus_down {
+        if self.is_bus_down() {
             return Err(ArmError::BusDown);
         }
         self.device.arm(tick.now())
@@ -233,49 +221,9 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self.device.update(tick);
         limit(&mut self.device);
         self.turn = self.turn.wrapping_add(1);
-        for _ in 0..FRAMES_A_TICK {
-            let Some(frame) = self.device.next_frame(self.turn) else { break };
-            increment(&mut self.statistics.offered);
-            match self.port.try_send(&frame) {
-                Sent::Accepted => self.count_sent(),
-                Sent::Evicted(other) => {
-                    self.count_sent();
-                    if self.device.requeue(&other) {
-                        increment(&mut self.statistics.evicted);
-                    } else {
-                        increment(&mut self.statistics.evicted_unrelated);
-                        evicted(&other);
-                    }
-                }
-                Sent::Full => {
-                    increment(&mut self.statistics.refused);
-                    self.keep(&frame, tick.now());
-                    break;
-                }
-                Sent::Failed(kind) => {
-                    self.statistics.send_errors.count(kind);
-                    self.keep(&frame, tick.now());
-                }
-            }
-        }
-        self.watch_bus(tick.now());
-    }
-
-    fn count_sent(&mut self) {
-        increment(&mut self.statistics.sent);
-        self.unsent_since = None;
-        self.bus_down = false;
-    }
-
-    fn keep(&mut self, frame: &CanFrame, now: Instant) {
-        self.device.requeue(frame);
-        self.unsent_since.get_or_insert(now);
-    }
-
-    fn watch_bus(&mut self, now: Instant) {
-        let lost = self.unsent_since.is_some_and(|since| now.since(since) >= BUS_LOST_AFTER);
-        if lost && !self.bus_down {
-            self.bus_down = true;
+        self.send(tick.now(), &mut evicted);
+        self.meter.finish(tick.now());
+        if self.watch.finish(tick.now()) {
             increment(&mut self.statistics.bus_losses);
             self.device.disarm();
         }
@@ -287,14 +235,107 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         Statistics {
             superseded: self.device.superseded(),
             overruns: self.ticker.overruns(),
+            clock_standstills: self.watch.standstills,
+            clock_reversals: self.watch.reversals,
             ..self.statistics
         }
     }
 
-    /// Tells whether no frame could be sent for 100 ms; the next one that the driver takes ends it.
+    /// Tells whether the driver has not taken some command frame for 100 ms; over when it takes them all.
     #[must_use]
     pub const fn is_bus_down(&self) -> bool {
-        self.bus_down
+        self.has(BusCondition::Down)
+    }
+
+    /// Tells whether something is wrong with the bus now.
+    #[must_use]
+    pub const fn has(&self, condition: BusCondition) -> bool {
+        self.watch.has(condition)
+    }
+
+    /// Returns the oldest change of a [`BusCondition`] that was not read yet, and takes it off the list.
+    ///
+    /// What concerns one motor only is an edge of that motor.
+    ///
+    /// # Examples
+    /// A second without a tick, and a second in time:
+    /// ```
+    /// use drivetrain::dji::Bus;
+    /// use drivetrain::runner::{Nb, Runner};
+    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// # use drivetrain::sim::World;
+    /// # let world = World::new(1);
+    /// # let can = world.controller();
+    ///
+    /// let clock = ManualClock::new(Instant::START);
+    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
+    /// runner.due();
+    /// clock.advance(Duration::from_secs(1));
+    /// for _ in 0..=1_000 {
+    ///     if let Some(tick) = runner.due() {
+    ///         runner.tick(tick);
+    ///     }
+    ///     clock.advance(Duration::from_millis(1));
+    /// }
+    /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
+    /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
+    /// ```
+    pub fn next_edge(&mut self) -> Option<BusEdge> {
+        self.watch.next_edge()
+    }
+
+    /// Takes all changes that were not read yet, the oldest first; see [`next_edge`](Self::next_edge).
+    pub fn edges(&mut self) -> impl Iterator<Item = BusEdge> + '_ {
+        core::iter::from_fn(|| self.next_edge())
+    }
+
+    /// Returns a number that goes on with each tick in which the whole loop ran: received frames were looked for since
+    /// the one before, the time went on, every loop was updated, and everything was offered to the driver. It wraps.
+    ///
+    /// Feed the hardware watchdog when it has changed, and only then: a loop that hangs, in a driver that waits for ever
+    /// say, lets the watchdog bite, and a program that resets starts disarmed. A dead bus is no reason to reset, so what
+    /// counts is that each part ran, not that it had something to do. [`poll`](Self::poll) and `poll_queue` count
+    /// as looking for frames; a program that hands them to [`ingest`](Self::ingest) calls `poll(0)` beside it.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::Bus;
+    /// use drivetrain::runner::{Nb, Runner};
+    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// # use drivetrain::sim::World;
+    /// # let world = World::new(1);
+    /// # let can = world.controller();
+    /// # struct Watchdog { fed: u32 }
+    /// # impl Watchdog { fn feed(&mut self) { self.fed += 1; } }
+    /// # let mut watchdog = Watchdog { fed: 0 }; // independent, with a time-out of some ticks
+    ///
+    /// let clock = ManualClock::new(Instant::START);
+    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new());
+    /// let mut beat = runner.heartbeat();
+    /// for _ in 0..100 {
+    ///     runner.poll(16);
+    ///     if let Some(tick) = runner.due() {
+    ///         runner.tick(tick);
+    ///     }
+    ///     if runner.heartbeat() != beat {
+    ///         beat = runner.heartbeat();
+    ///         watchdog.feed();
+    ///     }
+    ///     clock.advance(Duration::from_micros(100));
+    /// }
+    /// assert_eq!(watchdog.fed, 10); // once a tick
+    /// ```
+    #[must_use]
+    pub const fn heartbeat(&self) -> u32 {
+        self.watch.heartbeat
+    }
+
+    /// Returns how full the bus was in the last second, by the frames that came and went here; `None` in the first one.
+    ///
+    /// What the hardware filter drops is not seen.
+    #[must_use]
+    pub const fn measured_load(&self) -> Option<MeasuredLoad> {
+        self.meter.last()
     }
 
     /// Returns the device.

@@ -41,6 +41,8 @@ pub struct FrameSender<'q> {
 pub struct FrameReceiver<'q> {
     frames: spsc::Consumer<'q, (CanFrame, Instant)>,
     dropped: &'q AtomicU32,
+    /// Of those, how many the runner knows of.
+    noted: u32,
 }
 
 impl<const N: usize> FrameQueue<N> {
@@ -54,7 +56,9 @@ impl<const N: usize> FrameQueue<N> {
     pub fn split(&mut self) -> (FrameSender<'_>, FrameReceiver<'_>) {
         let (producer, consumer) = self.frames.split();
         let dropped = &self.dropped;
-        (FrameSender { frames: producer, dropped }, FrameReceiver { frames: consumer, dropped })
+        let noted = dropped.load(Ordering::Relaxed);
+        let receiver = FrameReceiver { frames: consumer, dropped, noted };
+        (FrameSender { frames: producer, dropped }, receiver)
     }
 }
 
@@ -86,6 +90,12 @@ impl FrameReceiver<'_> {
     /// Takes the oldest frame and the time of its arrival.
     pub fn pop(&mut self) -> Option<(CanFrame, Instant)> {
         self.frames.dequeue()
+    }
+
+    /// Returns how many frames were dropped since the last call.
+    pub(super) fn take_dropped(&mut self) -> u32 {
+        let dropped = self.dropped();
+        dropped.saturating_sub(core::mem::replace(&mut self.noted, dropped))
     }
 
     /// Returns how many frames were dropped because the queue was full, saturating.

@@ -33,10 +33,16 @@ pub struct Statistics {
     /// Command frames that newer ones replaced before the driver took them; wraps. See
     /// [`CanDevice::superseded`](crate::motor::CanDevice::superseded).
     pub superseded: u32,
+    /// Received frames that a queue dropped before they came here.
+    pub lost: u32,
     /// Periods without a tick.
     pub overruns: u32,
-    /// Times that no frame could be sent for 100 ms: everything was disarmed.
+    /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
+    /// Ticks whose time was that of the one before, and spells of a million readings in which the clock stood.
+    pub clock_standstills: u32,
+    /// Times that the clock went back.
+    pub clock_reversals: u32,
 }
 
 /// Errors of the driver, by kind; every counter saturates.

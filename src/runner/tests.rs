@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::dji::{Bus, Config, Handle, M3508};
+use crate::motor::Ingest;
 use crate::time::ManualClock;
 use embedded_can::{ErrorKind, Frame, StandardId};
 use std::collections::VecDeque;
@@ -16,6 +17,8 @@ struct Scripted {
     receive: VecDeque<Result<CanFrame, nb::Error<ErrorKind>>>,
     offered: Vec<CanFrame>,
     always: Option<nb::Error<ErrorKind>>,
+    /// The frame that never leaves.
+    stuck: Option<u32>,
 }
 
 impl embedded_can::nb::Can for Scripted {
@@ -26,6 +29,7 @@ impl embedded_can::nb::Can for Scripted {
         self.offered.push(*frame);
         match &self.always {
             Some(error) => Err(*error),
+            None if self.stuck == Some(frame.header()) => Err(nb::Error::Other(ErrorKind::Other)),
             None => self.transmit.pop_front().unwrap_or(Ok(None)),
         }
     }
@@ -199,6 +203,105 @@ fn a_bus_that_takes_nothing_for_100_ms_disarms_and_offers_zeros_afterwards() {
     assert_eq!(offered(&mut runner), [(0x200, 0), (0x1FF, 0)]);
     assert!(!runner.is_bus_down() && !runner.is_armed());
     assert_eq!(runner.arm(tick), Ok(()));
+}
+
+#[test]
+fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, wheels) = driving(&clock);
+    let step = |runner: &mut TestRunner<'_>, raw| {
+        clock.advance(Duration::from_millis(1));
+        hear(runner, &clock);
+        for wheel in wheels {
+            _ = runner.device_mut().set_raw(wheel, raw);
+        }
+        runner.tick(Tick::new(clock.now(), 0.001));
+    };
+    runner.port_mut().0.stuck = Some(0x1FF);
+    for ms in 1..=150 {
+        step(&mut runner, 900);
+        assert_eq!(runner.is_armed(), ms <= 100, "{ms}");
+    }
+    assert!(runner.is_bus_down() && runner.statistics().bus_losses == 1);
+    assert_eq!(runner.next_edge().map(|edge| edge.condition), Some(BusCondition::Down));
+    let newest = offered(&mut runner).into_iter().rfind(|(id, _)| *id == 0x200);
+    assert_eq!(newest, Some((0x200, 0)), "the healthy one stops its motors");
+    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::BusDown));
+    runner.port_mut().0.stuck = None;
+    step(&mut runner, 900);
+    assert!(!runner.is_bus_down() && runner.next_edge().is_some_and(|edge| !edge.began));
+}
+
+#[test]
+fn a_frame_that_is_not_offered_any_more_is_not_waited_for() {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let (mut runner, _) = driving(&clock);
+    runner.port_mut().0.stuck = Some(0x1FF);
+    let run = |runner: &mut TestRunner<'_>, ticks| {
+        for _ in 0..ticks {
+            clock.advance(Duration::from_millis(1));
+            runner.tick(Tick::new(clock.now(), 0.001));
+        }
+        runner.is_bus_down()
+    };
+    assert!(run(&mut runner, 200));
+    let mut other = Bus::new();
+    other.attach(Config::<M3508>::new(1)).unwrap();
+    *runner.device_mut() = other;
+    assert!(run(&mut runner, 900) && !run(&mut runner, 101));
+}
+
+/// Runs three frames over a driver that fails one call in each tick; returns how often each frame left.
+fn sent_beside_a_failure(place: usize) -> [usize; 3] {
+    let clock = ManualClock::new(Instant::from_micros(1_000));
+    let mut bus = Bus::new();
+    bus.attach_all([1, 5].map(Config::<M3508>::new)).unwrap();
+    bus.attach(Config::<crate::dji::Gm6020Voltage>::new(5)).unwrap();
+    let bus = bus.with_keep_alive(Duration::ZERO);
+    let mut runner = Runner::new(Nb(Scripted::default()), &clock, bus);
+    let mut sent = [0; 3];
+    for _ in 0..400 {
+        clock.advance(Duration::from_millis(1));
+        let mut answers = [Ok(None); 3];
+        answers[place] = Err(nb::Error::Other(ErrorKind::Bit));
+        runner.port_mut().0.transmit = answers.into();
+        runner.tick(Tick::new(clock.now(), 0.001));
+        let tried = offered(&mut runner);
+        assert_eq!(tried.len(), 3);
+        let taken = tried.into_iter().enumerate().filter(|(index, _)| *index != place);
+        for (_, (id, _)) in taken {
+            let frame = [0x200, 0x1FF, 0x2FF].iter().position(|known| *known == id);
+            sent[frame.unwrap()] += 1;
+        }
+    }
+    assert!(!runner.is_bus_down() && runner.statistics().bus_losses == 0);
+    sent
+}
+
+#[test]
+fn a_driver_that_fails_one_call_a_tick_keeps_no_frame_from_the_bus() {
+    for place in 0..3 {
+        let sent = sent_beside_a_failure(place);
+        assert!(sent.iter().all(|times| *times >= 100), "{place}: {sent:?}");
+        assert_eq!(sent.iter().sum::<usize>(), 800);
+    }
+}
+
+#[test]
+fn a_clock_that_repeats_itself_for_a_million_readings_stands() {
+    let clock = ManualClock::new(Instant::from_micros(7));
+    let mut runner = Runner::new(Nb(Scripted::default()), &clock, Bus::new());
+    let standstills = |runner: &mut TestRunner<'_>, readings| {
+        (0..readings).for_each(|_| _ = runner.due());
+        runner.statistics().clock_standstills
+    };
+    assert_eq!(standstills(&mut runner, 1_000_000), 0); // the first one is new
+    assert_eq!(standstills(&mut runner, 1), 1);
+    assert_eq!(standstills(&mut runner, 999_999), 1);
+    assert_eq!(standstills(&mut runner, 1), 2);
+    let edge = runner.next_edge().unwrap();
+    assert_eq!((edge.condition, edge.began), (BusCondition::ClockStandstill, true));
+    assert_eq!(runner.heartbeat(), 0);
 }
 
 #[test]

@@ -1,11 +1,12 @@
 use super::chassis::{Chassis, Escs};
 use super::esc::Esc;
 use super::fault::Faults;
+use super::joint::Drive;
 use super::line::{Line, Record, Sender, Wire};
 use super::mailbox::Offer;
 use super::motor::{MotorConfig, MotorState};
 use super::ring::Ring;
-use super::{AttachError, MotorKey};
+use super::{AttachError, Fault, JointConfig, JointKey, JointState, MotorKey};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
 
@@ -21,6 +22,7 @@ enum Event {
     FrameEnd(Line),
     Step,
     Feedback(usize),
+    Reply(usize),
     Fault,
     Arbitration(Line),
 }
@@ -32,8 +34,9 @@ pub(crate) struct Engine {
     pub(crate) now_ns: u64,
     stepped_ns: u64,
     steps: u64,
-    wires: [Wire; 2],
+    wires: [Wire; 3],
     escs: Escs,
+    joints: [Option<Drive>; JointKey::CAPACITY],
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
     /// Frames that passed while a blocking call waited.
@@ -47,8 +50,9 @@ impl Engine {
             now_ns: 0,
             stepped_ns: 0,
             steps: 0,
-            wires: [Wire::new(Line::Can1), Wire::new(Line::Can2)],
+            wires: [Wire::new(Line::Can1), Wire::new(Line::Can2), Wire::new(Line::Can3)],
             escs: [None; MotorKey::CAPACITY],
+            joints: [None; JointKey::CAPACITY],
             chassis: None,
             faults: Faults::new(),
             unseen: Ring::new(),
@@ -56,18 +60,20 @@ impl Engine {
     }
 
     pub(crate) const fn wire(&self, line: Line) -> &Wire {
-        let [can1, can2] = &self.wires;
+        let [can1, can2, can3] = &self.wires;
         match line {
             Line::Can1 => can1,
             Line::Can2 => can2,
+            Line::Can3 => can3,
         }
     }
 
     pub(crate) const fn wire_mut(&mut self, line: Line) -> &mut Wire {
-        let [can1, can2] = &mut self.wires;
+        let [can1, can2, can3] = &mut self.wires;
         match line {
             Line::Can1 => can1,
             Line::Can2 => can2,
+            Line::Can3 => can3,
         }
     }
 
@@ -80,6 +86,25 @@ impl Engine {
             *slot = Some(esc);
         }
         Ok(key)
+    }
+
+    pub(crate) fn attach_joint(&mut self, config: JointConfig) -> Result<JointKey, AttachError> {
+        let refused = AttachError::Joint { id: config.id };
+        let free = self.joints.iter().position(Option::is_none).ok_or(refused)?;
+        let key = JointKey::new(free).ok_or(refused)?;
+        let drive = Drive::new(config, self.seed, u64::from(key.0)).ok_or(refused)?;
+        if let Some(slot) = self.joints.get_mut(free) {
+            *slot = Some(drive);
+        }
+        Ok(key)
+    }
+
+    pub(crate) fn joint(&self, key: JointKey) -> Option<JointState> {
+        Some(self.joints.get(usize::from(key.0))?.as_ref()?.state())
+    }
+
+    fn joint_mut(&mut self, key: JointKey) -> Option<&mut Drive> {
+        self.joints.get_mut(usize::from(key.0))?.as_mut()
     }
 
     pub(crate) fn esc_mut(&mut self, key: MotorKey) -> Option<&mut Esc> {
@@ -113,6 +138,13 @@ impl Engine {
                 }
                 Event::Step => self.step(),
                 Event::Feedback(index) => self.send_feedback(index),
+                Event::Reply(index) => {
+                    let key = JointKey::new(index).map(Fault::SilentJoint);
+                    let silent = key.is_some_and(|fault| self.faults.is_active(fault, self.now_ns));
+                    if let Some(Some(joint)) = self.joints.get_mut(index) {
+                        joint.reply(silent);
+                    }
+                }
                 Event::Fault => {
                     while let Some((line, frame)) = self.faults.next_of_flood(self.now_ns) {
                         // A foreign node whose queue is full skips a turn.
@@ -142,6 +174,11 @@ impl Engine {
                 offer(due_ns, Event::Feedback(index));
             }
         }
+        for (index, joint) in self.joints.iter().enumerate() {
+            if let Some(due_ns) = joint.as_ref().and_then(Drive::due) {
+                offer(due_ns, Event::Reply(index));
+            }
+        }
         offer(self.faults.next_event(self.now_ns), Event::Fault);
         for wire in &self.wires {
             if let Some(idle_ns) = wire.idle_from() {
@@ -163,6 +200,11 @@ impl Engine {
             esc.set_powered(dead, self.now_ns);
             esc.rotor.mechanics = self.faults.mechanics(key, self.now_ns);
             esc.step_current(self.now_ns, STEP_S);
+        }
+        for (index, slot) in self.joints.iter_mut().enumerate() {
+            let (Some(joint), Some(key)) = (slot, JointKey::new(index)) else { continue };
+            joint.set_powered(!self.faults.is_active(Fault::JointPowerLoss(key), self.now_ns));
+            joint.step(STEP_S);
         }
         let ground = self.chassis.as_mut().map(|chassis| chassis.step(&self.escs, STEP_S));
         for (esc, ground_nm) in self.escs.iter_mut().zip(ground.unwrap_or_default()) {
@@ -200,19 +242,36 @@ impl Engine {
             let esc = esc.as_ref().filter(|esc| esc.config.line == line)?;
             Some((esc.mailboxes.candidate()?, Sender::Motor(MotorKey::new(index)?)))
         });
+        let joints = self.joints.iter().enumerate().filter_map(|(index, joint)| {
+            let joint = joint.as_ref().filter(|joint| joint.config.line == line)?;
+            Some((joint.mailboxes.candidate()?, Sender::Joint(JointKey::new(index)?)))
+        });
         let rank = |(frame, _): &(CanFrame, Sender)| (frame.id(), frame.is_remote_frame());
-        controller.into_iter().chain(foreign).chain(motors).min_by_key(rank)
+        controller.into_iter().chain(foreign).chain(motors).chain(joints).min_by_key(rank)
     }
 
     fn arbitrate(&mut self, line: Line) {
         let Some((frame, sender)) = self.winner(line) else { return };
         let now_ns = self.now_ns;
         match sender {
-            Sender::Controller => self.wire_mut(line).mailboxes.begin(),
+            Sender::Controller => {
+                for joint in self.joints.iter_mut().flatten() {
+                    let reply = joint.mailboxes.candidate().filter(|_| joint.config.line == line);
+                    if reply.is_some_and(|reply| reply.id() == frame.id()) {
+                        joint.collisions = joint.collisions.saturating_add(1);
+                    }
+                }
+                self.wire_mut(line).mailboxes.begin();
+            }
             Sender::Foreign => {}
             Sender::Motor(key) => {
                 if let Some(esc) = self.esc_mut(key) {
                     esc.mailboxes.begin();
+                }
+            }
+            Sender::Joint(key) => {
+                if let Some(joint) = self.joint_mut(key) {
+                    joint.mailboxes.begin();
                 }
             }
         }
@@ -245,6 +304,11 @@ impl Engine {
                     esc.mailboxes.finish();
                 }
             }
+            Sender::Joint(key) => {
+                if let Some(joint) = self.joint_mut(key) {
+                    joint.mailboxes.finish();
+                }
+            }
         }
         let copies = self.faults.copies(line, &frame, now_ns);
         for _ in 0..copies {
@@ -253,6 +317,11 @@ impl Engine {
             }
             for esc in self.escs.iter_mut().flatten().filter(|esc| esc.config.line == line) {
                 esc.receive(&frame, now_ns);
+            }
+            for joint in self.joints.iter_mut().flatten() {
+                if joint.config.line == line && !matches!(sender, Sender::Joint(_)) {
+                    joint.receive(&frame, now_ns);
+                }
             }
         }
         self.wire_mut(line).finish(now_ns, copies > 0)

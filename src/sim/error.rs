@@ -14,6 +14,11 @@ pub enum AttachError {
         /// The id that was asked for.
         id: u8,
     },
+    /// There is no joint with this id, or there are 12 joints already.
+    Joint {
+        /// The id that was asked for.
+        id: u8,
+    },
     /// A parameter of the chassis, by its name, makes no sense; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
     Chassis(&'static str),
 }
@@ -23,6 +28,7 @@ impl core::fmt::Display for AttachError {
         match self {
             Self::Full => write!(f, "a world holds {} motors", MotorKey::CAPACITY),
             Self::Id { model, id } => write!(f, "{model:?} has no id {id}"),
+            Self::Joint { id } => write!(f, "no joint has the id {id}, or there are 12 already"),
             Self::Chassis(name) => write!(f, "{name} of the chassis makes no sense"),
         }
     }

@@ -1,7 +1,7 @@
 use super::esc::Tampering;
 use super::random::Random;
 use super::rotor::Mechanics;
-use super::{Line, MotorKey};
+use super::{JointKey, Line, MotorKey};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use core::ops::{Bound, RangeBounds};
@@ -67,6 +67,10 @@ pub enum Fault {
         /// Whether the angle at which it starts again is its new zero.
         forgets_angle: bool,
     },
+    /// The joint answers nothing, and goes on otherwise.
+    SilentJoint(JointKey),
+    /// The joint has no supply. Afterwards it starts afresh, disabled, and counts from where it is.
+    JointPowerLoss(JointKey),
     /// Angle and speed in the feedback stay what they were.
     StuckEncoder(MotorKey),
     /// The ESC sends the same feedback again and again, and goes on otherwise.

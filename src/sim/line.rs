@@ -5,7 +5,7 @@ use crate::frame::CanFrame;
 use crate::time::Instant;
 use embedded_can::{Frame, Id};
 
-/// One of the two buses of a [`World`](super::World).
+/// One of the three buses of a [`World`](super::World).
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Line {
@@ -14,6 +14,8 @@ pub enum Line {
     Can1,
     /// The second bus.
     Can2,
+    /// The third bus.
+    Can3,
 }
 
 /// Who sent a frame.
@@ -24,6 +26,8 @@ pub enum Sender {
     Controller,
     /// A simulated motor.
     Motor(super::MotorKey),
+    /// A simulated joint.
+    Joint(super::JointKey),
     /// Anybody else: [`World::inject`](super::World::inject) or a flood.
     Foreign,
 }
@@ -69,6 +73,7 @@ impl core::fmt::Display for Record {
         let line = match self.line {
             Line::Can1 => "can0",
             Line::Can2 => "can1",
+            Line::Can3 => "can2",
         };
         write!(f, "({}.{:06}) {line} ", micros / 1_000_000, micros % 1_000_000)?;
         match self.frame.id() {

@@ -17,10 +17,12 @@
 //!
 //! | item | what it is |
 //! |---|---|
-//! | [`World`] | the two buses, up to 16 motors, and the time |
+//! | [`World`] | the three buses, up to 16 motors, and the time |
 //! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
 //! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
+//! | [`JointConfig`], [`JointKey`], [`JointState`] | a joint of a snake robot, with its drive |
+//! | [`SerialLine`], [`Noise`] | a serial line that takes its time, and damages bytes |
 //! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
 //! | [`Record`], [`Traffic`] | every frame with its time, as a line of candump; bus load and counters |
@@ -74,12 +76,14 @@ mod engine;
 mod error;
 mod esc;
 mod fault;
+mod joint;
 mod line;
 mod mailbox;
 mod motor;
 mod random;
 mod ring;
 mod rotor;
+mod serial;
 mod wheel;
 mod world;
 
@@ -89,7 +93,9 @@ pub use contract::{Rule, Subject, Violation, check_contract};
 pub use controller::{Controller, ControllerError};
 pub use error::AttachError;
 pub use fault::{Fault, FaultsFull};
+pub use joint::{JointConfig, JointKey, JointState};
 pub use line::{Line, Record, Sender, Traffic};
 pub use motor::{LostCommand, Model, MotorConfig, MotorKey, MotorState};
+pub use serial::{Noise, SerialCounts, SerialLine};
 pub use wheel::Wheel;
 pub use world::{SimClock, World};

@@ -1,7 +1,7 @@
 use super::Line;
 use crate::dji::{self, Facts};
 use crate::time::Duration;
-use crate::units::{AngularVelocity, Current};
+use crate::units::{Angle, AngularVelocity, Current};
 
 /// A motor model with its ESC, as it can be simulated.
 ///
@@ -84,6 +84,9 @@ pub struct MotorConfig {
     pub(crate) lost_command: LostCommand,
     pub(crate) supply_v: f32,
     pub(crate) load_inertia_kg_m2: f32,
+    pub(crate) load_friction_nm: f32,
+    /// Of the output shaft, in radians from the start.
+    pub(crate) stops: Option<(f32, f32)>,
     pub(crate) rotor_angle: Option<u16>,
     pub(crate) clock_ppm: Option<i16>,
     pub(crate) legacy_full_scale: bool,
@@ -101,6 +104,8 @@ impl MotorConfig {
             lost_command: LostCommand::HoldLast,
             supply_v: 24.0,
             load_inertia_kg_m2: 0.0,
+            load_friction_nm: 0.0,
+            stops: None,
             rotor_angle: None,
             clock_ppm: None,
             legacy_full_scale: false,
@@ -132,6 +137,23 @@ impl MotorConfig {
     pub const fn with_load_inertia_kg_m2(self, inertia: f32) -> Self {
         let inertia = if inertia > 0.0 && inertia < 1e3 { inertia } else { 0.0 };
         Self { load_inertia_kg_m2: inertia, ..self }
+    }
+
+    /// Adds dry friction at the output shaft to the motor's own, in Nm; what is not a positive number counts as none.
+    #[must_use]
+    pub const fn with_load_friction_nm(self, friction: f32) -> Self {
+        let friction = if friction > 0.0 && friction < 1e3 { friction } else { 0.0 };
+        Self { load_friction_nm: friction, ..self }
+    }
+
+    /// Puts the output shaft between two hard stops without bounce, as angles from where it starts: at most zero, and at
+    /// least zero. What is NaN counts as zero.
+    #[must_use]
+    pub const fn with_stops(self, lower: Angle, upper: Angle) -> Self {
+        let (lower, upper) = (lower.as_radians(), upper.as_radians());
+        let lower = if lower < 0.0 { lower } else { 0.0 };
+        let upper = if upper > 0.0 { upper } else { 0.0 };
+        Self { stops: Some((lower, upper)), ..self }
     }
 
     /// Sets the rotor's angle at the start, in counts of which a turn has 8192; by default the seed chooses.

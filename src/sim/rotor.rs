@@ -29,7 +29,11 @@ pub(crate) struct Rotor {
     current_limit: f32,
     supply_v: f32,
     inertia: f32,
+    /// Dry friction of motor and load, Nm.
+    coulomb: f32,
     gear: f32,
+    /// The rotor's lowest and highest angle.
+    stops: Option<(i64, i64)>,
     /// Rotor turns times 2^32: exact for 2^31 turns, whatever the speed.
     angle: i64,
     /// Output shaft, rad/s.
@@ -45,6 +49,8 @@ impl Rotor {
     pub(crate) const fn new(config: &MotorConfig, angle_counts: u16) -> Self {
         let facts = config.model.facts();
         let constants = Constants::of(config.model);
+        let gear = facts.gear.as_f32();
+        let angle = (angle_counts as i64) << 19;
         Self {
             constants,
             torque_constant: facts.torque_constant_nm_per_a,
@@ -52,8 +58,15 @@ impl Rotor {
             current_limit: facts.current_full_scale_a,
             supply_v: config.supply_v,
             inertia: constants.inertia + config.load_inertia_kg_m2,
-            gear: facts.gear.as_f32(),
-            angle: (angle_counts as i64) << 19,
+            coulomb: constants.coulomb + config.load_friction_nm,
+            gear,
+            stops: match config.stops {
+                Some((lower, upper)) => {
+                    Some((angle + rotor_angle(lower, gear), angle + rotor_angle(upper, gear)))
+                }
+                None => None,
+            },
+            angle,
             velocity: 0.0,
             current: 0.0,
             load_nm: 0.0,
@@ -114,18 +127,21 @@ impl Rotor {
         let moving = (self.inertia * self.velocity + impulse)
             / (self.inertia + self.constants.viscous * dt_s);
         // Dry friction takes speed away, and never more than there is.
-        let loss = self.constants.coulomb * dt_s / self.inertia;
+        let loss = self.coulomb * dt_s / self.inertia;
         self.velocity = if moving.abs() <= loss { 0.0 } else { moving - loss.copysign(moving) };
         self.angle = self.angle.wrapping_add(self.travel(dt_s));
+        if let Some((lowest, highest)) = self.stops {
+            let within = self.angle.clamp(lowest, highest);
+            if within != self.angle {
+                self.angle = within;
+                self.velocity = 0.0;
+            }
+        }
     }
 
     /// Returns the angle that the rotor covers in `dt_s`, in turns times 2^32.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "saturates; far below 2^63 at any real speed"
-    )]
-    fn travel(&self, dt_s: f32) -> i64 {
-        (self.velocity * dt_s * (self.gear / TAU) * TURN) as i64
+    const fn travel(&self, dt_s: f32) -> i64 {
+        rotor_angle(self.velocity * dt_s, self.gear)
     }
 
     /// Moves the temperature by one step of `dt_s`; call it less often than the others.
@@ -178,6 +194,12 @@ impl Rotor {
     }
 }
 
+/// Returns the angle of the rotor, in turns times 2^32, that is this angle of the output shaft.
+#[expect(clippy::cast_possible_truncation, reason = "saturates; far below 2^63 at any real speed")]
+const fn rotor_angle(output_rad: f32, gear: f32) -> i64 {
+    (output_rad * (gear / TAU) * TURN) as i64
+}
+
 /// Room temperature in °C.
 const AMBIENT_C: f32 = 25.0;
 
@@ -190,6 +212,39 @@ mod tests {
     const STEP: f32 = 1e-4;
     const MODELS: [Model; 4] =
         [Model::M2006, Model::M3508, Model::Gm6020Voltage, Model::Gm6020Current];
+
+    #[test]
+    fn a_stop_holds_against_full_torque_and_lets_go_the_other_way() {
+        let stops = [-0.3, 0.2].map(crate::units::Angle::from_radians);
+        let config = MotorConfig::new(Model::M2006, 1).with_stops(stops[0], stops[1]);
+        let mut rotor = Rotor::new(&config, 4_000);
+        let mut press = |amperes: f32| {
+            for _ in 0..10_000 {
+                rotor.step_current(Drive::Amperes(amperes), STEP);
+                rotor.step_motion(0.0, STEP);
+            }
+            let turned = (rotor.counts(0.0) - 4_000) as f32 / (8_192.0 * 36.0) * TAU;
+            (turned, rotor.velocity(), rotor.current())
+        };
+        for (amperes, stop) in [(10.0, 0.2), (-10.0, -0.3), (5.0, 0.2_f32)] {
+            let (turned, velocity, current) = press(amperes);
+            assert!((turned - stop).abs() < 1e-4 && velocity.abs() < 0.01, "{turned}, {velocity}");
+            assert!((current - amperes).abs() < 0.01, "{current}");
+        }
+    }
+
+    #[test]
+    fn friction_of_the_load_is_overcome_by_more_current_only() {
+        let config = MotorConfig::new(Model::M2006, 1).with_load_friction_nm(0.3); // and 0.05 own
+        for (amperes, moves) in [(1.8, false), (-1.8, false), (2.1, true), (-2.1, true)] {
+            let mut rotor = Rotor::new(&config, 0);
+            for _ in 0..1_000 {
+                rotor.step_current(Drive::Amperes(amperes), STEP); // 0.18 Nm/A
+                rotor.step_motion(0.0, STEP);
+            }
+            assert_eq!(rotor.velocity().abs() > 0.1, moves, "{amperes} A");
+        }
+    }
 
     fn rotor(model: Model) -> Rotor {
         Rotor::new(&MotorConfig::new(model, 1), 0)

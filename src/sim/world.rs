@@ -9,7 +9,7 @@ use crate::time::{Clock, Duration, Instant};
 use core::cell::RefCell;
 use core::ops::RangeBounds;
 
-/// Two CAN buses with motors on them, and the time.
+/// Three CAN buses with motors on them, and the time.
 ///
 /// It is shared by reference, so that the code under test can own the driver's end of a bus while the test goes
 /// on to move time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block.
@@ -100,7 +100,7 @@ impl World {
         self.advance(instant.since(self.now()));
     }
 
-    /// Moves time forward, and shows every frame that passes on either bus, in order.
+    /// Moves time forward, and shows every frame that passes on any bus, in order.
     ///
     /// While a frame is shown, the time is the end of that frame, and all of this world can be used.
     /// Frames that passed while a blocking call waited are shown first, the first 64 of them.

@@ -6,9 +6,9 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Ingest, Link, Malformed};
-use drivetrain::runner::FrameQueue;
+use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
-use drivetrain::time::Duration;
+use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use embedded_can::{ExtendedId, Frame, StandardId};
 
 /// The cases of this file.
@@ -211,12 +211,37 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     assert_eq!(task.dropped(), 13);
     assert_eq!(core::iter::from_fn(|| task.pop()).count(), 7);
 
+    // By the runner: one edge, whatever the rate, and its end a second after the last.
+    let mut queue = FrameQueue::<4>::new();
+    let (mut interrupt, mut task) = queue.split();
+    let clock = ManualClock::new(at_ms(1));
+    let world = World::new(1);
+    let (bus, _) = armed([Config::new(1)]);
+    let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
+    for ms in 2..3_000 {
+        clock.set(at_ms(ms));
+        world.advance(Duration::from_millis(1));
+        for _ in 0..if ms < 1_000 { 5 } else { 1 } {
+            interrupt.push(&feedback(0x201, 0, 0), at_ms(ms));
+        }
+        assert!((1..=3).contains(&runner.poll_queue(&mut task, 16)));
+        runner.tick(Tick::new(at_ms(ms), 0.001));
+    }
+    assert_eq!(runner.statistics().lost, 998 * 2);
+    let edges: Vec<String> = runner.edges().map(|edge| edge.to_string()).collect();
+    assert_eq!(edges, ["receive overrun began at 2000 us", "receive overrun ended at 1999000 us"]);
+
     let world = World::new(1).with_receive_depth(Line::Can1, 4);
     let mut rig = Rig::new(&world, Line::Can1, 4);
     rig.drive(100);
     world.advance(Duration::from_millis(20)); // the application hangs
     rig.drive(50);
     assert_eq!(rig.runner.statistics().receive_errors.overrun, 1);
+    let overrun = rig.runner.edges().find(|edge| edge.condition == BusCondition::ReceiveOverrun);
+    assert_eq!(
+        overrun.map(|edge| (edge.at, edge.began)),
+        Some((Instant::from_micros(120_100), true))
+    );
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
     assert!(rig.words(0, 140, 160).iter().all(|word| *word > 0));
     saw("13 dropped by the queue, 1 overrun of the controller, counted");

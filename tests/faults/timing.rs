@@ -5,7 +5,7 @@ use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, wor
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
-use drivetrain::runner::{Nb, Runner};
+use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
 
@@ -13,6 +13,7 @@ use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
 pub(crate) const CASES: &[Case] = cases![
     f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice,
     f25_with_all_feedback_lost_frames_are_still_offered,
+    f27_a_heartbeat_stops_with_any_part_of_the_loop,
     f26_an_application_that_stops_is_zero_after_the_deadline,
     f28_nothing_notices_that_a_hardware_counter_wraps,
     f29_time_that_stands_or_goes_back_is_never_fresh_for_ever,
@@ -84,11 +85,81 @@ fn f25_with_all_feedback_lost_frames_are_still_offered() {
     let sent: Vec<_> = rig.sent.iter().filter(|sent| sent.at > at_ms(320)).collect();
     assert!((50..=60).contains(&sent.len()), "a keep-alive every 10 ms, not {}", sent.len());
     assert!(sent.iter().all(|sent| sent.words == [0; 4]));
+    let edge = rig.runner.next_edge().unwrap();
+    assert_eq!((edge.condition, edge.began), (BusCondition::Silent, true));
+    // From the tick that heard the last frame, 100 ms and a tick at most.
+    assert!((at_ms(399)..=at_ms(402)).contains(&edge.at), "{edge}");
+    assert_eq!(rig.runner.next_edge(), None, "one edge for 490 ms, and the bus is not down");
     let sent = sent.len();
     rig.drive(100);
     assert!((0..4).all(|wheel| rig.link(wheel) == Link::Online));
     safe_after(ticks_since(300, rig.first_zero(0, 300)));
-    saw(format!("{} zero frames in 570 ms", sent));
+    saw(format!("{sent} zero frames in 570 ms; {edge}"));
+    let edge = rig.runner.next_edge().unwrap();
+    assert!(!edge.began && (at_ms(900)..=at_ms(903)).contains(&edge.at), "{edge}");
+
+    // One motor of four is no silence of the bus, and neither is a bus on which nothing was ever heard.
+    let world = World::new(2);
+    let mut rig = Rig::new(&world, Line::Can1, 4);
+    for key in rig.keys.clone().into_iter().skip(1) {
+        world.fault(Fault::Silent(key), ..).unwrap();
+    }
+    rig.drive(500);
+    assert_eq!(rig.runner.next_edge(), None);
+    let mut rig = Rig::new(&world, Line::Can2, 0);
+    rig.drive(500);
+    assert_eq!(rig.runner.next_edge(), None);
+}
+
+#[cfg_attr(test, test)]
+fn f27_a_heartbeat_stops_with_any_part_of_the_loop() {
+    const TICKS: u32 = 50;
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Stops {
+        Nothing,
+        Receive,
+        Tick,
+        Clock,
+        Bus,
+    }
+    // A hardware watchdog of 5 ms, fed as the documentation says; 200 ms in which one part stops after 50.
+    let resets_at = |stops: Stops| {
+        let clock = ManualClock::new(at_ms(1));
+        let world = World::new(1);
+        let (bus, [wheel]) = armed([Config::new(1)]);
+        let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
+        if stops == Stops::Bus {
+            world.fault(Fault::BusOff(Line::Can1), ..).unwrap();
+        }
+        let (mut beat, mut fed) = (runner.heartbeat(), 1);
+        for ms in 2..200 {
+            let stopped = ms > 50;
+            world.advance(Duration::from_millis(1));
+            if !(stopped && stops == Stops::Clock) {
+                clock.set(at_ms(ms));
+            }
+            if !(stopped && stops == Stops::Receive) {
+                runner.poll(8);
+            }
+            if let Some(tick) = runner.due().filter(|_| !(stopped && stops == Stops::Tick)) {
+                _ = runner.device_mut().set_raw(wheel, 7);
+                runner.tick(tick);
+            }
+            if runner.heartbeat() != beat {
+                (beat, fed) = (runner.heartbeat(), ms);
+            }
+            if ms - fed >= 5 {
+                return Err((ms, beat));
+            }
+        }
+        Ok(beat)
+    };
+    assert_eq!(resets_at(Stops::Nothing), Ok(198));
+    assert_eq!(resets_at(Stops::Bus), Ok(198), "a dead bus is no reason to reset");
+    for stops in [Stops::Receive, Stops::Tick, Stops::Clock] {
+        assert!(resets_at(stops).is_err_and(|(ms, beat)| ms <= 56 && beat <= TICKS), "{stops:?}");
+    }
+    saw("stops without receive, tick or a clock that goes on, and not with a dead bus");
 }
 
 #[cfg_attr(test, test)]
@@ -172,13 +243,34 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     runner.device_mut().set_raw(wheel, 700).unwrap();
     runner.tick(tick);
     assert!((0..1_000).all(|_| runner.due().is_none()));
+    assert_eq!(runner.next_edge(), None, "a clock may be coarse");
     for _ in 0..3 {
         runner.tick(Tick::new(at_ms(10), 0.0));
     }
     assert_eq!(runner.device().counters().bad_steps, 3);
+    assert_eq!(runner.statistics().clock_standstills, 3);
+    let edge = runner.next_edge().unwrap();
+    assert_eq!((edge.condition, edge.at), (BusCondition::ClockStandstill, at_ms(10)));
     clock.set(at_ms(3));
     assert!(runner.due().is_none(), "no tick before the time comes again");
-    saw("no tick while time stands; back by up to 50 min: late, then online");
+    assert!(runner.due().is_none());
+    assert_eq!(runner.statistics().clock_reversals, 1);
+    let edge = runner.next_edge().unwrap();
+    assert_eq!(
+        (edge.condition, edge.at, edge.began),
+        (BusCondition::ClockReversal, at_ms(3), true)
+    );
+    // Ticks by hand that go back are counted as well, once.
+    for ms in [12, 11, 12, 13] {
+        clock.set(at_ms(ms));
+        _ = runner.poll(1);
+        _ = runner.due();
+        runner.tick(Tick::new(at_ms(ms), 0.001));
+    }
+    assert_eq!(runner.statistics().clock_reversals, 2);
+    let others: Vec<_> = runner.edges().map(|edge| edge.condition).collect();
+    assert_eq!(others, [BusCondition::TickOverrun], "going back is one condition that lasts");
+    saw("no tick while time stands; back by up to 50 min: late, then online; both counted");
 }
 
 #[cfg_attr(test, test)]
@@ -247,6 +339,8 @@ fn f32_a_huge_time_step_moves_no_integral() {
     let tick = runner.due().unwrap();
     runner.tick(tick);
     assert_eq!(runner.statistics().overruns, 9_999);
+    let edges: Vec<_> = runner.edges().map(|edge| (edge.condition, edge.at)).collect();
+    assert_eq!(edges, [(BusCondition::TickOverrun, at_ms(10_001))]);
     saw("steps of 21 ms to 1e30 s move nothing, 9999 overruns counted");
 }
 

@@ -5,7 +5,7 @@ use crate::rig::{Rig, armed, at_ms, feedback, words};
 use drivetrain::dji::Config;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Link};
-use drivetrain::runner::{Nb, Runner};
+use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ManualClock, Tick};
 use embedded_can::ErrorKind;
@@ -166,6 +166,12 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
         assert!(stale <= stale_at_most, "{fault:?}: {stale}");
         assert!(after[stale..].iter().all(|word| *word == 0), "old ones first, then zeros");
         assert_eq!(rig.runner.statistics().bus_losses, 1);
+        let down: Vec<_> =
+            rig.runner.edges().filter(|edge| edge.condition == BusCondition::Down).collect();
+        assert_eq!(down.len(), 2, "{fault:?}: {down:?}");
+        let (began, ended) = (down[0], down[1]);
+        assert!(began.began && (at_ms(399)..at_ms(405)).contains(&began.at), "{began}");
+        assert!(!ended.began && (at_ms(599)..at_ms(605)).contains(&ended.at), "{ended}");
         assert!(!rig.runner.is_bus_down() && !rig.runner.is_armed());
         rig.runner.arm(Tick::new(world.now(), 0.001)).unwrap();
         rig.drive(50);

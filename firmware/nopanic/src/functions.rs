@@ -14,11 +14,12 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, CanDevice, Claim, Guard, Malformed, Missing, MotorName, Own, OwnMotor, Role, Timeouts,
-    VelocityDrive,
+    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing, MotorName, Own,
+    OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
+    MeasuredLoad, Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
@@ -38,6 +39,7 @@ pub fn call_all() {
     crate::health::call_all();
     crate::chassis::call_all();
     crate::pwm::call_all();
+    crate::snake::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
     #[cfg(feature = "panics")]
@@ -247,6 +249,8 @@ fn motor() {
     Timeouts::with_late.call();
     Timeouts::with_offline.call();
     Timeouts::with_command.call();
+    Timeouts::with_measured.call();
+    Timeouts::measured.call();
     Timeouts::with_good_frames.call();
     Timeouts::late.call();
     Timeouts::offline.call();
@@ -254,11 +258,14 @@ fn motor() {
     Timeouts::good_frames.call();
     BusLoad::new.call();
     BusLoad::with_frames.call();
+    BusLoad::with_frames_of.call();
+    BusLoad::and.call();
     BusLoad::frames_per_s.call();
     BusLoad::bit_rate.call();
     BusLoad::nominal.call();
     BusLoad::worst_case.call();
     BusLoad::frames_within.call();
+    BusLoad::frame_bits.call();
     Guard::new.call();
     Guard::without_feedback.call();
     Guard::with_timeouts.call();
@@ -278,6 +285,22 @@ fn motor() {
     Guard::refused_targets.call();
     Guard::forgotten_targets.call();
     Guard::reversals.call();
+    Capability::is_target.call();
+    (|list: &[Capability]| Capabilities::of(list)).call();
+    Capabilities::with.call();
+    Capabilities::has.call();
+    (|set: Capabilities| Capabilities::iter(set).count()).call();
+    StopHomingConfig::new.call();
+    StopHomingConfig::with_standing_below.call();
+    StopHomingConfig::with_window.call();
+    StopHomingConfig::with_timeout.call();
+    StopHomingConfig::with_travel.call();
+    StopHomingConfig::with_stop_at.call();
+    StopHomingConfig::with_back_off.call();
+    StopHomingConfig::validate.call();
+    StopHoming::new.call();
+    StopHoming::step.call();
+    StopHoming::is_done.call();
     Own::<AnyMotor>::new.call();
     Own::<AnyMotor>::with_timeouts.call();
     Own::<AnyMotor>::motor.call();
@@ -384,6 +407,18 @@ fn dji() {
     (|bus: &mut Bus, motor: AnyHandle, pid: PidConfig| Bus::set_position_loop(bus, motor, pid))
         .call();
     (|bus: &Bus, motor: AnyHandle| VelocityDrive::velocity(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| VelocityDrive::capabilities(bus, motor)).call();
+    (|bus: &Bus, motor: AnyHandle| Bus::capabilities(bus, motor)).call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Angle, measured: Measured| {
+        Bus::set_angle_measured(bus, motor, to, measured)
+    })
+    .call();
+    (|bus: &mut Bus, motor: AnyHandle, to: Position, measured: Measured<Position>| {
+        Bus::set_position_measured(bus, motor, to, measured)
+    })
+    .call();
+    Measured::<Angle>::way_to.call();
+    Measured::<Position>::way_to.call();
     device::<Bus>();
 }
 
@@ -485,6 +520,24 @@ fn runner() {
     .call();
     Shell::statistics.call();
     Shell::is_bus_down.call();
+    Shell::has.call();
+    Shell::next_edge.call();
+    (|runner: &mut Shell| Shell::edges(runner).count()).call();
+    Shell::heartbeat.call();
+    Shell::with_bit_rate.call();
+    Shell::measured_load.call();
+    Shell::note_lost.call();
+    Shell::poll_queue.call();
+    (|runner: &mut Shell, queue: &mut FrameReceiver<'_>, budget: usize| {
+        Shell::poll_queue_with(runner, queue, budget, |frame| {
+            black_box(frame);
+        })
+    })
+    .call();
+    MeasuredLoad::new.call();
+    MeasuredLoad::frames_per_s.call();
+    MeasuredLoad::nominal.call();
+    MeasuredLoad::worst_case.call();
     Shell::device.call();
     Shell::device_mut.call();
     Shell::port_mut.call();

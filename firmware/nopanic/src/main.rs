@@ -14,6 +14,7 @@ mod health;
 mod opaque;
 mod pwm;
 mod shaping;
+mod snake;
 mod wire;
 
 use core::panic::PanicInfo;

@@ -62,7 +62,7 @@ impl LowPass {
         if step.admits(input.is_finite(), &mut self.rejected) {
             if self.started {
                 let gain = step.dt_s / (step.dt_s + self.time_constant_s);
-                self.value += gain * finite(input - self.value);
+                self.value = finite(self.value + gain * finite(input - self.value));
             } else {
                 self.reset_to(input);
             }
@@ -154,5 +154,12 @@ mod tests {
                 prop_assert!((lowest - slack..=highest + slack).contains(&filter.update(input, dt_s)));
             }
         }
+    }
+
+    #[test]
+    fn the_largest_floats_round_to_no_infinity() {
+        let mut filter = LowPass::new(1e38).unwrap();
+        filter.reset_to(-1.5e31);
+        assert_eq!(filter.update(f32::MIN, 0.001), f32::MIN);
     }
 }

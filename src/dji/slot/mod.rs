@@ -1,7 +1,9 @@
 //! One motor: feedback in, loops, raw command out.
 
 mod arming;
+mod capability;
 mod health;
+mod measured;
 mod receive;
 mod target;
 mod update;

@@ -16,6 +16,8 @@ pub(super) enum Action {
     /// The shortest way.
     Angle,
     Position,
+    /// The way that another sensor leaves.
+    Measured,
 }
 
 impl Action {
@@ -54,6 +56,20 @@ impl Goal {
 
     pub(super) const fn turns(&self) -> Turns {
         self.turns
+    }
+
+    /// A way in rad, and the rate in rad/s that goes with it.
+    pub(super) const fn measured(way: f32, rad_per_s: f32) -> Self {
+        let rate = Turns::new(rad_per_s.to_bits() as i64);
+        Self { turns: rate, value: way.to_bits().cast_signed() }
+    }
+
+    pub(super) const fn way(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    pub(super) const fn rate(&self) -> f32 {
+        f32::from_bits(self.turns.low())
     }
 }
 
@@ -141,7 +157,7 @@ impl Slot {
 
     /// A value that cannot be followed takes the target before it away: zero output, integrators untouched. An older
     /// value must not act in its place when the feedback comes back.
-    fn admit(&mut self, finite: bool) -> Result<(), TargetError> {
+    pub(super) fn admit(&mut self, finite: bool) -> Result<(), TargetError> {
         if !finite {
             self.ask(Action::Rest, Goal::NONE);
             self.refused_targets = self.refused_targets.saturating_add(1);
@@ -159,7 +175,7 @@ impl Slot {
         Ok(())
     }
 
-    fn start(&mut self, action: Action, goal: Goal, now: u32) {
+    pub(super) fn start(&mut self, action: Action, goal: Goal, now: u32) {
         self.ask(action, goal);
         self.commanded = now;
     }
@@ -171,9 +187,13 @@ impl Slot {
     }
 
     /// The speed loop takes over from a direct command where that was: no jump of the output.
-    fn enter_speed_loop(&mut self) {
+    pub(super) fn enter_speed_loop(&mut self) {
         if self.asked == Action::Raw {
             self.speed.reset_to(self.goal.raw() as f32 / self.raw_per_unit);
+        } else if self.asked == Action::Measured {
+            // Another sensor: its last reading says nothing of the next one.
+            self.speed.interrupt();
+            self.position.interrupt();
         }
     }
 
@@ -189,7 +209,7 @@ impl Slot {
     }
 }
 
-fn needs(pid: &Pid) -> Result<(), TargetError> {
+pub(super) fn needs(pid: &Pid) -> Result<(), TargetError> {
     if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 

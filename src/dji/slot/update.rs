@@ -32,13 +32,17 @@ impl Slot {
     /// Runs the loops of this motor and returns its raw command.
     #[inline]
     pub(in crate::dji) fn update(&mut self, step: &TimeStep) -> i16 {
-        let velocity = self.velocity().as_rad_per_s();
+        let mut velocity = self.velocity().as_rad_per_s();
         let goal = if self.action == Action::Velocity {
             self.goal.rad_per_s()
         } else {
             let way = match self.action {
                 Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
                 Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+                Action::Measured => {
+                    velocity = self.goal.rate();
+                    self.goal.way()
+                }
                 Action::Raw => return saturate(self.goal.raw(), self.range),
                 Action::Rest | Action::Velocity => return 0,
             };
@@ -89,7 +93,7 @@ impl Slot {
     }
 
     /// The application has not set a target for too long.
-    fn forget_target(&mut self) {
+    pub(super) fn forget_target(&mut self) {
         self.relax();
         self.conditions.set(Condition::CommandLost, true);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);

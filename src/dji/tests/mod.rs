@@ -2,6 +2,7 @@
 
 mod attaching;
 mod commanding;
+mod measured;
 mod receiving;
 mod safety;
 

@@ -27,6 +27,14 @@ pub trait Subject {
     /// The first error.
     fn drive(&mut self, share: f32) -> Result<(), TargetError>;
 
+    /// Sets some target that the motors do not offer, by their capabilities.
+    ///
+    /// # Errors
+    /// Says why not, as has to be; and so it does by default, for a device whose functions offer no such thing.
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        Err(TargetError::Unsupported)
+    }
+
     /// Tells whether a command frame asks for nothing: eight zeros, unless said otherwise.
     fn is_zero(&self, command: &CanFrame) -> bool {
         *command.bytes() == [0; 8]
@@ -35,6 +43,12 @@ pub trait Subject {
     /// Returns the milliseconds after which lost feedback has to be zero output, one tick included.
     fn late_ms(&self) -> u64 {
         11
+    }
+
+    /// Returns the milliseconds that an emergency stop may take until it is on its way: 0, unless the protocol has it wait
+    /// for an answer.
+    fn stop_ms(&self) -> u64 {
+        0
     }
 
     /// Returns the milliseconds after which a target no longer counts, one tick included.
@@ -76,6 +90,8 @@ pub enum Rule {
     OldTargetsAreZero,
     /// A target that is NaN is an error and gives zero.
     NanIsZero,
+    /// A target that is not offered is an error, and changes nothing (I5).
+    UnsupportedIsAnError,
     /// A second bad time step in a row gives zero.
     BadStepsAreZero,
     /// A frame that is given back is taken, waits for the next update, and comes again with the newest values (I7).
@@ -136,7 +152,7 @@ impl core::error::Error for Violation {}
 ///     let wheel = bus.attach(Config::new(1)).expect("a free id");
 ///     OneWheel(bus, wheel)
 /// };
-/// assert_eq!(check_contract(make), Ok(19)); // rules
+/// assert_eq!(check_contract(make), Ok(20)); // rules
 /// ```
 ///
 /// # Errors

@@ -19,6 +19,7 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     others(make)?;
     old_target(Run::driving(make())?)?;
     nan(Run::driving(make())?)?;
+    unsupported(Run::driving(make())?, Run::driving(make())?)?;
     bad_steps(make)?;
     requeue(Run::driving(make())?)?;
     emergency_stop(Run::driving(make())?)?;
@@ -169,6 +170,17 @@ fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
     Ok(())
 }
 
+/// On one device of two: the other must not differ.
+fn unsupported<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
+    for _ in 0..20 {
+        let outcome = run.subject.drive_unsupported();
+        let refused = matches!(outcome, Err(TargetError::Unsupported | TargetError::NoLoop));
+        let same = run.step()? == other.step()?;
+        run.expect(refused && same, Rule::UnsupportedIsAnError)?;
+    }
+    Ok(())
+}
+
 fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     for dt_s in [0.0, -0.001, f32::NAN, f32::INFINITY] {
         let mut run = Run::driving(make())?;
@@ -210,15 +222,20 @@ fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
     // In the middle of a cycle: what waits now must be zero already.
     run.subject.device().emergency_stop();
     let output = run.drain()?;
-    run.expect(output.frames > 0 && output.driving == 0, rule)?;
-    for _ in 0..20 {
+    let mut frames = output.frames;
+    run.expect(output.driving == 0, rule)?;
+    for ms in 0..20 {
         let now = run.now();
         let refused = run.subject.device().arm(now) == Err(ArmError::Stopped);
         let no_target = run.subject.drive(1.0) == Err(TargetError::Disarmed);
-        let zero = run.step()?.driving == 0;
+        let output = run.step()?;
+        if ms < run.subject.stop_ms() {
+            frames += output.frames;
+        }
         let stopped = run.subject.device().is_stopped();
-        run.expect(refused && no_target && zero && stopped, rule)?;
+        run.expect(refused && no_target && output.driving == 0 && stopped, rule)?;
     }
+    run.expect(frames > 0, rule)?;
     run.subject.device().clear_emergency_stop();
     let zero = run.step()?.driving == 0;
     let disarmed = !run.subject.device().is_armed();

@@ -329,4 +329,10 @@ mod tests {
             let _ = Record::parse(&line);
         }
     }
+
+    #[test]
+    fn an_error_says_column_and_what_was_expected() {
+        let error = Record::parse(b"can0 201#0E1").unwrap_err();
+        assert_eq!(std::format!("{error}"), "column 13: expected two hexadecimal digits");
+    }
 }

@@ -207,3 +207,41 @@ impl Dbus {
 fn count(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME: [u8; FRAME_LENGTH] =
+        [0x94, 0x66, 0x0B, 0xA5, 0xD9, 0x92, 0, 0, 0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0];
+
+    fn ms(ms: u64) -> Instant {
+        Instant::START + Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn a_pause_between_two_whole_frames_cuts_nothing_off() {
+        let mut dbus = Dbus::new();
+        for at in [0, 14, 28] {
+            assert!(dbus.read(&mut &FRAME[..], ms(at)).is_some());
+        }
+        assert_eq!(dbus.counts(), DbusCounts { frames: 3, ..DbusCounts::default() });
+    }
+
+    #[test]
+    fn the_pause_that_separates_two_frames_can_be_set() {
+        let mut dbus = Dbus::new().with_pause(Duration::from_millis(6));
+        assert_eq!(dbus.read(&mut &FRAME[..9], ms(0)), None);
+        assert!(dbus.read(&mut &FRAME[9..], ms(5)).is_some()); // 3 ms would have cut it
+        assert_eq!(dbus.read(&mut &FRAME[..9], ms(20)), None);
+        assert_eq!(dbus.read(&mut &FRAME[9..], ms(26)), None);
+        assert_eq!(dbus.counts().truncated, 1);
+    }
+
+    #[test]
+    fn the_silence_after_which_the_signal_is_lost_can_be_set() {
+        let mut dbus = Dbus::new().with_deadline(Duration::from_millis(300));
+        assert!(dbus.read(&mut &FRAME[..], ms(0)).is_some());
+        assert!(dbus.is_live(ms(299)) && !dbus.is_live(ms(301)));
+    }
+}

@@ -142,9 +142,7 @@ mod app {
             next += 1.millis();
             Micros::delay_until(next).await;
             cx.shared.runner.lock(|runner| {
-                while let Some((frame, arrived)) = cx.local.queue.pop() {
-                    _ = runner.ingest(&frame, arrived);
-                }
+                runner.poll_queue(cx.local.queue, 64);
                 if let Some(tick) = runner.due() {
                     runner.tick(tick);
                 }

@@ -1,0 +1,86 @@
+//! Joints that hold their own position loop.
+
+use crate::opaque::{Function, any};
+use core::hint::black_box;
+use drivetrain::motor::CanDevice;
+use drivetrain::snake::*;
+
+pub fn call_all() {
+    Register::from_raw.call();
+    Register::as_raw.call();
+    Register::is_writable.call();
+    Command::frame.call();
+    decode_command.call();
+    Command::is_safe.call();
+    Reply::new.call();
+    decode_reply.call();
+    Reply::encode.call();
+    Reply::register.call();
+    Reply::value.call();
+    Config::new.call();
+    Config::reversed.call();
+    Config::with_speed.call();
+    Config::with_settings.call();
+    Config::id.call();
+    Config::settings.call();
+    Settings::new.call();
+    Settings::with_current.call();
+    Settings::with_acceleration.call();
+    Settings::with_deceleration.call();
+    Settings::with_mode.call();
+    Settings::current.call();
+    Settings::acceleration.call();
+    Settings::deceleration.call();
+    Settings::mode.call();
+    Joints::new.call();
+    Joints::with_timeouts.call();
+    Joints::with_reply_timeout.call();
+    Joints::with_frames_per_update.call();
+    Joints::with_bit_rate.call();
+    Joints::with_tick_rate.call();
+    Joints::load.call();
+    Joints::attach.call();
+    Joints::detach.call();
+    Joints::ingest.call();
+    Joints::update.call();
+    Joints::next_frame.call();
+    Joints::requeue.call();
+    Joints::state.call();
+    Joints::link.call();
+    Joints::is_joint_armed.call();
+    Joints::awaited.call();
+    joints.call();
+    Joints::counters.call();
+    Joints::set_position.call();
+    Joints::set_pulses.call();
+    Joints::set_speed.call();
+    Joints::set_settings.call();
+    Joints::relax.call();
+    Joints::zero.call();
+    Joints::set_offset.call();
+    Joints::offset.call();
+    Joints::read.call();
+    Joints::answer.call();
+    <Joints as CanDevice>::arm.call();
+    <Joints as CanDevice>::disarm.call();
+    <Joints as CanDevice>::emergency_stop.call();
+    <Joints as CanDevice>::clear_emergency_stop.call();
+    <Joints as CanDevice>::is_armed.call();
+}
+
+/// `Command::decode` borrows its argument.
+fn decode_command() -> Option<Command> {
+    Command::decode(&any::<[u8; 8]>()[..any::<usize>() & 7])
+}
+
+/// `Reply::decode` borrows its argument.
+fn decode_reply() -> Result<Reply, ReplyError> {
+    Reply::decode(&any::<[u8; 8]>()[..any::<usize>() & 7])
+}
+
+/// `Joints::joints` returns a borrowing iterator.
+fn joints(all: &Joints) {
+    for joint in all.joints() {
+        black_box(joint);
+    }
+}

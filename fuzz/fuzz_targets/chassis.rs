@@ -1,0 +1,161 @@
+//! Any layout, any wheels, any commands, any steps: what the wheels are told is finite and within their limit.
+#![no_main]
+
+use drivetrain::chassis::{
+    Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
+    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, OmniWheel, Spin, SteeringConfig,
+    Swerve, SwerveSteering, WheelSpeed, WithoutGimbal,
+};
+use drivetrain::control::PidConfig;
+use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
+use drivetrain::time::{Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain_fuzz::Input;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    let radius = input.positive();
+    let vec2 = |input: &mut Input| Vec2::new(input.float(), input.float());
+    let speed = |input: &mut Input| AngularVelocity::from_rad_per_s(input.float());
+    match input.byte() % 6 {
+        0 | 1 => {
+            let geometry = MecanumGeometry {
+                wheel_radius_m: radius,
+                half_wheelbase_m: input.positive(),
+                half_track_m: input.positive(),
+            };
+            let Ok(layout) = Mecanum::new(geometry) else { return };
+            drive(layout, input, speed);
+        }
+        2 => {
+            let geometry =
+                DifferentialGeometry { wheel_radius_m: radius, half_track_m: input.positive() };
+            let Ok(layout) = Differential::new(geometry) else { return };
+            drive(layout, input, speed);
+        }
+        3 => {
+            let wheel = |input: &mut Input| {
+                OmniWheel::tangential(Angle::from_radians(input.float()), input.positive())
+            };
+            let wheels = [wheel(&mut input), wheel(&mut input), wheel(&mut input)];
+            let Ok(layout) = Omni::<3>::new(radius, wheels) else { return };
+            drive(layout, input, speed);
+        }
+        4 => {
+            let places = [vec2(&mut input), vec2(&mut input), vec2(&mut input), vec2(&mut input)];
+            let Ok(layout) = Swerve::<4>::new(radius, places) else { return };
+            let mut steering = SwerveSteering::new(
+                SteeringConfig::new().with_hysteresis(Angle::from_radians(input.float())),
+            );
+            drive(layout, input, |input| {
+                let wanted = core::array::from_fn(|_| {
+                    ModuleState::new(speed(input), Angle::from_radians(input.float()))
+                });
+                let measured = core::array::from_fn(|_| {
+                    (input.byte() % 4 != 0).then(|| Angle::from_radians(input.float()))
+                });
+                let [module, ..]: [ModuleState; 4] = steering.steer(wanted, measured);
+                module
+            });
+        }
+        _ => modes(input),
+    }
+});
+
+fn drive<K: Kinematics>(
+    layout: K,
+    mut input: Input,
+    mut measured: impl FnMut(&mut Input) -> K::Speed,
+) where
+    Chassis<K>: Copy,
+{
+    let mut chassis = Chassis::new(layout);
+    let mut now = 1_000;
+    let mut limit = f32::MAX;
+    while !input.is_empty() {
+        match input.byte() {
+            0..=31 => {
+                chassis.set_body(Twist::new(input.float(), input.float(), input.float()));
+            }
+            32..=63 => {
+                let twist = Twist::new(input.float(), input.float(), input.float());
+                chassis.set_world(twist, Heading::new(Angle::from_radians(input.float())));
+            }
+            64..=71 => chassis.set_heading(Heading::new(Angle::from_radians(input.float()))),
+            72..=79 => chassis.stop(),
+            80..=87 => chassis.restart(),
+            88..=91 => chassis.set_pose(Pose2::ORIGIN),
+            92..=111 => {
+                let (linear, angular, wheel) = (input.positive(), input.positive(), input.float());
+                let limits = ChassisLimits::new()
+                    .with_acceleration(linear, angular)
+                    .with_wheel_speed(AngularVelocity::from_rad_per_s(wheel));
+                if chassis.set_limits(limits).is_ok() {
+                    limit = wheel;
+                }
+            }
+            lost => {
+                now = input.time(now);
+                let wheels = K::map(layout_wheels(&chassis), |_: K::Speed| {
+                    (lost < 240 || input.byte() % 2 == 0).then(|| measured(&mut input))
+                });
+                let tick = Tick::new(Instant::from_micros(now), input.step_s());
+                let mut same = chassis;
+                let targets = chassis.update(wheels, tick);
+                let again = same.update(wheels, tick);
+                let _: K::Wheels<()> = K::map(K::zip(targets, again), |(target, again)| {
+                    let speed = target.velocity().as_rad_per_s();
+                    assert!(speed.is_finite(), "{speed}: {:?}", chassis.status());
+                    // Where wheels would turn at 1e38 rad/s the factor has few digits.
+                    let slack = if limit >= 1.0 { 1e-5 } else { 1e-2 };
+                    assert!(speed.abs() <= limit + limit * slack + 1e-6, "I2: {speed} of {limit}");
+                    assert_eq!(speed.to_bits(), again.velocity().as_rad_per_s().to_bits(), "I10");
+                });
+                let (pose, moves) = (chassis.pose(), chassis.measured());
+                assert!(moves.is_finite(), "{moves:?}");
+                assert!(pose.angle.is_finite(), "{pose:?}");
+                assert!(!pose.x_m.is_nan() && !pose.y_m.is_nan(), "{pose:?}");
+            }
+        }
+    }
+}
+
+fn layout_wheels<K: Kinematics>(chassis: &Chassis<K>) -> K::Wheels<K::Speed> {
+    chassis.kinematics().inverse(Twist::ZERO)
+}
+
+fn modes(mut input: Input) {
+    let mut config = ModeConfig::new(PidConfig::new(input.positive(), input.positive(), 0.0));
+    if input.byte() % 2 == 0 {
+        config = config.with_rotor(input.positive(), input.positive(), input.positive());
+        config = config.with_transition(input.positive());
+    }
+    config = config.with_spin(Spin::Alternate).with_gimbal_timeout(
+        input.positive(),
+        if input.byte() % 2 == 0 { WithoutGimbal::Relax } else { WithoutGimbal::Independent },
+    );
+    let Ok(mut modes) = Modes::new(config) else { return };
+    while !input.is_empty() {
+        let kind = input.byte();
+        modes.set_mode(match kind % 4 {
+            0 => Mode::Relax,
+            1 => Mode::FollowGimbal,
+            2 => Mode::Rotor,
+            _ => Mode::Independent,
+        });
+        let command = Twist::new(input.float(), input.float(), input.float());
+        let yaw = (kind < 192).then(|| Angle::from_radians(input.float()));
+        let dt_s = input.step_s();
+        if let Some(twist) = modes.update(command, yaw, dt_s) {
+            assert!(twist.is_finite(), "{twist:?} of {command:?}");
+            assert!(modes.acting() != Mode::Relax);
+        }
+        for edges in 0.. {
+            if modes.take_edge().is_none() {
+                break;
+            }
+            assert!(edges < 2);
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! Controllers and filters with any gains, any samples and any steps.
+#![no_main]
+
+use drivetrain::control::{
+    Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
+    MotionLimits, MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator,
+    PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
+    SpeedActuatorConfig, StepResponse,
+};
+use drivetrain_fuzz::{Input, Observed};
+use libfuzzer_sys::fuzz_target;
+
+const ANY: (f32, f32) = (f32::MIN, f32::MAX);
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    match input.byte() % 12 {
+        0 | 1 => pid(input),
+        2 => incremental(input),
+        3 => speed_actuator(input),
+        4 => position_actuator(input),
+        5 => filters(input),
+        6 => differentiators(input),
+        7 => slew(input),
+        8 => profile(input),
+        9 => relay(input),
+        10 => windows(input),
+        _ => step_response(input),
+    }
+});
+
+fn pid_config(input: &mut Input) -> PidConfig {
+    let mut config = PidConfig::new(input.positive(), input.positive(), input.positive());
+    let options = input.byte();
+    for bit in 0..8 {
+        if options & (1 << bit) == 0 {
+            continue;
+        }
+        config = match (bit, input.byte() % 2) {
+            (0, 0) => config.with_output_limit(input.positive()),
+            (0, _) => config.with_output_range(input.float(), input.float()),
+            (1, 0) => config.with_integral_limit(input.positive()),
+            (1, _) => config.with_max_step(input.positive()),
+            (2, 0) => config.with_integral_separation(input.positive()),
+            (2, _) => config.with_variable_integral(input.positive(), input.positive()),
+            (3, 0) => config.with_back_calculation(input.positive()),
+            (3, _) => config.without_anti_windup(),
+            (4, 0) => config.with_dead_band(input.positive()),
+            (4, _) => config.with_feed_forward(input.float(), input.float()),
+            (5, 0) => config.with_slew_limit(input.positive()),
+            (5, _) => config.with_period(input.positive()),
+            (6, _) => config.with_derivative_filter(input.positive()),
+            _ => config.with_derivative_on_error(),
+        };
+    }
+    config
+}
+
+fn pid(mut input: Input) {
+    let Ok(pid) = Pid::new(pid_config(&mut input)) else { return };
+    let mut pid = Observed::new(pid);
+    let mut range = pid_range(&pid);
+    while !input.is_empty() {
+        match input.byte() {
+            0..=223 => {
+                let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
+                pid.step(range, Pid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+            }
+            224..=231 => {
+                let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
+                pid.step(range, Pid::rejected, |pid| {
+                    let step = pid.time_step(dt_s);
+                    pid.step_error(error, rate, &step)
+                });
+            }
+            232..=237 => pid.change(|pid| {
+                pid.reset();
+                pid.output()
+            }),
+            238..=243 => {
+                let output = input.float();
+                pid.change(|pid| {
+                    pid.reset_to(output);
+                    pid.output()
+                });
+            }
+            244..=249 => {
+                let (kp, ki, kd) = (input.positive(), input.positive(), input.positive());
+                pid.change(|pid| {
+                    _ = pid.set_gains(kp, ki, kd);
+                    pid.output()
+                });
+            }
+            _ => {
+                let config = pid_config(&mut input);
+                let mut kept = false;
+                pid.change(|pid| {
+                    let before = pid.output();
+                    kept = pid.set_config(config).is_ok();
+                    assert_eq!(pid.output().to_bits(), before.to_bits());
+                    pid.output()
+                });
+                range = pid_range(&pid);
+                _ = kept;
+            }
+        }
+    }
+}
+
+/// The output that a held step repeats may be one from before the limits were changed.
+fn pid_range(pid: &Observed<Pid>) -> (f32, f32) {
+    let (lower, upper) = pid.get().config().output_range();
+    let output = pid.get().output();
+    (lower.min(output), upper.max(output))
+}
+
+fn incremental(mut input: Input) {
+    let gains = [input.positive(), input.positive(), input.positive()];
+    let mut config = IncrementalPidConfig::new(gains[0], gains[1], gains[2]);
+    let options = input.byte();
+    if options & 1 != 0 {
+        config = config.with_output_limit(input.positive());
+    }
+    if options & 2 != 0 {
+        config = config.with_tracking(input.positive());
+    }
+    let mut range = ANY;
+    if options & 4 != 0 {
+        range = (input.float(), input.float());
+        config = config.with_output_range(range.0, range.1);
+    } else if options & 1 != 0 {
+        range = ANY;
+    }
+    let Ok(pid) = IncrementalPid::new(config) else { return };
+    let mut pid = Observed::new(pid);
+    // Zero is where it starts, within the limits or not.
+    let range = (range.0.min(0.0), range.1.max(0.0));
+    while !input.is_empty() {
+        let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
+        pid.step(range, IncrementalPid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+    }
+}
+
+fn speed_config(input: &mut Input) -> SpeedActuatorConfig {
+    let mut config = SpeedActuatorConfig::new(pid_config(input));
+    let options = input.byte();
+    if options & 1 != 0 {
+        config = config.with_feedback_filter(input.positive());
+    }
+    if options & 2 != 0 {
+        config = config.with_output_filter(input.positive());
+    }
+    config
+}
+
+fn speed_actuator(mut input: Input) {
+    let Ok(actuator) = SpeedActuator::new(speed_config(&mut input)) else { return };
+    let (lower, upper) = actuator.pid().config().output_range();
+    // The output filter comes after the limits, and may round.
+    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
+    let range = (rounded(lower.min(0.0)), rounded(upper.max(0.0)));
+    let mut actuator = Observed::new(actuator);
+    while !input.is_empty() {
+        let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
+        actuator.step(range, SpeedActuator::rejected, |actuator| {
+            actuator.update(setpoint, speed, dt_s)
+        });
+    }
+}
+
+fn position_actuator(mut input: Input) {
+    let angle = pid_config(&mut input);
+    let mut config = PositionActuatorConfig::new(angle, speed_config(&mut input));
+    let options = input.byte();
+    if options & 1 != 0 {
+        config = config.with_angle_filter(input.positive());
+    }
+    if options & 2 != 0 {
+        config = config.with_outer_divider(input.byte());
+    }
+    let Ok(mut actuator) = PositionActuator::new(config) else { return };
+    let (lower, upper) = actuator.speed().pid().config().output_range();
+    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
+    let (lower, upper) = (rounded(lower), rounded(upper));
+    while !input.is_empty() {
+        let (setpoint, angle, speed) = (input.float(), input.float(), input.float());
+        let dt_s = input.step_s();
+        let mut same = actuator;
+        let output = if options & 4 == 0 {
+            actuator.update(setpoint, angle, speed, dt_s)
+        } else {
+            actuator.update_error(setpoint, speed, dt_s)
+        };
+        let again = if options & 4 == 0 {
+            same.update(setpoint, angle, speed, dt_s)
+        } else {
+            same.update_error(setpoint, speed, dt_s)
+        };
+        assert_eq!(output.to_bits(), again.to_bits(), "I10");
+        assert!(output.is_finite() && lower.min(0.0) <= output && output <= upper.max(0.0));
+        let (slowest, fastest) = actuator.angle_pid().config().output_range();
+        let speed = actuator.speed_setpoint();
+        assert!(speed.is_finite() && slowest.min(0.0) <= speed && speed <= fastest.max(0.0));
+    }
+}
+
+fn filters(mut input: Input) {
+    let low_pass = LowPass::new(input.positive());
+    let (center, q, sample) = (input.positive(), input.positive(), input.positive());
+    let biquad = if input.byte() % 2 == 0 {
+        Biquad::low_pass(center, q, sample)
+    } else {
+        Biquad::notch(center, q, sample)
+    };
+    let mut low_pass = low_pass.ok().map(Observed::new);
+    let mut biquad = biquad.ok().map(Observed::new);
+    let mut extremes = (0.0_f32, 0.0_f32);
+    let mut first = true;
+    while !input.is_empty() {
+        let (sample, dt_s) = (input.float(), input.step_s());
+        if sample.is_finite() {
+            extremes = if first {
+                (sample.min(0.0), sample.max(0.0))
+            } else {
+                (extremes.0.min(sample), extremes.1.max(sample))
+            };
+            first = false;
+        }
+        if let Some(filter) = &mut low_pass {
+            // A low pass of the first order never leaves what it was given, but for rounding.
+            let slack = 1e-5 * extremes.0.abs().max(extremes.1.abs()) + f32::MIN_POSITIVE;
+            let range = ((extremes.0 - slack).max(f32::MIN), (extremes.1 + slack).min(f32::MAX));
+            filter.step(range, LowPass::rejected, |filter| filter.update(sample, dt_s));
+        }
+        if let Some(filter) = &mut biquad {
+            let before = filter.get().rejected();
+            filter.step(ANY, Biquad::rejected, |filter| filter.update(sample));
+            // A good sample that overflows makes the filter start anew.
+            if sample.is_finite() && filter.get().rejected() != before {
+                filter.forgive();
+            }
+        }
+    }
+}
+
+fn differentiators(mut input: Input) {
+    let (r, h0_s, max_step_s) = (input.positive(), input.positive(), input.positive());
+    let mut linear = LinearDifferentiator::new(r, max_step_s).ok().map(Observed::new);
+    let mut optimal = OptimalDifferentiator::new(r, h0_s, max_step_s).ok().map(Observed::new);
+    while !input.is_empty() {
+        let (sample, dt_s) = (input.float(), input.step_s());
+        if let Some(differentiator) = &mut linear {
+            differentiator
+                .step(ANY, LinearDifferentiator::rejected, |one| one.update(sample, dt_s));
+            assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
+        }
+        if let Some(differentiator) = &mut optimal {
+            differentiator
+                .step(ANY, OptimalDifferentiator::rejected, |one| one.update(sample, dt_s));
+            assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
+        }
+    }
+}
+
+fn slew(mut input: Input) {
+    let (up, down) = (input.positive(), input.positive());
+    let Ok(limiter) = SlewLimiter::new(up, down) else { return };
+    let mut limiter = Observed::new(limiter);
+    while !input.is_empty() {
+        let (target, dt_s) = (input.float(), input.step_s());
+        let before = limiter.get().value();
+        let after =
+            limiter.step(ANY, SlewLimiter::rejected, |limiter| limiter.update(target, dt_s));
+        let towards = if before <= target {
+            before <= after && after <= target
+        } else {
+            target <= after && after <= before
+        };
+        assert!(towards || after == before, "from {before} to {target} by {after}");
+    }
+}
+
+fn windows(mut input: Input) {
+    let mut average = Observed::new(MovingAverage::<5>::new());
+    let mut median = Observed::new(Median::<5>::new());
+    while !input.is_empty() {
+        let sample = input.float();
+        average.step(ANY, MovingAverage::rejected, |filter| filter.update(sample));
+        median.step(ANY, Median::rejected, |filter| filter.update(sample));
+    }
+}
+
+fn profile(mut input: Input) {
+    // Open: limits or distances near the ends of f32 overflow within the plan.
+    let (start, end) = (input.float().clamp(-1e6, 1e6), input.float().clamp(-1e6, 1e6));
+    let mut limit = || input.positive().clamp(1e-3, 1e6);
+    let mut limits = MotionLimits::new(limit(), limit());
+    if limit() > 1.0 {
+        limits = limits.with_jerk(limit());
+    }
+    let Ok(profile) = Profile::plan(start, end, &limits) else { return };
+    assert!(profile.duration_s() >= 0.0, "{profile:?}");
+    assert_eq!(profile.end().to_bits(), end.to_bits());
+    while !input.is_empty() {
+        let state = profile.at(input.float());
+        let all = [state.position, state.velocity, state.acceleration];
+        assert!(all.iter().all(|value| value.is_finite()), "{state:?} of {profile:?}");
+    }
+}
+
+fn relay(mut input: Input) {
+    let (amplitude, hysteresis) = (input.positive(), input.positive());
+    let mut config = RelayTunerConfig::new(amplitude, hysteresis);
+    let bias = if input.byte() % 2 == 0 { input.float() } else { 0.0 };
+    // Open: the sum of both is not checked.
+    if !(amplitude + bias.abs()).is_finite() {
+        return;
+    }
+    config = config.with_bias(bias).with_cycles(input.byte()).with_time_limit(input.positive());
+    let Ok(mut tuner) = RelayTuner::new(config) else { return };
+    while !input.is_empty() {
+        let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
+        let output = tuner.update(setpoint, measured, dt_s);
+        assert!(output.is_finite(), "{output}");
+        let off = (output - bias).abs();
+        let rounding = 1e-6 * bias.abs();
+        assert!(
+            off <= amplitude * 1.001 + rounding || output == 0.0,
+            "{output} of {bias} and {amplitude}"
+        );
+        if let Some(found) = tuner.oscillation() {
+            assert!(format!("{found:?}").find("NaN").is_none(), "{found:?}");
+        }
+    }
+}
+
+fn step_response(mut input: Input) {
+    let [start, target, duration_s] = [input.float(), input.float(), input.float()];
+    let response = StepResponse::new(start, target, duration_s, input.float());
+    let Ok(mut response) = response else { return };
+    while !input.is_empty() {
+        let (value, dt_s) = (input.float(), input.step_s());
+        response.record(value, dt_s);
+        _ = (response.is_complete(), response.measures(), response.rejected());
+    }
+}

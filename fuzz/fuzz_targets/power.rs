@@ -1,0 +1,57 @@
+//! Any model, any loads, any readings: the power limiter cuts, and never adds.
+#![no_main]
+
+use drivetrain::chassis::{PowerBuffer, PowerFit, PowerModel, WheelLoad};
+use drivetrain::control::PidConfig;
+use drivetrain_fuzz::Input;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let mut input = Input(data);
+    let [k0, k1, k2, k3] = [input.float(), input.float(), input.float(), input.float()];
+    let usable = [k0, k1, k2, k3].iter().all(|k| k.is_finite() && *k >= 0.0);
+    let model = PowerModel::new(k0, k1, k2, k3);
+    assert_eq!(model.is_ok(), usable);
+    let Ok(model) = model else { return };
+    let mut fit = PowerFit::new(model, input.float());
+    let pid = PidConfig::new(2.0, 0.5, 0.0).with_output_limit(120.0);
+    let Ok(mut buffer) = PowerBuffer::new(input.positive(), pid) else { return };
+    while !input.is_empty() {
+        let loads: [WheelLoad; 4] = core::array::from_fn(|_| WheelLoad {
+            torque: input.float(),
+            speed_rad_s: input.float(),
+        });
+        let limit_w = input.float();
+        cut(&model, loads, limit_w);
+        fit.learn(loads, input.float());
+        cut(&fit.model(), loads, limit_w);
+        let energy_j = (input.byte() % 4 != 0).then(|| input.float());
+        let allowance_w = buffer.allowance_w(limit_w, energy_j, input.step_s());
+        assert!(allowance_w >= 0.0 && allowance_w.is_finite(), "{allowance_w}");
+        let most = if limit_w > 0.0 { limit_w.min(f32::MAX) } else { 0.0 };
+        assert!(allowance_w <= most + 120.0, "{allowance_w} of {limit_w}");
+    }
+});
+
+/// The factor is one, and what it promises holds when it is counted anew, in `f64`.
+fn cut(model: &PowerModel, loads: [WheelLoad; 4], limit_w: f32) {
+    let cut = model.cut(loads, limit_w);
+    assert!((0.0..=1.0).contains(&cut.scale), "{cut:?}");
+    let same = model.cut(loads, limit_w);
+    assert_eq!((same.scale.to_bits(), same.within), (cut.scale.to_bits(), cut.within), "I10");
+    let power =
+        |load: &WheelLoad, torque: f32| f64::from(model.power_w(WheelLoad { torque, ..*load }));
+    let idle: f64 = loads.iter().map(|load| power(load, 0.0)).sum();
+    let cut_w: f64 = loads.iter().map(|load| power(load, load.torque * cut.scale)).sum();
+    let size: f64 = loads
+        .iter()
+        .map(|load| power(load, load.torque).abs() + power(load, -load.torque).abs())
+        .sum();
+    if cut.within && cut_w.is_finite() && size.is_finite() && size < 1e30 {
+        let limit = f64::from(if limit_w > 0.0 { limit_w } else { 0.0 });
+        assert!(
+            cut_w <= limit + 1e-4 * (size + idle) + 1e-30,
+            "{cut_w} of {limit_w}: {cut:?} {loads:?}"
+        );
+    }
+}

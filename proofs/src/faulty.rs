@@ -1,0 +1,66 @@
+//! The same functions, each with an error that is found in the field. No proof may hold here.
+
+use crate::frames::{Wire, outcome};
+use drivetrain::dji::Bus;
+use drivetrain::frame::CanFrame;
+
+/// Takes 8192, the first angle that there is not.
+#[unsafe(no_mangle)]
+extern "C" fn decode_faulty(high: u32, low: u32, fields: &mut [i32; 5]) -> u32 {
+    let accepted = high <= (8192 << 16) | 0xFFFF;
+    let [rpm, current] = [high as i16, (low >> 16) as i16].map(i32::from);
+    *fields = [(high >> 16) as i32, 0, 0, 0, 0];
+    if accepted {
+        let [.., temperature, error] = low.to_be_bytes().map(i32::from);
+        *fields = [(high >> 16) as i32, rpm, current, temperature, error];
+    }
+    u32::from(accepted)
+}
+
+/// Takes the remainder, which has the sign of the dividend.
+#[unsafe(no_mangle)]
+extern "C" fn unwrap_faulty(previous: u32, next: u32) -> i32 {
+    (i32::from(next as u16) - i32::from(previous as u16) + 4096) % 8192 - 4096
+}
+
+/// Takes an extended frame for a standard one of the same number.
+#[unsafe(no_mangle)]
+extern "C" fn route_by_number(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
+    let Some(frame) = wire.frame() else { return 0 };
+    let standard = u16::try_from(wire.id).ok().and_then(|id| CanFrame::standard(id, wire.data));
+    match standard {
+        Some(standard) if wire.remote == 0 && wire.length == 8 => outcome(bus, &standard, now_us),
+        _ => outcome(bus, &frame, now_us),
+    }
+}
+
+/// Makes an angle of any 16 bits, instead of refusing what is none.
+#[unsafe(no_mangle)]
+extern "C" fn route_masked(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
+    let [high, low, rest @ ..] = wire.data;
+    let [c, d, e, f, g, h] = rest;
+    let data = [high & 0x1F, low, c, d, e, f, g, h];
+    let frame = u16::try_from(wire.id).ok().and_then(|id| CanFrame::standard(id, data));
+    frame.map_or(0, |frame| outcome(bus, &frame, now_us))
+}
+
+/// Rounds towards zero.
+#[unsafe(no_mangle)]
+extern "C" fn word_faulty(bits: u32, word: &mut i16) -> u32 {
+    let value = f32::from_bits(bits);
+    let raw = (value * (16_384.0 / 20.0)) as i32;
+    let raw = if raw > 16_384 { 16_384 } else { raw };
+    let raw = if raw < -16_384 { -16_384 } else { raw };
+    *word = if value.is_finite() { raw as i16 } else { 0 };
+    u32::from(value.is_finite())
+}
+
+/// Compares stamps of 32 bits and nothing else: after 71 minutes the old ones are new again.
+#[unsafe(no_mangle)]
+extern "C" fn word_at_faulty(times: &[u64; 3]) -> i32 {
+    let [heard, set, updated] = times.map(|time| time as u32);
+    let near = |stamp: u32, limit: u32| {
+        updated.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
+    };
+    if near(heard, 10_000) && near(set, 100_000) { 1_000 } else { 0 }
+}

@@ -1,0 +1,55 @@
+//! When feedback and targets count as too old.
+
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{CanDevice, Timeouts};
+use drivetrain::time::{Duration, Instant, Tick};
+
+/// What a motor is asked for, on the wire's scale.
+const ASKED: i16 = 1_000;
+
+const fn armed_with(timeouts: Timeouts) -> (Bus, Handle<M3508>) {
+    let mut bus = Bus::new().with_timeouts(timeouts);
+    match bus.attach(Config::new(1)) {
+        Ok(motor) => (bus, motor),
+        Err(_) => panic!("not attached"),
+    }
+}
+
+/// Hears a motor, arms it, sets a target and updates, each at its time in µs: the word that is sent then.
+fn word(setup: (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
+    let (mut bus, motor) = setup;
+    let [heard, set, updated] = times.map(Instant::from_micros);
+    if let Some(rest) = CanFrame::standard(0x201, [0; 8]) {
+        _ = bus.ingest(&rest, heard);
+    }
+    if bus.arm(heard).is_err() {
+        return i32::MIN;
+    }
+    bus.update(Tick::new(set, 0.001));
+    while bus.next_frame().is_some() {}
+    if bus.set_raw(motor, ASKED).is_err() {
+        return i32::MAX;
+    }
+    bus.update(Tick::new(updated, 0.001));
+    bus.next_frame().map_or(0, |frame| {
+        let [high, low, ..] = *frame.bytes();
+        i32::from(i16::from_be_bytes([high, low]))
+    })
+}
+
+/// Feedback late after 10 ms, targets too old after 100 ms.
+#[unsafe(no_mangle)]
+extern "C" fn word_at(times: &[u64; 3]) -> i32 {
+    const SETUP: (Bus, Handle<M3508>) = armed_with(Timeouts::new());
+    word(SETUP, times)
+}
+
+/// Feedback late after 10 s, which leaves the deadline of the targets alone.
+#[unsafe(no_mangle)]
+extern "C" fn word_at_patient(times: &[u64; 3]) -> i32 {
+    const SETUP: (Bus, Handle<M3508>) = armed_with(
+        Timeouts::new().with_late(Duration::from_secs(10)).with_offline(Duration::from_secs(10)),
+    );
+    word(SETUP, times)
+}

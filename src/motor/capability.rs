@@ -1,0 +1,151 @@
+/// Something that a motor can be asked for, or reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Capability {
+    /// It takes a direct command on its own scale: the word on the wire, a duty, a throttle.
+    Raw,
+    /// It takes a torque current.
+    Current,
+    /// It takes a voltage.
+    Voltage,
+    /// It takes a velocity of the output shaft.
+    Velocity,
+    /// It takes an angle within a turn, and goes there by the shortest way.
+    Angle,
+    /// It takes a position over many turns.
+    Position,
+    /// It reports what its shaft does, and so can be missing.
+    Feedback,
+    /// It reports its temperature.
+    Temperature,
+    /// It reports what is wrong with it.
+    ErrorCodes,
+    /// It knows the angle of its output shaft at power-on, without being homed.
+    AbsoluteAngle,
+}
+
+impl Capability {
+    /// All of them: the targets first.
+    pub const ALL: [Self; 10] = [
+        Self::Raw,
+        Self::Current,
+        Self::Voltage,
+        Self::Velocity,
+        Self::Angle,
+        Self::Position,
+        Self::Feedback,
+        Self::Temperature,
+        Self::ErrorCodes,
+        Self::AbsoluteAngle,
+    ];
+
+    /// Tells whether it is a kind of target; otherwise it is something that the motor reports.
+    #[must_use]
+    pub const fn is_target(self) -> bool {
+        (self as u16) < Self::Feedback as u16
+    }
+}
+
+impl core::fmt::Display for Capability {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Raw => "raw",
+            Self::Current => "current",
+            Self::Voltage => "voltage",
+            Self::Velocity => "velocity",
+            Self::Angle => "angle",
+            Self::Position => "position",
+            Self::Feedback => "feedback",
+            Self::Temperature => "temperature",
+            Self::ErrorCodes => "error codes",
+            Self::AbsoluteAngle => "absolute angle",
+        })
+    }
+}
+
+/// What a motor offers, as it is configured: a set of [`Capability`].
+///
+/// A target that is not in the set is refused with an error when it is set: `Unsupported` where the motor has no such
+/// thing, `NoLoop` where it was attached without the loop.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Capabilities, Capability};
+///
+/// const SERVO: Capabilities = Capabilities::of(&[Capability::Raw, Capability::Position]);
+/// assert!(SERVO.has(Capability::Position) && !SERVO.has(Capability::Temperature));
+/// assert_eq!(SERVO.with(Capability::Temperature).to_string(), "raw, position, temperature");
+/// assert_eq!(SERVO.iter().filter(|it| it.is_target()).count(), 2);
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Capabilities(u16);
+
+impl Capabilities {
+    /// Offers nothing: a motor that was detached.
+    pub const NONE: Self = Self(0);
+
+    /// Collects a list.
+    #[must_use]
+    pub const fn of(list: &[Capability]) -> Self {
+        let (mut set, mut rest) = (Self::NONE, list);
+        while let [first, others @ ..] = rest {
+            set = set.with(*first);
+            rest = others;
+        }
+        set
+    }
+
+    /// Adds one.
+    #[must_use]
+    pub const fn with(self, capability: Capability) -> Self {
+        Self(self.0 | 1 << capability as u16)
+    }
+
+    /// Tells whether one is among them.
+    #[must_use]
+    pub const fn has(self, capability: Capability) -> bool {
+        self.0 & 1 << capability as u16 != 0
+    }
+
+    /// Iterates over them, the targets first.
+    pub fn iter(self) -> impl Iterator<Item = Capability> {
+        Capability::ALL.into_iter().filter(move |capability| self.has(*capability))
+    }
+}
+
+/// Writes their names in a list.
+impl core::fmt::Display for Capabilities {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if *self == Self::NONE {
+            return f.write_str("nothing");
+        }
+        for (index, capability) in self.iter().enumerate() {
+            write!(f, "{}{capability}", if index == 0 { "" } else { ", " })?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    #[test]
+    fn each_one_is_a_bit_of_its_own_and_comes_back() {
+        let all = Capabilities::of(&Capability::ALL);
+        assert_eq!(all.iter().collect::<Vec<_>>(), Capability::ALL);
+        for one in Capability::ALL {
+            let set = Capabilities::NONE.with(one);
+            assert!(Capability::ALL.iter().all(|other| set.has(*other) == (*other == one)));
+            assert_eq!(set.to_string(), one.to_string());
+        }
+        assert_eq!(Capabilities::default().to_string(), "nothing");
+        assert_eq!(Capability::ALL.iter().filter(|it| it.is_target()).count(), 6);
+    }
+}

@@ -1,0 +1,301 @@
+//! What can be wrong with a bus as a whole, and the latch that keeps it until it is read.
+
+use crate::time::{Duration, Instant};
+
+/// Something that is wrong with the bus as a whole, for a moment or for hours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum BusCondition {
+    /// The driver has not taken some command frame for 100 ms: everything was disarmed. Ends when it takes them all.
+    Down,
+    /// Feedback was heard once, and none from any motor for 100 ms. Ends with the first.
+    Silent,
+    /// Received frames were lost because a buffer was full: the driver's, or a queue. Ends after 1 s without.
+    ReceiveOverrun,
+    /// A tick came so late that others were left out. Ends after 1 s without.
+    TickOverrun,
+    /// The clock shows the same time again and again. Ends after 1 s in which it goes on.
+    ClockStandstill,
+    /// The clock went back. Ends after 1 s in which it does not.
+    ClockReversal,
+}
+
+impl BusCondition {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Down,
+        Self::Silent,
+        Self::ReceiveOverrun,
+        Self::TickOverrun,
+        Self::ClockStandstill,
+        Self::ClockReversal,
+    ];
+
+    /// Tells whether it happens from time to time, and so is over when it did not for a while.
+    const fn is_repeated(self) -> bool {
+        !matches!(self, Self::Down | Self::Silent)
+    }
+}
+
+impl core::fmt::Display for BusCondition {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Down => "bus down",
+            Self::Silent => "bus silent",
+            Self::ReceiveOverrun => "receive overrun",
+            Self::TickOverrun => "tick overrun",
+            Self::ClockStandstill => "clock standstill",
+            Self::ClockReversal => "clock reversal",
+        })
+    }
+}
+
+/// A [`BusCondition`] that began or ended.
+///
+/// Latched until it is read with [`Runner::next_edge`](super::Runner::next_edge), so none is lost; and as long as it waits,
+/// the same change is not noted again, so that none floods: [`Statistics`](super::Statistics) has the numbers. The edge
+/// read last always tells the present state; two beginnings in a row say that it ended in between.
+///
+/// # Examples
+/// ```
+/// use drivetrain::runner::{BusCondition, BusEdge};
+/// use drivetrain::time::Instant;
+///
+/// let at = Instant::from_micros(2_310_000);
+/// let edge = BusEdge { condition: BusCondition::Silent, began: true, at };
+/// assert_eq!(edge.to_string(), "bus silent began at 2310000 us");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BusEdge {
+    /// What changed.
+    pub condition: BusCondition,
+    /// Whether it began; otherwise it ended.
+    pub began: bool,
+    /// When it began, the first time since the last reading; or when it ended, the last time.
+    pub at: Instant,
+}
+
+impl core::fmt::Display for BusEdge {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let phase = if self.began { "began" } else { "ended" };
+        write!(f, "{} {phase} at {} us", self.condition, self.at.as_micros())
+    }
+}
+
+/// How long a repeated condition must not have come again before it is over.
+const CALM: Duration = Duration::from_secs(1);
+
+/// The conditions and the edges that wait to be read.
+#[derive(Debug)]
+pub(super) struct Edges([Latch; BusCondition::ALL.len()]);
+
+#[derive(Debug, Clone, Copy)]
+struct Latch {
+    began: Instant,
+    ended: Instant,
+    seen: Instant,
+    begin_waits: bool,
+    end_waits: bool,
+    active: bool,
+}
+
+impl Edges {
+    pub(super) const fn new() -> Self {
+        let calm = Latch {
+            began: Instant::START,
+            ended: Instant::START,
+            seen: Instant::START,
+            begin_waits: false,
+            end_waits: false,
+            active: false,
+        };
+        Self([calm; BusCondition::ALL.len()])
+    }
+
+    pub(super) const fn is_active(&self, condition: BusCondition) -> bool {
+        let [down, silent, receive, tick, standstill, reversal] = &self.0;
+        match condition {
+            BusCondition::Down => down.active,
+            BusCondition::Silent => silent.active,
+            BusCondition::ReceiveOverrun => receive.active,
+            BusCondition::TickOverrun => tick.active,
+            BusCondition::ClockStandstill => standstill.active,
+            BusCondition::ClockReversal => reversal.active,
+        }
+    }
+
+    /// Notes that a condition is there; returns whether it was not before.
+    pub(super) fn begin(&mut self, condition: BusCondition, at: Instant) -> bool {
+        self.0.get_mut(condition as usize).is_some_and(|latch| latch.begin(at))
+    }
+
+    pub(super) fn end(&mut self, condition: BusCondition, at: Instant) {
+        if let Some(latch) = self.0.get_mut(condition as usize) {
+            latch.end(at);
+        }
+    }
+
+    /// Ends the repeated conditions that did not come again.
+    pub(super) fn settle(&mut self, now: Instant) {
+        for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.0) {
+            // The clock may have gone back.
+            latch.seen = latch.seen.min(now);
+            if condition.is_repeated() && now.since(latch.seen) >= CALM {
+                latch.end(now);
+            }
+        }
+    }
+
+    /// Takes the oldest edge.
+    pub(super) fn next(&mut self) -> Option<BusEdge> {
+        let waiting = BusCondition::ALL
+            .into_iter()
+            .zip(&mut self.0)
+            .filter_map(|(condition, latch)| Some((latch.waiting(condition)?, latch)));
+        let (edge, latch) = waiting.min_by_key(|(edge, _)| edge.at)?;
+        latch.take(edge);
+        Some(edge)
+    }
+}
+
+impl Latch {
+    fn begin(&mut self, at: Instant) -> bool {
+        self.seen = at;
+        if self.active {
+            return false;
+        }
+        self.active = true;
+        if self.begin_waits {
+            // It ended and began again, and nobody has read either.
+            self.end_waits = false;
+        } else {
+            self.began = at;
+            self.begin_waits = true;
+        }
+        true
+    }
+
+    const fn end(&mut self, at: Instant) {
+        if self.active {
+            self.active = false;
+            self.end_waits = true;
+            self.ended = at;
+        }
+    }
+
+    /// Returns the edge that is to be read next.
+    const fn waiting(&self, condition: BusCondition) -> Option<BusEdge> {
+        // An end that waits while the condition is there belongs to the time before.
+        if self.end_waits && (self.active || !self.begin_waits) {
+            Some(BusEdge { condition, began: false, at: self.ended })
+        } else if self.begin_waits {
+            Some(BusEdge { condition, began: true, at: self.began })
+        } else {
+            None
+        }
+    }
+
+    const fn take(&mut self, edge: BusEdge) {
+        if edge.began {
+            self.begin_waits = false;
+        } else {
+            self.end_waits = false;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const DOWN: BusCondition = BusCondition::Down;
+    const OVERRUN: BusCondition = BusCondition::TickOverrun;
+
+    fn at_ms(ms: u64) -> Instant {
+        Instant::from_micros(1_000 * ms)
+    }
+
+    fn drained(edges: &mut Edges) -> Vec<(BusCondition, u64, bool)> {
+        core::iter::from_fn(|| edges.next())
+            .map(|edge| (edge.condition, edge.at.as_micros() / 1_000, edge.began))
+            .collect()
+    }
+
+    #[test]
+    fn a_condition_that_lasts_is_one_edge_and_its_end_another() {
+        let mut edges = Edges::new();
+        assert!((10..500).filter(|ms| edges.begin(DOWN, at_ms(*ms))).eq([10]));
+        assert_eq!(drained(&mut edges), [(DOWN, 10, true)]);
+        edges.begin(DOWN, at_ms(600));
+        assert!(edges.is_active(DOWN) && edges.next().is_none());
+        edges.end(DOWN, at_ms(700));
+        edges.end(DOWN, at_ms(701));
+        assert_eq!(drained(&mut edges), [(DOWN, 700, false)]);
+    }
+
+    #[test]
+    fn what_came_and_went_unread_is_its_first_beginning_and_its_last_end() {
+        let mut edges = Edges::new();
+        for round in 0..3 {
+            edges.begin(DOWN, at_ms(100 * round));
+            edges.end(DOWN, at_ms(100 * round + 50));
+        }
+        assert_eq!(drained(&mut edges), [(DOWN, 0, true), (DOWN, 250, false)]);
+        edges.begin(DOWN, at_ms(300));
+        assert_eq!(drained(&mut edges), [(DOWN, 300, true)]);
+        edges.end(DOWN, at_ms(350));
+        edges.begin(DOWN, at_ms(400));
+        assert_eq!(drained(&mut edges), [(DOWN, 350, false), (DOWN, 400, true)]);
+    }
+
+    #[test]
+    fn a_repeated_condition_is_over_when_it_did_not_come_for_a_second() {
+        let mut edges = Edges::new();
+        for ms in (0..5_000).step_by(900) {
+            edges.begin(OVERRUN, at_ms(ms));
+            edges.settle(at_ms(ms + 899));
+        }
+        assert_eq!(drained(&mut edges), [(OVERRUN, 0, true)]);
+        edges.settle(at_ms(5_499));
+        assert!(edges.is_active(OVERRUN));
+        edges.settle(at_ms(5_500));
+        assert_eq!(drained(&mut edges), [(OVERRUN, 5_500, false)]);
+    }
+
+    #[test]
+    fn a_clock_that_went_back_keeps_nothing_alive() {
+        let mut edges = Edges::new();
+        edges.begin(OVERRUN, at_ms(1_000_000));
+        edges.settle(at_ms(10));
+        edges.settle(at_ms(1_010));
+        assert!(!edges.is_active(OVERRUN));
+    }
+
+    proptest! {
+        /// Law: the edge read last tells the present state, and an end follows a beginning.
+        #[test]
+        fn the_last_edge_tells_the_state(steps in prop::collection::vec(0..4_u8, 0..200)) {
+            let mut edges = Edges::new();
+            let mut known = false;
+            for (step, ms) in steps.into_iter().zip(0..) {
+                match step {
+                    0 => _ = edges.begin(DOWN, at_ms(ms)),
+                    1 => edges.end(DOWN, at_ms(ms)),
+                    _ => {
+                        while let Some(edge) = edges.next() {
+                            prop_assert!(edge.began || known, "an end after an end");
+                            known = edge.began;
+                        }
+                        prop_assert_eq!(known, edges.is_active(DOWN));
+                    }
+                }
+            }
+        }
+    }
+}

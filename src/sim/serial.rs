@@ -1,0 +1,177 @@
+use super::random::Random;
+use super::ring::Ring;
+use crate::time::Instant;
+
+/// Start bit, eight data bits, stop bit.
+const BITS_A_BYTE: u64 = 10;
+/// So many bytes are on their way at most, in the sender's buffer or on the wire.
+const CAPACITY: usize = 1024;
+
+/// One direction of a serial line: bytes take their time, and some are damaged.
+///
+/// # Examples
+/// ```
+/// use drivetrain::sim::SerialLine;
+/// use drivetrain::time::Instant;
+///
+/// let mut line = SerialLine::new(115_200, 1);
+/// assert_eq!(line.send(&[1, 2, 3], Instant::START), 3);
+/// let mut bytes = [0; 8];
+/// assert_eq!(line.receive(Instant::from_micros(180), &mut bytes), [1, 2]); // 86.8 us each
+/// assert_eq!(line.receive(Instant::from_micros(270), &mut bytes), [3]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct SerialLine {
+    byte_ns: u64,
+    /// When the last byte is over.
+    free_ns: u64,
+    queue: Ring<(u64, u8), CAPACITY>,
+    noise: Noise,
+    is_cut: bool,
+    random: Random,
+    counts: SerialCounts,
+}
+
+/// What happens to the bytes of a [`SerialLine`]; each a probability for a byte, 0 to 1.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Noise {
+    /// One of its bits is wrong.
+    pub flipped: f32,
+    /// It is missing.
+    pub dropped: f32,
+    /// A byte of chance stands before it.
+    pub inserted: f32,
+}
+
+/// What went over a [`SerialLine`]. All counts saturate.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct SerialCounts {
+    /// Bytes that were sent, damaged and lost ones too.
+    pub sent: u32,
+    /// Bytes that came out.
+    pub received: u32,
+    /// Bytes with a wrong bit.
+    pub flipped: u32,
+    /// Bytes that are missing: dropped, or sent while the line was cut.
+    pub lost: u32,
+    /// Bytes that nobody sent.
+    pub inserted: u32,
+}
+
+impl SerialLine {
+    /// Takes the baud rate, 8 data bits and no parity, and a seed for its noise; quiet at first.
+    #[must_use]
+    pub fn new(baud: u32, seed: u64) -> Self {
+        Self {
+            byte_ns: (BITS_A_BYTE * 1_000_000_000) / u64::from(baud.max(1)),
+            free_ns: 0,
+            queue: Ring::new(),
+            noise: Noise::default(),
+            is_cut: false,
+            random: Random::new(seed, 1 << 41),
+            counts: SerialCounts::default(),
+        }
+    }
+
+    /// Sets what happens to bytes that are sent from now on.
+    pub const fn set_noise(&mut self, noise: Noise) {
+        self.noise = noise;
+    }
+
+    /// Cuts the line, or mends it: what is sent while it is cut comes out nowhere.
+    pub const fn set_cut(&mut self, is_cut: bool) {
+        self.is_cut = is_cut;
+    }
+
+    /// Sends bytes; returns how many there was room for.
+    pub fn send(&mut self, bytes: &[u8], now: Instant) -> usize {
+        self.free_ns = self.free_ns.max(now.as_micros().saturating_mul(1_000));
+        for (done, byte) in bytes.iter().enumerate() {
+            // Room for it, and for one that noise adds.
+            if self.queue.len() + 2 > CAPACITY {
+                return done;
+            }
+            self.send_byte(*byte);
+        }
+        bytes.len()
+    }
+
+    fn send_byte(&mut self, byte: u8) {
+        let counts = &mut self.counts;
+        counts.sent = counts.sent.saturating_add(1);
+        self.free_ns += self.byte_ns;
+        if self.is_cut || self.random.chance(self.noise.dropped) {
+            counts.lost = counts.lost.saturating_add(1);
+            return;
+        }
+        if self.random.chance(self.noise.inserted) {
+            counts.inserted = counts.inserted.saturating_add(1);
+            let [stray, ..] = self.random.next_u32().to_le_bytes();
+            _ = self.queue.push((self.free_ns, stray));
+        }
+        let flips = self.random.chance(self.noise.flipped);
+        let wrong = if flips { 1 << self.random.below(8) } else { 0 };
+        counts.flipped = counts.flipped.saturating_add(u32::from(flips));
+        _ = self.queue.push((self.free_ns, byte ^ wrong));
+    }
+
+    /// Takes the bytes that arrived until `now`, as many as fit into `out`; returns them.
+    pub fn receive<'a>(&mut self, now: Instant, out: &'a mut [u8]) -> &'a [u8] {
+        let now_ns = now.as_micros().saturating_mul(1_000);
+        let mut length = 0;
+        for place in out.iter_mut() {
+            let Some((_, byte)) = self.queue.peek().filter(|(at_ns, _)| *at_ns <= now_ns) else {
+                break;
+            };
+            _ = self.queue.pop();
+            *place = byte;
+            length += 1;
+        }
+        self.counts.received =
+            self.counts.received.saturating_add(u32::try_from(length).unwrap_or(u32::MAX));
+        out.get(..length).unwrap_or(&[])
+    }
+
+    /// Returns what went over it so far.
+    #[must_use]
+    pub const fn counts(&self) -> SerialCounts {
+        self.counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn through(line: &mut SerialLine, bytes: usize) -> u32 {
+        let (mut now, mut out) = (0, [0; 64]);
+        for _ in 0..bytes / 10 {
+            assert_eq!(line.send(&[0x55; 10], Instant::from_micros(now)), 10);
+            now += 1_000;
+            while !line.receive(Instant::from_micros(now), &mut out).is_empty() {}
+        }
+        line.counts().received
+    }
+
+    #[test]
+    fn bytes_add_up_whatever_the_noise_does() {
+        let mut line = SerialLine::new(115_200, 3);
+        line.set_noise(Noise { flipped: 0.1, dropped: 0.05, inserted: 0.02 });
+        let received = through(&mut line, 100_000);
+        let counts = line.counts();
+        assert_eq!((counts.sent, received), (100_000, 100_000 - counts.lost + counts.inserted));
+        assert!(counts.flipped.abs_diff(9_500) < 400 && counts.lost.abs_diff(5_000) < 300);
+    }
+
+    #[test]
+    fn a_cut_line_swallows_and_a_full_one_refuses() {
+        let mut line = SerialLine::new(9_600, 1);
+        line.set_cut(true);
+        assert_eq!(through(&mut line, 100), 0);
+        line.set_cut(false);
+        assert_eq!(line.send(&[0; 2_000], Instant::from_micros(10_000)), CAPACITY - 1);
+    }
+}

@@ -1,0 +1,298 @@
+use super::budget::Budget;
+use super::model::IDS;
+use super::slot::{Slot, name};
+use super::{AttachError, Command, Config, Joint, Register, Reply, ReplyError, State};
+use crate::control::TimeStep;
+use crate::frame::CanFrame;
+use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::time::{Duration, Instant, Tick};
+use embedded_can::Frame;
+
+pub(super) const SLOTS: usize = IDS as usize;
+
+/// Any time step is right here: the loops are in the drives.
+const ANY_STEP_S: f32 = f32::INFINITY;
+
+/// The joints of one CAN bus, and the frames for them.
+///
+/// It owns the joints; [`attach`](Self::attach) returns a `Copy` handle for each. What is polled and written when is said
+/// in the [module](super). It can stand in a `static`.
+///
+/// # Examples
+/// ```
+/// use drivetrain::encoder::Position;
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::CanDevice;
+/// use drivetrain::snake::{Config, Joints, Register, Reply};
+/// use drivetrain::time::{Instant, Tick};
+/// use drivetrain::units::Angle;
+/// use embedded_can::{Frame, StandardId};
+///
+/// let mut joints = Joints::new();
+/// let neck = joints.attach(Config::new(3))?;
+/// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+/// joints.update(Tick::new(at_ms(1), 0.001));
+/// let sent = |joints: &mut Joints| joints.next_frame().map(|frame| format!("{frame:?}"));
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 10 00 00 00 00")); // disabled
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [2] 03 07")); // where are you?
+///
+/// let id = StandardId::new(3).ok_or("id")?;
+/// let reply = Reply::new(Register::ActualPosition, 16_384).encode();
+/// _ = joints.ingest(&CanFrame::new(id, &reply).ok_or("length")?, at_ms(2));
+/// assert_eq!(joints.state(neck).map(|state| state.position.as_turns()), Some(0.25));
+/// joints.zero(neck)?;
+/// joints.arm(at_ms(2))?;
+/// joints.set_position(neck, Position::from_angle(Angle::from_degrees(30.0)))?;
+/// joints.update(Tick::new(at_ms(2), 0.001));
+/// assert_eq!(sent(&mut joints).as_deref(), Some("003 [6] 01 0F 00 00 00 01")); // mode first, enable last
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Joints {
+    pub(super) slots: [Slot; SLOTS],
+    pub(super) now: Instant,
+    timeouts: Timeouts,
+    reply_timeout: Duration,
+    pub(super) budget: Budget,
+    /// Joints to be disabled before all else, to be written to, and to be asked; a bit each.
+    pub(super) stops: u16,
+    pub(super) writes: u16,
+    pub(super) reads: u16,
+    /// The same, given back: for the next update.
+    pub(super) returned: (u16, u16, u16),
+    pub(super) reads_first: bool,
+    /// Who was written to and asked last.
+    pub(super) last_write: u8,
+    pub(super) last_read: u8,
+    held_steps: u8,
+    pub(super) stopped: bool,
+    pub(super) counters: Counters,
+}
+
+/// What was counted; saturates, but for the frames, which wrap at 2^32.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Replies that were taken.
+    pub replies: u32,
+    /// Frames with a joint's id and another length than 6.
+    pub bad_length: u32,
+    /// Frames with a joint's id that are no reply, or of a register that is not known.
+    pub bad_field: u32,
+    /// Frames with a joint's id that only a controller sends: there is a second one on the bus.
+    pub foreign_commands: u32,
+    /// Frames with the id of a joint that is not attached.
+    pub unattached: u32,
+    /// Requests that were sent.
+    pub requests: u32,
+    /// Requests that were not answered in time.
+    pub unanswered: u32,
+    /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
+    pub bad_steps: u32,
+    /// Frames that an update had ready; wraps.
+    pub packed: u32,
+    /// Frames that were replaced by newer ones before they were taken; wraps.
+    pub superseded: u32,
+}
+
+impl Joints {
+    /// Makes a bus without joints. Feedback is late after 40 ms, as a joint of twelve is asked for its position each 12 or
+    /// 24 ms; a joint is offline after 100 ms, and its target counts for 100 ms.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            slots: [Slot::FREE; SLOTS],
+            now: Instant::START,
+            timeouts: Timeouts::new().with_late(Duration::from_millis(40)),
+            reply_timeout: Duration::from_millis(2),
+            budget: Budget::new(),
+            stops: 0,
+            writes: 0,
+            reads: 0,
+            returned: (0, 0, 0),
+            reads_first: false,
+            last_write: 0,
+            last_read: IDS / 2,
+            held_steps: 0,
+            stopped: false,
+            counters: Counters {
+                replies: 0,
+                bad_length: 0,
+                bad_field: 0,
+                foreign_commands: 0,
+                unattached: 0,
+                requests: 0,
+                unanswered: 0,
+                bad_steps: 0,
+                packed: 0,
+                superseded: 0,
+            },
+        }
+    }
+
+    /// Sets when feedback and targets count as lost, for joints attached afterwards.
+    #[must_use]
+    pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
+        self.timeouts = timeouts;
+        self
+    }
+
+    /// Sets how long a joint has to answer; 2 ms at first. For so long nothing is sent to it, a stop neither: see the
+    /// [module](super).
+    #[must_use]
+    pub const fn with_reply_timeout(mut self, timeout: Duration) -> Self {
+        self.reply_timeout = timeout;
+        self
+    }
+
+    /// Attaches a joint. It is disabled with the next update.
+    ///
+    /// # Errors
+    /// When its id is out of range or taken, or a parameter is not usable. Nothing changed then.
+    pub fn attach(&mut self, config: Config) -> Result<Joint, AttachError> {
+        let joint = name(config.id());
+        let index = config.id().checked_sub(1).ok_or(AttachError::Id(joint))?;
+        let slot = self.slots.get_mut(usize::from(index)).ok_or(AttachError::Id(joint))?;
+        if slot.id.is_some() {
+            return Err(AttachError::Taken(joint));
+        }
+        let generation = slot.next_generation().ok_or(AttachError::WornOut(joint))?;
+        *slot = Slot::new(&config, self.timeouts, generation)?;
+        self.returned.0 |= 1 << index;
+        Ok(Joint::new(index, generation))
+    }
+
+    /// Detaches a joint. It is disabled once more.
+    pub fn detach(&mut self, joint: Joint) {
+        let Some(slot) = self.slot_mut(joint) else { return };
+        slot.free();
+        self.stop(joint.index());
+        self.reads &= !(1 << joint.index());
+        self.returned.2 &= !(1 << joint.index());
+    }
+
+    /// Takes a received frame that arrived at `now`. Constant time.
+    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let index = frame.header().wrapping_sub(1) as usize;
+        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
+        let counters = &mut self.counters;
+        if slot.id.is_none() {
+            count(&mut counters.unattached);
+            return Ingest::Unrelated;
+        }
+        match Reply::decode(frame.data()) {
+            Ok(reply) => {
+                count(&mut counters.replies);
+                slot.receive(reply, now);
+                return Ingest::Taken;
+            }
+            Err(_) if Command::decode(frame.data()).is_some() => {
+                count(&mut counters.foreign_commands);
+            }
+            Err(ReplyError::Length(_)) => count(&mut counters.bad_length),
+            Err(ReplyError::Kind(_) | ReplyError::Register(_)) => count(&mut counters.bad_field),
+        }
+        slot.bad_replies = slot.bad_replies.saturating_add(1);
+        Ingest::Malformed(match frame.length() {
+            6 => Malformed::Field,
+            length => Malformed::Length(length),
+        })
+    }
+
+    /// Chooses who is asked and written to, and relaxes who may not move.
+    ///
+    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that stands still, change nothing for one update; a
+    /// second one in a row relaxes all joints.
+    pub fn update(&mut self, tick: Tick) {
+        let stands = tick.now() == self.now && self.now != Instant::START;
+        if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() || stands {
+            count(&mut self.counters.bad_steps);
+            self.held_steps = self.held_steps.saturating_add(1);
+            if self.held_steps >= 2 {
+                self.let_go();
+            }
+            return;
+        }
+        self.held_steps = 0;
+        self.now = tick.now();
+        for index in 0..SLOTS {
+            let Some(slot) = self.slots.get_mut(index) else { continue };
+            if slot.give_up(tick.now(), self.reply_timeout) {
+                count(&mut self.counters.unanswered);
+            }
+            if slot.id.is_none() {
+                continue;
+            }
+            let stops = slot.update(tick.now());
+            if stops || slot.wants_reminder(tick.now()) {
+                self.stop(index);
+            }
+        }
+        self.plan();
+    }
+
+    /// Takes the targets of all joints away.
+    fn let_go(&mut self) {
+        for index in 0..SLOTS {
+            if self.slots.get_mut(index).is_some_and(Slot::let_go) {
+                self.stop(index);
+            }
+        }
+    }
+
+    /// Returns what is known of a joint; `None` before its first position, and once it is detached.
+    #[must_use]
+    pub fn state(&self, joint: Joint) -> Option<State> {
+        self.slot(joint)?.state()
+    }
+
+    /// Tells whether a joint is heard; `None` once it is detached.
+    #[must_use]
+    pub fn link(&self, joint: Joint) -> Option<Link> {
+        Some(self.slot(joint)?.guard.link())
+    }
+
+    /// Tells whether a joint takes targets: armed, and not relaxed by a fault.
+    #[must_use]
+    pub fn is_joint_armed(&self, joint: Joint) -> bool {
+        self.slot(joint).is_some_and(|slot| slot.guard.is_armed())
+    }
+
+    /// Returns the register that a joint was asked for and has not answered yet.
+    #[must_use]
+    pub fn awaited(&self, joint: Joint) -> Option<Register> {
+        self.slot(joint)?.awaiting.map(|(register, _)| register)
+    }
+
+    /// Iterates over the attached joints, in the order of their ids.
+    pub fn joints(&self) -> impl Iterator<Item = (Joint, MotorName)> + '_ {
+        (0..).zip(&self.slots).filter_map(|(index, slot)| {
+            Some((Joint::new(index, slot.next_generation()?), slot.name()?))
+        })
+    }
+
+    /// Returns what was counted.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    pub(super) fn slot(&self, joint: Joint) -> Option<&Slot> {
+        self.slots.get(joint.index()).filter(|slot| slot.matches(joint))
+    }
+
+    pub(super) fn slot_mut(&mut self, joint: Joint) -> Option<&mut Slot> {
+        self.slots.get_mut(joint.index()).filter(|slot| slot.matches(joint))
+    }
+}
+
+impl Default for Joints {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+pub(super) const fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

@@ -1,0 +1,163 @@
+use super::model::{ACCELERATION, CURRENT, POSITION_MODE};
+use crate::units::AngularVelocity;
+
+/// What [`Joints::attach`](super::Joints::attach) needs to know of a joint.
+///
+/// # Examples
+/// ```
+/// use drivetrain::snake::{Config, Settings};
+/// use drivetrain::units::AngularVelocity;
+///
+/// const HEAD: Config = Config::new(1)
+///     .reversed()
+///     .with_speed(AngularVelocity::from_rpm(20.0))
+///     .with_settings(Settings::new().with_current(1_000));
+/// assert_eq!((HEAD.id(), HEAD.settings().current()), (1, 1_000));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    id: u8,
+    pub(super) reversed: bool,
+    pub(super) speed: AngularVelocity,
+    settings: Settings,
+}
+
+impl Config {
+    /// Takes the id that is set on the joint, 1 to 12; 10 rpm, and the settings of the robot's firmware.
+    #[must_use]
+    pub const fn new(id: u8) -> Self {
+        let speed = AngularVelocity::from_rpm(10.0);
+        Self { id, reversed: false, speed, settings: Settings::new() }
+    }
+
+    /// Turns the positive direction around, for position and speed alike.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self { reversed: !self.reversed, ..self }
+    }
+
+    /// Sets the speed with which the joint goes to its targets, until
+    /// [`set_speed`](super::Joints::set_speed) changes it; not negative, at most 255 rpm.
+    #[must_use]
+    pub const fn with_speed(self, speed: AngularVelocity) -> Self {
+        Self { speed, ..self }
+    }
+
+    /// Sets what is written before the joint is enabled.
+    #[must_use]
+    pub const fn with_settings(self, settings: Settings) -> Self {
+        Self { settings, ..self }
+    }
+
+    /// Returns the id.
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        self.id
+    }
+
+    /// Returns what is written before the joint is enabled.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+}
+
+/// The registers that a drive is set up with, as on the wire: their units are not documented.
+///
+/// # Examples
+/// ```
+/// use drivetrain::snake::Settings;
+///
+/// let settings = Settings::new().with_acceleration(500_000);
+/// assert_eq!((settings.acceleration(), settings.deceleration()), (500_000, 0x0010_AAAA));
+/// assert_eq!((settings.current(), settings.mode()), (2_000, 1));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Settings {
+    current: i32,
+    acceleration: i32,
+    deceleration: i32,
+    mode: i32,
+}
+
+impl Settings {
+    /// Takes what the robot's firmware writes.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            current: CURRENT,
+            acceleration: ACCELERATION,
+            deceleration: ACCELERATION,
+            mode: POSITION_MODE,
+        }
+    }
+
+    /// Sets the current, in the drive's own unit.
+    #[must_use]
+    pub const fn with_current(self, current: i32) -> Self {
+        Self { current, ..self }
+    }
+
+    /// Sets the acceleration in pulses a second².
+    #[must_use]
+    pub const fn with_acceleration(self, acceleration: i32) -> Self {
+        Self { acceleration, ..self }
+    }
+
+    /// Sets the deceleration in pulses a second².
+    #[must_use]
+    pub const fn with_deceleration(self, deceleration: i32) -> Self {
+        Self { deceleration, ..self }
+    }
+
+    /// Sets the work mode; only 1, position, is documented.
+    #[must_use]
+    pub const fn with_mode(self, mode: i32) -> Self {
+        Self { mode, ..self }
+    }
+
+    /// Returns the current.
+    #[must_use]
+    pub const fn current(&self) -> i32 {
+        self.current
+    }
+
+    /// Returns the acceleration in pulses a second².
+    #[must_use]
+    pub const fn acceleration(&self) -> i32 {
+        self.acceleration
+    }
+
+    /// Returns the deceleration in pulses a second².
+    #[must_use]
+    pub const fn deceleration(&self) -> i32 {
+        self.deceleration
+    }
+
+    /// Returns the work mode.
+    #[must_use]
+    pub const fn mode(&self) -> i32 {
+        self.mode
+    }
+
+    /// Names the first that makes no sense.
+    pub(super) const fn refused(&self) -> Option<&'static str> {
+        if self.current <= 0 {
+            Some("current")
+        } else if self.acceleration <= 0 {
+            Some("acceleration")
+        } else if self.deceleration <= 0 {
+            Some("deceleration")
+        } else {
+            None
+        }
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,84 @@
+//! The joints as a device of the runner.
+
+use super::{Joints, slot::Slot};
+use crate::frame::CanFrame;
+use crate::motor::{CanDevice, Claim, Ingest, MotorName, Role};
+use crate::time::{Instant, Tick};
+use embedded_can::StandardId;
+
+impl CanDevice for Joints {
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        Self::ingest(self, frame, now)
+    }
+
+    fn update(&mut self, tick: Tick) {
+        Self::update(self, tick);
+    }
+
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        Self::next_frame(self)
+    }
+
+    fn requeue(&mut self, frame: &CanFrame) -> bool {
+        Self::requeue(self, frame)
+    }
+
+    fn superseded(&self) -> u32 {
+        self.counters.superseded
+    }
+
+    /// Each joint has one id, in both directions.
+    fn claims(&self) -> impl Iterator<Item = Claim> {
+        let joints = || self.slots.iter().filter_map(|slot| slot.id.zip(slot.name()));
+        let claims = move |role| {
+            joints().filter_map(move |(id, name)| {
+                Some(Claim::new(StandardId::new(u16::from(id))?, role, name))
+            })
+        };
+        claims(Role::Feedback).chain(claims(Role::Command))
+    }
+
+    fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
+        self.slots.iter().filter(move |slot| slot.is_missing(now)).filter_map(Slot::name)
+    }
+
+    fn engage(&mut self, now: Instant) {
+        if !self.stopped {
+            let heard = self.slots.iter_mut().filter(|slot| slot.id.is_some());
+            for slot in heard.filter(|slot| !slot.is_missing(now)) {
+                _ = slot.guard.engage(now);
+            }
+        }
+    }
+
+    fn disarm(&mut self) {
+        for index in 0..self.slots.len() {
+            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
+                continue;
+            };
+            slot.guard.disarm();
+            _ = slot.let_go();
+            self.stop(index);
+        }
+    }
+
+    fn is_armed(&self) -> bool {
+        let mut attached = self.slots.iter().filter(|slot| slot.id.is_some()).peekable();
+        attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())
+    }
+
+    fn emergency_stop(&mut self) {
+        if !self.stopped {
+            self.disarm();
+            self.stopped = true;
+        }
+    }
+
+    fn clear_emergency_stop(&mut self) {
+        self.stopped = false;
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+}

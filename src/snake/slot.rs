@@ -1,0 +1,361 @@
+//! One joint: replies in, the next frame for it out.
+
+use super::model::{FASTEST, PULSES_PER_TURN};
+use super::{AttachError, Command, Config, Joint, Register, Reply, Settings, State};
+use crate::encoder::{Homing, Position};
+use crate::motor::{Guard, Link, MotorName, Timeouts};
+use crate::time::{Duration, Instant};
+use crate::units::{Angle, AngularVelocity};
+use crate::wire::host_link::Offset;
+use core::f32::consts::TAU;
+
+/// A relaxed joint is told again after this time: its drive may have missed it.
+const KEEP_RELAXED: Duration = Duration::from_millis(100);
+/// Beside twice its fastest way, so far may a position be off between two replies: a sixteenth of a turn.
+const JUMP: i32 = PULSES_PER_TURN / 16;
+/// Every so many readings of the speed make way for one that looks whether the drive is still enabled.
+const CHECKS: u8 = 8;
+
+/// All registers of [`Register::SEQUENCE`].
+const ALL: u8 = 0x7F;
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slot {
+    pub(super) id: Option<u8>,
+    generation: u8,
+    reversed: bool,
+    settings: Settings,
+    pub(super) guard: Guard,
+    pub(super) offset: Offset,
+    homing: Homing,
+    raw: Option<i32>,
+    raw_speed: i32,
+    heard: Instant,
+    /// As on the wire.
+    target: i32,
+    speed: i32,
+    /// Registers of [`Register::SEQUENCE`] that wait to be written.
+    pending: u8,
+    driven: bool,
+    stopped: Instant,
+    pub(super) awaiting: Option<(Register, Instant)>,
+    turn: u8,
+    pub(super) question: Option<Register>,
+    pub(super) answer: Option<Reply>,
+    pub(super) unanswered: u32,
+    pub(super) bad_replies: u32,
+    position_jumps: u16,
+    resets: u16,
+}
+
+impl Slot {
+    pub(super) const FREE: Self = Self {
+        id: None,
+        generation: 0,
+        reversed: false,
+        settings: Settings::new(),
+        guard: Guard::new(),
+        offset: Offset::new(0),
+        homing: Homing::Relative,
+        raw: None,
+        raw_speed: 0,
+        heard: Instant::START,
+        target: 0,
+        speed: 0,
+        pending: 0,
+        driven: false,
+        stopped: Instant::START,
+        awaiting: None,
+        turn: 0,
+        question: None,
+        answer: None,
+        unanswered: 0,
+        bad_replies: 0,
+        position_jumps: 0,
+        resets: 0,
+    };
+
+    /// Makes the slot of a joint, validating its configuration.
+    pub(super) fn new(
+        config: &Config,
+        timeouts: Timeouts,
+        generation: u8,
+    ) -> Result<Self, AttachError> {
+        let joint = name(config.id());
+        let speed = config.speed.as_rad_per_s();
+        let refused = if speed.is_finite() && speed >= 0.0 && to_pulses(speed) <= FASTEST {
+            config.settings().refused()
+        } else {
+            Some("speed")
+        };
+        if let Some(parameter) = refused {
+            return Err(AttachError::Parameter { joint, parameter });
+        }
+        Ok(Self {
+            id: Some(config.id()),
+            generation,
+            reversed: config.reversed,
+            settings: *config.settings(),
+            guard: Guard::new().with_timeouts(timeouts),
+            speed: to_pulses(speed),
+            ..Self::FREE
+        })
+    }
+
+    /// Frees the slot; handles of the joint find nothing from now on. An answer that is due may still come.
+    pub(super) const fn free(&mut self) {
+        let (generation, awaiting) = (self.generation + 1, self.awaiting);
+        *self = Self { generation, awaiting, ..Self::FREE };
+    }
+
+    pub(super) const fn next_generation(&self) -> Option<u8> {
+        if self.generation < Joint::GENERATIONS { Some(self.generation) } else { None }
+    }
+
+    pub(super) const fn matches(&self, joint: Joint) -> bool {
+        self.id.is_some() && self.generation == joint.generation()
+    }
+
+    pub(super) fn name(&self) -> Option<MotorName> {
+        self.id.map(name)
+    }
+
+    /// Takes a reply that arrived at `now`. Every reply is kept, only a position is a sign of life: it is what moves
+    /// without being looked at.
+    pub(super) fn receive(&mut self, reply: Reply, now: Instant) {
+        if self.awaiting.is_some_and(|(register, _)| register == reply.register()) {
+            self.awaiting = None;
+        }
+        match reply.register() {
+            Register::ActualPosition => self.receive_position(reply.value(), now),
+            Register::ActualSpeed => self.raw_speed = reply.value(),
+            // What waits to be written says that the answer is from before.
+            Register::Enable if self.driven && self.pending == 0 && reply.value() == 0 => {
+                self.resets = self.resets.saturating_add(1);
+                self.distrust();
+            }
+            _ => {}
+        }
+        if self.question == Some(reply.register()) {
+            self.question = None;
+            self.answer = Some(reply);
+        }
+    }
+
+    fn receive_position(&mut self, raw: i32, now: Instant) {
+        if let (Some(before), Link::Online | Link::Late) = (self.raw, self.guard.link()) {
+            let way = raw.wrapping_sub(before).unsigned_abs();
+            let gap_ms = now.since(self.heard).micros_u32().map_or(u32::MAX, |us| us / 1_000 + 1);
+            let furthest = gap_ms.saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
+            if way > furthest.saturating_add(JUMP.unsigned_abs()) {
+                self.position_jumps = self.position_jumps.saturating_add(1);
+                self.distrust();
+            }
+        }
+        self.raw = Some(raw);
+        self.heard = now;
+        self.guard.hear(now);
+    }
+
+    /// The drive is not what it was: its zero may be another, so nothing moves until it is armed again.
+    fn distrust(&mut self) {
+        self.lose_zero();
+        self.guard.disarm();
+    }
+
+    fn lose_zero(&mut self) {
+        if self.homing == Homing::Homed {
+            self.homing = Homing::Uncertain;
+        }
+    }
+
+    /// Waits no longer for an answer that is overdue; returns whether one is.
+    pub(super) fn give_up(&mut self, now: Instant, reply_timeout: Duration) -> bool {
+        let Some((_, since)) = self.awaiting else { return false };
+        // A clock that was set back would have it wait for long.
+        let overdue = now.since(since) > reply_timeout || now < since;
+        if overdue {
+            self.unanswered = self.unanswered.saturating_add(1);
+            self.awaiting = None;
+        }
+        overdue
+    }
+
+    /// Brings the joint to `now`. Returns whether it has to be told to relax.
+    pub(super) fn update(&mut self, now: Instant) -> bool {
+        let drives = self.guard.drives(now);
+        if self.guard.link() == Link::Offline {
+            self.lose_zero();
+        }
+        let stops = self.driven && !drives;
+        if drives && !self.driven {
+            self.pending = ALL;
+        }
+        self.driven = drives;
+        stops
+    }
+
+    /// Tells whether something of a driven joint waits to be written, beside what is only repeated.
+    pub(super) const fn has_news(&self) -> bool {
+        self.driven && self.pending != 0
+    }
+
+    /// Tells whether a relaxed joint is to be told again.
+    pub(super) fn wants_reminder(&self, now: Instant) -> bool {
+        !self.driven && now.since(self.stopped) >= KEEP_RELAXED
+    }
+
+    pub(super) const fn is_driven(&self) -> bool {
+        self.driven
+    }
+
+    /// Lets go at once; returns whether the joint has to be told.
+    pub(super) const fn let_go(&mut self) -> bool {
+        self.guard.relax();
+        core::mem::replace(&mut self.driven, false)
+    }
+
+    /// Notes that it is told to relax now. A joint that has a target again is brought up from the beginning after that.
+    pub(super) const fn told_to_relax(&mut self, now: Instant) {
+        self.stopped = now;
+        self.pending = ALL;
+    }
+
+    /// Returns the frame that is next to be written.
+    pub(super) fn next_write(&mut self, now: Instant) -> Command {
+        if !self.driven {
+            self.stopped = now;
+            return Command::DISABLE;
+        }
+        let next = self.pending.trailing_zeros() as usize;
+        self.pending &= self.pending.wrapping_sub(1);
+        match Register::SEQUENCE.get(next) {
+            Some(register) => Command::Write(*register, self.value(*register)),
+            None => Command::Write(Register::Position, self.target),
+        }
+    }
+
+    const fn value(&self, register: Register) -> i32 {
+        match register {
+            Register::Mode => self.settings.mode(),
+            Register::Current => self.settings.current(),
+            Register::Acceleration => self.settings.acceleration(),
+            Register::Deceleration => self.settings.deceleration(),
+            Register::Speed => self.speed,
+            Register::Enable => 1,
+            Register::Position | Register::ActualPosition | Register::ActualSpeed => self.target,
+        }
+    }
+
+    /// Takes back a write that was not sent.
+    pub(super) fn unwrite(&mut self, register: Register) {
+        if let Some(place) = Register::SEQUENCE.iter().position(|other| *other == register) {
+            self.pending |= 1 << place;
+        }
+    }
+
+    /// Returns the frame that asks for what is next in turn.
+    pub(super) fn next_read(&mut self, now: Instant) -> Command {
+        let register = match (self.turn % 3, self.question) {
+            (2, Some(question)) => question,
+            (2, None) if self.turn / 3 == CHECKS - 1 => Register::Enable,
+            (2, None) => Register::ActualSpeed,
+            _ => Register::ActualPosition,
+        };
+        self.turn = (self.turn + 1) % (3 * CHECKS);
+        self.awaiting = Some((register, now));
+        Command::Read(register)
+    }
+
+    /// Sets a target in pulses from the joint's zero.
+    pub(super) fn set_target(&mut self, pulses: i32) {
+        let target = self.offset.target(self.directed(pulses));
+        if target != self.target {
+            self.target = target;
+            self.unwrite(Register::Position);
+        }
+    }
+
+    /// Sets the speed with which it goes there; saturates.
+    pub(super) fn set_speed(&mut self, rad_per_s: f32) {
+        let pulses = to_pulses(rad_per_s.abs());
+        let speed = if pulses > FASTEST { FASTEST } else { pulses };
+        if speed != self.speed {
+            self.speed = speed;
+            self.unwrite(Register::Speed);
+        }
+    }
+
+    pub(super) fn set_settings(&mut self, settings: Settings) {
+        self.settings = settings;
+        for register in
+            [Register::Mode, Register::Current, Register::Acceleration, Register::Deceleration]
+        {
+            self.unwrite(register);
+        }
+    }
+
+    /// Makes the present position zero; `false` when it is not known.
+    pub(super) fn zero(&mut self) -> bool {
+        match self.raw {
+            Some(raw) if self.guard.link() == Link::Online => {
+                self.set_offset(Offset::new(raw));
+                true
+            }
+            _ => false,
+        }
+    }
+
+    pub(super) fn set_offset(&mut self, offset: Offset) {
+        self.offset = offset;
+        self.homing = Homing::Homed;
+    }
+
+    const fn directed(&self, pulses: i32) -> i32 {
+        if self.reversed { pulses.wrapping_neg() } else { pulses }
+    }
+
+    /// Tells whether there was no position yet, or none lately.
+    pub(super) fn is_missing(&self, now: Instant) -> bool {
+        self.id.is_some() && (self.raw.is_none() || self.guard.is_missing(now))
+    }
+
+    /// Returns what is known; `None` before the first position.
+    pub(super) fn state(&self) -> Option<State> {
+        let (motor, raw_pulses) = (self.name()?, self.raw?);
+        let pulses = self.directed(self.offset.shown(raw_pulses));
+        let (turns, rest) =
+            (pulses.div_euclid(PULSES_PER_TURN), pulses.rem_euclid(PULSES_PER_TURN));
+        let speed = self.directed(self.raw_speed) as f32 * (TAU / PULSES_PER_TURN as f32);
+        Some(State {
+            motor,
+            position: Position::new(
+                i64::from(turns),
+                Angle::from_turns(rest as f32 / PULSES_PER_TURN as f32),
+            ),
+            pulses,
+            raw_pulses,
+            homing: self.homing,
+            velocity: AngularVelocity::from_rad_per_s(speed),
+            link: self.guard.link(),
+            is_driven: self.driven,
+            unanswered: self.unanswered,
+            bad_replies: self.bad_replies,
+            position_jumps: self.position_jumps,
+            resets: self.resets,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+        })
+    }
+}
+
+pub(super) const fn name(id: u8) -> MotorName {
+    MotorName::new("snake joint", id)
+}
+
+/// Rounds rad or rad/s to pulses; saturates, NaN gives 0.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn to_pulses(radians: f32) -> i32 {
+    let pulses = radians * (PULSES_PER_TURN as f32 / TAU);
+    (pulses + 0.5_f32.copysign(pulses)) as i32
+}

@@ -1,0 +1,236 @@
+//! Joints and their drives on a simulated bus, through the runner.
+
+#![cfg(test)]
+
+use drivetrain::encoder::Position;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{ArmError, CanDevice, Link, TargetError};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{Controller, Fault, JointConfig, JointKey, Line, SimClock, World};
+use drivetrain::snake::{Command, Config, Joint, Joints, Register};
+use drivetrain::time::{Duration, Instant};
+use drivetrain::units::{Angle, AngularVelocity};
+
+type Shell<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Joints>;
+
+struct Robot<'w> {
+    world: &'w World,
+    runner: Shell<'w>,
+    joints: Vec<Joint>,
+    keys: Vec<JointKey>,
+    /// Where they are told to be, in degrees.
+    wanted: Option<f32>,
+}
+
+impl<'w> Robot<'w> {
+    fn new(world: &'w World, count: u8, mut joints: Joints) -> Self {
+        let keys = (1..=count).map(|id| world.attach_joint(JointConfig::new(id)).unwrap());
+        let keys = keys.collect();
+        let fast = |id| Config::new(id).with_speed(AngularVelocity::from_rpm(30.0));
+        let handles = (1..=count).map(|id| joints.attach(fast(id)).unwrap()).collect();
+        let runner = Runner::new(Nb(world.controller()), world.clock(), joints);
+        Self { world, runner, joints: handles, keys, wanted: None }
+    }
+
+    fn run(&mut self, ms: u64) {
+        for _ in 0..10 * ms {
+            self.world.advance(Duration::from_micros(100));
+            self.runner.poll(16);
+            let Some(tick) = self.runner.due() else { continue };
+            if let Some(degrees) = self.wanted {
+                let position = Position::from_angle(Angle::from_degrees(degrees));
+                for joint in &self.joints {
+                    _ = self.runner.device_mut().set_position(*joint, position);
+                }
+            }
+            self.runner.tick(tick);
+        }
+    }
+
+    fn arm(&mut self) {
+        let now = self.world.now();
+        for joint in self.joints.clone() {
+            self.runner.device_mut().zero(joint).unwrap();
+        }
+        self.runner.device_mut().arm(now).unwrap();
+    }
+
+    fn degrees(&self, joint: usize) -> f32 {
+        let state = self.runner.device().state(self.joints[joint]).unwrap();
+        state.position.as_angle().as_degrees()
+    }
+
+    fn is_enabled(&self, joint: usize) -> bool {
+        self.world.joint(self.keys[joint]).unwrap().is_enabled
+    }
+}
+
+#[test]
+fn joints_go_where_they_are_told_from_wherever_they_were_zeroed() {
+    let world = World::new(3);
+    let mut robot = Robot::new(&world, 12, Joints::new());
+    robot.run(50);
+    let start: Vec<_> = robot.keys.iter().map(|key| world.joint(*key).unwrap().pulses).collect();
+    robot.arm();
+    robot.wanted = Some(45.0);
+    robot.run(600);
+    for (index, start) in start.iter().enumerate() {
+        let way = world.joint(robot.keys[index]).unwrap().pulses - start;
+        assert_eq!(way, 8_192, "an eighth of a turn, whatever the counter was");
+        assert!((robot.degrees(index) - 45.0).abs() < 0.01);
+    }
+    robot.wanted = Some(-45.0);
+    robot.run(800);
+    assert!((0..12).all(|joint| (robot.degrees(joint) + 45.0).abs() < 0.01));
+}
+
+#[test]
+fn an_application_that_stops_setting_targets_has_its_joints_disabled() {
+    let world = World::new(3);
+    let mut robot = Robot::new(&world, 12, Joints::new());
+    robot.run(50);
+    robot.arm();
+    robot.wanted = Some(60.0);
+    robot.run(150);
+    assert!((0..12).all(|joint| robot.is_enabled(joint)));
+    robot.wanted = None;
+    robot.run(110);
+    assert!((0..12).all(|joint| !robot.is_enabled(joint)));
+    assert!(robot.runner.is_armed(), "relaxed, and not disarmed");
+}
+
+#[test]
+fn an_emergency_stop_disables_twelve_joints_within_five_milliseconds_over_three_mailboxes() {
+    let world = World::new(3);
+    let mut robot = Robot::new(&world, 12, Joints::new());
+    robot.run(50);
+    robot.arm();
+    robot.wanted = Some(60.0);
+    robot.run(150);
+    robot.runner.device_mut().emergency_stop();
+    robot.run(5);
+    assert!((0..12).all(|joint| !robot.is_enabled(joint)));
+    let now = world.now();
+    assert_eq!(robot.runner.device_mut().arm(now), Err(ArmError::Stopped));
+}
+
+#[test]
+fn the_load_of_every_budget_is_measured_between_its_bounds() {
+    // Four frames a tick would need a queue before the three mailboxes.
+    for (reads, writes) in [(1, 1), (2, 1), (1, 2)] {
+        let world = World::new(9);
+        let joints = Joints::new().with_frames_per_update(reads, writes);
+        let mut robot = Robot::new(&world, 12, joints);
+        robot.run(50);
+        robot.arm();
+        robot.wanted = Some(60.0);
+        robot.run(200);
+        let before = world.traffic(Line::Can1);
+        robot.run(1_000);
+        let measured = world.traffic(Line::Can1).since(&before).load();
+        let load = robot.runner.device().load();
+        // What the runner has sent, and what is answered, shift by a frame at the ends.
+        let (low, high) = (load.nominal() * 0.998, load.worst_case() * 1.002);
+        assert!((low..=high).contains(&measured), "{reads} {writes}: {measured} not in {load}");
+        let collisions = robot.keys.iter().map(|key| world.joint(*key).unwrap().collisions);
+        assert_eq!(collisions.sum::<u32>(), 0);
+    }
+}
+
+#[test]
+fn a_joint_that_is_unplugged_is_named_and_comes_back() {
+    let world = World::new(4);
+    let mut robot = Robot::new(&world, 4, Joints::new());
+    let at = |ms| Instant::START + Duration::from_millis(ms);
+    world.fault(Fault::SilentJoint(robot.keys[2]), at(300)..at(700)).unwrap();
+    robot.run(50);
+    robot.arm();
+    robot.wanted = Some(30.0);
+    robot.run(450);
+    let joint = robot.joints[2];
+    assert_eq!(robot.runner.device().link(joint), Some(Link::Offline));
+    assert_eq!(robot.runner.device_mut().set_pulses(joint, 0), Err(TargetError::Relaxed));
+    let now = world.now();
+    let refused = robot.runner.device_mut().arm(now).map_err(|error| error.to_string());
+    assert_eq!(refused, Err("no feedback from snake joint #3".to_owned()));
+    assert!(!robot.is_enabled(2) && robot.is_enabled(1));
+    robot.run(400);
+    assert_eq!(robot.runner.device().link(joint), Some(Link::Online));
+    let now = world.now();
+    robot.runner.device_mut().arm(now).unwrap();
+    robot.run(100);
+    assert!(robot.is_enabled(2));
+}
+
+#[test]
+fn a_brown_out_shorter_than_any_time_limit_does_not_set_a_joint_going_again() {
+    let world = World::new(4);
+    let mut robot = Robot::new(&world, 12, Joints::new());
+    let at = |ms| Instant::START + Duration::from_millis(ms);
+    world.fault(Fault::JointPowerLoss(robot.keys[6]), at(400)..at(405)).unwrap();
+    robot.run(50);
+    robot.arm();
+    robot.wanted = Some(5.0);
+    robot.run(354);
+    assert!(!robot.is_enabled(6), "it forgot that it was enabled");
+    robot.run(400);
+    let state = robot.runner.device().state(robot.joints[6]).unwrap();
+    assert!(state.resets + state.position_jumps >= 1, "{state:?}");
+    assert!(!robot.is_enabled(6) && !state.is_driven && !robot.runner.is_armed());
+}
+
+#[test]
+fn a_second_controller_shows_in_the_counters() {
+    let world = World::new(4);
+    let mut robot = Robot::new(&world, 2, Joints::new());
+    robot.run(20);
+    let foreign: CanFrame = Command::Write(Register::Enable, 1).frame(1).unwrap();
+    world.inject(Line::Can1, foreign).unwrap();
+    robot.run(5);
+    assert_eq!(robot.runner.device().counters().foreign_commands, 1);
+}
+
+/// The negative control of every `collisions == 0` here and in `snake_robot`.
+#[test]
+fn a_controller_that_does_not_wait_for_the_answer_collides_with_it() {
+    use embedded_can::nb::Can;
+    let world = World::new(6);
+    let key = world.attach_joint(JointConfig::new(3)).unwrap();
+    let mut can = world.controller();
+    let read = Command::Read(Register::ActualPosition).frame(3).unwrap();
+    let write = Command::Write(Register::Position, 5).frame(3).unwrap();
+    let urgent = CanFrame::standard(0, [0; 8]).unwrap();
+    for _ in 0..50 {
+        can.transmit(&read).unwrap();
+        world.advance(Duration::from_micros(130));
+        // The bus is busy until after the answer is due, and this waits as well.
+        for _ in 0..2 {
+            world.inject(Line::Can1, urgent).unwrap();
+        }
+        world.advance(Duration::from_micros(10));
+        can.transmit(&write).unwrap();
+        world.advance(Duration::from_millis(2));
+    }
+    let state = world.joint(key).unwrap();
+    assert!(state.replies == 50 && state.collisions > 25, "{state:?}");
+}
+
+#[test]
+fn one_bus_carries_dji_motors_and_joints_and_finds_no_clash() {
+    use drivetrain::dji::{Bus, Config as Dji, Gm6020Voltage, M2006};
+    let mut bus = Bus::new();
+    bus.attach(Dji::<Gm6020Voltage>::new(1)).unwrap();
+    bus.attach(Dji::<M2006>::new(1)).unwrap();
+    let mut joints = Joints::new();
+    for id in 1..=12 {
+        joints.attach(Config::new(id)).unwrap();
+    }
+    assert_eq!(joints.load().and(&bus.load()).to_string(), "70 % to 85 %");
+    let both = (joints, bus);
+    assert_eq!(both.clash(), None);
+    let mut twice = [Joints::new(), Joints::new()];
+    for joints in &mut twice {
+        joints.attach(Config::new(5)).unwrap();
+    }
+    assert!(matches!(twice.arm(Instant::from_micros(1)), Err(ArmError::Clash(..))));
+}

@@ -1,0 +1,515 @@
+//! Long runs: random frames and calls with the invariants of `docs/faults.md` asserted, and healthy motors that must not
+//! raise an alarm.
+//!
+//! Ignored in the everyday run; `.ci/run` runs a share of them, with a seed that changes by the day. All of it:
+//! `DRIVETRAIN_SOAK=full cargo test --release --all-features --test soak -- --ignored --nocapture --test-threads 1`
+
+#![cfg(test)]
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M2006, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{CanDevice, Ingest, Link, Malformed};
+use drivetrain::time::{Instant, Tick};
+use drivetrain::units::AngularVelocity;
+use embedded_can::{ExtendedId, Frame, StandardId};
+use std::thread;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Runs `work` on two threads with seeds of their own, each with half of `full` or of a 25th of it.
+fn soak(what: &str, full: u64, work: impl Fn(u64, u64) -> Report + Sync) {
+    let everything = std::env::var("DRIVETRAIN_SOAK").is_ok_and(|share| share == "full");
+    let share = if everything { full } else { full / 25 };
+    let day = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs() / 86_400;
+    let start = std::time::Instant::now();
+    let reports = thread::scope(|scope| {
+        let threads = [2 * day, 2 * day + 1].map(|seed| {
+            let work = &work;
+            scope.spawn(move || work(seed, share / 2))
+        });
+        threads.map(|thread| thread.join().unwrap())
+    });
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "soak: {share} of {full} {what} in {seconds:.1} s, seeds {} and {}",
+        2 * day,
+        2 * day + 1
+    );
+    reports.iter().for_each(|report| println!("  {report}"));
+}
+
+type Report = String;
+
+/// splitmix64: short, and good enough to reach every case.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, bound: u64) -> u64 {
+        ((self.next() >> 32) * bound) >> 32
+    }
+}
+
+/// A motor of the soak: feedback id, command id, slot and limit, from the manuals.
+struct Motor {
+    feedback: u16,
+    command: u32,
+    slot: usize,
+    limit: i16,
+    handle: AnyHandle,
+    /// When its last good frame came, and its last accepted target.
+    heard: Option<u64>,
+    asked: Option<u64>,
+}
+
+const LATE_US: u64 = 10_000;
+const DEADLINE_US: u64 = 100_000;
+const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
+
+fn motors(bus: &mut Bus) -> Vec<Motor> {
+    let of = |feedback, command, slot, limit, handle| Motor {
+        feedback,
+        command,
+        slot,
+        limit,
+        handle,
+        heard: None,
+        asked: None,
+    };
+    let m3508 = |id| Config::<M3508>::new(id).speed_loop(SPEED);
+    let voltage = PidConfig::new(1.0, 5.0, 0.0);
+    vec![
+        of(0x201, 0x200, 0, 16_384, bus.attach(m3508(1)).unwrap().into()),
+        of(0x202, 0x200, 1, 16_384, bus.attach(m3508(2).reversed()).unwrap().into()),
+        of(0x204, 0x200, 3, 10_000, bus.attach(Config::<M2006>::new(4)).unwrap().into()),
+        of(0x206, 0x1FF, 1, 10_000, bus.attach(Config::<M2006>::new(6)).unwrap().into()),
+        of(
+            0x209,
+            0x2FF,
+            0,
+            25_000,
+            bus.attach(Config::<Gm6020Voltage>::new(5).speed_loop(voltage)).unwrap().into(),
+        ),
+    ]
+}
+
+/// What the test expects of the bus, counted by itself.
+#[derive(Default)]
+struct Books {
+    offered: u64,
+    taken: u64,
+    unrelated: u64,
+    bad_length: u32,
+    bad_field: u32,
+    unattached: u32,
+    sent: u32,
+    nonzero: u64,
+}
+
+struct Soak {
+    bus: Bus,
+    motors: Vec<Motor>,
+    books: Books,
+    random: Random,
+    now_us: u64,
+    /// Of everything that was sent: I10.
+    digest: u64,
+}
+
+impl Soak {
+    fn new(seed: u64) -> Self {
+        let mut bus = Bus::new();
+        let motors = motors(&mut bus);
+        let (books, random) = (Books::default(), Random(seed));
+        Self { bus, motors, books, random, now_us: 1, digest: 0 }
+    }
+
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.now_us)
+    }
+
+    /// Every other frame is good feedback of one of the motors; the others are anything.
+    fn frame(&mut self) {
+        let bits = self.random.next();
+        let data = self.random.next().to_be_bytes();
+        let (frame, mine) = if bits & 1 == 0 {
+            let index = usize::try_from((bits >> 8) % 5).unwrap();
+            let [high, rest @ ..] = data;
+            let [b, c, d, e, f, g, h] = rest;
+            let data = [high & 0x1F, b, c, d, e, f, g, h];
+            (CanFrame::standard(self.motors[index].feedback, data), Some(index))
+        } else {
+            (self.any_frame(bits, &data), None)
+        };
+        let Some(frame) = frame else { return };
+        let outcome = self.bus.ingest(&frame, self.now());
+        self.books.offered += 1;
+        self.check_outcome(&frame, mine, outcome);
+    }
+
+    fn any_frame(&self, bits: u64, data: &[u8; 8]) -> Option<CanFrame> {
+        let near = u16::try_from(0x1F8 + (bits >> 8) % 24).ok()?;
+        let length = usize::try_from((bits >> 16) % 9).ok()?;
+        let standard = StandardId::new(near)?;
+        match bits >> 1 & 7 {
+            // Ids of the family and around it, often with 8 bytes.
+            0..=2 => {
+                CanFrame::new(standard, &data[..if bits & 0x1000_0000 == 0 { 8 } else { length }])
+            }
+            3 => CanFrame::new(
+                StandardId::new(u16::try_from(bits >> 20 & 0x7FF).ok()?)?,
+                &data[..length],
+            ),
+            4 => CanFrame::new_remote(standard, length),
+            5 => CanFrame::new(ExtendedId::new(u32::from(near))?, data),
+            6 => {
+                CanFrame::new(ExtendedId::new(u32::try_from(bits >> 32 & 0x1FFF_FFFF).ok()?)?, data)
+            }
+            _ => CanFrame::new_remote(ExtendedId::new(u32::from(near))?, length),
+        }
+    }
+
+    /// I5 and I6: the outcome is what the form of the frame says.
+    fn check_outcome(&mut self, frame: &CanFrame, mine: Option<usize>, outcome: Ingest) {
+        let id = match frame.id() {
+            embedded_can::Id::Standard(id) if frame.is_data_frame() => id.as_raw(),
+            _ => 0,
+        };
+        let owner = mine.or_else(|| self.motors.iter().position(|motor| motor.feedback == id));
+        let family = (0x201..=0x20B).contains(&id);
+        let books = &mut self.books;
+        match (owner, frame.dlc(), frame.bytes()[0]) {
+            (None, ..) => {
+                assert_eq!(outcome, Ingest::Unrelated, "{frame:?}");
+                books.unrelated += 1;
+                books.unattached = books.unattached.saturating_add(u32::from(family));
+            }
+            (Some(_), 0..=7, _) => {
+                assert_eq!(outcome, Ingest::Malformed(Malformed::Length(frame.length())));
+                books.bad_length = books.bad_length.saturating_add(1);
+            }
+            (Some(_), _, 0x20..) => {
+                assert_eq!(outcome, Ingest::Malformed(Malformed::Field), "{frame:?}");
+                books.bad_field = books.bad_field.saturating_add(1);
+            }
+            (Some(owner), ..) => {
+                assert_eq!(outcome, Ingest::Taken, "{frame:?}");
+                books.taken += 1;
+                self.motors[owner].heard = Some(self.now_us);
+            }
+        }
+    }
+
+    fn call(&mut self) {
+        let bits = self.random.next();
+        let index = usize::try_from(bits % 5).unwrap();
+        let value = f32::from_bits(u32::try_from(bits >> 32).unwrap());
+        let now = self.now();
+        let motor = &mut self.motors[index];
+        let handle = motor.handle;
+        match bits >> 8 & 31 {
+            0..=7 => {
+                #[expect(clippy::cast_possible_truncation, reason = "any word")]
+                let done = self.bus.set_raw(handle, (bits >> 40) as i16);
+                // A target has the time of the update before it.
+                motor.asked = if done.is_ok() { Some(self.now_us) } else { motor.asked };
+            }
+            8..=15 => {
+                let velocity = if bits & 0x10_0000 == 0 { value } else { 20.0 };
+                let done = self.bus.set_velocity(handle, AngularVelocity::from_rad_per_s(velocity));
+                motor.asked = if done.is_ok() { Some(self.now_us) } else { motor.asked };
+            }
+            16 => self.bus.relax(handle),
+            17 if bits & 0x7000 == 0 => self.bus.disarm(),
+            18 if bits & 0x7000 == 0 => self.bus.emergency_stop(),
+            19..=20 => self.bus.clear_emergency_stop(),
+            21 => _ = self.bus.zero(handle),
+            _ => _ = self.bus.arm(now),
+        }
+    }
+
+    /// Time goes on, mostly by a millisecond, sometimes by much more.
+    fn update(&mut self) {
+        let bits = self.random.next();
+        self.now_us += match bits & 0xFF {
+            0 => bits >> 8 & 0x3_FFFF,
+            1 if bits & 0xFF00 == 0 => bits >> 20 & 0xFFFF_FFFF,
+            2..=20 => bits >> 8 & 0x3FF,
+            _ => 1_000,
+        };
+        let dt_s = if bits >> 56 == 0 {
+            f32::from_bits(u32::try_from(bits & 0xFFFF_FFFF).unwrap())
+        } else {
+            0.001
+        };
+        self.bus.update(Tick::new(self.now(), dt_s));
+        // The last frames stay for one update whose step is unusable.
+        if dt_s > 0.0 && dt_s.is_finite() {
+            self.check_frames();
+        } else {
+            while self.bus.next_frame().is_some() {
+                self.books.sent += 1;
+            }
+        }
+        self.check_books();
+    }
+
+    /// I2, I3 and I4 on every frame.
+    fn check_frames(&mut self) {
+        let stopped = self.bus.is_stopped();
+        for sent in 0.. {
+            let Some(frame) = self.bus.next_frame() else { break };
+            assert!(sent < 5, "more frames than there are");
+            self.books.sent = self.books.sent.wrapping_add(1);
+            assert!(frame.is_data_frame() && frame.dlc() == 8);
+            assert!([0x200, 0x1FF, 0x2FF].contains(&frame.header()), "{frame:?}");
+            let bytes = u64::from_be_bytes(*frame.bytes());
+            self.digest = (self.digest ^ bytes ^ u64::from(frame.header()))
+                .rotate_left(7)
+                .wrapping_mul(0x100_0000_01B3);
+            for (slot, word) in frame.bytes().chunks_exact(2).enumerate() {
+                let word = i16::from_be_bytes([word[0], word[1]]);
+                if word == 0 {
+                    continue;
+                }
+                let owner = self
+                    .motors
+                    .iter()
+                    .find(|motor| motor.command == frame.header() && motor.slot == slot);
+                let motor = owner.unwrap_or_else(|| panic!("a slot of nobody: {frame:?}"));
+                assert!((-motor.limit..=motor.limit).contains(&word), "{frame:?}");
+                let fresh = |at: Option<u64>, limit| at.is_some_and(|at| self.now_us - at <= limit);
+                assert!(fresh(motor.heard, LATE_US), "driven without feedback: {frame:?}");
+                assert!(fresh(motor.asked, DEADLINE_US), "driven without a target: {frame:?}");
+                assert!(
+                    !stopped && self.bus.is_motor_armed(motor.handle),
+                    "driven unarmed: {frame:?}"
+                );
+                self.books.nonzero += 1;
+            }
+        }
+    }
+
+    /// I6, on both sides.
+    fn check_books(&self) {
+        let (books, counters) = (&self.books, self.bus.counters());
+        let refused = u64::from(books.bad_length) + u64::from(books.bad_field);
+        assert_eq!(books.offered, books.taken + books.unrelated + refused);
+        assert_eq!(
+            (counters.bad_length, counters.bad_field, counters.unattached),
+            (books.bad_length, books.bad_field, books.unattached)
+        );
+        assert_eq!(
+            counters.packed,
+            books.sent.wrapping_add(counters.superseded),
+            "all frames were taken"
+        );
+    }
+
+    fn run(&mut self, frames_and_calls: u64) {
+        for _ in 0..frames_and_calls / 32 {
+            for _ in 0..26 {
+                self.frame();
+            }
+            for _ in 0..5 {
+                self.call();
+            }
+            self.update();
+        }
+    }
+}
+
+#[test]
+#[ignore = "10^9 frames and calls: in release, a share by .ci/run"]
+fn random_frames_and_calls_keep_the_invariants() {
+    soak("frames and calls", 1_000_000_000, |seed, count| {
+        // I10: the same again gives the same, bit for bit.
+        let again = [0, 1].map(|_| {
+            let mut soak = Soak::new(seed);
+            soak.run(100_000);
+            soak.digest
+        });
+        assert_eq!(again[0], again[1]);
+        let mut soak = Soak::new(seed);
+        soak.run(count);
+        let books = &soak.books;
+        assert!(
+            books.nonzero > count / 2_000,
+            "{} words: the motors hardly ever ran",
+            books.nonzero
+        );
+        assert!(books.taken * 2 > books.offered, "half of the frames are good");
+        format!(
+            "{} frames: {} taken, {} of others, {} of a wrong length, {} with a bad field; {} sent, {} words not zero",
+            books.offered,
+            books.taken,
+            books.unrelated,
+            books.bad_length,
+            books.bad_field,
+            books.sent,
+            books.nonzero
+        )
+    });
+}
+
+/// A motor that does what it is told: first order, in rotor counts.
+struct Healthy {
+    feedback: u16,
+    command: u32,
+    slot: usize,
+    handle: AnyHandle,
+    /// Rotor rpm of full command without load.
+    fastest_rpm: f64,
+    limit: f64,
+    wanted_rpm: f64,
+    gear: f64,
+    rpm: f64,
+    counts: f64,
+    word: i16,
+    /// Rotor counts at the first frame.
+    first: Option<i64>,
+}
+
+impl Healthy {
+    /// One millisecond.
+    fn turn(&mut self) {
+        let drive = f64::from(self.word) / self.limit * self.fastest_rpm;
+        // 50 ms to no-load speed, as `Gap` takes it.
+        self.rpm += (drive - self.rpm) * (1.0 / 50.0);
+        self.counts += self.rpm * (8192.0 / 60_000.0);
+    }
+
+    fn whole_counts(&self) -> i64 {
+        #[expect(clippy::cast_possible_truncation, reason = "far below 2^53")]
+        let counts = self.counts.floor() as i64;
+        counts
+    }
+
+    fn frame(&self) -> CanFrame {
+        let angle = u16::try_from(self.whole_counts().rem_euclid(8192)).unwrap();
+        #[expect(clippy::cast_possible_truncation, reason = "below no-load speed")]
+        let rpm = self.rpm.round() as i16;
+        let ([a, b], [c, d], [e, f]) =
+            (angle.to_be_bytes(), rpm.to_be_bytes(), self.word.to_be_bytes());
+        CanFrame::standard(self.feedback, [a, b, c, d, e, f, 40, 0]).unwrap()
+    }
+}
+
+/// What no healthy motor may raise. Edges of motor health belong here as soon as a bus reports them.
+fn alarm(bus: &Bus, motor: &Healthy) -> Option<String> {
+    let state = bus.state(motor.handle)?;
+    let quiet = state.link == Link::Online
+        && state.ambiguous_gaps == 0
+        && state.refused_targets == 0
+        && state.forgotten_targets == 0
+        && state.error.is_none()
+        && bus.is_motor_armed(motor.handle);
+    (!quiet).then(|| format!("{state:?}"))
+}
+
+fn healthy_motors(bus: &mut Bus) -> Vec<Healthy> {
+    let mut motors = Vec::new();
+    let of = |feedback, command, slot, handle, fastest_rpm, limit, gear| Healthy {
+        feedback,
+        command,
+        slot,
+        handle,
+        fastest_rpm,
+        limit,
+        wanted_rpm: 0.0,
+        gear,
+        rpm: 0.0,
+        counts: f64::from(feedback) * 700.0 % 8192.0,
+        word: 0,
+        first: None,
+    };
+    let amperes = PidConfig::new(0.2, 2.0, 0.0);
+    for id in 1..=4_u8 {
+        let (slot, feedback) = (usize::from(id - 1), 0x200 + u16::from(id));
+        let m3508 = bus.attach(Config::<M3508>::new(id).speed_loop(amperes)).unwrap();
+        motors.push(of(feedback, 0x200, slot, m3508.into(), 9256.0, 16_384.0, 3591.0 / 187.0));
+        let m2006 = bus.attach(Config::<M2006>::new(id + 4).speed_loop(amperes)).unwrap();
+        motors.push(of(feedback + 4, 0x1FF, slot, m2006.into(), 18_000.0, 10_000.0, 36.0));
+    }
+    for id in 5..=7_u8 {
+        let volts = PidConfig::new(0.2, 2.0, 0.0);
+        let gm6020 = bus.attach(Config::<Gm6020Voltage>::new(id).speed_loop(volts)).unwrap();
+        let feedback = 0x204 + u16::from(id);
+        motors.push(of(feedback, 0x2FF, usize::from(id - 5), gm6020.into(), 320.0, 25_000.0, 1.0));
+    }
+    motors
+}
+
+#[test]
+#[ignore = "10^8 ticks of motors: in release, a share by .ci/run"]
+fn healthy_motors_that_lose_one_frame_in_twenty_raise_no_alarm() {
+    soak("ticks of healthy motors at 5 % loss", 100_000_000, |seed, count| {
+        let mut bus = Bus::new();
+        let mut motors = healthy_motors(&mut bus);
+        let mut random = Random(seed);
+        let (mut lost, mut longest, mut fastest) = (0_u64, 0, 0.0_f64);
+        let mut silent = [0; 11];
+        for ms in 1..=count / 11 {
+            let now = Instant::from_micros(ms * 1_000);
+            for (motor, silent) in motors.iter_mut().zip(&mut silent) {
+                motor.turn();
+                if random.below(20) == 0 && ms > 1 {
+                    lost += 1;
+                    *silent += 1;
+                    longest = longest.max(*silent);
+                    continue;
+                }
+                *silent = 0;
+                assert_eq!(bus.ingest(&motor.frame(), now), Ingest::Taken);
+                // Exact to the count, whatever was lost.
+                if ms % 64 == 0 || motor.first.is_none() {
+                    let counts = bus.state(motor.handle).unwrap().rotor_counts;
+                    let offset = motor.whole_counts() - counts;
+                    assert_eq!(
+                        *motor.first.get_or_insert(offset),
+                        offset,
+                        "{ms} ms: a turn too many or too few"
+                    );
+                }
+            }
+            if ms == 1 {
+                bus.arm(now).unwrap();
+            }
+            for motor in &mut motors {
+                // Half of no-load speed at most: there, 9 lost frames in a row leave no doubt about the turns.
+                if random.below(2_000) == 0 {
+                    let share = random.below(2_001) as f64 / 1_000.0 - 1.0;
+                    motor.wanted_rpm = share * motor.fastest_rpm.min(10_000.0) * 0.5;
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "a speed")]
+                let rpm = (motor.wanted_rpm / motor.gear) as f32;
+                bus.set_velocity(motor.handle, AngularVelocity::from_rpm(rpm)).unwrap();
+                fastest = fastest.max(motor.rpm.abs());
+            }
+            bus.update(Tick::new(now, 0.001));
+            while let Some(frame) = bus.next_frame() {
+                for motor in motors.iter_mut().filter(|motor| motor.command == frame.header()) {
+                    let [high, low] = [0, 1].map(|byte| frame.bytes()[2 * motor.slot + byte]);
+                    motor.word = i16::from_be_bytes([high, low]);
+                }
+            }
+            if ms % 8 == 0 {
+                let alarm = motors.iter().find_map(|motor| alarm(&bus, motor));
+                assert_eq!(alarm, None, "{ms} ms");
+            }
+        }
+        assert!(fastest > 4_000.0, "{fastest} rpm: they hardly moved");
+        let share = lost as f64 * 100.0 / count as f64;
+        assert!((4.5..5.5).contains(&share), "{share} % lost");
+        format!(
+            "{lost} frames lost ({share:.2} %), at most {longest} in a row; up to {fastest:.0} rpm; no alarm"
+        )
+    });
+}

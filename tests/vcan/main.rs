@@ -1,0 +1,262 @@
+//! A real CAN stack: the example `socketcan` on a `vcan0` of Linux, a simulated robot on its other side, and candump as the
+//! witness of both. [`run`](../run) starts a Linux of its own for it, so that nothing of the host's kernel is needed.
+//!
+//! The two go in lock-step, a millisecond for each line: in there the clock stalls. The interface loses and doubles frames,
+//! and its queue is full for a while (netem); among the robot's frames are foreign, remote, extended, malformed and error
+//! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
+
+#![cfg(test)]
+#![cfg(target_os = "linux")]
+
+mod judge;
+
+use drivetrain::frame::CanFrame;
+use drivetrain::sim::{Line, Model, MotorConfig, MotorKey, Sender, World};
+use drivetrain::time::Duration;
+use judge::{Judge, Phase, Written, line_of};
+use socketcan::{CanErrorFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+const BUS: &str = "vcan0";
+/// Between two phases, with nothing in the way of it.
+const MARKER: u16 = 0x7F0;
+/// After everything else.
+const END: u16 = 0x7F1;
+const RPM: f32 = 60.0;
+
+/// Name, what netem does, milliseconds.
+const PHASES: [(&str, &str, u32); 6] = [
+    ("clean", "", 1_500),
+    ("5 % lost", "loss 5%", 4_000),
+    ("2 % doubled", "duplicate 2%", 2_000),
+    ("both", "loss 5% duplicate 2%", 3_000),
+    ("queue full", "limit 4 delay 30ms", 60),
+    ("clean again", "", 1_000),
+];
+
+fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
+    for _ in 0..10_000 {
+        if done() {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    panic!("{what}: waited in vain");
+}
+
+fn output(program: &str, arguments: &[&str]) -> String {
+    let done = Command::new(program).args(arguments).output().unwrap();
+    assert!(done.status.success(), "{program} {arguments:?}: {done:?}");
+    String::from_utf8(done.stdout).unwrap()
+}
+
+/// Frames that the kernel dropped, and those that still wait.
+fn queue() -> (u64, u64) {
+    let text = output("tc", &["-s", "qdisc", "show", "dev", BUS]);
+    let number = |after: &str, until: char| {
+        let rest = text.split(after).nth(1).and_then(|rest| rest.split(until).next());
+        rest.and_then(|number| number.trim().parse().ok()).unwrap_or(0)
+    };
+    let waiting = text.split("backlog ").nth(1).and_then(|rest| rest.split_whitespace().nth(1));
+    let waiting = waiting.and_then(|packets| packets.trim_end_matches('p').parse().ok());
+    (number("dropped ", ','), waiting.unwrap_or(0))
+}
+
+/// The example, one millisecond after the other.
+struct Example {
+    child: Child,
+    steps: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Example {
+    fn start(program: &str, log: &str) -> Self {
+        let mut child = Command::new(program)
+            .args(["--interface", BUS, "--motors", "m3508:1-4,gm6020:5", "--rpm", &RPM.to_string()])
+            .args(["--arm", "--lock-step", "--log", log])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let steps = child.stdin.take().unwrap();
+        let answers = BufReader::new(child.stdout.take().unwrap());
+        Self { child, steps, answers }
+    }
+
+    fn step(&mut self) {
+        writeln!(self.steps).unwrap();
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer).unwrap();
+        assert_eq!(answer, ".\n");
+    }
+
+    /// Ends it, and returns what it reports.
+    fn end(mut self) -> Vec<String> {
+        drop(self.steps);
+        let report = self.answers.lines().map(Result::unwrap).collect();
+        assert!(self.child.wait().unwrap().success());
+        report
+    }
+}
+
+struct Robot {
+    world: World,
+    keys: Vec<MotorKey>,
+    socket: CanSocket,
+    written: Written,
+    /// What it received, as candump would write it.
+    received: Vec<String>,
+    ms: u32,
+}
+
+impl Robot {
+    fn new(world: World) -> Self {
+        let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::new(Model::M3508, id)).collect();
+        configs.push(MotorConfig::new(Model::Gm6020Voltage, 5));
+        let keys = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
+        let socket = CanSocket::open(BUS).unwrap();
+        socket.set_nonblocking(true).unwrap();
+        Self { world, keys, socket, written: Written::default(), received: Vec::new(), ms: 0 }
+    }
+
+    fn write(&mut self, frame: &socketcan::CanFrame) {
+        match self.socket.write_frame(frame) {
+            Ok(()) => self.written.accepted += 1,
+            // No buffer space: the queue is full.
+            Err(error) => {
+                assert_eq!(error.raw_os_error(), Some(105), "{error}");
+                self.written.refused += 1;
+            }
+        }
+    }
+
+    fn data(&mut self, id: impl Into<embedded_can::Id>, data: &[u8]) {
+        self.write(&socketcan::CanFrame::new(id, data).unwrap());
+    }
+
+    fn error(&mut self, class: u32, data: &[u8]) {
+        self.write(&CanErrorFrame::new_error(class, data).unwrap().into());
+    }
+
+    /// A millisecond: takes the commands that have come, and sends feedback and much else.
+    fn step(&mut self) {
+        self.receive();
+        let mut feedback: Vec<CanFrame> = Vec::new();
+        self.world.advance_with(Duration::from_millis(1), |record| {
+            if record.sender != Sender::Controller {
+                feedback.push(record.frame);
+            }
+        });
+        for frame in feedback {
+            self.write(&frame.convert::<socketcan::CanFrame>().unwrap());
+        }
+        self.noise();
+        self.ms += 1;
+    }
+
+    fn receive(&mut self) {
+        while let Ok(frame) = self.socket.read_frame() {
+            self.received.push(line_of(&frame));
+            let frame = CanFrame::copy_of(&frame).unwrap();
+            _ = embedded_can::nb::Can::transmit(&mut self.world.controller_on(Line::Can1), &frame);
+        }
+    }
+
+    /// Frames that are no feedback of these motors, or look like it.
+    fn noise(&mut self) {
+        let standard = |id| StandardId::new(id).unwrap();
+        let count = self.ms.to_be_bytes();
+        let ids = [standard(0x201), standard(0x203), standard(0x209)];
+        let id = ids[self.ms as usize % 3];
+        self.data(standard(0x300 + (self.ms % 64) as u16), &count);
+        match self.ms % 8 {
+            0 => self.write(&socketcan::CanFrame::new_remote(id, 8).unwrap()),
+            1 | 5 => {
+                let extended = socketcan::ExtendedId::new(u32::from(id.as_raw())).unwrap();
+                self.data(extended, &[0; 8]);
+            }
+            2 => self.data(id, &count),
+            3 => self.data(id, &[0x20, 0, 0, 0, 0, 0, 0, 0]),
+            // Another motor of the family, which is not attached.
+            4 => self.data(standard(0x208), &[0; 8]),
+            // The number of an error frame is its class: this one would be a motor's id.
+            6 => self.error(0x201, &[0; 8]),
+            _ => self.error(0x004, &[0, 1, 0, 0, 0, 0, 0, 0]),
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs vcan0, candump and tc: tests/vcan/run starts a Linux that has them"]
+fn every_frame_on_a_real_can_stack_is_accounted_for() {
+    let results = PathBuf::from(std::env::var("VCAN_RESULTS").unwrap());
+    let program = std::env::var("VCAN_EXAMPLE").unwrap();
+    let path = |name: &str| results.join(name).to_str().unwrap().to_owned();
+
+    let mut robot = Robot::new(World::new(1));
+    let mut example = Example::start(&program, &path("ours.log"));
+    let mut candump = Command::new("candump")
+        .args(["-L", "-r", "16777216", &format!("{BUS},0:0,#FFFFFFFF")])
+        .stdout(File::create(path("candump.log")).unwrap())
+        .spawn()
+        .unwrap();
+    wait_until("three sockets on the bus", || {
+        let listeners = |file: &str| fs::read_to_string(file).unwrap().matches(" raw").count();
+        listeners("/proc/net/can/rcvlist_all") >= 3 && listeners("/proc/net/can/rcvlist_err") >= 2
+    });
+
+    let mut phases = Vec::new();
+    for (index, (name, netem, ms)) in PHASES.into_iter().enumerate() {
+        if !netem.is_empty() {
+            let mut arguments = vec!["qdisc", "add", "dev", BUS, "root", "netem"];
+            arguments.extend(netem.split(' '));
+            output("tc", &arguments);
+        }
+        robot.written = Written::default();
+        for _ in 0..ms {
+            robot.step();
+            example.step();
+        }
+        wait_until("an empty queue", || queue().1 == 0);
+        let dropped = if netem.is_empty() { 0 } else { queue().0 };
+        if !netem.is_empty() {
+            output("tc", &["qdisc", "del", "dev", BUS, "root"]);
+        }
+        // What still came, then the marker.
+        example.step();
+        let written = robot.written;
+        robot.receive();
+        robot.data(StandardId::new(MARKER).unwrap(), &[u8::try_from(index).unwrap()]);
+        example.step();
+        phases.push(Phase { name, written, dropped });
+    }
+    for _ in 0..200 {
+        robot.step();
+        example.step();
+    }
+    robot.receive();
+    let reached: Vec<f32> =
+        robot.keys.iter().map(|key| robot.world.motor(*key).unwrap().velocity.as_rpm()).collect();
+    let report = example.end();
+    robot.receive();
+    // candump is slower than the others, and writes in blocks: it has caught up when what comes last is in its file.
+    for _ in 0..1_000 {
+        robot.data(StandardId::new(END).unwrap(), &[0; 8]);
+    }
+    wait_until("the end of what candump writes", || {
+        fs::read_to_string(path("candump.log")).unwrap().contains(" 7F1#")
+    });
+    output("busybox", &["kill", "-TERM", &candump.id().to_string()]);
+    candump.wait().unwrap();
+
+    let judge =
+        Judge::new(&path("candump.log"), &path("ours.log"), &report, robot.received, phases);
+    judge.bytes_are_equal();
+    judge.print_table();
+    judge.frames_add_up();
+    assert!(reached.iter().all(|rpm| (rpm - RPM).abs() < 3.0), "{reached:?} rpm, not {RPM}");
+    println!("motors at the end: {reached:.1?} rpm, {RPM} asked for");
+}
