@@ -91,11 +91,11 @@ impl Slot {
 
     /// Keeps the speed loop within what is left of the output: it knows only the full limit, and would wind up.
     pub(super) fn hold_back(&mut self) {
-        let output = self.speed.output();
+        let output = self.loops.output();
         let raw = to_raw(output, self.raw_per_unit, i16::MAX);
         let nearest = self.range.nearest(raw.into());
         if nearest != raw {
-            self.speed.reset_to(f32::from(nearest) / self.raw_per_unit);
+            self.loops.speed_mut().reset_to(f32::from(nearest) / self.raw_per_unit);
         }
     }
 }

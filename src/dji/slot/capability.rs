@@ -13,9 +13,9 @@ impl Slot {
         };
         let set = Capabilities::of(&[Capability::Raw, direct, Capability::Feedback]);
         [
-            (Capability::Velocity, is_loop(&self.speed)),
-            (Capability::Angle, is_loop(&self.position)),
-            (Capability::Position, is_loop(&self.position)),
+            (Capability::Velocity, is_loop(self.loops.speed())),
+            (Capability::Angle, is_loop(self.loops.position())),
+            (Capability::Position, is_loop(self.loops.position())),
             (Capability::Temperature, facts.has_temperature),
             (Capability::ErrorCodes, facts.errors != ErrorTable::None),
             (Capability::AbsoluteAngle, self.shaft.is_direct()),

@@ -14,7 +14,7 @@ impl Slot {
         timeouts: &Timeouts,
     ) -> Result<(), TargetError> {
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
-        needs(&self.position)?;
+        needs(self.loops.position())?;
         let (limit, command_us) = (timeouts.measured_us(), timeouts.command_us());
         let Some(at) = at.filter(|at| is_near(now, *at, limit)) else {
             if self.asked != Action::Rest {
@@ -37,9 +37,8 @@ impl Slot {
     fn enter_loops_at(&mut self, rad_per_s: f32) {
         self.enter_speed_loop();
         if self.asked != Action::Rest && !self.asked.is_way() {
-            self.position.reset_to(rad_per_s);
+            self.loops.position_mut().reset_to(rad_per_s);
         }
-        self.speed.interrupt();
-        self.position.interrupt();
+        self.loops.interrupt();
     }
 }

@@ -13,7 +13,7 @@ use super::config::{PlainConfig, USUAL};
 use super::handle::Key;
 use super::range::Range;
 use super::{AttachError, Facts, Feedback, State};
-use crate::control::{Pid, PidConfig};
+use crate::control::{Cascade, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft};
 use crate::motor::{
     Condition, HealthConfig, Latch, Link, Monitor, MotorName, Recovery, TargetError, Traffic,
@@ -47,8 +47,7 @@ pub(super) struct Slot {
     raw_per_unit: f32,
     goal: Goal,
     commanded: u32,
-    speed: Pid,
-    position: Pid,
+    loops: Cascade,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
     ramp_started: u16,
@@ -73,8 +72,10 @@ pub(super) struct Slot {
 }
 
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
-const NO_LOOP: Pid = match Pid::new(PidConfig::new(0.0, 0.0, 0.0)) {
-    Ok(pid) => pid,
+const NO_LOOP: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
+
+const NO_LOOPS: Cascade = match Cascade::new(NO_LOOP, NO_LOOP) {
+    Ok(loops) => loops,
     // Evaluated by the compiler: were zero gains refused, this would not compile.
     Err(_) => unreachable!(),
 };
@@ -100,8 +101,7 @@ impl Slot {
         ambiguous_gaps: 0,
         refused_targets: 0,
         forgotten_targets: 0,
-        speed: NO_LOOP,
-        position: NO_LOOP,
+        loops: NO_LOOPS,
         generation: 0,
         place: Place::NOWHERE,
         link: Link::Unheard,
@@ -155,13 +155,10 @@ impl Slot {
         let limit_raw = to_raw(limit, raw_per_unit, config.command_raw);
         let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
         let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
-        let speed = match limited_loop(config.speed, limit) {
-            Ok(speed) => speed,
-            Err(name) => return Err(parameter!(name)),
-        };
-        let position = match limited_loop(config.position, fastest) {
-            Ok(position) => position,
-            Err(name) => return Err(parameter!(name)),
+        let position = within(config.position, fastest);
+        let loops = match Cascade::new(position, within(config.speed, limit)) {
+            Ok(loops) => loops,
+            Err(error) => return Err(parameter!(error.parameter())),
         };
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));
@@ -177,8 +174,7 @@ impl Slot {
             range: Range::within(limit_raw),
             full_limit: limit_raw,
             ramp_ms: ramp_time(config.recovery),
-            speed,
-            position,
+            loops,
             generation,
             place,
             health: config.health,
@@ -290,7 +286,7 @@ impl Slot {
     }
 
     pub(super) const fn speed_loop_mut(&mut self) -> &mut Pid {
-        &mut self.speed
+        self.loops.speed_mut()
     }
 
     fn direction(&self) -> f32 {
@@ -333,22 +329,14 @@ const fn no_load_velocity(facts: &Facts, rad_per_s_per_rpm: f32) -> f32 {
     facts.rotor_no_load_rpm() as f32 * rad_per_s_per_rpm.abs()
 }
 
-/// Makes a loop whose output stays within `limit`, or names the parameter that is not usable.
-const fn limited_loop(config: Option<PidConfig>, limit: f32) -> Result<Pid, &'static str> {
-    let Some(config) = config else { return Ok(NO_LOOP) };
-    match Pid::new(within(config, limit)) {
-        Ok(pid) => Ok(pid),
-        Err(error) => Err(error.parameter()),
-    }
-}
-
 /// Tells a loop from [`NO_LOOP`], the only one without limits.
 const fn is_loop(pid: &Pid) -> bool {
     pid.config().output_range().1 < f32::MAX
 }
 
-/// Narrows the output of a loop to ±`limit`.
-const fn within(config: PidConfig, limit: f32) -> PidConfig {
+/// Narrows the output of a loop to ±`limit`, where there is a loop.
+const fn within(config: Option<PidConfig>, limit: f32) -> PidConfig {
+    let Some(config) = config else { return NO_LOOP };
     let (lower, upper) = config.output_range();
     let lower = if lower < -limit { -limit } else { lower };
     let upper = if upper > limit { limit } else { upper };

@@ -130,8 +130,7 @@ impl Slot {
         self.conditions.set(Condition::Late, true);
         self.action = Action::Rest;
         self.trusted_gap_us = 0;
-        self.speed.interrupt();
-        self.position.interrupt();
+        self.loops.interrupt();
     }
 
     /// Nobody knows any more when the motor was heard.

@@ -77,8 +77,7 @@ impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.ask(Action::Rest, Goal::NONE);
-        self.speed.reset();
-        self.position.reset();
+        self.loops.reset();
     }
 
     /// Takes a value in the unit of the command: amperes or volts.
@@ -105,7 +104,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
-        needs(&self.speed)?;
+        needs(self.loops.speed())?;
         self.enter_speed_loop();
         self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
@@ -118,7 +117,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
-        needs(&self.position)?;
+        needs(self.loops.position())?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -135,7 +134,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
-        needs(&self.position)?;
+        needs(self.loops.position())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         self.enter_position_loop();
         self.start(Action::Position, Goal { turns, value: phase }, now);
@@ -145,14 +144,14 @@ impl Slot {
     /// Changes the gains of the speed loop without a jump of its output.
     pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
-        replace(&mut self.speed, config, limit)
+        replace(self.loops.speed_mut(), config, limit)
     }
 
     /// Changes the gains of the position loop without a jump of its output.
     pub(in crate::dji) fn set_position_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
         let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = super::no_load_velocity(facts, self.rad_per_s_per_rpm);
-        replace(&mut self.position, config, limit)
+        replace(self.loops.position_mut(), config, limit)
     }
 
     /// A value that cannot be followed takes the target before it away: zero output, integrators untouched. An older
@@ -189,11 +188,10 @@ impl Slot {
     /// The speed loop takes over from a direct command where that was: no jump of the output.
     pub(super) fn enter_speed_loop(&mut self) {
         if self.asked == Action::Raw {
-            self.speed.reset_to(self.goal.raw() as f32 / self.raw_per_unit);
+            self.loops.speed_mut().reset_to(self.goal.raw() as f32 / self.raw_per_unit);
         } else if self.asked == Action::Measured {
             // Another sensor: its last reading says nothing of the next one.
-            self.speed.interrupt();
-            self.position.interrupt();
+            self.loops.interrupt();
         }
     }
 
@@ -204,7 +202,8 @@ impl Slot {
         }
         self.enter_speed_loop();
         if self.asked != Action::Rest {
-            self.position.reset_to(self.velocity().as_rad_per_s());
+            let velocity = self.velocity().as_rad_per_s();
+            self.loops.position_mut().reset_to(velocity);
         }
     }
 }
@@ -217,6 +216,6 @@ fn replace(pid: &mut Pid, config: PidConfig, limit: f32) -> Result<(), LoopError
     if !is_loop(pid) {
         return Err(LoopError::NoLoop);
     }
-    pid.set_config(super::within(config, limit))
+    pid.set_config(super::within(Some(config), limit))
         .map_err(|error| LoopError::Parameter(error.parameter()))
 }

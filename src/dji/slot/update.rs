@@ -46,9 +46,9 @@ impl Slot {
                 Action::Raw => return saturate(self.goal.raw(), self.range),
                 Action::Rest | Action::Velocity => return 0,
             };
-            self.position.step_error(way, velocity, step)
+            self.loops.step_position(way, velocity, step)
         };
-        loop_to_raw(self.speed.step(goal, velocity, step), self.raw_per_unit, self.range)
+        loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
     }
 
     /// Adds the ages of this motor's feedback and target, when it is heard.
