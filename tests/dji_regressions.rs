@@ -307,3 +307,80 @@ fn frames_are_conserved_through_refusals_and_evictions() {
     let waiting = u32::try_from(sent(&mut bus).len()).unwrap();
     assert_eq!(counters.packed + evicted, taken + counters.superseded + waiting);
 }
+
+/// After it a stamp of 32 bits is the same again.
+const WRAP_US: u64 = 1 << 32;
+
+fn stays_at_rest(bus: &mut Bus, motor: Handle<M3508>, micros: u64) {
+    assert!(bus.arm(us(micros)).is_err(), "armed by feedback of long ago");
+    assert!(bus.arm_only(&[motor.erase()], us(micros)).is_err(), "armed alone");
+    bus.engage(us(micros));
+    assert!(bus.set_raw(motor, 5_000).is_err(), "takes targets");
+    step(bus, micros);
+    assert!(sent(bus).iter().all(|frame| frame.1 == [0; 4]), "driven");
+}
+
+#[test]
+fn a_first_update_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 0), 1_000);
+    stays_at_rest(&mut bus, motor, 1_000 + WRAP_US);
+
+    let (mut bus, motor) = armed(Config::new(1));
+    bus.set_raw(motor, 5_000).unwrap();
+    step(&mut bus, 1_500 + WRAP_US);
+    assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]));
+    stays_at_rest(&mut bus, motor, 2_000 + WRAP_US);
+}
+
+#[test]
+fn a_motor_that_joins_before_the_first_update_neither_hides_nor_shares_the_pause_of_another() {
+    let mut bus = Bus::new();
+    let [old, young] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 0), 0);
+    hear(&mut bus, feedback(0x202, 0, 0), WRAP_US);
+    bus.engage(us(WRAP_US));
+    _ = (bus.set_raw(old, 5_000), bus.set_raw(young, 5_000));
+    step(&mut bus, WRAP_US + 1_000);
+    assert_eq!(sent(&mut bus), [(0x200, [0, 5_000, 0, 0])]);
+}
+
+#[test]
+fn an_update_without_a_step_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
+    let (mut bus, motor) = armed(Config::new(1));
+    step(&mut bus, 1_500);
+    bus.set_raw(motor, 5_000).unwrap();
+    bus.update(Tick::new(us(1_000 + WRAP_US), f32::NAN));
+    stays_at_rest(&mut bus, motor, 1_500 + WRAP_US);
+}
+
+#[test]
+fn updates_without_a_step_are_one_pause_however_many() {
+    let (mut bus, motor) = armed(Config::new(1));
+    step(&mut bus, 1_500);
+    for held in 1..=100 {
+        bus.update(Tick::new(us(1_000 + held * WRAP_US / 100), 0.0));
+    }
+    stays_at_rest(&mut bus, motor, 1_500 + WRAP_US);
+}
+
+#[test]
+fn a_clock_that_is_late_already_at_the_first_frame_is_no_pause() {
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.update(Tick::new(us(WRAP_US), 0.0));
+    hear(&mut bus, feedback(0x201, 0, 0), WRAP_US + 1_000);
+    bus.arm(us(WRAP_US + 1_000)).unwrap();
+    bus.set_raw(motor, 77).unwrap();
+    step(&mut bus, WRAP_US + 1_000);
+    assert_eq!(sent(&mut bus).last(), Some(&(0x200, [77, 0, 0, 0])));
+
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    hear(&mut bus, feedback(0x201, 0, 0), WRAP_US);
+    bus.arm(us(WRAP_US)).unwrap();
+    bus.set_raw(motor, 77).unwrap();
+    step(&mut bus, WRAP_US);
+    assert_eq!(sent(&mut bus), [(0x200, [77, 0, 0, 0])]);
+}
