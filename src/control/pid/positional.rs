@@ -244,7 +244,7 @@ impl Pid {
             p: settings.kp * error,
             i: self.integral,
             d: -(settings.kd * self.rate),
-            feed_forward: self.feed_forward(self.setpoint()),
+            feed_forward: self.feed_forward(self.measurement, self.error),
         }
     }
 
@@ -283,14 +283,13 @@ impl Pid {
         };
     }
 
-    /// The last setpoint, to rounding; zero when the error was formed elsewhere.
-    const fn setpoint(&self) -> f32 {
-        let known = self.error != UNKNOWN && self.measurement != UNKNOWN;
-        if known { self.error + self.measurement } else { 0.0 }
-    }
-
+    /// For the setpoint as a later call can know it too; zero when the error was formed elsewhere.
     #[inline]
-    pub(super) const fn feed_forward(&self, setpoint: f32) -> f32 {
+    pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
+        if measurement == UNKNOWN || error == UNKNOWN {
+            return 0.0;
+        }
+        let setpoint = measurement + error;
         let moving = self.settings.velocity_gain * setpoint;
         if setpoint > 0.0 {
             moving + self.settings.static_gain
@@ -307,6 +306,7 @@ impl Pid {
 mod tests {
     use super::*;
     use crate::control::ConfigFault;
+    use crate::control::pid::settings::FEED_FORWARD;
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -606,6 +606,24 @@ mod tests {
     }
 
     #[test]
+    fn feed_forward_on_a_circle_takes_over_and_changes_without_a_jump() {
+        let config = PidConfig::new(1.0, 1.0, 0.0).with_period(360.0).with_feed_forward(0.5, 0.1);
+        let mut pid = pid(config);
+        pid.reset_to(7.0);
+        assert!((pid.update(10.0, 350.0, DT_S) - 7.0).abs() < 1e-4);
+        assert_eq!(pid.terms().feed_forward, 37.5); // for 370, the 10 next to 350
+        pid.set_config(config.with_feed_forward(0.5, 0.0)).unwrap();
+        assert!((pid.update(10.0, 350.0, DT_S) - 7.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn feed_forward_that_is_too_small_to_see_is_not_in_the_terms_either() {
+        let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_feed_forward(0.5, 0.0));
+        let output = pid.update(1e-6, 100.0, DT_S);
+        assert_eq!(pid.terms().p + pid.terms().feed_forward, output);
+    }
+
+    #[test]
     fn slew_limit_holds_up_and_down_and_from_the_start() {
         let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_slew_limit(1000.0));
         assert_eq!(pid.update(5.0, 0.0, DT_S), 1.0);
@@ -779,7 +797,7 @@ mod tests {
         #[test]
         fn within_the_limits_the_terms_add_up_to_the_output(
             config in any_config(),
-            samples in prop::collection::vec((0.0_f32..180.0, 0.0_f32..179.0), 1..40),
+            samples in prop::collection::vec((-360.0_f32..720.0, -360.0_f32..720.0), 1..40),
         ) {
             let mut pid = pid(config);
             for (setpoint, measurement) in samples {
@@ -788,9 +806,24 @@ mod tests {
                 let sum = p + i + d + feed_forward;
                 let (lower, upper) = config.output_range();
                 let free = lower < output && output < upper && config.slew_per_s == PidConfig::OFF;
-                let largest = p.abs().max(d.abs()).max(1.0);
+                let largest = p.abs().max(d.abs()).max(feed_forward.abs()).max(1.0);
                 prop_assert!(!free || (sum - output).abs() < 1e-5 * largest, "{} {}", sum, output);
             }
+        }
+
+        #[test]
+        fn a_reset_to_an_output_gives_that_output_first(
+            config in any_config(),
+            output in -50.0_f32..50.0,
+            sample in (-360.0_f32..720.0, -360.0_f32..720.0),
+        ) {
+            let config = PidConfig { integral_limit: PidConfig::OFF, ki: config.ki + 0.1, ..config };
+            let mut pid = pid(config);
+            pid.reset_to(output);
+            let expected = pid.output();
+            let first = pid.update(sample.0, sample.1, DT_S);
+            let largest = pid.terms().p.abs().max(1.0);
+            prop_assert!((first - expected).abs() <= 1e-6 * largest, "{} {}", first, expected);
         }
 
         #[test]
@@ -812,10 +845,13 @@ mod tests {
             config in any_config(),
             samples in prop::collection::vec((0_u16..5760, 0_u16..5760, -50_i8..50, -50_i8..50), 1..30),
         ) {
-            // Without feed-forward, which sees the setpoint itself. Sixteenths of a degree are exact in f32.
-            let config = config.with_period(360.0).with_feed_forward(0.0, 0.0);
+            // Feed-forward is for the setpoint next to the measurement: it sees turns of that. Sixteenths of a degree are
+            // exact in f32.
+            let config = config.with_period(360.0);
+            let turning = config.options() & FEED_FORWARD == 0;
             let (mut here, mut turned) = (pid(config), pid(config));
             for (setpoint, measurement, turns, others) in samples {
+                let others = if turning { others } else { 0 };
                 let (setpoint, measurement) = (f32::from(setpoint) / 16.0, f32::from(measurement) / 16.0);
                 let expected = here.update(setpoint, measurement, DT_S);
                 let shifted = turned.update(

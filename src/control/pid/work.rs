@@ -66,7 +66,7 @@ impl Pid {
                 return self.step_error_carefully(error, rate, step);
             }
             let rate = self.rate_at(measurement, error, step);
-            return self.work_carefully(0.0, measurement, error, rate, step);
+            return self.work_carefully(measurement, error, rate, step);
         }
         let output = self.settings.output_upper.copysign(wanted);
         let growth = integral - self.integral;
@@ -148,7 +148,7 @@ impl Pid {
         rate: f32,
         step: &TimeStep,
     ) -> f32 {
-        match self.work::<false>(setpoint, measurement, error, rate, step) {
+        match self.work::<false>(measurement, error, rate, step) {
             Some(output) => output,
             None if measurement == UNKNOWN => self.step_error_carefully(error, rate, step),
             None => self.step_carefully(setpoint, measurement, step),
@@ -164,7 +164,7 @@ impl Pid {
         }
         let error = self.shortest(setpoint - measurement);
         let rate = self.rate_at(measurement, error, step);
-        self.work_carefully(setpoint, measurement, error, rate, step)
+        self.work_carefully(measurement, error, rate, step)
     }
 
     #[cold]
@@ -173,7 +173,7 @@ impl Pid {
         if step.is_hold() || !error.is_finite() || !rate.is_finite() {
             return self.refuse();
         }
-        self.work_carefully(0.0, UNKNOWN, error, rate, step)
+        self.work_carefully(UNKNOWN, error, rate, step)
     }
 
     pub(in crate::control) const fn refuse(&mut self) -> f32 {
@@ -183,14 +183,7 @@ impl Pid {
 
     #[cold]
     #[inline(never)]
-    fn work_carefully(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
+    fn work_carefully(&mut self, measurement: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let (mut rate, mut step) = (rate, *step);
         if step.is_frozen() {
             (rate, step.half_dt_s) = (self.rate, 0.0);
@@ -201,7 +194,7 @@ impl Pid {
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
-        self.work::<true>(setpoint, measurement, error, rate, &step).unwrap_or(self.output)
+        self.work::<true>(measurement, error, rate, &step).unwrap_or(self.output)
     }
 
     /// A way on the circle, exact and finite.
@@ -233,7 +226,6 @@ impl Pid {
     #[inline]
     fn work<const CAREFUL: bool>(
         &mut self,
-        setpoint: f32,
         measurement: f32,
         error: f32,
         rate: f32,
@@ -256,7 +248,7 @@ impl Pid {
         }
         let mut others = finite(proportional - finite(settings.kd * rate));
         if self.has(FEED_FORWARD) {
-            others = finite(others + self.feed_forward(setpoint));
+            others = finite(others + self.feed_forward(measurement, error));
         }
         let mut integral = finite(self.integral + growth);
         let mut wanted = others + integral;
