@@ -1,5 +1,5 @@
 use super::PidConfig;
-use super::settings::{Settings, TRACK_OUTPUT};
+use super::settings::{REST_DERIVATIVE, Settings, TRACK_OUTPUT};
 use super::work::{CLOSED, UNKNOWN, passes};
 use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
@@ -19,7 +19,8 @@ use crate::control::step::TimeStep;
 ///   It does not matter how long ago the controller was made.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`]: the integral and D stay for this step, P and feed-forward follow.
-/// * NaN or infinity in any input: as for `dt_s` zero. The next good sample works as if the bad one had not been.
+/// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
+///   in the next good step: it keeps its value, since the travel of the time that is missing is not that of one step.
 /// * `ki` zero: the integral is zero and stays zero.
 /// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
 ///   what is stored stays finite.
@@ -170,6 +171,7 @@ impl Pid {
         self.rate = 0.0;
         self.output = 0.0;
         self.options &= !TRACK_OUTPUT;
+        self.end_rest();
     }
 
     /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
@@ -191,6 +193,7 @@ impl Pid {
         self.error = UNKNOWN;
         self.measurement = UNKNOWN;
         self.rate = 0.0;
+        self.end_rest();
     }
 
     /// Resets, and lets the first call return `output`, within the limits, whatever its error: for taking over from
@@ -270,7 +273,11 @@ impl Pid {
         let before = self.terms();
         let options = config.options();
         self.settings = Settings::new(&config, options);
+        let rests = self.has(REST_DERIVATIVE);
         self.options = options | self.options & TRACK_OUTPUT;
+        if rests {
+            self.rest_derivative();
+        }
         let after = self.terms();
         let carried = before.i
             + (before.p - after.p)
@@ -372,10 +379,12 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_sample_holds_the_output_and_leaves_no_trace() {
-        for config in
-            [PidConfig::new(2.0, 10.0, 0.1), PidConfig::new(0.0, 0.0, 0.0), every_option()]
-        {
+    fn a_bad_sample_holds_the_output_and_leaves_no_trace_but_in_d() {
+        for config in [
+            PidConfig::new(2.0, 10.0, 0.0),
+            PidConfig::new(0.0, 0.0, 0.0),
+            every_option().with_gains(2.0, 10.0, 0.0),
+        ] {
             for bad in BAD {
                 let (mut clean, mut hit) = (pid(config), pid(config));
                 for sample in 0..20_u8 {
@@ -387,8 +396,32 @@ mod tests {
                     assert_eq!(hit.update(1.0, measurement, DT_S), expected);
                 }
                 assert_eq!(hit.rejected(), 40);
-                assert_eq!(Pid { rejected: 0, ..hit }, clean);
+                assert_eq!(Pid { rejected: 0, rate: clean.rate, ..hit }, clean);
             }
+        }
+    }
+
+    #[test]
+    fn a_burst_of_bad_samples_of_a_moving_shaft_does_not_kick() {
+        let damper = PidConfig::new(0.0, 1.0, 0.05);
+        for config in [
+            damper,
+            damper.with_derivative_on_error(),
+            damper.with_derivative_filter(1e4),
+            damper.with_period(360.0).with_slew_limit(1e9),
+        ] {
+            let mut pid = pid(config);
+            let mut at = 0.0;
+            for sample in 0..100_u8 {
+                at += 10.0 * DT_S;
+                let bad = (20..70).contains(&sample);
+                pid.update(0.0, if bad { f32::NAN } else { at }, DT_S);
+                assert!(sample < 19 || (pid.terms().d + 0.5).abs() < 0.01, "{:?}", pid.terms());
+            }
+            assert_eq!(pid.rejected(), 50);
+            assert_eq!(pid.config(), config);
+            let gate = Pid::new(config).unwrap().settings;
+            assert_eq!(pid.settings, gate); // back on the plain path
         }
     }
 
@@ -822,7 +855,7 @@ mod tests {
             pid.reset_to(output);
             let expected = pid.output();
             let first = pid.update(sample.0, sample.1, DT_S);
-            let largest = pid.terms().p.abs().max(1.0);
+            let largest = pid.terms().p.abs().max(pid.terms().feed_forward.abs()).max(1.0);
             prop_assert!((first - expected).abs() <= 1e-6 * largest, "{} {}", first, expected);
         }
 
