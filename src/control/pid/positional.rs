@@ -211,7 +211,8 @@ impl Pid {
         self.options |= TRACK_OUTPUT;
     }
 
-    /// Changes the gains without a jump of the output: the integral takes up the difference.
+    /// Changes the gains without a jump of P: the integral takes up the difference. A new `kd` shows at once, in D, which passes;
+    /// the integral would keep it after the shaft has come to rest.
     ///
     /// With `ki` zero the integral is dropped, since nothing would ever drain it; then the output moves to P and D.
     ///
@@ -223,7 +224,7 @@ impl Pid {
         Ok(())
     }
 
-    /// Changes the configuration without a jump of the output, as [`set_gains`](Self::set_gains) does; new limits hold
+    /// Changes the configuration without a jump of P and feed-forward, as [`set_gains`](Self::set_gains) does; new limits hold
     /// from the next step on.
     ///
     /// # Errors
@@ -279,10 +280,7 @@ impl Pid {
             self.rest_derivative();
         }
         let after = self.terms();
-        let carried = before.i
-            + (before.p - after.p)
-            + (before.d - after.d)
-            + (before.feed_forward - after.feed_forward);
+        let carried = before.i + (before.p - after.p) + (before.feed_forward - after.feed_forward);
         self.integral = if config.ki > 0.0 {
             limited(finite(carried), -config.integral_limit, config.integral_limit)
         } else {
@@ -731,7 +729,8 @@ mod tests {
                 pid.update(1.0, f32::from(sample) * 0.001, DT_S);
             }
             let (before, terms) = (pid.output(), pid.terms());
-            pid.set_gains(3.0, 5.0, 0.04).unwrap();
+            let kd = pid.config().gains().2;
+            pid.set_gains(3.0, 5.0, kd).unwrap();
             let now = pid.terms();
             assert!(
                 (now.p + now.i + now.d + now.feed_forward - before).abs() < 1e-4,
@@ -739,6 +738,18 @@ mod tests {
             );
             assert!((pid.update(1.0, 0.010, DT_S) - before).abs() < 0.02);
         }
+    }
+
+    #[test]
+    fn a_new_kd_is_not_kept_by_the_integral() {
+        let mut pid = pid(PidConfig::new(1.0, 1.0, 0.0));
+        for sample in 0..100_u8 {
+            pid.update(0.99, f32::from(sample) * 0.01, DT_S);
+        }
+        let integral = pid.terms().i;
+        pid.set_gains(1.0, 1.0, 0.5).unwrap();
+        pid.update(0.99, 0.99, DT_S);
+        assert!((pid.update(0.99, 0.99, DT_S) - integral).abs() < 1e-6); // at rest, on target
     }
 
     #[test]
