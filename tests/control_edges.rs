@@ -151,8 +151,8 @@ fn moving(sample: u8) -> [f32; 3] {
 }
 
 /// Runs two of each type; `disturb` one of them before every sample, and it must leave no trace.
-fn leaves_no_trace(disturb: impl Fn(&mut dyn Subject, Long, [f32; 3]) -> u16) {
-    for ((long, mut clean), (_, mut hit)) in table(GAINS).into_iter().zip(table(GAINS)) {
+fn leaves_no_trace(gains: PidConfig, disturb: impl Fn(&mut dyn Subject, Long, [f32; 3]) -> u16) {
+    for ((long, mut clean), (_, mut hit)) in table(gains).into_iter().zip(table(gains)) {
         let mut refused = 0;
         for sample in 0..20 {
             refused += disturb(&mut *hit, long, moving(sample));
@@ -166,7 +166,7 @@ fn leaves_no_trace(disturb: impl Fn(&mut dyn Subject, Long, [f32; 3]) -> u16) {
 
 #[test]
 fn a_time_step_that_is_no_time_holds_the_output_and_is_counted() {
-    leaves_no_trace(|subject, long, [a, b, c]| {
+    leaves_no_trace(GAINS, |subject, long, [a, b, c]| {
         if long == Long::NoTime {
             return 0;
         }
@@ -181,8 +181,12 @@ fn a_time_step_that_is_no_time_holds_the_output_and_is_counted() {
 
 #[test]
 fn an_input_that_is_not_finite_holds_the_output_and_is_counted() {
-    leaves_no_trace(|subject, _, inputs| {
+    // D rests in the step after it, and the filters of actuators start anew: tests of their own.
+    leaves_no_trace(GAINS.with_gains(2.0, 10.0, 0.0), |subject, long, inputs| {
         let mut refused = 0;
+        if long == Long::FreezesBehindFilter && !format!("{subject:?}").starts_with("Incr") {
+            return 0;
+        }
         for input in 0..subject.inputs() {
             for bad in NOT_FINITE {
                 let mut inputs = inputs;

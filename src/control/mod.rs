@@ -20,8 +20,8 @@
 //! # What they all do
 //! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. What a
 //!   very long one does is said at each type; for the controllers see [`TimeStep`].
-//! * A setpoint or measurement that is NaN or infinite changes nothing: the last output is returned, the sample is counted, and
-//!   the next good one works as if the bad one had not been.
+//! * A setpoint or measurement that is NaN or infinite: the last output is returned and the sample is counted. The next good one
+//!   works as if the bad one had not been, but that the D of a controller rests in it, since the time between is not one step.
 //! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`] names the one that cannot work. What
 //!   needs arithmetic only is `const`, so that a bad constant does not compile.
 //! * Nothing panics, and what is stored is finite.

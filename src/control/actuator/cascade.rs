@@ -15,7 +15,7 @@ use crate::control::step::TimeStep;
 /// # Edge behaviour
 /// That of the [`Pid`], loop by loop: an error that is NaN or infinite holds the velocity that is wanted, a velocity that is
 /// NaN or infinite, or a step on hold, holds the output; each loop counts what it refused. A step that is frozen freezes the
-/// integral and D of both. A bad sample leaves no trace.
+/// integral and D of both. After a bad velocity, the D of the speed loop rests in the next good step.
 ///
 /// # Examples
 /// ```

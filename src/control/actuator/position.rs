@@ -54,8 +54,8 @@ impl PositionActuatorConfig {
 ///
 /// # Edge behaviour
 /// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward. A `dt_s` that is zero, negative, NaN or
-/// infinite, and a setpoint, angle or speed that is NaN or infinite, change nothing: the last output is returned and
-/// [`rejected`](Self::rejected) grows. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D of both loops, and
+/// infinite, and a setpoint, angle or speed that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected)
+/// grows; after a bad input, the next values pass their filters as first ones, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D of both loops, and
 /// counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
 /// time that has passed for it; if one of the steps since was above the maximum, that freezes it too. Without `ki` an
 /// integral stays zero. Huge gains end at the output limits.
@@ -120,7 +120,7 @@ impl PositionActuator {
         let step = TimeStep::of(dt_s);
         let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
         if !step.admits(finite, &mut self.rejected) {
-            return self.output();
+            return self.miss(&step);
         }
         let angle = self.filter.pass(angle, &step);
         if let Some(outer) = self.outer_step(&step) {
@@ -135,7 +135,7 @@ impl PositionActuator {
     pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
         if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
-            return self.output();
+            return self.miss(&step);
         }
         if let Some(outer) = self.outer_step(&step) {
             self.cascade.step_position(error, speed, &outer);
@@ -178,6 +178,17 @@ impl PositionActuator {
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
+    }
+
+    /// What was measured is too old by the time of this step: filters take the next values as first ones, and D rests.
+    const fn miss(&mut self, step: &TimeStep) -> f32 {
+        if !step.is_hold() {
+            self.filter.reset();
+            self.cascade.position_mut().rest_derivative();
+            self.cascade.speed_mut().rest_derivative();
+        }
+        self.filters.miss(step);
+        self.output()
     }
 
     fn step_speed(&mut self, speed: f32, step: &TimeStep) -> f32 {
@@ -259,7 +270,7 @@ mod tests {
         for sample in 0..20_u8 {
             let angle = f32::from(sample) * 0.1;
             let expected = clean.update(3.0, angle, 1.0, DT_S);
-            let held = hit.output();
+            let (held, before) = (hit.output(), hit);
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                 assert_eq!(hit.update(bad, angle, 1.0, DT_S), held);
                 assert_eq!(hit.update(3.0, bad, 1.0, DT_S), held);
@@ -267,9 +278,35 @@ mod tests {
                 assert_eq!(hit.update(3.0, angle, 1.0, bad), held);
                 assert_eq!(hit.update_error(bad, 1.0, DT_S), held);
             }
+            hit = before;
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -DT_S] {
+                assert_eq!(hit.update(3.0, angle, 1.0, bad), held);
+            }
             assert_eq!(hit.update(3.0, angle, 1.0, DT_S), expected);
         }
-        assert_eq!((hit.rejected(), PositionActuator { rejected: 0, ..hit }), (300, clean));
+        assert_eq!((hit.rejected(), PositionActuator { rejected: 0, ..hit }), (100, clean));
+    }
+
+    #[test]
+    fn a_burst_of_bad_samples_of_a_moving_shaft_does_not_kick() {
+        let damped = PositionActuatorConfig::new(
+            PidConfig::new(0.0, 0.0, 0.05),
+            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.05)).with_feedback_filter(50.0),
+        );
+        for config in [damped, damped.with_angle_filter(50.0), damped.with_outer_divider(3)] {
+            let mut actuator = PositionActuator::new(config).unwrap();
+            let (mut angle, mut speed) = (0.0, 0.0);
+            let mut most = 0.0_f32;
+            for sample in 0..200_u8 {
+                (angle, speed) = (angle + 10.0 * DT_S, speed + 10.0 * DT_S);
+                let bad = (100..150).contains(&sample);
+                actuator.update(0.0, if bad { f32::NAN } else { angle }, speed, DT_S);
+                for pid in [actuator.cascade().position(), actuator.cascade().speed()] {
+                    most = most.max(pid.terms().d.abs());
+                }
+            }
+            assert!(most < 0.51, "{most}");
+        }
     }
 
     #[test]

@@ -55,8 +55,8 @@ impl SpeedActuatorConfig {
 ///
 /// # Edge behaviour
 /// That of the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward.
-/// A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or infinite, change nothing: the last output is
-/// returned and [`rejected`](Self::rejected) grows. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and
+/// A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or infinite: the last output is returned
+/// and [`rejected`](Self::rejected) grows; after a bad input, the next speed passes its filter as a first one, and D rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and
 /// counts as that maximum for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold
 /// behind the filter too.
 ///
@@ -108,6 +108,13 @@ impl SpeedFilters {
         self.value
     }
 
+    /// Lets the next speed through as if it were the first: the last one is too old.
+    pub(super) const fn miss(&mut self, step: &TimeStep) {
+        if !step.is_hold() {
+            self.feedback.reset();
+        }
+    }
+
     pub(super) const fn reset(&mut self) {
         self.feedback.reset();
         self.output.reset();
@@ -145,7 +152,8 @@ impl SpeedActuator {
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
-            self.pid.refuse();
+            self.pid.refuse(step);
+            self.filters.miss(step);
             return self.output();
         }
         self.filters.around(speed, step, |speed| self.pid.step(setpoint, speed, step))
@@ -229,15 +237,20 @@ mod tests {
         for sample in 0..20_u8 {
             let speed = f32::from(sample) * 0.1;
             let expected = clean.update(3.0, speed, DT_S);
+            let before = hit;
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                 let held = hit.output();
                 assert_eq!(hit.update(3.0, bad, DT_S), held);
                 assert_eq!(hit.update(bad, speed, DT_S), held);
                 assert_eq!(hit.update(3.0, speed, bad), held);
             }
+            hit = before;
+            for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -DT_S] {
+                assert_eq!(hit.update(3.0, speed, bad), before.output());
+            }
             assert_eq!(hit.update(3.0, speed, DT_S), expected);
         }
-        assert_eq!(hit.rejected(), 180);
+        assert_eq!(hit.rejected(), 100);
     }
 
     #[test]

@@ -134,6 +134,8 @@ impl PidConfig {
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
     ///
     /// For speed loops: the effort that overcomes dry friction (in units of the output), and the effort a unit of speed takes.
+    /// The setpoint is taken as `measurement + e`: on a circle it is the one next to the measurement, whatever its turn, and
+    /// one that is lost in the rounding of the error counts as zero. With an error formed elsewhere there is none.
     #[must_use]
     pub const fn with_feed_forward(self, static_gain: f32, velocity_gain: f32) -> Self {
         Self { static_gain, velocity_gain, ..self }

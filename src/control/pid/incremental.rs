@@ -98,8 +98,8 @@ impl IncrementalPidConfig {
 ///
 /// # Edge behaviour
 /// * The first call gives P only, or after [`reset_to`](Self::reset_to) the given output.
-/// * `dt_s` zero, negative, NaN or infinite, and NaN or infinity in an input: nothing changes, the last output is returned, and
-///   [`rejected`](Self::rejected) grows. The next good sample works as if the bad one had not been.
+/// * `dt_s` zero, negative, NaN or infinite, and NaN or infinity in an input: the last output is returned, and
+///   [`rejected`](Self::rejected) grows. After a bad input, D rests in the next good step, as that of [`Pid`](super::Pid) does.
 /// * `dt_s` above the maximum of the [`TimeStep`]: only the change of P is added.
 /// * `ki` zero: nothing brings the output back after it was limited; what the limit cut off stays off.
 /// * Overflow of `f32`: the output is the limit, never NaN.
@@ -124,6 +124,7 @@ pub struct IncrementalPid {
     output: f32,
     rejected: u16,
     track_output: bool,
+    rest_derivative: bool,
 }
 
 impl IncrementalPid {
@@ -149,6 +150,7 @@ impl IncrementalPid {
             output: 0.0,
             rejected: 0,
             track_output: false,
+            rest_derivative: false,
         })
     }
 
@@ -160,6 +162,7 @@ impl IncrementalPid {
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         if !step.admits(setpoint.is_finite() && measurement.is_finite(), &mut self.rejected) {
+            self.rest_derivative |= !step.is_hold();
             return self.output;
         }
         let config = &self.config;
@@ -179,7 +182,11 @@ impl IncrementalPid {
         } else if step.is_frozen() {
             config.kp * (error - self.error)
         } else {
-            let rate = (measurement - self.measurement) * step.per_dt;
+            let rate = if self.rest_derivative {
+                self.rate
+            } else {
+                (measurement - self.measurement) * step.per_dt
+            };
             let change = self.change::<false>(error, rate, step);
             if (change + rate).is_finite() {
                 self.rate = rate;
@@ -192,6 +199,7 @@ impl IncrementalPid {
             }
         };
         self.track_output = false;
+        self.rest_derivative = false;
         self.error = error;
         self.measurement = measurement;
         let wanted = self.output + finite(change);
@@ -216,6 +224,7 @@ impl IncrementalPid {
         self.rate = 0.0;
         self.output = 0.0;
         self.track_output = false;
+        self.rest_derivative = false;
     }
 
     /// Resets, and lets the first call return `output`, within the limits, whatever its error.
@@ -289,7 +298,7 @@ mod tests {
     #[test]
     fn bad_time_and_bad_samples_hold_the_output_and_leave_no_trace() {
         let config =
-            IncrementalPidConfig::new(2.0, 10.0, 0.1).with_max_step(0.01).with_tracking(50.0);
+            IncrementalPidConfig::new(2.0, 10.0, 0.0).with_max_step(0.01).with_tracking(50.0);
         let (mut clean, mut hit) = (pid(config), pid(config));
         for sample in 0..20_u8 {
             let measurement = f32::from(sample) * 0.01;
@@ -304,7 +313,20 @@ mod tests {
             assert_eq!(hit.update(1.0, measurement, -DT_S), held);
             assert_eq!(hit.update(1.0, measurement, DT_S), expected);
         }
-        assert_eq!((hit.rejected(), IncrementalPid { rejected: 0, ..hit }), (220, clean));
+        assert_eq!(hit.rejected(), 220);
+        assert_eq!(IncrementalPid { rejected: 0, rate: clean.rate, ..hit }, clean);
+    }
+
+    #[test]
+    fn a_burst_of_bad_samples_of_a_moving_shaft_does_not_kick() {
+        let mut pid = pid(IncrementalPidConfig::new(0.0, 0.0, 0.05));
+        let mut at = 0.0;
+        for sample in 0..100_u8 {
+            at += 10.0 * DT_S;
+            let bad = (20..70).contains(&sample);
+            let output = pid.update(0.0, if bad { f32::NAN } else { at }, DT_S);
+            assert!(sample < 1 || (output + 0.5).abs() < 1e-3, "{output}");
+        }
     }
 
     #[test]

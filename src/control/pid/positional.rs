@@ -1,5 +1,5 @@
 use super::PidConfig;
-use super::settings::{Settings, TRACK_OUTPUT};
+use super::settings::{REST_DERIVATIVE, Settings, TRACK_OUTPUT};
 use super::work::{CLOSED, UNKNOWN, passes};
 use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
@@ -19,7 +19,8 @@ use crate::control::step::TimeStep;
 ///   It does not matter how long ago the controller was made.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`]: the integral and D stay for this step, P and feed-forward follow.
-/// * NaN or infinity in any input: as for `dt_s` zero. The next good sample works as if the bad one had not been.
+/// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
+///   in the next good step: it keeps its value, since the travel of the time that is missing is not that of one step.
 /// * `ki` zero: the integral is zero and stays zero.
 /// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
 ///   what is stored stays finite.
@@ -170,6 +171,7 @@ impl Pid {
         self.rate = 0.0;
         self.output = 0.0;
         self.options &= !TRACK_OUTPUT;
+        self.end_rest();
     }
 
     /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
@@ -191,6 +193,7 @@ impl Pid {
         self.error = UNKNOWN;
         self.measurement = UNKNOWN;
         self.rate = 0.0;
+        self.end_rest();
     }
 
     /// Resets, and lets the first call return `output`, within the limits, whatever its error: for taking over from
@@ -208,7 +211,8 @@ impl Pid {
         self.options |= TRACK_OUTPUT;
     }
 
-    /// Changes the gains without a jump of the output: the integral takes up the difference.
+    /// Changes the gains without a jump of P: the integral takes up the difference. A new `kd` shows at once, in D, which passes;
+    /// the integral would keep it after the shaft has come to rest.
     ///
     /// With `ki` zero the integral is dropped, since nothing would ever drain it; then the output moves to P and D.
     ///
@@ -220,7 +224,7 @@ impl Pid {
         Ok(())
     }
 
-    /// Changes the configuration without a jump of the output, as [`set_gains`](Self::set_gains) does; new limits hold
+    /// Changes the configuration without a jump of P and feed-forward, as [`set_gains`](Self::set_gains) does; new limits hold
     /// from the next step on.
     ///
     /// # Errors
@@ -244,7 +248,7 @@ impl Pid {
             p: settings.kp * error,
             i: self.integral,
             d: -(settings.kd * self.rate),
-            feed_forward: self.feed_forward(self.setpoint()),
+            feed_forward: self.feed_forward(self.measurement, self.error),
         }
     }
 
@@ -270,12 +274,13 @@ impl Pid {
         let before = self.terms();
         let options = config.options();
         self.settings = Settings::new(&config, options);
+        let rests = self.has(REST_DERIVATIVE);
         self.options = options | self.options & TRACK_OUTPUT;
+        if rests {
+            self.rest_derivative();
+        }
         let after = self.terms();
-        let carried = before.i
-            + (before.p - after.p)
-            + (before.d - after.d)
-            + (before.feed_forward - after.feed_forward);
+        let carried = before.i + (before.p - after.p) + (before.feed_forward - after.feed_forward);
         self.integral = if config.ki > 0.0 {
             limited(finite(carried), -config.integral_limit, config.integral_limit)
         } else {
@@ -283,14 +288,13 @@ impl Pid {
         };
     }
 
-    /// The last setpoint, to rounding; zero when the error was formed elsewhere.
-    const fn setpoint(&self) -> f32 {
-        let known = self.error != UNKNOWN && self.measurement != UNKNOWN;
-        if known { self.error + self.measurement } else { 0.0 }
-    }
-
+    /// For the setpoint as a later call can know it too; zero when the error was formed elsewhere.
     #[inline]
-    pub(super) const fn feed_forward(&self, setpoint: f32) -> f32 {
+    pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
+        if measurement == UNKNOWN || error == UNKNOWN {
+            return 0.0;
+        }
+        let setpoint = measurement + error;
         let moving = self.settings.velocity_gain * setpoint;
         if setpoint > 0.0 {
             moving + self.settings.static_gain
@@ -307,6 +311,7 @@ impl Pid {
 mod tests {
     use super::*;
     use crate::control::ConfigFault;
+    use crate::control::pid::settings::FEED_FORWARD;
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -372,10 +377,12 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_sample_holds_the_output_and_leaves_no_trace() {
-        for config in
-            [PidConfig::new(2.0, 10.0, 0.1), PidConfig::new(0.0, 0.0, 0.0), every_option()]
-        {
+    fn a_bad_sample_holds_the_output_and_leaves_no_trace_but_in_d() {
+        for config in [
+            PidConfig::new(2.0, 10.0, 0.0),
+            PidConfig::new(0.0, 0.0, 0.0),
+            every_option().with_gains(2.0, 10.0, 0.0),
+        ] {
             for bad in BAD {
                 let (mut clean, mut hit) = (pid(config), pid(config));
                 for sample in 0..20_u8 {
@@ -387,8 +394,32 @@ mod tests {
                     assert_eq!(hit.update(1.0, measurement, DT_S), expected);
                 }
                 assert_eq!(hit.rejected(), 40);
-                assert_eq!(Pid { rejected: 0, ..hit }, clean);
+                assert_eq!(Pid { rejected: 0, rate: clean.rate, ..hit }, clean);
             }
+        }
+    }
+
+    #[test]
+    fn a_burst_of_bad_samples_of_a_moving_shaft_does_not_kick() {
+        let damper = PidConfig::new(0.0, 1.0, 0.05);
+        for config in [
+            damper,
+            damper.with_derivative_on_error(),
+            damper.with_derivative_filter(1e4),
+            damper.with_period(360.0).with_slew_limit(1e9),
+        ] {
+            let mut pid = pid(config);
+            let mut at = 0.0;
+            for sample in 0..100_u8 {
+                at += 10.0 * DT_S;
+                let bad = (20..70).contains(&sample);
+                pid.update(0.0, if bad { f32::NAN } else { at }, DT_S);
+                assert!(sample < 19 || (pid.terms().d + 0.5).abs() < 0.01, "{:?}", pid.terms());
+            }
+            assert_eq!(pid.rejected(), 50);
+            assert_eq!(pid.config(), config);
+            let gate = Pid::new(config).unwrap().settings;
+            assert_eq!(pid.settings, gate); // back on the plain path
         }
     }
 
@@ -606,6 +637,24 @@ mod tests {
     }
 
     #[test]
+    fn feed_forward_on_a_circle_takes_over_and_changes_without_a_jump() {
+        let config = PidConfig::new(1.0, 1.0, 0.0).with_period(360.0).with_feed_forward(0.5, 0.1);
+        let mut pid = pid(config);
+        pid.reset_to(7.0);
+        assert!((pid.update(10.0, 350.0, DT_S) - 7.0).abs() < 1e-4);
+        assert_eq!(pid.terms().feed_forward, 37.5); // for 370, the 10 next to 350
+        pid.set_config(config.with_feed_forward(0.5, 0.0)).unwrap();
+        assert!((pid.update(10.0, 350.0, DT_S) - 7.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn feed_forward_that_is_too_small_to_see_is_not_in_the_terms_either() {
+        let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_feed_forward(0.5, 0.0));
+        let output = pid.update(1e-6, 100.0, DT_S);
+        assert_eq!(pid.terms().p + pid.terms().feed_forward, output);
+    }
+
+    #[test]
     fn slew_limit_holds_up_and_down_and_from_the_start() {
         let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_slew_limit(1000.0));
         assert_eq!(pid.update(5.0, 0.0, DT_S), 1.0);
@@ -680,7 +729,8 @@ mod tests {
                 pid.update(1.0, f32::from(sample) * 0.001, DT_S);
             }
             let (before, terms) = (pid.output(), pid.terms());
-            pid.set_gains(3.0, 5.0, 0.04).unwrap();
+            let kd = pid.config().gains().2;
+            pid.set_gains(3.0, 5.0, kd).unwrap();
             let now = pid.terms();
             assert!(
                 (now.p + now.i + now.d + now.feed_forward - before).abs() < 1e-4,
@@ -688,6 +738,18 @@ mod tests {
             );
             assert!((pid.update(1.0, 0.010, DT_S) - before).abs() < 0.02);
         }
+    }
+
+    #[test]
+    fn a_new_kd_is_not_kept_by_the_integral() {
+        let mut pid = pid(PidConfig::new(1.0, 1.0, 0.0));
+        for sample in 0..100_u8 {
+            pid.update(0.99, f32::from(sample) * 0.01, DT_S);
+        }
+        let integral = pid.terms().i;
+        pid.set_gains(1.0, 1.0, 0.5).unwrap();
+        pid.update(0.99, 0.99, DT_S);
+        assert!((pid.update(0.99, 0.99, DT_S) - integral).abs() < 1e-6); // at rest, on target
     }
 
     #[test]
@@ -779,7 +841,7 @@ mod tests {
         #[test]
         fn within_the_limits_the_terms_add_up_to_the_output(
             config in any_config(),
-            samples in prop::collection::vec((0.0_f32..180.0, 0.0_f32..179.0), 1..40),
+            samples in prop::collection::vec((-360.0_f32..720.0, -360.0_f32..720.0), 1..40),
         ) {
             let mut pid = pid(config);
             for (setpoint, measurement) in samples {
@@ -788,9 +850,24 @@ mod tests {
                 let sum = p + i + d + feed_forward;
                 let (lower, upper) = config.output_range();
                 let free = lower < output && output < upper && config.slew_per_s == PidConfig::OFF;
-                let largest = p.abs().max(d.abs()).max(1.0);
+                let largest = p.abs().max(d.abs()).max(feed_forward.abs()).max(1.0);
                 prop_assert!(!free || (sum - output).abs() < 1e-5 * largest, "{} {}", sum, output);
             }
+        }
+
+        #[test]
+        fn a_reset_to_an_output_gives_that_output_first(
+            config in any_config(),
+            output in -50.0_f32..50.0,
+            sample in (-360.0_f32..720.0, -360.0_f32..720.0),
+        ) {
+            let config = PidConfig { integral_limit: PidConfig::OFF, ki: config.ki + 0.1, ..config };
+            let mut pid = pid(config);
+            pid.reset_to(output);
+            let expected = pid.output();
+            let first = pid.update(sample.0, sample.1, DT_S);
+            let largest = pid.terms().p.abs().max(pid.terms().feed_forward.abs()).max(1.0);
+            prop_assert!((first - expected).abs() <= 1e-6 * largest, "{} {}", first, expected);
         }
 
         #[test]
@@ -812,10 +889,13 @@ mod tests {
             config in any_config(),
             samples in prop::collection::vec((0_u16..5760, 0_u16..5760, -50_i8..50, -50_i8..50), 1..30),
         ) {
-            // Without feed-forward, which sees the setpoint itself. Sixteenths of a degree are exact in f32.
-            let config = config.with_period(360.0).with_feed_forward(0.0, 0.0);
+            // Feed-forward is for the setpoint next to the measurement: it sees turns of that. Sixteenths of a degree are
+            // exact in f32.
+            let config = config.with_period(360.0);
+            let turning = config.options() & FEED_FORWARD == 0;
             let (mut here, mut turned) = (pid(config), pid(config));
             for (setpoint, measurement, turns, others) in samples {
+                let others = if turning { others } else { 0 };
                 let (setpoint, measurement) = (f32::from(setpoint) / 16.0, f32::from(measurement) / 16.0);
                 let expected = here.update(setpoint, measurement, DT_S);
                 let shifted = turned.update(

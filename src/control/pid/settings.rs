@@ -15,6 +15,8 @@ pub(super) const WIND_UP: u16 = 1 << 8;
 pub(super) const SEPARATION_INSIDE: u16 = 1 << 9;
 /// Set by `reset_to` until the first step after it.
 pub(super) const TRACK_OUTPUT: u16 = 1 << 10;
+/// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
+pub(super) const REST_DERIVATIVE: u16 = 1 << 11;
 
 /// A [`PidConfig`] in the form in which a step reads it, and no larger: what is on or off is in the options.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +100,13 @@ impl Settings {
             tracking_time_s: self.tracking_time_s,
             derivative_on_error: options & DERIVATIVE_ON_ERROR != 0,
             wind_up: options & WIND_UP != 0,
+        }
+    }
+
+    /// Opens the plain path again to a controller without options.
+    pub(super) const fn reopen(&mut self, options: u16) {
+        if options & NOT_PLAIN == 0 {
+            self.integral_gate = self.integral_limit_gate;
         }
     }
 

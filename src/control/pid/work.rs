@@ -9,8 +9,8 @@
 
 use super::positional::{Pid, Terms};
 use super::settings::{
-    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, SEPARATION_INSIDE, SLEW_LIMIT,
-    TRACK_OUTPUT, WIND_UP,
+    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, REST_DERIVATIVE,
+    SEPARATION_INSIDE, SLEW_LIMIT, TRACK_OUTPUT, WIND_UP,
 };
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -66,7 +66,7 @@ impl Pid {
                 return self.step_error_carefully(error, rate, step);
             }
             let rate = self.rate_at(measurement, error, step);
-            return self.work_carefully(0.0, measurement, error, rate, step);
+            return self.work_carefully(measurement, error, rate, step);
         }
         let output = self.settings.output_upper.copysign(wanted);
         let growth = integral - self.integral;
@@ -85,7 +85,7 @@ impl Pid {
         measurement: f32,
         step: &TimeStep,
     ) -> f32 {
-        if self.has(DERIVATIVE_ON_ERROR) {
+        if self.has(DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
             return self.step_on_error(setpoint, measurement, step);
         }
         self.step_by(setpoint, measurement, measurement - self.measurement, step)
@@ -93,6 +93,9 @@ impl Pid {
 
     #[inline(never)]
     fn step_on_error(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
+        if self.has(REST_DERIVATIVE) {
+            return self.step_carefully(setpoint, measurement, step);
+        }
         let travel = self.error - (setpoint - measurement);
         self.step_by(setpoint, measurement, travel, step)
     }
@@ -148,7 +151,7 @@ impl Pid {
         rate: f32,
         step: &TimeStep,
     ) -> f32 {
-        match self.work::<false>(setpoint, measurement, error, rate, step) {
+        match self.work::<false>(measurement, error, rate, step) {
             Some(output) => output,
             None if measurement == UNKNOWN => self.step_error_carefully(error, rate, step),
             None => self.step_carefully(setpoint, measurement, step),
@@ -160,37 +163,51 @@ impl Pid {
     #[inline(never)]
     fn step_carefully(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !measurement.is_finite() {
-            return self.refuse();
+            return self.refuse(step);
         }
         let error = self.shortest(setpoint - measurement);
-        let rate = self.rate_at(measurement, error, step);
-        self.work_carefully(setpoint, measurement, error, rate, step)
+        let rate = if self.has(REST_DERIVATIVE) {
+            self.rate
+        } else {
+            self.rate_at(measurement, error, step)
+        };
+        self.work_carefully(measurement, error, rate, step)
     }
 
     #[cold]
     #[inline(never)]
     fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !error.is_finite() || !rate.is_finite() {
-            return self.refuse();
+            return self.refuse(&TimeStep::of(0.0)); // the rate is given: no travel is missed
         }
-        self.work_carefully(0.0, UNKNOWN, error, rate, step)
+        self.work_carefully(UNKNOWN, error, rate, step)
     }
 
-    pub(in crate::control) const fn refuse(&mut self) -> f32 {
+    pub(in crate::control) const fn refuse(&mut self, step: &TimeStep) -> f32 {
         self.rejected = self.rejected.saturating_add(1);
+        if !step.is_hold() {
+            self.rest_derivative();
+        }
         self.output
+    }
+
+    /// Keeps D as it is for the next good step: time passed, and the travel in it is not known.
+    pub(in crate::control) const fn rest_derivative(&mut self) {
+        self.options |= REST_DERIVATIVE;
+        self.settings.integral_gate = CLOSED;
+    }
+
+    pub(super) const fn end_rest(&mut self) {
+        if self.has(REST_DERIVATIVE) {
+            self.options &= !REST_DERIVATIVE;
+            self.settings.reopen(self.options);
+        }
     }
 
     #[cold]
     #[inline(never)]
-    fn work_carefully(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
+    fn work_carefully(&mut self, measurement: f32, error: f32, rate: f32, step: &TimeStep) -> f32 {
+        self.end_rest();
         let (mut rate, mut step) = (rate, *step);
         if step.is_frozen() {
             (rate, step.half_dt_s) = (self.rate, 0.0);
@@ -201,7 +218,7 @@ impl Pid {
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
-        self.work::<true>(setpoint, measurement, error, rate, &step).unwrap_or(self.output)
+        self.work::<true>(measurement, error, rate, &step).unwrap_or(self.output)
     }
 
     /// A way on the circle, exact and finite.
@@ -233,7 +250,6 @@ impl Pid {
     #[inline]
     fn work<const CAREFUL: bool>(
         &mut self,
-        setpoint: f32,
         measurement: f32,
         error: f32,
         rate: f32,
@@ -256,7 +272,7 @@ impl Pid {
         }
         let mut others = finite(proportional - finite(settings.kd * rate));
         if self.has(FEED_FORWARD) {
-            others = finite(others + self.feed_forward(setpoint));
+            others = finite(others + self.feed_forward(measurement, error));
         }
         let mut integral = finite(self.integral + growth);
         let mut wanted = others + integral;
