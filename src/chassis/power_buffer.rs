@@ -5,8 +5,9 @@ use crate::control::{ConfigError, Pid, PidConfig};
 ///
 /// The referee's buffer (60 J) drains by what the chassis takes above its limit, and fills by what it leaves. The
 /// allowance is `limit + pid(energy - reserve)`: with a proportional gain `kp` in W/J the charge nears the reserve with the
-/// time constant `1/kp` and never falls below it, as far as the power model is right; an integral gain takes care
-/// of what it has wrong. Without a reading only `blind_share` of the limit is allowed.
+/// time constant `1/kp` and never falls below it, as far as the power model is right. An integral gain takes care of
+/// what it has wrong: the integral only ever takes power away, up to the whole limit, and so a full buffer winds nothing
+/// up that would empty it later. Without a reading only `blind_share` of the limit is allowed.
 ///
 /// # Examples
 /// ```
@@ -82,6 +83,8 @@ impl PowerBuffer {
         };
         // The buffer is the measurement: above the reserve the loop's output is negative.
         let allowance_w = limit_w - self.pid.update(self.reserve_j, energy_j, dt_s);
+        let integral = self.pid.terms().i;
+        self.pid.keep_integral_within(if integral > 0.0 { limit_w } else { 0.0 });
         if allowance_w > 0.0 { allowance_w } else { 0.0 }
     }
 }
@@ -114,6 +117,51 @@ mod tests {
             energy_j += (80.0 - power_w) * 0.001;
             assert!(energy_j > 10.0, "{energy_j}");
         }
+    }
+
+    /// Ten seconds with nothing to drive, then thirty at full throttle: the lowest charge and the last.
+    fn idle_then_throttle(gains: PidConfig, wrong: f32) -> (f32, f32) {
+        let mut buffer = PowerBuffer::new(20.0, gains).unwrap();
+        let (mut energy_j, mut lowest) = (60.0_f32, 60.0_f32);
+        for step in 0..40_000 {
+            let allowed_w = buffer.allowance_w(80.0, Some(energy_j), 0.001);
+            let power_w = if step < 10_000 { 0.0 } else { allowed_w * wrong };
+            energy_j = (energy_j + (80.0 - power_w) * 0.001).clamp(0.0, 60.0);
+            lowest = lowest.min(energy_j);
+        }
+        (lowest, energy_j)
+    }
+
+    #[test]
+    fn idling_with_a_full_buffer_winds_nothing_up_that_would_empty_it() {
+        for (kp, ki) in [(2.0, 0.5), (2.0, 10.0), (0.5, 5.0), (20.0, 1.0), (3.0, 0.0)] {
+            for gains in [PidConfig::new(kp, ki, 0.0), PidConfig::new(kp, ki, 0.0).with_output_limit(120.0)] {
+                let (lowest, last) = idle_then_throttle(gains, 1.0);
+                assert!(lowest >= 19.9, "{kp} {ki}: {lowest} J");
+                assert!(last < 20.1, "{kp} {ki}: {last} J are never used");
+            }
+        }
+    }
+
+    #[test]
+    fn an_integral_gain_brings_the_charge_back_to_the_reserve_with_a_model_that_is_wrong() {
+        for (kp, ki) in [(2.0, 0.5), (2.0, 2.0), (3.0, 1.0)] {
+            let (lowest, last) = idle_then_throttle(PidConfig::new(kp, ki, 0.0), 1.1);
+            assert!(lowest > 15.0 && (last - 20.0).abs() < 0.1, "{kp} {ki}: {lowest} {last}");
+        }
+    }
+
+    #[test]
+    fn a_buffer_that_was_empty_for_a_minute_is_spent_again_when_it_is_full() {
+        let mut buffer = PowerBuffer::new(20.0, PidConfig::new(2.0, 0.5, 0.0)).unwrap();
+        for _ in 0..60_000 {
+            assert!(buffer.allowance_w(80.0, Some(0.0), 0.001) >= 0.0);
+        }
+        let mut allowed_w = 0.0;
+        for _ in 0..4_500 {
+            allowed_w = buffer.allowance_w(80.0, Some(60.0), 0.001);
+        }
+        assert!((allowed_w - 160.0).abs() < 0.1, "{allowed_w}");
     }
 
     #[test]
