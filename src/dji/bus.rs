@@ -21,7 +21,7 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
 
-/// Stamps of 32 bits cannot tell how long ago a frame was heard when no update looked at them for longer than this.
+/// Stamps of 32 bits cannot tell how long ago a frame was heard when there was no update for longer than this.
 pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// The motors of one CAN bus, their loops, and the frames for them.
@@ -61,7 +61,7 @@ pub struct Bus<B = ()> {
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
     pub(super) budget: Budget,
-    /// The time of the last update that took its step, or of one after it where time went back.
+    /// The time of the last update.
     pub(super) updated: Instant,
     /// Until then no age exceeds its limit and no frame is due, unless something [disturbs](Self::disturb) that.
     pub(super) quiet_until: Instant,

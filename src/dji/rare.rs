@@ -32,7 +32,7 @@ impl<B> Bus<B> {
             return Ingest::Malformed(Malformed::Field);
         };
         let before = slot.conditions;
-        slot.receive_after_gap(facts, feedback, now, &self.timeouts);
+        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
         self.journal.note(motor, &before, &slot.conditions, now);
         self.disturb();
         Ingest::Taken
@@ -46,7 +46,9 @@ impl<B> Bus<B> {
         if self.running && self.updated <= before {
             return false;
         }
-        self.notice_pause(before);
+        if self.running && self.updated > before + LONGEST_PAUSE {
+            self.lose_all();
+        }
         self.running = true;
         self.held_steps = 0;
         let keep_alive_us = self.outbox.keep_alive(self.now);
@@ -82,19 +84,14 @@ impl<B> Bus<B> {
         }
     }
 
-    /// Takes the motors for lost whose stamps of 32 bits do not tell how long ago they were heard.
+    /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
     #[cold]
     #[inline(never)]
-    fn notice_pause(&mut self, before: Instant) {
-        let (running, now) = (self.running, self.updated);
-        let is_pause = now > before + LONGEST_PAUSE;
+    fn lose_all(&mut self) {
         for (motor, slot) in (0..).zip(&mut self.slots) {
-            let is_bygone = if running { is_pause } else { slot.is_bygone(now) };
-            if is_bygone {
-                let before = slot.conditions;
-                slot.lose();
-                self.journal.note(motor, &before, &slot.conditions, now);
-            }
+            let before = slot.conditions;
+            slot.lose();
+            self.journal.note(motor, &before, &slot.conditions, self.updated);
         }
     }
 
@@ -102,15 +99,11 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
-        self.notice_pause(before);
+        self.running = true;
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
-        // Nobody looks at ages here: many of these in a row are one pause.
-        if core::mem::replace(&mut self.running, true) {
-            self.updated = self.updated.min(before);
-        }
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }

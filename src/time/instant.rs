@@ -46,12 +46,6 @@ impl Instant {
     pub(crate) const fn stamp(self) -> u32 {
         self.0 as u32
     }
-
-    /// Returns how often the stamp has wrapped: once in 71 minutes, for nearly nine years.
-    #[expect(clippy::cast_possible_truncation, reason = "compared by wrapping difference")]
-    pub(crate) const fn era(self) -> u16 {
-        (self.0 >> 32) as u16
-    }
 }
 
 impl core::ops::Add<Duration> for Instant {

@@ -60,8 +60,6 @@ pub(super) struct Slot {
     good_frames: u8,
     generation: u8,
     is_ramping: bool,
-    /// How often the stamps had wrapped when the last frame after a gap came.
-    era: u16,
     error_code: u8,
     /// Below this temperature byte and this command the motor need not be looked at closely.
     cool_below: u8,
@@ -111,7 +109,6 @@ impl Slot {
         homing: Homing::Relative,
         arming: Arming::Disarmed,
         is_ramping: false,
-        era: 0,
         error_code: 0,
         cool_below: 0,
         calm_word: 0,

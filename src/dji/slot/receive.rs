@@ -1,10 +1,8 @@
 use super::target::Action;
 use super::{Slot, age, is_near};
-use crate::dji::bus::LONGEST_PAUSE;
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
 use crate::motor::{Condition, Link, Timeouts};
-use crate::time::Instant;
 
 impl Slot {
     /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
@@ -26,11 +24,9 @@ impl Slot {
         &mut self,
         facts: &Facts,
         feedback: Feedback,
-        now: Instant,
+        now: u32,
         timeouts: &Timeouts,
     ) {
-        self.era = now.era();
-        let now = now.stamp();
         if self.link != Link::Unheard {
             self.traffic.gap(age(now, self.heard));
         }
@@ -135,15 +131,6 @@ impl Slot {
         self.action = Action::Rest;
         self.trusted_gap_us = 0;
         self.loops.interrupt();
-    }
-
-    /// Tells whether the motor was heard longer ago than its stamp tells; to be asked until there is an update that looks
-    /// at stamps. One that is heard without a gap while the stamps wrap seems older than it is.
-    pub(in crate::dji) fn is_bygone(&self, now: Instant) -> bool {
-        let heard = u64::from(self.era) << 32 | u64::from(self.heard);
-        // Eras wrap too: their 48 bits are shifted up, so that the difference has its sign.
-        let age = now.as_micros().wrapping_sub(heard) << 16;
-        age.cast_signed() >> 16 > LONGEST_PAUSE.as_micros().cast_signed()
     }
 
     /// Nobody knows any more when the motor was heard.
