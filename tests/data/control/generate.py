@@ -48,6 +48,7 @@ class Pid:
 
     def __call__(self, setpoint, measurement, dt):
         error = shortest(setpoint - measurement, self.period)
+        setpoint = measurement + error if self.period else setpoint  # the one next to the measurement
         growth = 0.0
         if self.errors:
             if self.on_error:
