@@ -1,3 +1,4 @@
+use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
 use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
@@ -15,8 +16,9 @@ use crate::units::{Angle, AngularVelocity};
 /// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit.
 ///
 /// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
-/// as zero. A `dt` that is zero, negative or NaN moves neither pose nor command; one over 0.1 s counts as 0.1 s for
-/// the acceleration, and one over 1 s moves no pose.
+/// as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one over 0.1 s counts as
+/// 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without usable time the clock
+/// is dead: the command counts as stale, and since no ramp can be timed, the wheels are told to stand at once.
 ///
 /// # Examples
 /// ```
@@ -38,6 +40,7 @@ pub struct Chassis<K> {
     limits: ChassisLimits,
     command: Command,
     command_age_s: f32,
+    clock: DeadClock,
     gyro: Option<Heading>,
     reference: Twist<World>,
     measured: Twist<Body>,
@@ -77,7 +80,7 @@ pub struct ChassisStatus {
     pub blind_s: f32,
     /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known.
     pub slip_m_s: f32,
-    /// The last tick ran without a fresh command.
+    /// The last tick ran without a fresh command, or the clock is dead.
     pub command_stale: bool,
     /// The wheels' speed limit slowed the chassis in the last tick.
     pub saturated: bool,
@@ -101,6 +104,7 @@ impl<K: Kinematics> Chassis<K> {
             limits: ChassisLimits::new(),
             command: Command::Body(Twist::ZERO),
             command_age_s: f32::MAX,
+            clock: DeadClock::new(),
             gyro: None,
             reference: Twist::ZERO,
             measured: Twist::ZERO,
@@ -172,12 +176,16 @@ impl<K: Kinematics> Chassis<K> {
         measured: K::Wheels<Option<K::Speed>>,
         tick: Tick,
     ) -> K::Wheels<K::Speed> {
-        let dt_s = if tick.dt_s() > 0.0 { tick.dt_s() } else { 0.0 };
+        let dt_s = self.clock.see(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
         let target = self.target(dt_s).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
-        self.reference = self.limits.approach(self.reference, target, step_s);
+        self.reference = if self.clock.is_dead() {
+            Twist::ZERO
+        } else {
+            self.limits.approach(self.reference, target, step_s)
+        };
         let twist = self.reference.to_body(heading).discretized(step_s);
         let wheels = self.kinematics.inverse(twist);
         let mut fastest = Fastest::default();
@@ -227,7 +235,8 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn target(&mut self, dt_s: f32) -> Twist<Body> {
-        self.status.command_stale = self.command_age_s > self.limits.command_timeout_s();
+        self.status.command_stale =
+            self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
         self.command_age_s += dt_s;
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
@@ -477,6 +486,40 @@ mod tests {
             chassis.update(rolling, Tick::new(Instant::START, dt));
         }
         assert_eq!((chassis.pose(), chassis.reference()), (Pose2::ORIGIN, Twist::ZERO));
+    }
+
+    #[test]
+    fn a_step_of_no_time_moves_no_command_either_when_nothing_is_limited() {
+        for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
+            let mut chassis = Chassis::new(mecanum());
+            chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+            let wheels = chassis.update(NONE, Tick::new(Instant::START, dt));
+            assert_eq!(wheels, MecanumWheels::splat(AngularVelocity::ZERO), "{dt}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_died_stops_the_chassis_and_its_return_lets_it_go_on() {
+        for limits in [ChassisLimits::new(), ChassisLimits::new().with_acceleration(1.0, 1.0)] {
+            for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
+                let mut chassis = limited(limits);
+                chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+                let moving = chassis.reference();
+                for ticks in 1..=200 {
+                    chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                    chassis.update(NONE, Tick::new(Instant::START, dt));
+                    let dead = ticks >= 100;
+                    assert_eq!(chassis.status().command_stale, dead, "{dt} {ticks}");
+                    let expected = if dead { Twist::ZERO } else { moving };
+                    assert_eq!(chassis.reference(), expected, "{dt} {ticks}");
+                }
+                chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+                assert_eq!(chassis.reference(), moving);
+                assert!(chassis.status().blind_s.is_finite());
+            }
+        }
     }
 
     struct Bench {
