@@ -74,11 +74,12 @@ pub enum MotionSource {
 pub struct ChassisStatus {
     /// How the motion of the last tick was measured.
     pub source: MotionSource,
-    /// Wheels without feedback in the last tick.
+    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
     pub lost_wheels: u8,
     /// Seconds for which the position could not be followed, in all.
     pub blind_s: f32,
-    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known.
+    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known. Never NaN:
+    /// `f32::MAX` where it overflows.
     pub slip_m_s: f32,
     /// The last tick ran without a fresh command, or the clock is dead.
     pub command_stale: bool,
@@ -198,7 +199,7 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn measure(&mut self, wheels: K::Wheels<Option<K::Speed>>, dt_s: f32) {
-        let wheels = K::map(wheels, |wheel| wheel.filter(|speed| speed.velocity().is_finite()));
+        let wheels = K::map(wheels, |wheel| wheel.filter(|speed| speed.is_finite()));
         let (mut lost, mut any) = (0_u8, None);
         let _: K::Wheels<()> = K::map(wheels, |wheel| {
             lost = lost.saturating_add(u8::from(wheel.is_none()));
@@ -209,7 +210,8 @@ impl<K: Kinematics> Chassis<K> {
         let motion = match any {
             Some(any) if lost == 0 => {
                 let all = K::map(wheels, |wheel| wheel.unwrap_or(any));
-                self.status.slip_m_s = self.kinematics.slip_m_s(all);
+                let slip_m_s = self.kinematics.slip_m_s(all);
+                self.status.slip_m_s = if slip_m_s.is_finite() { slip_m_s } else { f32::MAX };
                 Some(self.kinematics.forward(all))
             }
             _ => self.kinematics.forward_partial(wheels),
@@ -309,7 +311,7 @@ impl<K: Kinematics<Speed = AngularVelocity>> Chassis<K> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels, ModuleState, Swerve};
     use crate::geometry::Vec2;
     use crate::math::wrap_pi;
     use crate::time::Instant;
@@ -519,6 +521,34 @@ mod tests {
                 assert_eq!(chassis.reference(), moving);
                 assert!(chassis.status().blind_s.is_finite());
             }
+        }
+    }
+
+    #[test]
+    fn a_module_whose_angle_is_no_number_is_lost_and_the_others_keep_the_pose() {
+        let corners = [(0.3, 0.3), (0.3, -0.3), (-0.3, 0.3), (-0.3, -0.3)];
+        let swerve = Swerve::new(0.05, corners.map(|(x, y)| Vec2::new(x, y))).unwrap();
+        let mut rolling = swerve.inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        for angle in [f32::NAN, f32::INFINITY] {
+            rolling[0] = rolling[0]
+                .map(|module| ModuleState { angle: Angle::from_radians(angle), ..module });
+            let mut chassis = Chassis::new(swerve);
+            chassis.update(rolling, TICK);
+            let status = chassis.status();
+            assert_eq!((status.source, status.lost_wheels), (MotionSource::SomeWheels, 1));
+            assert!((chassis.pose().x_m - 0.001).abs() < 1e-6, "{:?}", chassis.pose());
+        }
+    }
+
+    #[test]
+    fn wheels_beyond_all_numbers_leave_no_slip_that_is_none() {
+        for speed in [1e38, f32::MAX] {
+            let mut chassis = Chassis::new(mecanum());
+            let mut wheels = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(speed)));
+            wheels.rear_left = wheels.rear_left.map(|wheel| wheel * -1.0);
+            chassis.update(wheels, TICK);
+            let status = chassis.status();
+            assert!(status.slip_m_s > 1e6 && status.slip_m_s.is_finite(), "{status:?}");
         }
     }
 
