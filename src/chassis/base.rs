@@ -85,7 +85,7 @@ pub struct ChassisStatus {
     pub command_stale: bool,
     /// The wheels' speed limit slowed the chassis in the last tick.
     pub saturated: bool,
-    /// Commands that were NaN or infinite, in all.
+    /// Commands and headings that were NaN or infinite, in all; a command and its heading count once.
     pub rejected: u16,
     /// Motors that refused their target in the last tick.
     pub refused: u8,
@@ -140,14 +140,23 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     /// Commands a motion in the frame of the world, and gives the gyroscope's heading for this tick.
+    ///
+    /// With a heading that is NaN or infinite the command is as bad as a NaN itself: it stops the chassis.
     pub fn set_world(&mut self, twist: Twist<World>, heading: Heading) {
-        self.set_command(Command::World(twist), twist.is_finite());
-        self.set_heading(heading);
+        self.set_command(Command::World(twist), twist.is_finite() && heading.is_finite());
+        self.gyro = Some(heading).filter(|heading| heading.is_finite());
     }
 
     /// Gives the gyroscope's heading for the next tick. In ticks without one, the wheels keep the heading.
+    ///
+    /// A heading that is NaN or infinite is none, and is counted in [`ChassisStatus::rejected`].
     pub const fn set_heading(&mut self, heading: Heading) {
-        self.gyro = Some(heading);
+        if heading.is_finite() {
+            self.gyro = Some(heading);
+        } else {
+            self.gyro = None;
+            self.status.rejected = self.status.rejected.saturating_add(1);
+        }
     }
 
     /// Commands standing still: the chassis comes to a stop within its limits.
@@ -550,6 +559,19 @@ mod tests {
             let status = chassis.status();
             assert!(status.slip_m_s > 1e6 && status.slip_m_s.is_finite(), "{status:?}");
         }
+    }
+
+    #[test]
+    fn a_heading_of_nan_is_counted_and_a_world_command_with_it_stops() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_world(Twist::new(1.0, 0.0, 0.0), facing(f32::NAN));
+        chassis.update(NONE, TICK);
+        assert_eq!((chassis.reference(), chassis.status().rejected), (Twist::ZERO, 1));
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.set_heading(facing(f32::INFINITY));
+        chassis.update(NONE, TICK);
+        assert_eq!(chassis.status().rejected, 2);
+        assert_eq!(chassis.reference(), Twist::new(1.0, 0.0, 0.0)); // a body command needs no heading
     }
 
     struct Bench {
