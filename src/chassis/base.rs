@@ -15,6 +15,9 @@ use crate::units::{Angle, AngularVelocity};
 /// 2. the command is brought into the world and approached within the acceleration limits: the same for every heading;
 /// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit.
 ///
+/// Of a [`Swerve`](super::Swerve) the targets go through a [`SwerveSteering`](super::SwerveSteering) before they reach the
+/// motors: as they are, a module that shall not move has the angle zero, and would turn there.
+///
 /// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
 /// as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one over 0.1 s counts as
 /// 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without usable time the clock
