@@ -1,3 +1,4 @@
+use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
 use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
@@ -14,9 +15,13 @@ use crate::units::{Angle, AngularVelocity};
 /// 2. the command is brought into the world and approached within the acceleration limits: the same for every heading;
 /// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit.
 ///
+/// Of a [`Swerve`](super::Swerve) the targets go through a [`SwerveSteering`](super::SwerveSteering) before they reach the
+/// motors: as they are, a module that shall not move has the angle zero, and would turn there.
+///
 /// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
-/// as zero. A `dt` that is zero, negative or NaN moves neither pose nor command; one over 0.1 s counts as 0.1 s for
-/// the acceleration, and one over 1 s moves no pose.
+/// as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one over 0.1 s counts as
+/// 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without usable time the clock
+/// is dead: the command counts as stale, and since no ramp can be timed, the wheels are told to stand at once.
 ///
 /// # Examples
 /// ```
@@ -38,6 +43,7 @@ pub struct Chassis<K> {
     limits: ChassisLimits,
     command: Command,
     command_age_s: f32,
+    clock: DeadClock,
     gyro: Option<Heading>,
     reference: Twist<World>,
     measured: Twist<Body>,
@@ -71,17 +77,18 @@ pub enum MotionSource {
 pub struct ChassisStatus {
     /// How the motion of the last tick was measured.
     pub source: MotionSource,
-    /// Wheels without feedback in the last tick.
+    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
     pub lost_wheels: u8,
     /// Seconds for which the position could not be followed, in all.
     pub blind_s: f32,
-    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known.
+    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known. Never NaN:
+    /// `f32::MAX` where it overflows.
     pub slip_m_s: f32,
-    /// The last tick ran without a fresh command.
+    /// The last tick ran without a fresh command, or the clock is dead.
     pub command_stale: bool,
     /// The wheels' speed limit slowed the chassis in the last tick.
     pub saturated: bool,
-    /// Commands that were NaN or infinite, in all.
+    /// Commands and headings that were NaN or infinite, in all; a command and its heading count once.
     pub rejected: u16,
     /// Motors that refused their target in the last tick.
     pub refused: u8,
@@ -101,6 +108,7 @@ impl<K: Kinematics> Chassis<K> {
             limits: ChassisLimits::new(),
             command: Command::Body(Twist::ZERO),
             command_age_s: f32::MAX,
+            clock: DeadClock::new(),
             gyro: None,
             reference: Twist::ZERO,
             measured: Twist::ZERO,
@@ -135,14 +143,23 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     /// Commands a motion in the frame of the world, and gives the gyroscope's heading for this tick.
+    ///
+    /// With a heading that is NaN or infinite the command is as bad as a NaN itself: it stops the chassis.
     pub fn set_world(&mut self, twist: Twist<World>, heading: Heading) {
-        self.set_command(Command::World(twist), twist.is_finite());
-        self.set_heading(heading);
+        self.set_command(Command::World(twist), twist.is_finite() && heading.is_finite());
+        self.gyro = Some(heading).filter(|heading| heading.is_finite());
     }
 
     /// Gives the gyroscope's heading for the next tick. In ticks without one, the wheels keep the heading.
+    ///
+    /// A heading that is NaN or infinite is none, and is counted in [`ChassisStatus::rejected`].
     pub const fn set_heading(&mut self, heading: Heading) {
-        self.gyro = Some(heading);
+        if heading.is_finite() {
+            self.gyro = Some(heading);
+        } else {
+            self.gyro = None;
+            self.status.rejected = self.status.rejected.saturating_add(1);
+        }
     }
 
     /// Commands standing still: the chassis comes to a stop within its limits.
@@ -172,12 +189,16 @@ impl<K: Kinematics> Chassis<K> {
         measured: K::Wheels<Option<K::Speed>>,
         tick: Tick,
     ) -> K::Wheels<K::Speed> {
-        let dt_s = if tick.dt_s() > 0.0 { tick.dt_s() } else { 0.0 };
+        let dt_s = self.clock.see(tick.dt_s());
         self.measure(measured, dt_s);
         let heading = self.odometry.heading();
         let target = self.target(dt_s).to_world(heading);
         let step_s = if dt_s > Self::MAX_STEP_S { Self::MAX_STEP_S } else { dt_s };
-        self.reference = self.limits.approach(self.reference, target, step_s);
+        self.reference = if self.clock.is_dead() {
+            Twist::ZERO
+        } else {
+            self.limits.approach(self.reference, target, step_s)
+        };
         let twist = self.reference.to_body(heading).discretized(step_s);
         let wheels = self.kinematics.inverse(twist);
         let mut fastest = Fastest::default();
@@ -190,7 +211,7 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn measure(&mut self, wheels: K::Wheels<Option<K::Speed>>, dt_s: f32) {
-        let wheels = K::map(wheels, |wheel| wheel.filter(|speed| speed.velocity().is_finite()));
+        let wheels = K::map(wheels, |wheel| wheel.filter(|speed| speed.is_finite()));
         let (mut lost, mut any) = (0_u8, None);
         let _: K::Wheels<()> = K::map(wheels, |wheel| {
             lost = lost.saturating_add(u8::from(wheel.is_none()));
@@ -201,7 +222,8 @@ impl<K: Kinematics> Chassis<K> {
         let motion = match any {
             Some(any) if lost == 0 => {
                 let all = K::map(wheels, |wheel| wheel.unwrap_or(any));
-                self.status.slip_m_s = self.kinematics.slip_m_s(all);
+                let slip_m_s = self.kinematics.slip_m_s(all);
+                self.status.slip_m_s = if slip_m_s.is_finite() { slip_m_s } else { f32::MAX };
                 Some(self.kinematics.forward(all))
             }
             _ => self.kinematics.forward_partial(wheels),
@@ -227,7 +249,8 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn target(&mut self, dt_s: f32) -> Twist<Body> {
-        self.status.command_stale = self.command_age_s > self.limits.command_timeout_s();
+        self.status.command_stale =
+            self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
         self.command_age_s += dt_s;
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
@@ -300,7 +323,7 @@ impl<K: Kinematics<Speed = AngularVelocity>> Chassis<K> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels, ModuleState, Swerve};
     use crate::geometry::Vec2;
     use crate::math::wrap_pi;
     use crate::time::Instant;
@@ -477,6 +500,81 @@ mod tests {
             chassis.update(rolling, Tick::new(Instant::START, dt));
         }
         assert_eq!((chassis.pose(), chassis.reference()), (Pose2::ORIGIN, Twist::ZERO));
+    }
+
+    #[test]
+    fn a_step_of_no_time_moves_no_command_either_when_nothing_is_limited() {
+        for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
+            let mut chassis = Chassis::new(mecanum());
+            chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+            let wheels = chassis.update(NONE, Tick::new(Instant::START, dt));
+            assert_eq!(wheels, MecanumWheels::splat(AngularVelocity::ZERO), "{dt}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_died_stops_the_chassis_and_its_return_lets_it_go_on() {
+        for limits in [ChassisLimits::new(), ChassisLimits::new().with_acceleration(1.0, 1.0)] {
+            for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
+                let mut chassis = limited(limits);
+                chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+                let moving = chassis.reference();
+                for ticks in 1..=200 {
+                    chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                    chassis.update(NONE, Tick::new(Instant::START, dt));
+                    let dead = ticks >= 100;
+                    assert_eq!(chassis.status().command_stale, dead, "{dt} {ticks}");
+                    let expected = if dead { Twist::ZERO } else { moving };
+                    assert_eq!(chassis.reference(), expected, "{dt} {ticks}");
+                }
+                chassis.set_body(Twist::new(2.0, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+                assert_eq!(chassis.reference(), moving);
+                assert!(chassis.status().blind_s.is_finite());
+            }
+        }
+    }
+
+    #[test]
+    fn a_module_whose_angle_is_no_number_is_lost_and_the_others_keep_the_pose() {
+        let corners = [(0.3, 0.3), (0.3, -0.3), (-0.3, 0.3), (-0.3, -0.3)];
+        let swerve = Swerve::new(0.05, corners.map(|(x, y)| Vec2::new(x, y))).unwrap();
+        let mut rolling = swerve.inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        for angle in [f32::NAN, f32::INFINITY] {
+            rolling[0] = rolling[0]
+                .map(|module| ModuleState { angle: Angle::from_radians(angle), ..module });
+            let mut chassis = Chassis::new(swerve);
+            chassis.update(rolling, TICK);
+            let status = chassis.status();
+            assert_eq!((status.source, status.lost_wheels), (MotionSource::SomeWheels, 1));
+            assert!((chassis.pose().x_m - 0.001).abs() < 1e-6, "{:?}", chassis.pose());
+        }
+    }
+
+    #[test]
+    fn wheels_beyond_all_numbers_leave_no_slip_that_is_none() {
+        for speed in [1e38, f32::MAX] {
+            let mut chassis = Chassis::new(mecanum());
+            let mut wheels = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(speed)));
+            wheels.rear_left = wheels.rear_left.map(|wheel| wheel * -1.0);
+            chassis.update(wheels, TICK);
+            let status = chassis.status();
+            assert!(status.slip_m_s > 1e6 && status.slip_m_s.is_finite(), "{status:?}");
+        }
+    }
+
+    #[test]
+    fn a_heading_of_nan_is_counted_and_a_world_command_with_it_stops() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_world(Twist::new(1.0, 0.0, 0.0), facing(f32::NAN));
+        chassis.update(NONE, TICK);
+        assert_eq!((chassis.reference(), chassis.status().rejected), (Twist::ZERO, 1));
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.set_heading(facing(f32::INFINITY));
+        chassis.update(NONE, TICK);
+        assert_eq!(chassis.status().rejected, 2);
+        assert_eq!(chassis.reference(), Twist::new(1.0, 0.0, 0.0)); // a body command needs no heading
     }
 
     struct Bench {

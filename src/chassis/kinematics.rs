@@ -66,6 +66,9 @@ pub trait WheelSpeed: Copy {
     /// Returns the rolling velocity of the wheel, positive forward.
     fn velocity(self) -> AngularVelocity;
 
+    /// Returns whether all of it is a number: the velocity, and of a steered wheel the angle.
+    fn is_finite(self) -> bool;
+
     /// Returns the same motion, faster by `factor`.
     #[must_use]
     fn scaled(self, factor: f32) -> Self;
@@ -81,6 +84,10 @@ pub trait WheelSpeed: Copy {
 impl WheelSpeed for AngularVelocity {
     fn velocity(self) -> AngularVelocity {
         self
+    }
+
+    fn is_finite(self) -> bool {
+        Self::is_finite(self)
     }
 
     fn scaled(self, factor: f32) -> Self {

@@ -81,8 +81,11 @@ impl ChassisLimits {
         self.command_timeout_s
     }
 
-    /// Moves `from` towards `to` as far as `dt_s` allows.
+    /// Moves `from` towards `to` as far as `dt_s` allows: without time nothing moves, limited or not.
     pub(super) fn approach(&self, from: Twist<World>, to: Twist<World>, dt_s: f32) -> Twist<World> {
+        if dt_s <= 0.0 {
+            return from;
+        }
         let change = to - from;
         let linear = share(change.linear().norm(), self.linear_m_s2, dt_s);
         let angular = share(change.wz_rad_s.abs(), self.angular_rad_s2, dt_s);

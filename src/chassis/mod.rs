@@ -46,6 +46,7 @@
 //! ```
 
 mod base;
+mod clock;
 mod differential;
 mod error;
 mod kinematics;

@@ -1,3 +1,4 @@
+use super::clock::DeadClock;
 use crate::control::{ConfigError, Pid, PidConfig};
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
@@ -177,6 +178,7 @@ pub struct Modes {
     acting: Mode,
     yaw: Option<Heading>,
     yaw_age_s: f32,
+    clock: DeadClock,
     gimbal_lost: bool,
     edges: [Option<GimbalEdge>; 2],
     clockwise: bool,
@@ -215,6 +217,7 @@ impl Modes {
             acting: Mode::Relax,
             yaw: None,
             yaw_age_s: f32::MAX,
+            clock: DeadClock::new(),
             gimbal_lost: false,
             edges: [None; 2],
             clockwise: false,
@@ -266,7 +269,8 @@ impl Modes {
     ///
     /// A `gimbal_yaw` that is not finite counts as none. A command that is NaN or infinite, or so large that its motion
     /// overflows, counts as standing still.
-    /// A `dt_s` that is zero, negative, NaN or infinite counts as zero.
+    /// A `dt_s` that is zero, negative, NaN or infinite counts as zero. From the 100th such call in a row on the clock is
+    /// dead: the motion is zero, and a yaw that is missing counts as lost. When time is back the motion starts from rest.
     pub fn update(
         &mut self,
         command: Twist<Gimbal>,
@@ -274,7 +278,7 @@ impl Modes {
         dt_s: f32,
     ) -> Option<Twist<Body>> {
         let command = if command.is_finite() { command } else { Twist::ZERO };
-        let dt_s = if dt_s > 0.0 && dt_s.is_finite() { dt_s } else { 0.0 };
+        let dt_s = self.clock.see(dt_s);
         self.see_yaw(gimbal_yaw, dt_s);
         let allowed = self.allowed();
         self.act(allowed);
@@ -292,6 +296,10 @@ impl Modes {
             (Mode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),
             _ => Twist::new(command.vx_m_s, command.vy_m_s, command.wz_rad_s),
         };
+        if self.clock.is_dead() {
+            (self.from, self.output, self.progress) = (Twist::ZERO, Twist::ZERO, 0.0);
+            return Some(Twist::ZERO);
+        }
         let output = self.blend(wanted, dt_s);
         self.output = if output.is_finite() { output } else { Twist::ZERO };
         Some(self.output)
@@ -303,6 +311,7 @@ impl Modes {
                 self.yaw = Some(Heading::new(angle));
                 self.yaw_age_s = 0.0;
             }
+            None if self.clock.is_dead() => self.yaw_age_s = f32::MAX,
             None => self.yaw_age_s += dt_s,
         }
     }
@@ -494,6 +503,27 @@ mod tests {
             (modes.acting(), modes.take_edge()),
             (Mode::FollowGimbal, Some(GimbalEdge::Back))
         );
+    }
+
+    #[test]
+    fn a_clock_that_died_stops_the_motion_and_loses_the_gimbal() {
+        for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
+            for mode in [Mode::FollowGimbal, Mode::Rotor, Mode::Independent] {
+                let mut modes = modes(config(), mode);
+                let before = settled(&mut modes, 20.0);
+                for calls in 1..=200 {
+                    let twist = modes.update(AHEAD, None, dt).unwrap();
+                    let expected = if calls < 100 { before } else { Twist::ZERO };
+                    let change = twist - expected;
+                    assert!(change.linear().norm() < 1e-6, "{dt} {calls}: {twist:?}");
+                    assert!(change.wz_rad_s.abs() < 0.01, "{dt} {calls}: {twist:?}"); // the swing's last step
+                }
+                assert_eq!(modes.acting(), Mode::Independent);
+                let again = modes.update(AHEAD, yaw(20.0), DT).unwrap();
+                assert_eq!(modes.acting(), mode);
+                assert!(again.linear().norm() < 0.01, "{again:?}"); // from rest, evenly
+            }
+        }
     }
 
     #[test]

@@ -135,7 +135,9 @@ mod tests {
     #[test]
     fn idling_with_a_full_buffer_winds_nothing_up_that_would_empty_it() {
         for (kp, ki) in [(2.0, 0.5), (2.0, 10.0), (0.5, 5.0), (20.0, 1.0), (3.0, 0.0)] {
-            for gains in [PidConfig::new(kp, ki, 0.0), PidConfig::new(kp, ki, 0.0).with_output_limit(120.0)] {
+            for gains in
+                [PidConfig::new(kp, ki, 0.0), PidConfig::new(kp, ki, 0.0).with_output_limit(120.0)]
+            {
                 let (lowest, last) = idle_then_throttle(gains, 1.0);
                 assert!(lowest >= 19.9, "{kp} {ki}: {lowest} J");
                 assert!(last < 20.1, "{kp} {ki}: {last} J are never used");

@@ -35,6 +35,10 @@ impl WheelSpeed for ModuleState {
         self.velocity
     }
 
+    fn is_finite(self) -> bool {
+        self.velocity.is_finite() && self.angle.is_finite()
+    }
+
     fn scaled(self, factor: f32) -> Self {
         Self { velocity: self.velocity * factor, ..self }
     }
