@@ -14,12 +14,12 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing, MotorName, Own,
-    OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
+    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing,
+    MotorName, Own, OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
-    MeasuredLoad, Nb, Runner,
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, MeasuredLoad,
+    Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
