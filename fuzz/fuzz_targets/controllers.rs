@@ -40,7 +40,7 @@ fn pid_config(input: &mut Input) -> PidConfig {
             (0, 0) => config.with_output_limit(input.positive()),
             (0, _) => config.with_output_range(input.float(), input.float()),
             (1, 0) => config.with_integral_limit(input.positive()),
-            (1, _) => config.with_max_step(input.positive()),
+            (1, _) => config.with_dead_band(input.positive()),
             (2, 0) => config.with_integral_separation(input.positive()),
             (2, _) => config.with_variable_integral(input.positive(), input.positive()),
             (3, 0) => config.with_back_calculation(input.positive()),
@@ -69,7 +69,7 @@ fn pid(mut input: Input) {
             224..=231 => {
                 let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
                 pid.step(range, Pid::rejected, |pid| {
-                    let step = pid.time_step(dt_s);
+                    let step = drivetrain::control::TimeStep::of(dt_s);
                     pid.step_error(error, rate, &step)
                 });
             }
@@ -179,7 +179,7 @@ fn position_actuator(mut input: Input) {
         config = config.with_outer_divider(input.byte());
     }
     let Ok(mut actuator) = PositionActuator::new(config) else { return };
-    let (lower, upper) = actuator.speed().pid().config().output_range();
+    let (lower, upper) = actuator.cascade().speed().config().output_range();
     let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
     let (lower, upper) = (rounded(lower), rounded(upper));
     while !input.is_empty() {
@@ -198,7 +198,7 @@ fn position_actuator(mut input: Input) {
         };
         assert_eq!(output.to_bits(), again.to_bits(), "I10");
         assert!(output.is_finite() && lower.min(0.0) <= output && output <= upper.max(0.0));
-        let (slowest, fastest) = actuator.angle_pid().config().output_range();
+        let (slowest, fastest) = actuator.cascade().position().config().output_range();
         let speed = actuator.speed_setpoint();
         assert!(speed.is_finite() && slowest.min(0.0) <= speed && speed <= fastest.max(0.0));
     }
