@@ -20,6 +20,7 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     let mut buffer = [0; COMMAND_LENGTH];
     let bytes = command.encode(&mut buffer).unwrap();
     assert_eq!(host.latest(ms(0)), None, "nothing moves before the first command");
+    assert_eq!(host.losses(), 0, "what never came was not lost");
     for at in [10, 60, 110] {
         assert_eq!(host.read(&mut &bytes[..], ms(at)), Some(command));
     }
@@ -37,6 +38,22 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     assert_eq!(host.read(&mut &bytes[..], ms(500)), Some(command));
     assert_eq!(host.edge(ms(500)), Some(Edge::Heard { at: ms(500) }));
     assert_eq!(host.losses(), 1);
+}
+
+#[test]
+fn f61_half_a_command_given_up_does_not_swallow_the_next() {
+    let mut host = Link::<_, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+    let command = Command { reset: Reset::Enable, ..Command::default() };
+    let mut buffer = [0; COMMAND_LENGTH];
+    let bytes = command.encode(&mut buffer).unwrap();
+    let (half, _) = bytes.split_at(40);
+    assert_eq!(host.read(&mut &half[..], ms(10)), None);
+    assert!(format!("{host:?}").contains("buffered: 40"), "{host:?}");
+    host.abandon();
+    assert_eq!(host.read(&mut &[][..], ms(50)), None);
+    assert_eq!(host.counts().skipped_bytes, 40);
+    assert_eq!(host.read(&mut &bytes[..], ms(60)), Some(command));
+    assert_eq!(host.counts().skipped_bytes, 40, "nothing but the half");
 }
 
 const SHOWN: [u8; 18] = [0x94, 0x66, 0x0B, 0xA5, 0xD9, 0x92, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4];

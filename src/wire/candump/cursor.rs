@@ -115,9 +115,6 @@ impl<'a> Cursor<'a> {
         let start = self.at;
         let mut raw = 0_u32;
         while let Some(digit) = self.peek().and_then(nibble) {
-            if self.at - start == 8 {
-                return Err(error);
-            }
             raw = raw << 4 | u32::from(digit);
             self.at += 1;
         }

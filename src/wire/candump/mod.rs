@@ -214,10 +214,14 @@ mod tests {
     }
 
     #[test]
-    fn short_time_stamps_keep_their_size() {
-        for (text, micros) in
-            [("(0.5)", 500_000), ("(000.001021)", 1_021), ("( 2.000000)", 2_000_000)]
-        {
+    fn time_stamps_of_any_length_keep_their_size() {
+        for (text, micros) in [
+            ("(0.5)", 500_000),
+            ("(000.001021)", 1_021),
+            ("( 2.000000)", 2_000_000),
+            ("(0.1234567)", 123_456),
+            ("(0.12345678)", 123_456),
+        ] {
             let line = format!("{text} can0 201#");
             let time = Record::parse(line.as_bytes()).unwrap().time;
             assert_eq!(time, Some(Instant::from_micros(micros)));
@@ -275,6 +279,7 @@ mod tests {
         assert_eq!(refused("can0 201 [2] 01 02 03"), (20, Expected::End));
         assert_eq!(refused("can0 201#0102030405060708 x"), (27, Expected::End));
         assert_eq!(refused("can0 201#010203040506070809"), (26, Expected::End));
+        assert_eq!(refused("can0 201 [2] remote request 1"), (29, Expected::End));
         assert_eq!(refused("can0 201#R9"), (11, Expected::Length));
         assert_eq!(refused("can0 201#R88"), (12, Expected::End));
         assert_eq!(refused("can0 201#0102030405060708_8"), (27, Expected::End));
