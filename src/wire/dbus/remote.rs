@@ -189,3 +189,23 @@ const fn button(raw: u8) -> Option<bool> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_its_own_bit_and_no_other() {
+        use Key::{A, B, C, Ctrl, D, E, F, G, Q, R, S, Shift, V, W, X, Z};
+        for (bit, key) in [W, S, A, D, Shift, Ctrl, Q, E, R, F, G, Z, X, C, V, B].iter().enumerate()
+        {
+            assert!(Keys(1 << bit).is_pressed(*key), "{key:?} is bit {bit}");
+            assert!(!Keys(!(1 << bit)).is_pressed(*key), "{key:?} has no other bit");
+        }
+    }
+
+    #[test]
+    fn a_stick_in_the_middle_is_zero_with_no_sign() {
+        assert_eq!(scaled(CENTRE, 0).map(f32::to_bits), Some(0.0_f32.to_bits()));
+    }
+}
