@@ -158,3 +158,12 @@ fn an_instruction_longer_than_its_length_byte_is_refused() {
     assert_eq!(error, InstructionError::TooLong { parameters: 258 });
     assert!(feetech::sync_write(41, &servos[..31], &mut buffer).is_ok());
 }
+
+/// The checksum by hand: FE + 07 + 82 + 38 + 08 + 01 + 02 + 03 is 1CD, and the complement of CD is 32.
+#[test]
+fn three_servos_are_asked_in_one_frame() {
+    let servos = [1, 2, 3].map(|id| ServoId::new(id).unwrap());
+    let mut buffer = [0; 16];
+    let frame = feetech::sync_read(&servos, 0x38, 8, &mut buffer).unwrap();
+    assert_eq!(frame, [0xFF, 0xFF, 0xFE, 7, 0x82, 0x38, 8, 1, 2, 3, 0x32]);
+}

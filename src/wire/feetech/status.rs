@@ -133,3 +133,34 @@ impl Protocol for Sts {
         Ok(status)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_complaint_is_one_bit() {
+        let complaints: [(u8, fn(ServoErrors) -> bool); 5] = [
+            (0, ServoErrors::voltage),
+            (1, ServoErrors::sensor),
+            (2, ServoErrors::overheat),
+            (3, ServoErrors::overcurrent),
+            (5, ServoErrors::overload),
+        ];
+        for (bit, complains) in complaints {
+            assert!(complains(ServoErrors(1 << bit)), "bit {bit}");
+            assert!(!complains(ServoErrors(!(1 << bit))), "bit {bit}");
+            assert!(!ServoErrors(1 << bit).is_empty());
+        }
+        assert!(ServoErrors(0).is_empty());
+    }
+
+    #[test]
+    fn a_status_comes_from_one_servo_and_fits_the_longest_frame() {
+        assert_eq!(MAX_FRAME, 38);
+        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 34]), Some(MAX_FRAME));
+        assert_eq!(Sts.length(&[0xFF, 0xFF, 254, 34]), None);
+        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 35]), None);
+        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 1]), None);
+    }
+}
