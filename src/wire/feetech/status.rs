@@ -140,16 +140,16 @@ mod tests {
 
     #[test]
     fn each_complaint_is_one_bit() {
-        let complaints: [(u8, fn(ServoErrors) -> bool); 5] = [
-            (0, ServoErrors::voltage),
-            (1, ServoErrors::sensor),
-            (2, ServoErrors::overheat),
-            (3, ServoErrors::overcurrent),
-            (5, ServoErrors::overload),
-        ];
-        for (bit, complains) in complaints {
-            assert!(complains(ServoErrors(1 << bit)), "bit {bit}");
-            assert!(!complains(ServoErrors(!(1 << bit))), "bit {bit}");
+        let complaints = |errors: ServoErrors| {
+            let (voltage, sensor, overheat) =
+                (errors.voltage(), errors.sensor(), errors.overheat());
+            [voltage, sensor, overheat, errors.overcurrent(), errors.overload()]
+        };
+        for (place, bit) in [0, 1, 2, 3, 5].into_iter().enumerate() {
+            let mut only = [false; 5];
+            only[place] = true;
+            assert_eq!(complaints(ServoErrors(1 << bit)), only);
+            assert_eq!(complaints(ServoErrors(!(1 << bit))), only.map(|set| !set));
             assert!(!ServoErrors(1 << bit).is_empty());
         }
         assert!(ServoErrors(0).is_empty());
