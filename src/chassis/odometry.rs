@@ -28,7 +28,8 @@ pub struct Odometry {
     y_m: Sum,
     angle_rad: Sum,
     heading: Heading,
-    gyro: Option<Heading>,
+    /// The gyroscope's heading of the step before, if it had one.
+    gyro: Option<Angle>,
 }
 
 impl Odometry {
@@ -57,7 +58,7 @@ impl Odometry {
         let wheels = if counts { twist.over(dt_s) } else { Twist::ZERO.over(0.0) };
         let mut arc = wheels;
         if let (Some(now), Some(before)) = (gyro, self.gyro) {
-            arc.theta_rad = wrap_pi(now.angle().as_radians() - before.angle().as_radians());
+            arc.theta_rad = wrap_pi(now.angle().as_radians() - before.as_radians());
         }
         if counts {
             // The heading at the start is the one the sum has: the gyroscope's of the step before.
@@ -77,7 +78,7 @@ impl Odometry {
             }
             None => {}
         }
-        self.gyro = gyro;
+        self.gyro = gyro.map(Heading::angle);
         counts
     }
 
