@@ -89,7 +89,7 @@ pub struct ChassisStatus {
     pub command_stale: bool,
     /// The wheels' speed limit slowed the chassis in the last tick.
     pub saturated: bool,
-    /// Commands and headings that were NaN or infinite, in all; a command and its heading count once.
+    /// Commands, headings and poses that were NaN or infinite, in all; a command and its heading count once.
     pub rejected: u16,
     /// Wheels of which a motor refused its target in the last [`drive`](Chassis::drive).
     pub refused: u8,
@@ -302,8 +302,13 @@ impl<K: Kinematics> Chassis<K> {
         self.odometry.pose()
     }
 
-    /// Puts the chassis at a pose; the motion goes on.
+    /// Puts the chassis at a pose; the motion goes on. A pose that is NaN or infinite changes nothing, and is counted in
+    /// [`ChassisStatus::rejected`].
     pub fn set_pose(&mut self, pose: Pose2<World>) {
+        if !(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite()) {
+            self.status.rejected = self.status.rejected.saturating_add(1);
+            return;
+        }
         let body = self.reference();
         self.odometry = Odometry::new(pose);
         self.reference = body.to_world(self.odometry.heading());
@@ -613,6 +618,20 @@ mod tests {
         chassis.update(NONE, TICK);
         assert_eq!(chassis.status().rejected, 2);
         assert_eq!(chassis.reference(), Twist::new(1.0, 0.0, 0.0)); // a body command needs no heading
+    }
+
+    #[test]
+    fn a_pose_of_nan_is_counted_and_the_chassis_stays_where_it_is() {
+        let mut chassis = Chassis::new(mecanum());
+        let pose = Pose2::new(1.0, 2.0, Angle::from_degrees(30.0));
+        chassis.set_pose(pose);
+        chassis.set_pose(Pose2::new(f32::NAN, 0.0, Angle::ZERO));
+        chassis.set_pose(Pose2::new(0.0, f32::INFINITY, Angle::ZERO));
+        chassis.set_pose(Pose2::new(0.0, 0.0, Angle::from_radians(f32::NAN)));
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.update(NONE, TICK);
+        assert_eq!((chassis.pose(), chassis.status().rejected), (pose, 3));
+        assert!(chassis.reference().vx_m_s > 0.9);
     }
 
     struct Bench {

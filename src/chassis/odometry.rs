@@ -36,14 +36,15 @@ impl Odometry {
     /// The longest step in seconds that is integrated.
     pub const MAX_STEP_S: f32 = 1.0;
 
-    /// Takes the pose to start from.
+    /// Takes the pose to start from. What of it is NaN or infinite counts as zero.
     #[must_use]
     pub const fn new(pose: Pose2<World>) -> Self {
+        let angle = Angle::from_radians(or_zero(pose.angle.as_radians()));
         Self {
-            x_m: Sum::new(pose.x_m),
-            y_m: Sum::new(pose.y_m),
-            angle_rad: Sum::new(wrap_pi(pose.angle.as_radians())),
-            heading: Heading::new(pose.angle),
+            x_m: Sum::new(or_zero(pose.x_m)),
+            y_m: Sum::new(or_zero(pose.y_m)),
+            angle_rad: Sum::new(wrap_pi(angle.as_radians())),
+            heading: Heading::new(angle),
             gyro: None,
         }
     }
@@ -98,8 +99,11 @@ impl Odometry {
         self.gyro.is_some()
     }
 
-    /// Sets the position and keeps the heading.
+    /// Sets the position and keeps the heading. A position that is NaN or infinite changes nothing.
     pub const fn set_position_m(&mut self, position_m: Vec2) {
+        if !position_m.is_finite() {
+            return;
+        }
         self.x_m = Sum::new(position_m.x);
         self.y_m = Sum::new(position_m.y);
     }
@@ -109,6 +113,10 @@ impl Default for Odometry {
     fn default() -> Self {
         Self::new(Pose2::ORIGIN)
     }
+}
+
+const fn or_zero(value: f32) -> f32 {
+    if value.is_finite() { value } else { 0.0 }
 }
 
 /// A sum that keeps what rounding would lose for the next addition.
@@ -248,6 +256,10 @@ mod tests {
         }
         let pose = odometry.pose();
         assert!(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite(), "{pose:?}");
+        odometry.set_position_m(Vec2::new(f32::NAN, 0.0));
+        assert_eq!(odometry.pose(), pose);
+        let nowhere = Pose2::new(f32::NAN, f32::INFINITY, Angle::from_radians(f32::NAN));
+        assert_eq!(Odometry::new(nowhere), Odometry::default());
         odometry.set_position_m(Vec2::new(0.0, 0.0));
         odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
         assert!(odometry.pose().x_m.is_finite());
