@@ -13,7 +13,7 @@
 mod course;
 
 use course::Sample;
-use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve, SwerveBuses, WheelDrive};
+use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve, SwerveBuses};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::Vec2;
