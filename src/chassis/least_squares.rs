@@ -93,7 +93,7 @@ impl Normal {
                 [inverse.xy, inverse.xw, inverse.yw],
             ));
         // Not written the other way round: NaN is no condition either.
-        (scale > 0.0 && condition <= MAX_CONDITION).then(|| Inverse {
+        (scale > 0.0 && condition <= MAX_CONDITION).then_some(Inverse {
             xw: inverse.xw * per_reach,
             yw: inverse.yw * per_reach,
             ww: inverse.ww * per_reach * per_reach,
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn what_is_just_taken_is_still_read_back() {
-        let omni = [3.0, 3.5, 4.0, 4.5].map(three).into_iter().filter_map(Result::ok).last();
+        let omni = [4.5, 4.0, 3.5, 3.0].map(three).into_iter().find_map(Result::ok);
         let omni = omni.unwrap();
         let motion = Twist::new(0.5, -0.25, 1.0);
         let error = omni.forward(omni.inverse(motion)) - motion;
