@@ -73,10 +73,9 @@ fn drive(world: &World) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
         }
         let time_s = tick.now().since(started.unwrap_or(tick.now())).as_secs_f32();
         let (driven_m, heading) = course::truth(world)?;
-        chassis.set_world(course::command(time_s, chassis.pose()), heading);
-        chassis.drive(runner.device_mut(), wheels, tick);
+        course::command(&mut chassis, time_s, heading);
+        let targets = chassis.drive(runner.device_mut(), wheels, tick);
         let bus = runner.device();
-        let targets = chassis.kinematics().inverse(chassis.reference());
         let rpm = |wheel| bus.state(wheel).map_or(0.0, |state| state.velocity.as_rpm());
         samples.push(Sample {
             time_s,

@@ -1,4 +1,4 @@
-//! Four steered modules drive a square while the body turns, on the simulator, through the public API.
+//! Four steered modules drive a square while the body turns, then lock, on the simulator, through the public API.
 //!
 //! ```text
 //! cargo run --release --example swerve [FILE.svg]
@@ -13,11 +13,9 @@
 mod course;
 
 use course::Sample;
-use drivetrain::chassis::{
-    Chassis, ChassisLimits, ModuleState, SteeringConfig, Swerve, SwerveSteering,
-};
+use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve, SwerveBuses};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{self, Bus, Config, Gm6020Voltage, Handle, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::Vec2;
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
@@ -45,18 +43,8 @@ const MODULES: [(Vec2, Angle); 4] = [
     (Vec2::new(-0.2, -0.2), Angle::from_degrees(333.0)),
 ];
 
-/// All motors of one kind, on a bus of their own.
-struct Row<'w, M: dji::Model> {
-    runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>,
-    motors: [Handle<M>; 4],
-}
-
-impl<M: dji::Model> Row<'_, M> {
-    /// Arms by itself, which only a simulated robot may.
-    fn is_ready(&mut self, tick: Tick) -> bool {
-        self.runner.is_armed() || self.runner.arm(tick).is_ok()
-    }
-}
+type Motors = ModuleMotors<Handle<M3508>, Handle<Gm6020Voltage>>;
+type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = course::output("swerve")?;
@@ -69,9 +57,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     course::judge(&samples)
 }
 
-/// The robot, and the floor under it.
-fn robot(world: &World) -> Result<(Row<'_, M3508>, Row<'_, Gm6020Voltage>), Box<dyn Error>> {
-    let mut floor = Vec::new();
+/// The motors that roll, those that steer, and the floor under them.
+fn robot(world: &World) -> Result<(Robot<'_>, Robot<'_>, [Motors; 4]), Box<dyn Error>> {
+    let (mut can1, mut can2) =
+        (Bus::new().with_load_ceiling(0.9), Bus::new().with_load_ceiling(0.9));
+    let (mut floor, mut motors) = (Vec::new(), Vec::new());
     for (id, (place, zero)) in (1..).zip(MODULES) {
         let drive = world.attach(MotorConfig::new(Model::M3508, id))?;
         let steering = MotorConfig::new(Model::Gm6020Voltage, id)
@@ -79,89 +69,58 @@ fn robot(world: &World) -> Result<(Row<'_, M3508>, Row<'_, Gm6020Voltage>), Box<
             .with_load_inertia_kg_m2(MODULE_INERTIA_KG_M2);
         let steering = world.attach(steering)?;
         floor.push(Wheel::steered(drive, WHEEL_RADIUS_M, place, steering, zero));
+        let drive = can1.attach(Config::<M3508>::new(id).speed_loop(DRIVE))?;
+        let steering = Config::<Gm6020Voltage>::new(id).position_loop(ANGLE, RATE);
+        motors.push(ModuleMotors::new(drive, can2.attach(steering)?, zero));
     }
     world.attach_chassis(ChassisConfig::new(&floor))?;
-    let (mut can1, mut can2) =
-        (Bus::new().with_load_ceiling(0.9), Bus::new().with_load_ceiling(0.9));
-    let drive = |id| Config::<M3508>::new(id).speed_loop(DRIVE);
-    let steering = |id| Config::<Gm6020Voltage>::new(id).position_loop(ANGLE, RATE);
-    let drives = can1.attach_all([1, 2, 3, 4].map(drive))?;
-    let steerings = can2.attach_all([1, 2, 3, 4].map(steering))?;
+    let motors = motors.try_into().map_err(|_| "there are four modules")?;
     let runner = |line, bus| Runner::new(Nb(world.controller_on(line)), world.clock(), bus);
-    Ok((
-        Row { runner: runner(Line::Can1, can1), motors: drives },
-        Row { runner: runner(Line::Can2, can2), motors: steerings },
-    ))
+    Ok((runner(Line::Can1, can1), runner(Line::Can2, can2), motors))
+}
+
+/// Arms by itself, which only a simulated robot may.
+fn is_ready(robot: &mut Robot<'_>, tick: Tick) -> bool {
+    robot.is_armed() || robot.arm(tick).is_ok()
 }
 
 fn drive(world: &World) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
-    let (mut drives, mut steerings) = robot(world)?;
-    let swerve = Swerve::new(WHEEL_RADIUS_M, MODULES.map(|(place, _)| place))?;
-    let mut chassis = Chassis::new(swerve);
+    let (mut drives, mut steerings, modules) = robot(world)?;
+    let mut chassis = Chassis::new(Swerve::new(WHEEL_RADIUS_M, MODULES.map(|(place, _)| place))?);
     let limits = ChassisLimits::new()
         .with_acceleration(4.0, 20.0)
         .with_wheel_speed(AngularVelocity::from_rpm(450.0));
     chassis.set_limits(limits)?;
-    let mut modules = SwerveSteering::<4>::new(SteeringConfig::new());
 
     let mut samples = Vec::new();
     let mut started = None;
     for _ in 0..course::STEPS {
         world.advance(Duration::from_micros(100));
-        drives.runner.poll(16);
-        steerings.runner.poll(16);
-        let (Some(tick), Some(steering_tick)) = (drives.runner.due(), steerings.runner.due())
-        else {
+        drives.poll(16);
+        steerings.poll(16);
+        let (Some(tick), Some(steering_tick)) = (drives.due(), steerings.due()) else {
             continue;
         };
-        // Both, or neither: modules that do not steer must not drive.
-        let ready = steerings.is_ready(steering_tick) & drives.is_ready(tick);
-        if ready {
+        if is_ready(&mut steerings, steering_tick) & is_ready(&mut drives, tick) {
             started = started.or(Some(tick.now()));
         }
         let time_s = tick.now().since(started.unwrap_or(tick.now())).as_secs_f32();
         let (driven_m, heading) = course::truth(world)?;
-        chassis.set_world(course::command(time_s, chassis.pose()), heading);
-
-        let (angles, measured) = measured(&drives, &steerings);
-        let targets = modules.steer(chassis.update(measured, tick), angles);
-        for ((drive, steering), (target, (_, zero))) in
-            drives.motors.into_iter().zip(steerings.motors).zip(targets.into_iter().zip(MODULES))
-        {
-            let speed = if ready { target.velocity } else { AngularVelocity::ZERO };
-            // What a motor refuses shows in `ready` one tick later.
-            _ = drives.runner.device_mut().set_velocity(drive, speed);
-            _ = steerings.runner.device_mut().set_angle(steering, target.angle + zero);
-        }
+        course::command(&mut chassis, time_s, heading);
+        let mut buses =
+            SwerveBuses { drives: drives.device_mut(), steerings: steerings.device_mut() };
+        let targets = chassis.drive(&mut buses, modules, tick);
+        let measured = modules.map(|module| buses.velocity(module.drive));
         samples.push(Sample {
             time_s,
             planned_m: course::plan(time_s).0,
             driven_m,
             believed_m: course::place(chassis.pose()),
             target_rpm: targets.map(|module| module.velocity.as_rpm()),
-            measured_rpm: measured.map(|module| module.map_or(0.0, |m| m.velocity.as_rpm())),
+            measured_rpm: measured.map(|wheel| wheel.map_or(0.0, AngularVelocity::as_rpm)),
         });
-        drives.runner.tick(tick);
-        steerings.runner.tick(steering_tick);
+        drives.tick(tick);
+        steerings.tick(steering_tick);
     }
     Ok(samples)
-}
-
-type Measured = ([Option<Angle>; 4], [Option<ModuleState>; 4]);
-
-/// What each module does, as far as its motors are heard.
-fn measured(drives: &Row<'_, M3508>, steerings: &Row<'_, Gm6020Voltage>) -> Measured {
-    let (drive, steering) = (drives.runner.device(), steerings.runner.device());
-    let mut zeros = MODULES.into_iter();
-    let angles = steerings.motors.map(|motor| {
-        let (_, zero) = zeros.next()?;
-        let state = steering.state(motor).filter(|_| steering.velocity(motor).is_some())?;
-        Some(state.position.angle() - zero)
-    });
-    let mut known = angles.into_iter();
-    let states = drives.motors.map(|motor| {
-        let angle = known.next().flatten()?;
-        Some(ModuleState::new(drive.velocity(motor)?, angle))
-    });
-    (angles, states)
 }

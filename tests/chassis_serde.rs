@@ -7,7 +7,7 @@ use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
     ModeConfig, Modes, ModuleState, OmniFourWheels, OmniThreeWheels, OmniWheel, PowerModel, Spin,
-    SteeringConfig, SwerveSteering, WheelLoad, WithoutGimbal,
+    SteeringConfig, Swerve, SwerveSteering, WheelLoad, WithoutGimbal,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -149,9 +149,11 @@ fn a_steering_configuration_with_a_negative_hysteresis_is_the_positive_one() {
     let read = read::<SteeringConfig>(&spoiled(config, "0.5", "-0.5")).unwrap();
     assert_eq!(read, config);
     // With a hysteresis below zero the drive would flip to and fro.
-    let mut steering = SwerveSteering::<1>::new(read);
+    let places = [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)];
+    let swerve = Swerve::new(0.05, places).unwrap().with_steering(read);
     let wanted = ModuleState::new(AngularVelocity::from_rad_per_s(1.0), Angle::from_degrees(95.0));
-    let [module] = steering.steer([wanted], [Some(Angle::ZERO)]);
+    let measured = [Some(Angle::ZERO); 2];
+    let [module, _] = swerve.steer(&mut SwerveSteering::new(), [wanted; 2], measured);
     assert!((module.angle.as_degrees() - 95.0).abs() < 1e-3);
 }
 

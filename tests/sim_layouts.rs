@@ -4,13 +4,12 @@
 #![cfg(feature = "sim")]
 
 use drivetrain::chassis::{
-    Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, ModuleState,
-    OmniFour, OmniFourWheels, SteeringConfig, Swerve, SwerveSteering,
+    Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, ModuleMotors,
+    OmniFour, OmniFourWheels, Swerve, SwerveBuses,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
-use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, MotorKey, SimClock, Wheel,
@@ -121,8 +120,7 @@ struct Modules<'w> {
     world: &'w World,
     drives: (Robot<'w>, [Handle<M3508>; 4]),
     steerings: (Robot<'w>, [Handle<Gm6020Voltage>; 4]),
-    swerve: Swerve<4>,
-    steering: SwerveSteering<4>,
+    chassis: Chassis<Swerve<4>>,
     relaxed: bool,
 }
 
@@ -146,34 +144,31 @@ impl<'w> Modules<'w> {
             world,
             drives: robot(world, [1, 2, 3, 4]),
             steerings: (runner, handles),
-            swerve: Swerve::new(RADIUS_M, CORNERS).unwrap(),
-            steering: SwerveSteering::new(SteeringConfig::new()),
+            chassis: Chassis::new(Swerve::new(RADIUS_M, CORNERS).unwrap()),
             relaxed: false,
         }
     }
 
     /// One second of a motion, or of the lock.
     fn run(&mut self, motion: Option<Twist<Body>>) -> ChassisState {
-        let Self { world, drives, steerings, swerve, steering, relaxed } = self;
+        let Self { world, drives, steerings, chassis, relaxed } = self;
         let (drives, wheels) = drives;
         let (runner, modules) = steerings;
+        let mut modules = modules.iter();
+        let motors = wheels.map(|wheel| ModuleMotors::new(wheel, *modules.next().unwrap(), ZERO));
         each_tick(world, drives, |drives, tick| {
             runner.poll(16);
             let _due = runner.due();
             let _missing = runner.is_armed() || runner.arm(tick).is_ok();
-            let angles =
-                modules.map(|module| Some(runner.device().state(module)?.position.angle() - ZERO));
-            let targets = match motion {
-                Some(motion) => steering.steer(swerve.inverse(motion), angles),
-                None => steering.lock(swerve, angles),
-            };
-            for ((wheel, module), target) in wheels.iter().zip(modules.iter()).zip(targets) {
-                let ModuleState { velocity, angle } = target;
-                let _disarmed = VelocityDrive::set_velocity(drives.device_mut(), *wheel, velocity);
-                if *relaxed {
-                    drives.device_mut().relax(*wheel);
-                }
-                let _disarmed = runner.device_mut().set_angle(*module, angle + ZERO);
+            match motion {
+                Some(motion) => chassis.set_body(motion),
+                None => chassis.lock(),
+            }
+            let buses = (drives.device_mut(), runner.device_mut());
+            let mut buses = SwerveBuses { drives: buses.0, steerings: buses.1 };
+            chassis.drive(&mut buses, motors, tick);
+            if *relaxed {
+                wheels.iter().for_each(|wheel| drives.device_mut().relax(*wheel));
             }
             runner.tick(tick);
         });

@@ -1,5 +1,6 @@
 //! What the examples `omni` and `swerve` share: a course to drive, what came of it, and its picture.
 
+use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
 use drivetrain::sim;
 use drivetrain::units::Angle;
@@ -17,6 +18,9 @@ const FOLLOW: f32 = 4.0;
 
 /// How far the robot may be off. Its loops lag by some 20 ms, at up to 1.5 m/s and a turn of 3 rad/s.
 const BOUND_M: f32 = 0.03;
+
+/// When the robot is back and stands.
+const END_S: f32 = 4.0 * SIDE_S + 0.3;
 
 /// How many steps of 100 us the whole takes: a little to arm, the square, and rest.
 pub(crate) const STEPS: u32 = 90_000;
@@ -65,11 +69,16 @@ fn speed(t: f32) -> f32 {
     1.0 - (TAU * t).cos()
 }
 
-/// The planned motion, and what drives off the error of the believed position.
-pub(crate) fn command(time_s: f32, believed: Pose2<World>) -> Twist<World> {
-    let (position, motion) = plan(time_s);
-    let error = (position - place(believed)) * FOLLOW;
-    motion + Twist::new(error.x, error.y, 0.0)
+/// Commands the planned motion, and what drives off the error of the believed position; at the end, to stay there.
+pub(crate) fn command<K: Kinematics>(chassis: &mut Chassis<K>, time_s: f32, heading: Heading) {
+    if time_s < END_S {
+        let (position, motion) = plan(time_s);
+        let error = (position - place(chassis.pose())) * FOLLOW;
+        chassis.set_world(motion + Twist::new(error.x, error.y, 0.0), heading);
+    } else {
+        chassis.set_heading(heading);
+        chassis.lock();
+    }
 }
 
 pub(crate) fn place(pose: Pose2<World>) -> Vec2 {

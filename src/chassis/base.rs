@@ -1,10 +1,10 @@
 use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
-use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelSpeed};
+use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelDrive, WheelSpeed};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
-use crate::motor::{TargetError, VelocityDrive};
+use crate::motor::TargetError;
 use crate::time::Tick;
-use crate::units::{Angle, AngularVelocity};
+use crate::units::Angle;
 
 /// A chassis of any layout: commands in, wheel speeds out, pose kept.
 ///
@@ -13,10 +13,9 @@ use crate::units::{Angle, AngularVelocity};
 ///
 /// 1. measured wheels and gyroscope move the [`Odometry`];
 /// 2. the command is brought into the world and approached within the acceleration limits: the same for every heading;
-/// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit.
-///
-/// Of a [`Swerve`](super::Swerve) the targets go through a [`SwerveSteering`](super::SwerveSteering) before they reach the
-/// motors: as they are, a module that shall not move has the angle zero, and would turn there.
+/// 3. back in the body, the bend of a turning step is taken off and the wheels are slowed together to their limit;
+/// 4. the modules of a [`Swerve`](super::Swerve) take the shorter way, and at rest keep their angles:
+///    see [`Swerve::steer`](super::Swerve::steer).
 ///
 /// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
 /// as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one over 0.1 s counts as
@@ -38,8 +37,9 @@ use crate::units::{Angle, AngularVelocity};
 /// # Ok::<(), drivetrain::chassis::GeometryError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chassis<K> {
+pub struct Chassis<K: Kinematics> {
     kinematics: K,
+    steering: K::Steering,
     limits: ChassisLimits,
     command: Command,
     command_age_s: f32,
@@ -56,6 +56,7 @@ pub struct Chassis<K> {
 enum Command {
     Body(Twist<Body>),
     World(Twist<World>),
+    Lock,
 }
 
 /// Where the measured motion of the last tick comes from.
@@ -81,16 +82,16 @@ pub struct ChassisStatus {
     pub lost_wheels: u8,
     /// Seconds for which the position could not be followed, in all.
     pub blind_s: f32,
-    /// Largest contradiction between the wheels of the last tick in m/s; zero when not all were known. Never NaN:
-    /// `f32::MAX` where it overflows.
-    pub slip_m_s: f32,
+    /// Largest contradiction between the wheels of the last tick in m/s; `None` while one of them is lost, because the
+    /// others then say too little about each other. Never NaN: `f32::MAX` where it overflows.
+    pub slip_m_s: Option<f32>,
     /// The last tick ran without a fresh command, or the clock is dead.
     pub command_stale: bool,
     /// The wheels' speed limit slowed the chassis in the last tick.
     pub saturated: bool,
-    /// Commands and headings that were NaN or infinite, in all; a command and its heading count once.
+    /// Commands, headings and poses that were NaN or infinite, in all; a command and its heading count once.
     pub rejected: u16,
-    /// Motors that refused their target in the last tick.
+    /// Wheels of which a motor refused its target in the last [`drive`](Chassis::drive).
     pub refused: u8,
     /// Why the first of them did.
     pub refusal: Option<TargetError>,
@@ -105,6 +106,7 @@ impl<K: Kinematics> Chassis<K> {
     pub const fn new(kinematics: K) -> Self {
         Self {
             kinematics,
+            steering: K::UNSTEERED,
             limits: ChassisLimits::new(),
             command: Command::Body(Twist::ZERO),
             command_age_s: f32::MAX,
@@ -117,7 +119,7 @@ impl<K: Kinematics> Chassis<K> {
                 source: MotionSource::Unknown,
                 lost_wheels: 0,
                 blind_s: 0.0,
-                slip_m_s: 0.0,
+                slip_m_s: None,
                 command_stale: true,
                 saturated: false,
                 rejected: 0,
@@ -167,9 +169,20 @@ impl<K: Kinematics> Chassis<K> {
         self.set_body(Twist::ZERO);
     }
 
-    /// Starts over from the measured motion: call it when the motors were relaxed, so that they take over without a jump.
+    /// Commands standing still so that the chassis resists being pushed.
+    ///
+    /// It comes to a stop within its limits; then the modules of a [`Swerve`](super::Swerve) turn to an X. Other layouts
+    /// stand as after [`stop`](Self::stop): their wheels hold as well as their speed loops do. Renewed like any command;
+    /// when it is not, the modules stay as they are.
+    pub fn lock(&mut self) {
+        self.set_command(Command::Lock, true);
+    }
+
+    /// Starts over from the measured motion and angles: call it when the motors were relaxed, so that they take over
+    /// without a jump.
     pub fn restart(&mut self) {
         self.command = Command::Body(Twist::ZERO);
+        self.steering = K::UNSTEERED;
         self.reference = self.measured.to_world(self.odometry.heading());
     }
 
@@ -184,6 +197,8 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     /// Takes the measured speed of each wheel, `None` where there is no fresh feedback, and returns the speed it shall have.
+    ///
+    /// Of a module whose speed alone is not known give a speed of NaN: its angle still counts for the steering.
     pub fn update(
         &mut self,
         measured: K::Wheels<Option<K::Speed>>,
@@ -207,7 +222,16 @@ impl<K: Kinematics> Chassis<K> {
         // What the wheels cannot do must not wind up: the next step starts from what they do.
         self.reference = if scale > 0.0 { self.reference * scale } else { Twist::ZERO };
         self.status.saturated = scale < 1.0;
-        K::map(wheels, |wheel| slowed(wheel, scale))
+        let wheels = K::map(wheels, |wheel| slowed(wheel, scale));
+        if self.is_locking() {
+            self.kinematics.lock(&mut self.steering, measured)
+        } else {
+            self.kinematics.steer(&mut self.steering, wheels, measured)
+        }
+    }
+
+    fn is_locking(&self) -> bool {
+        self.command == Command::Lock && !self.status.command_stale && self.reference == Twist::ZERO
     }
 
     fn measure(&mut self, wheels: K::Wheels<Option<K::Speed>>, dt_s: f32) {
@@ -218,12 +242,12 @@ impl<K: Kinematics> Chassis<K> {
             any = any.or(wheel);
         });
         self.status.lost_wheels = lost;
-        self.status.slip_m_s = 0.0;
+        self.status.slip_m_s = None;
         let motion = match any {
             Some(any) if lost == 0 => {
                 let all = K::map(wheels, |wheel| wheel.unwrap_or(any));
                 let slip_m_s = self.kinematics.slip_m_s(all);
-                self.status.slip_m_s = if slip_m_s.is_finite() { slip_m_s } else { f32::MAX };
+                self.status.slip_m_s = Some(if slip_m_s.is_finite() { slip_m_s } else { f32::MAX });
                 Some(self.kinematics.forward(all))
             }
             _ => self.kinematics.forward_partial(wheels),
@@ -254,6 +278,7 @@ impl<K: Kinematics> Chassis<K> {
         self.command_age_s += dt_s;
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
+            Command::Lock => Twist::ZERO,
             Command::Body(twist) => twist,
             Command::World(twist) => twist.to_body(self.odometry.heading()),
         }
@@ -277,8 +302,13 @@ impl<K: Kinematics> Chassis<K> {
         self.odometry.pose()
     }
 
-    /// Puts the chassis at a pose; the motion goes on.
+    /// Puts the chassis at a pose; the motion goes on. A pose that is NaN or infinite changes nothing, and is counted in
+    /// [`ChassisStatus::rejected`].
     pub fn set_pose(&mut self, pose: Pose2<World>) {
+        if !(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite()) {
+            self.status.rejected = self.status.rejected.saturating_add(1);
+            return;
+        }
         let body = self.reference();
         self.odometry = Odometry::new(pose);
         self.reference = body.to_world(self.odometry.heading());
@@ -295,38 +325,48 @@ impl<K: Kinematics> Chassis<K> {
     pub const fn kinematics(&self) -> &K {
         &self.kinematics
     }
-}
 
-impl<K: Kinematics<Speed = AngularVelocity>> Chassis<K> {
-    /// Reads the motors of the wheels, and gives each the speed it shall have.
+    /// Reads the motors of the wheels, gives each wheel what it shall do, and returns that.
     ///
-    /// What a motor refuses is in [`status`](Self::status); the others are driven all the same.
-    pub fn drive<H: Copy, D: VelocityDrive<H> + ?Sized>(
+    /// The handles of plain wheels are those of any [`VelocityDrive`](crate::motor::VelocityDrive), those of modules
+    /// are [`ModuleMotors`](super::ModuleMotors). What a motor refuses is in [`status`](Self::status); the others are
+    /// driven all the same. When all wheels refuse, nothing is steered: the angles to hold are then forgotten.
+    pub fn drive<H: Copy, D: WheelDrive<H, K::Speed> + ?Sized>(
         &mut self,
         owner: &mut D,
         wheels: K::Wheels<H>,
         tick: Tick,
-    ) {
-        let measured = K::map(wheels, |wheel| owner.velocity(wheel));
+    ) -> K::Wheels<K::Speed> {
+        let measured = K::map(wheels, |wheel| owner.measured(wheel));
         let targets = self.update(measured, tick);
         (self.status.refused, self.status.refusal) = (0, None);
-        let status = &mut self.status;
-        let _: K::Wheels<()> = K::map(K::zip(wheels, targets), |(wheel, target)| {
-            if let Err(error) = owner.set_velocity(wheel, target) {
-                status.refused = status.refused.saturating_add(1);
-                status.refusal = status.refusal.or(Some(error));
-            }
-        });
+        let (status, mut taken) = (&mut self.status, false);
+        let _: K::Wheels<()> =
+            K::map(K::zip(wheels, targets), |(wheel, target)| match owner.command(wheel, target) {
+                Ok(()) => taken = true,
+                Err(error) => {
+                    status.refused = status.refused.saturating_add(1);
+                    status.refusal = status.refusal.or(Some(error));
+                }
+            });
+        if !taken {
+            self.steering = K::UNSTEERED;
+        }
+        targets
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{Mecanum, MecanumGeometry, MecanumWheels, ModuleState, Swerve};
+    use crate::chassis::{
+        Mecanum, MecanumGeometry, MecanumWheels, ModuleMotors, ModuleState, Swerve, SwerveBuses,
+    };
     use crate::geometry::Vec2;
     use crate::math::wrap_pi;
+    use crate::motor::{AngleDrive, VelocityDrive};
     use crate::time::Instant;
+    use crate::units::AngularVelocity;
     use proptest::prelude::*;
 
     const TICK: Tick = Tick::new(Instant::START, 0.001);
@@ -560,7 +600,10 @@ mod tests {
             wheels.rear_left = wheels.rear_left.map(|wheel| wheel * -1.0);
             chassis.update(wheels, TICK);
             let status = chassis.status();
-            assert!(status.slip_m_s > 1e6 && status.slip_m_s.is_finite(), "{status:?}");
+            assert!(
+                status.slip_m_s.is_some_and(|slip| slip > 1e6 && slip.is_finite()),
+                "{status:?}"
+            );
         }
     }
 
@@ -575,6 +618,20 @@ mod tests {
         chassis.update(NONE, TICK);
         assert_eq!(chassis.status().rejected, 2);
         assert_eq!(chassis.reference(), Twist::new(1.0, 0.0, 0.0)); // a body command needs no heading
+    }
+
+    #[test]
+    fn a_pose_of_nan_is_counted_and_the_chassis_stays_where_it_is() {
+        let mut chassis = Chassis::new(mecanum());
+        let pose = Pose2::new(1.0, 2.0, Angle::from_degrees(30.0));
+        chassis.set_pose(pose);
+        chassis.set_pose(Pose2::new(f32::NAN, 0.0, Angle::ZERO));
+        chassis.set_pose(Pose2::new(0.0, f32::INFINITY, Angle::ZERO));
+        chassis.set_pose(Pose2::new(0.0, 0.0, Angle::from_radians(f32::NAN)));
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.update(NONE, TICK);
+        assert_eq!((chassis.pose(), chassis.status().rejected), (pose, 3));
+        assert!(chassis.reference().vx_m_s > 0.9);
     }
 
     struct Bench {
@@ -612,6 +669,227 @@ mod tests {
         assert!((chassis.pose().x_m - 0.5).abs() < 1e-4, "{:?}", chassis.pose());
         assert_eq!(chassis.status().refused, 1);
         assert_eq!(chassis.status().refusal, Some(TargetError::NoFeedback));
+    }
+
+    #[test]
+    fn a_lost_wheel_leaves_the_slip_unknown_and_not_zero() {
+        let mut chassis = Chassis::new(mecanum());
+        assert_eq!(chassis.status().slip_m_s, None);
+        let mut wheels = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
+        chassis.update(wheels, TICK);
+        assert!(chassis.status().slip_m_s.is_some_and(|slip| slip < 1e-5));
+        wheels.front_left = Some(AngularVelocity::ZERO); // blocked
+        chassis.update(wheels, TICK);
+        assert!(chassis.status().slip_m_s.is_some_and(|slip| (slip - 0.25).abs() < 1e-5));
+        wheels.rear_right = None;
+        chassis.update(wheels, TICK);
+        assert_eq!(chassis.status().slip_m_s, None);
+    }
+
+    #[test]
+    fn wheels_that_do_not_steer_lock_by_standing() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.update(NONE, TICK);
+        chassis.lock();
+        assert_eq!(chassis.update(NONE, TICK), MecanumWheels::splat(AngularVelocity::ZERO));
+        assert_eq!(size_of::<Chassis<Mecanum>>(), 164); // steering costs them nothing
+    }
+
+    const CORNERS: [Vec2; 4] =
+        [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3), Vec2::new(-0.3, 0.3), Vec2::new(-0.3, -0.3)];
+    /// What the encoders of the modules show when they point forward.
+    const ZERO: Angle = Angle::from_degrees(200.0);
+
+    fn swerve() -> Swerve<4> {
+        Swerve::new(0.05, CORNERS).unwrap()
+    }
+
+    /// Steering motors that are where they were told to be, with one that may be broken.
+    struct Turned {
+        angles: [Angle; 4],
+        broken: usize,
+    }
+
+    impl AngleDrive<usize> for Turned {
+        fn angle(&self, motor: usize) -> Option<Angle> {
+            (motor != self.broken).then(|| self.angles[motor])
+        }
+
+        fn set_angle(&mut self, motor: usize, target: Angle) -> Result<(), TargetError> {
+            if motor == self.broken {
+                return Err(TargetError::Relaxed);
+            }
+            self.angles[motor] = target;
+            Ok(())
+        }
+    }
+
+    struct Modules {
+        drives: Bench,
+        steerings: Turned,
+        chassis: Chassis<Swerve<4>>,
+    }
+
+    impl Modules {
+        const NONE: usize = 9;
+
+        fn new() -> Self {
+            Self {
+                drives: Bench { speeds: [AngularVelocity::ZERO; 4], broken: Self::NONE },
+                steerings: Turned { angles: [ZERO; 4], broken: Self::NONE },
+                chassis: Chassis::new(swerve()),
+            }
+        }
+
+        fn drive(&mut self) {
+            let Self { drives, steerings, chassis } = self;
+            let modules = [0, 1, 2, 3].map(|motor| ModuleMotors::new(motor, motor, ZERO));
+            chassis.drive(&mut SwerveBuses { drives, steerings }, modules, TICK);
+        }
+
+        fn go(&mut self, vx: f32, vy: f32) {
+            self.chassis.set_body(Twist::new(vx, vy, 0.0));
+            self.drive();
+        }
+
+        fn degrees(&self) -> [f32; 4] {
+            self.steerings.angles.map(|angle| (angle - ZERO).as_degrees())
+        }
+
+        fn assert_degrees(&self, expected: [f32; 4]) {
+            let degrees = self.degrees();
+            for (is, should) in degrees.into_iter().zip(expected) {
+                assert!((is - should).abs() < 0.3, "{degrees:?} and not {expected:?}");
+            }
+        }
+    }
+
+    // The fifth seed's system and librm turn their modules to 0 at zero command; so did this chassis.
+    #[test]
+    fn a_swerve_chassis_told_to_stand_keeps_its_angles() {
+        let mut modules = Modules::new();
+        modules.go(0.5, 0.5);
+        modules.assert_degrees([45.0; 4]);
+        for _ in 0..300 {
+            modules.drive(); // the command grows old
+        }
+        modules.chassis.stop();
+        modules.drive();
+        modules.assert_degrees([45.0; 4]);
+        assert_eq!(modules.drives.speeds, [AngularVelocity::ZERO; 4]);
+        assert!((modules.chassis.pose().x_m - 0.0505).abs() < 2e-3, "{:?}", modules.chassis.pose());
+    }
+
+    #[test]
+    fn a_swerve_chassis_before_its_first_command_turns_no_module() {
+        let mut modules = Modules::new();
+        modules.steerings.angles = [10.0, 250.0, 98.0, 333.0].map(Angle::from_degrees);
+        let before = modules.degrees();
+        modules.drive();
+        modules.assert_degrees(before);
+    }
+
+    #[test]
+    fn the_lock_waits_for_standstill_and_crosses_the_modules_until_the_next_command() {
+        let mut modules = Modules::new();
+        let limits = ChassisLimits::new().with_acceleration(10.0, 10.0);
+        modules.chassis.set_limits(limits).unwrap();
+        for _ in 0..100 {
+            modules.go(1.0, 0.0);
+        }
+        modules.assert_degrees([0.0; 4]);
+        for _ in 0..90 {
+            modules.chassis.lock();
+            modules.drive();
+        }
+        modules.assert_degrees([0.0; 4]); // still rolling
+        let x = [45.0, -45.0, -45.0, 45.0];
+        for _ in 0..20 {
+            modules.chassis.lock();
+            modules.drive();
+        }
+        modules.assert_degrees(x);
+        assert_eq!(modules.drives.speeds, [AngularVelocity::ZERO; 4]);
+        for _ in 0..200 {
+            modules.drive();
+        }
+        assert!(modules.chassis.status().command_stale);
+        modules.assert_degrees(x);
+        modules.go(1.0, 0.0);
+        modules.assert_degrees([0.0; 4]);
+    }
+
+    #[test]
+    fn a_module_that_does_not_steer_does_not_drive_and_the_others_do() {
+        let mut modules = Modules::new();
+        modules.steerings.broken = 2;
+        modules.go(1.0, 0.0);
+        assert_eq!(
+            modules.drives.speeds.map(|speed| speed > AngularVelocity::ZERO),
+            [true, true, false, true]
+        );
+        let status = modules.chassis.status();
+        assert_eq!((status.refused, status.refusal), (1, Some(TargetError::Relaxed)));
+        assert_eq!((status.lost_wheels, status.source), (1, MotionSource::SomeWheels));
+    }
+
+    #[test]
+    fn a_module_whose_drive_is_silent_still_steers() {
+        let mut modules = Modules::new();
+        modules.drives.broken = 1;
+        modules.go(0.0, 1.0);
+        modules.assert_degrees([90.0; 4]);
+        assert_eq!(
+            (modules.chassis.status().lost_wheels, modules.chassis.status().refused),
+            (1, 1)
+        );
+    }
+
+    #[test]
+    fn modules_that_were_turned_by_hand_while_relaxed_stay_where_they_are() {
+        let by_hand = [20.0, 30.0, 40.0, 50.0];
+        let turned = by_hand.map(|degrees| Angle::from_degrees(degrees) + ZERO);
+        let mut modules = Modules::new();
+        modules.go(1.0, 0.0);
+        modules.chassis.restart();
+        modules.steerings.angles = turned;
+        modules.drive();
+        modules.assert_degrees(by_hand);
+
+        // Nobody says `restart`, but all motors refuse for a while.
+        let mut modules = Modules::new();
+        modules.go(1.0, 0.0);
+        let mut refusing = Refusing;
+        let four = [0, 1, 2, 3].map(|motor| ModuleMotors::new(motor, motor, ZERO));
+        modules.chassis.drive(&mut refusing, four, TICK);
+        modules.chassis.stop();
+        modules.steerings.angles = turned;
+        modules.drive();
+        modules.assert_degrees(by_hand);
+    }
+
+    /// Motors that are heard and not armed.
+    struct Refusing;
+
+    impl VelocityDrive<usize> for Refusing {
+        fn velocity(&self, _: usize) -> Option<AngularVelocity> {
+            Some(AngularVelocity::ZERO)
+        }
+
+        fn set_velocity(&mut self, _: usize, _: AngularVelocity) -> Result<(), TargetError> {
+            Err(TargetError::Disarmed)
+        }
+    }
+
+    impl AngleDrive<usize> for Refusing {
+        fn angle(&self, _: usize) -> Option<Angle> {
+            Some(ZERO)
+        }
+
+        fn set_angle(&mut self, _: usize, _: Angle) -> Result<(), TargetError> {
+            Err(TargetError::Disarmed)
+        }
     }
 
     proptest! {

@@ -83,6 +83,9 @@ impl Differential {
 impl Kinematics for Differential {
     type Wheels<T: Copy> = DifferentialWheels<T>;
     type Speed = AngularVelocity;
+    type Steering = ();
+
+    const UNSTEERED: () = ();
 
     fn inverse(&self, twist: Twist<Body>) -> DifferentialWheels<AngularVelocity> {
         self.inverse(twist)

@@ -1,5 +1,6 @@
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
+use core::fmt::Debug;
 
 /// A layout of wheels: what each must do for a motion of the body, and what motion they make.
 ///
@@ -10,6 +11,11 @@ pub trait Kinematics {
     type Wheels<T: Copy>: Copy;
     /// What a wheel does: its velocity, and for a steered one its angle too.
     type Speed: WheelSpeed;
+    /// What is remembered of the wheels from one tick to the next: `()`, or where steered ones point.
+    type Steering: Copy + Debug + PartialEq;
+
+    /// Nothing remembered: before the first tick, and after the motors were relaxed.
+    const UNSTEERED: Self::Steering;
 
     /// Returns what each wheel must do for the motion `twist` of the body.
     fn inverse(&self, twist: Twist<Body>) -> Self::Wheels<Self::Speed>;
@@ -28,6 +34,31 @@ pub trait Kinematics {
 
     /// Pairs the values of every wheel.
     fn zip<T: Copy, U: Copy>(a: Self::Wheels<T>, b: Self::Wheels<U>) -> Self::Wheels<(T, U)>;
+
+    /// Returns what the motors are told, from what is wanted and what the wheels do: the same, unless they are steered.
+    ///
+    /// `None` stands for a wheel that is not heard; of a steered one that is finite in its angle alone, the angle counts.
+    #[must_use]
+    fn steer(
+        &self,
+        steering: &mut Self::Steering,
+        wanted: Self::Wheels<Self::Speed>,
+        measured: Self::Wheels<Option<Self::Speed>>,
+    ) -> Self::Wheels<Self::Speed> {
+        let _ = (steering, measured);
+        wanted
+    }
+
+    /// Returns what the motors are told so that the chassis resists being pushed: to stand, unless they are steered.
+    #[must_use]
+    fn lock(
+        &self,
+        steering: &mut Self::Steering,
+        measured: Self::Wheels<Option<Self::Speed>>,
+    ) -> Self::Wheels<Self::Speed> {
+        let _ = (steering, measured);
+        Self::map(self.inverse(Twist::ZERO), WheelSpeed::stopped)
+    }
 
     /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
     ///

@@ -1,7 +1,9 @@
 use super::error::positive;
+use super::least_squares::MAX_CONDITION;
 use super::{GeometryError, Kinematics, MecanumWheels};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
+use core::f32::consts::SQRT_2;
 use core::marker::PhantomData;
 
 /// The dimensions of a mecanum chassis: all in m, above zero.
@@ -100,8 +102,8 @@ impl<M: RollerMounting> Mecanum<M> {
     /// Takes the dimensions, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for [`FloorX`] when half
-    /// track and half wheelbase differ by less than 1 % of their sum.
+    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for [`FloorX`] when half track and
+    /// half wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
     ///
     /// # Examples
     /// ```
@@ -125,7 +127,9 @@ impl<M: RollerMounting> Mecanum<M> {
             return Err(error);
         }
         let arm_m = half_track_m + M::SIDE * half_wheelbase_m;
-        if arm_m.abs() < 0.01 * (half_track_m + half_wheelbase_m) {
+        // The condition number of its normal equations, of which translation has two parts.
+        let reach_m2 = half_track_m * half_track_m + half_wheelbase_m * half_wheelbase_m;
+        if arm_m * arm_m * MAX_CONDITION < SQRT_2 * reach_m2 {
             return Err(GeometryError::Singular("rotation: the chassis is square"));
         }
         Ok(Self {
@@ -175,6 +179,9 @@ impl<M: RollerMounting> Mecanum<M> {
 impl<M: RollerMounting> Kinematics for Mecanum<M> {
     type Wheels<T: Copy> = MecanumWheels<T>;
     type Speed = AngularVelocity;
+    type Steering = ();
+
+    const UNSTEERED: () = ();
 
     fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
         self.inverse(twist)

@@ -9,20 +9,21 @@
 //! | [`OmniThree`], [`OmniFour`] | [`OmniThreeWheels`], [`OmniFourWheels`] | positive rolls counter-clockwise |
 //! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
 //! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
-//! | [`Swerve`] | an array, as given | [`SwerveSteering`] finds the shorter way and holds the angles |
+//! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
 //! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
 //!
 //! ```text
-//! Modes ──> Chassis: command ──> acceleration limit ──> inverse ──> wheel limit ──> wheel targets
-//!                    odometry <── forward <──────────────────────────────────────── wheel speeds
+//! Modes ──> Chassis: command ──> acceleration limit ──> inverse ──> wheel limit ──> steering ──> wheel targets
+//!                    odometry <── forward <───────────────────────────────────────────────────── wheel speeds
 //! ```
 //!
 //! | on top of a layout | what it does |
 //! |---|---|
-//! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels |
+//! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
+//! | [`WheelDrive`] | the motors that it drives; [`ModuleMotors`], [`SwerveBuses`] for modules, also on two buses |
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
 //!
@@ -48,6 +49,7 @@
 mod base;
 mod clock;
 mod differential;
+mod drive;
 mod error;
 mod kinematics;
 mod least_squares;
@@ -65,6 +67,7 @@ mod wheels;
 
 pub use base::{Chassis, ChassisStatus, MotionSource};
 pub use differential::{Differential, DifferentialGeometry};
+pub use drive::{ModuleMotors, SwerveBuses, WheelDrive};
 pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::{ChassisLimits, LimitError};

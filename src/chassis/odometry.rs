@@ -28,21 +28,23 @@ pub struct Odometry {
     y_m: Sum,
     angle_rad: Sum,
     heading: Heading,
-    gyro: Option<Heading>,
+    /// The gyroscope's heading of the step before, if it had one.
+    gyro: Option<Angle>,
 }
 
 impl Odometry {
     /// The longest step in seconds that is integrated.
     pub const MAX_STEP_S: f32 = 1.0;
 
-    /// Takes the pose to start from.
+    /// Takes the pose to start from. What of it is NaN or infinite counts as zero.
     #[must_use]
     pub const fn new(pose: Pose2<World>) -> Self {
+        let angle = Angle::from_radians(or_zero(pose.angle.as_radians()));
         Self {
-            x_m: Sum::new(pose.x_m),
-            y_m: Sum::new(pose.y_m),
-            angle_rad: Sum::new(wrap_pi(pose.angle.as_radians())),
-            heading: Heading::new(pose.angle),
+            x_m: Sum::new(or_zero(pose.x_m)),
+            y_m: Sum::new(or_zero(pose.y_m)),
+            angle_rad: Sum::new(wrap_pi(angle.as_radians())),
+            heading: Heading::new(angle),
             gyro: None,
         }
     }
@@ -57,7 +59,7 @@ impl Odometry {
         let wheels = if counts { twist.over(dt_s) } else { Twist::ZERO.over(0.0) };
         let mut arc = wheels;
         if let (Some(now), Some(before)) = (gyro, self.gyro) {
-            arc.theta_rad = wrap_pi(now.angle().as_radians() - before.angle().as_radians());
+            arc.theta_rad = wrap_pi(now.angle().as_radians() - before.as_radians());
         }
         if counts {
             // The heading at the start is the one the sum has: the gyroscope's of the step before.
@@ -77,7 +79,7 @@ impl Odometry {
             }
             None => {}
         }
-        self.gyro = gyro;
+        self.gyro = gyro.map(Heading::angle);
         counts
     }
 
@@ -97,8 +99,11 @@ impl Odometry {
         self.gyro.is_some()
     }
 
-    /// Sets the position and keeps the heading.
+    /// Sets the position and keeps the heading. A position that is NaN or infinite changes nothing.
     pub const fn set_position_m(&mut self, position_m: Vec2) {
+        if !position_m.is_finite() {
+            return;
+        }
         self.x_m = Sum::new(position_m.x);
         self.y_m = Sum::new(position_m.y);
     }
@@ -108,6 +113,10 @@ impl Default for Odometry {
     fn default() -> Self {
         Self::new(Pose2::ORIGIN)
     }
+}
+
+const fn or_zero(value: f32) -> f32 {
+    if value.is_finite() { value } else { 0.0 }
 }
 
 /// A sum that keeps what rounding would lose for the next addition.
@@ -247,6 +256,10 @@ mod tests {
         }
         let pose = odometry.pose();
         assert!(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite(), "{pose:?}");
+        odometry.set_position_m(Vec2::new(f32::NAN, 0.0));
+        assert_eq!(odometry.pose(), pose);
+        let nowhere = Pose2::new(f32::NAN, f32::INFINITY, Angle::from_radians(f32::NAN));
+        assert_eq!(Odometry::new(nowhere), Odometry::default());
         odometry.set_position_m(Vec2::new(0.0, 0.0));
         odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
         assert!(odometry.pose().x_m.is_finite());

@@ -67,7 +67,8 @@ impl<const N: usize> Omni<N> {
     ///
     /// # Errors
     /// Names the value that is not finite or not above zero. [`GeometryError::Singular`] when the wheels leave some
-    /// motion undetermined: fewer than three, all parallel, or all pointing at one centre.
+    /// motion undetermined, or nearly: fewer than three, all parallel, all pointing at one centre, or all so far on one
+    /// side of the origin that a turn looks like a straight way (some 20 times their distance from their centre).
     pub fn new(wheel_radius_m: f32, wheels: [OmniWheel; N]) -> Result<Self, GeometryError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !wheels.iter().all(|wheel| wheel.position_m.is_finite()) {
@@ -117,6 +118,9 @@ pub(super) fn zip_arrays<T: Copy, U: Copy, const N: usize>(a: [T; N], b: [U; N])
 impl<const N: usize> Kinematics for Omni<N> {
     type Wheels<T: Copy> = [T; N];
     type Speed = AngularVelocity;
+    type Steering = ();
+
+    const UNSTEERED: () = ();
 
     fn inverse(&self, twist: Twist<Body>) -> [AngularVelocity; N] {
         self.inverse(twist)
@@ -179,6 +183,9 @@ macro_rules! named_omni {
         impl Kinematics for $name {
             type Wheels<T: Copy> = $wheels<T>;
             type Speed = AngularVelocity;
+            type Steering = ();
+
+            const UNSTEERED: () = ();
 
             fn inverse(&self, twist: Twist<Body>) -> $wheels<AngularVelocity> {
                 self.inverse(twist)

@@ -76,64 +76,84 @@ impl Default for SteeringConfig {
     }
 }
 
-/// Brings the modules of a swerve chassis to their angles by the shorter way.
+/// What is remembered of the modules of a [`Swerve`] from one tick to the next: where each was told to point.
 ///
-/// * A module turns by at most 90 degrees and the hysteresis; where the other direction is nearer, its drive reverses.
-///   The hysteresis keeps a command at 90 degrees from flipping it to and fro.
-/// * A module that does not point where it should drives with the cosine of its error, so it does not push sideways.
-/// * At zero command it stands still and keeps its angle.
-/// * The angles that come out are near the measured ones, whatever their number of turns: no unwinding.
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::{ModuleState, SteeringConfig, SwerveSteering};
-/// use drivetrain::units::{Angle, AngularVelocity};
-///
-/// let mut steering = SwerveSteering::<1>::new(SteeringConfig::new());
-/// let back = ModuleState::new(AngularVelocity::from_rad_per_s(10.0), Angle::from_degrees(170.0));
-/// let [module] = steering.steer([back], [Some(Angle::ZERO)]);
-/// assert!((module.angle.as_degrees() + 10.0).abs() < 1e-3); // 10 degrees to the right, drive reversed
-/// assert!((module.velocity.as_rad_per_s() + 9.848).abs() < 1e-3); // cos(10 degrees)
-/// ```
+/// [`Chassis`](super::Chassis) keeps it. Without one, keep it beside the layout for [`Swerve::steer`] and
+/// [`Swerve::lock`], and take a new one when the motors were relaxed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwerveSteering<const N: usize> {
-    config: SteeringConfig,
-    modules: [Module; N],
-}
+pub struct SwerveSteering<const N: usize>([Module; N]);
 
 /// What is remembered of one module.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Module {
     target_rad: f32,
+    /// Not before the module is measured: a target from nowhere would turn it when it arms.
+    has_target: bool,
     reversed: bool,
 }
 
 impl<const N: usize> SwerveSteering<N> {
-    /// Takes the configuration; until the first command the modules are held at the angle they are measured at.
+    /// Remembers nothing: a module that is not told to move holds the angle at which it is first measured.
     #[must_use]
-    pub const fn new(config: SteeringConfig) -> Self {
-        Self { config, modules: [Module { target_rad: f32::NAN, reversed: false }; N] }
+    pub const fn new() -> Self {
+        Self([Module { target_rad: 0.0, has_target: false, reversed: false }; N])
     }
+}
 
-    /// Returns what each module shall do, from what is wanted and the angles measured; without one, from its last target.
+impl<const N: usize> Default for SwerveSteering<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// How wanted states become states that the motors of the modules can follow.
+impl<const N: usize> Swerve<N> {
+    /// Returns what each module shall do, from what is wanted and the angles measured.
     ///
-    /// A wanted state that is NaN or infinite holds the module.
+    /// * A module turns by at most 90 degrees and the hysteresis; where the other direction is nearer, its drive reverses.
+    ///   The hysteresis keeps a command at 90 degrees from flipping it to and fro.
+    /// * A module that does not point where it should drives with the cosine of its error, so it does not push sideways.
+    /// * At zero command it stands still and keeps its angle; so it does for a wanted state that is NaN or infinite.
+    /// * The angles that come out are near the measured ones, whatever their number of turns: no unwinding.
+    /// * A module whose angle is not measured stands still, because nobody knows where it would push. It keeps its angle;
+    ///   one that was never measured has none to keep, and is given the wanted one, which its motor refuses.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    ///
+    /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
+    /// let mut steering = SwerveSteering::new();
+    /// let back = swerve.inverse(Twist::new(-1.0, 0.1763, 0.0)); // 170 degrees
+    /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
+    /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
+    /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
+    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// ```
     pub fn steer(
-        &mut self,
+        &self,
+        steering: &mut SwerveSteering<N>,
         wanted: [ModuleState; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
-        let (config, mut inputs) = (self.config, wanted.into_iter().zip(measured));
-        self.modules.each_mut().map(|module| match inputs.next() {
+        let config = self.steering_config();
+        let mut inputs = wanted.into_iter().zip(measured);
+        steering.0.each_mut().map(|module| match inputs.next() {
             Some((wanted, measured)) => module.steer(config, wanted, measured),
             None => ModuleState::default(),
         })
     }
 
-    /// Returns the states that lock the chassis: all at rest, each module pointing at the origin of the body.
-    pub fn lock(&mut self, swerve: &Swerve<N>, measured: [Option<Angle>; N]) -> [ModuleState; N] {
-        let mut inputs = swerve.positions_m().iter().zip(measured);
-        self.modules.each_mut().map(|module| match inputs.next() {
+    /// Returns the states that lock the chassis in an X: all at rest, each module pointing at the origin of the body.
+    ///
+    /// A module at the origin has no such direction, and holds its angle.
+    pub fn lock(
+        &self,
+        steering: &mut SwerveSteering<N>,
+        measured: [Option<Angle>; N],
+    ) -> [ModuleState; N] {
+        let mut inputs = self.positions_m().iter().zip(measured);
+        steering.0.each_mut().map(|module| match inputs.next() {
             Some((&position, measured)) => module.lock(position, measured),
             None => ModuleState::default(),
         })
@@ -141,21 +161,17 @@ impl<const N: usize> SwerveSteering<N> {
 }
 
 impl Module {
-    fn reference(self, measured: Option<Angle>) -> f32 {
-        let known = measured.filter(|angle| angle.is_finite()).map(Angle::as_radians);
-        let last = if self.target_rad.is_finite() { self.target_rad } else { 0.0 };
-        known.unwrap_or(last)
-    }
-
     fn steer(
         &mut self,
         config: SteeringConfig,
         wanted: ModuleState,
         measured: Option<Angle>,
     ) -> ModuleState {
-        let here = self.reference(measured);
         let speed = wanted.velocity.as_rad_per_s().abs();
-        let moves = wanted.angle.is_finite() && wanted.velocity.is_finite();
+        let moves = wanted.angle.is_finite() && speed.is_finite();
+        let Some(here) = known(measured) else {
+            return self.blind(wanted.angle);
+        };
         if !moves || speed <= config.hold_below.as_rad_per_s() {
             return self.hold(here);
         }
@@ -168,28 +184,52 @@ impl Module {
         } else {
             kept
         };
-        self.target_rad = here + error;
+        let target = self.keep(here + error);
         let along = if config.cosine_compensation { sin_cos(error).1 } else { 1.0 };
         let along = if along > 0.0 { along } else { 0.0 };
         let turned = wanted.scaled(if self.reversed { -along } else { along });
-        ModuleState::new(turned.velocity, Angle::from_radians(self.target_rad))
+        ModuleState::new(turned.velocity, target)
     }
 
     fn hold(&mut self, here: f32) -> ModuleState {
-        if !self.target_rad.is_finite() {
-            self.target_rad = here;
+        let target = if self.has_target { self.target_rad } else { here };
+        standing(self.keep(target))
+    }
+
+    fn blind(self, wanted: Angle) -> ModuleState {
+        if self.has_target {
+            standing(Angle::from_radians(self.target_rad))
+        } else {
+            standing(if wanted.is_finite() { wanted } else { Angle::ZERO })
         }
-        ModuleState::new(AngularVelocity::ZERO, Angle::from_radians(self.target_rad))
     }
 
     fn lock(&mut self, position: Vec2, measured: Option<Angle>) -> ModuleState {
-        let here = self.reference(measured);
-        let outward = wrap_pi(atan2(position.y, position.x) - here);
+        let away = Angle::from_radians(atan2(position.y, position.x));
+        let Some(here) = known(measured) else {
+            return self.blind(away);
+        };
+        if position == Vec2::ZERO {
+            return self.hold(here);
+        }
+        let outward = wrap_pi(away.as_radians() - here);
         let inward = wrap_pi(outward + PI);
         let nearer = if outward.abs() <= inward.abs() { outward } else { inward };
-        self.target_rad = here + nearer;
-        ModuleState::new(AngularVelocity::ZERO, Angle::from_radians(self.target_rad))
+        standing(self.keep(here + nearer))
     }
+
+    const fn keep(&mut self, target_rad: f32) -> Angle {
+        (self.target_rad, self.has_target) = (target_rad, true);
+        Angle::from_radians(target_rad)
+    }
+}
+
+fn known(measured: Option<Angle>) -> Option<f32> {
+    measured.filter(|angle| angle.is_finite()).map(Angle::as_radians)
+}
+
+const fn standing(angle: Angle) -> ModuleState {
+    ModuleState::new(AngularVelocity::ZERO, angle)
 }
 
 #[cfg(test)]
@@ -197,22 +237,38 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn go(degrees: f32) -> [ModuleState; 1] {
+    fn go(degrees: f32) -> ModuleState {
         let velocity = AngularVelocity::from_rad_per_s(10.0);
-        [ModuleState::new(velocity, Angle::from_degrees(degrees))]
+        ModuleState::new(velocity, Angle::from_degrees(degrees))
     }
 
-    fn at(degrees: f32) -> [Option<Angle>; 1] {
-        [Some(Angle::from_degrees(degrees))]
+    /// One module and what is remembered of it.
+    struct One {
+        swerve: Swerve<2>,
+        steering: SwerveSteering<2>,
     }
 
-    fn steered(steering: &mut SwerveSteering<1>, wanted: f32, measured: f32) -> (f32, f32) {
-        let [module] = steering.steer(go(wanted), at(measured));
-        (module.angle.as_degrees(), module.velocity.as_rad_per_s())
+    impl One {
+        fn new(config: SteeringConfig) -> Self {
+            let places = [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3)];
+            let swerve = Swerve::new(0.05, places).unwrap().with_steering(config);
+            Self { swerve, steering: SwerveSteering::new() }
+        }
+
+        fn steer(&mut self, wanted: ModuleState, measured: Option<f32>) -> (f32, f32) {
+            let measured = measured.map(Angle::from_degrees);
+            let [one, two] = self.swerve.steer(&mut self.steering, [wanted; 2], [measured; 2]);
+            assert_eq!(one, two);
+            (one.angle.as_degrees(), one.velocity.as_rad_per_s())
+        }
     }
 
-    fn fresh() -> SwerveSteering<1> {
-        SwerveSteering::new(SteeringConfig::new().without_cosine_compensation())
+    fn steered(one: &mut One, wanted: f32, measured: f32) -> (f32, f32) {
+        one.steer(go(wanted), Some(measured))
+    }
+
+    fn fresh() -> One {
+        One::new(SteeringConfig::new().without_cosine_compensation())
     }
 
     // The fifth seed's system and librm drive to angle 0 at zero command.
@@ -221,15 +277,39 @@ mod tests {
         let mut steering = fresh();
         let (angle, _) = steered(&mut steering, 60.0, 55.0);
         assert!((angle - 60.0).abs() < 1e-3);
-        let [held] = steering.steer([ModuleState::default()], at(57.0));
-        assert!((held.angle.as_degrees() - 60.0).abs() < 1e-3);
-        assert_eq!(held.velocity, AngularVelocity::ZERO);
+        let (angle, velocity) = steering.steer(ModuleState::default(), Some(57.0));
+        assert!((angle - 60.0).abs() < 1e-3 && velocity.abs() < 1e-9);
     }
 
     #[test]
     fn before_the_first_command_the_measured_angle_is_held() {
-        let [held] = fresh().steer([ModuleState::default()], at(123.0));
-        assert!((held.angle.as_degrees() - 123.0).abs() < 1e-3);
+        let (angle, _) = fresh().steer(ModuleState::default(), Some(123.0));
+        assert!((angle - 123.0).abs() < 1e-3);
+    }
+
+    // A target kept from before the first feedback would turn the module to 0 when it arms.
+    #[test]
+    fn before_the_first_feedback_nothing_is_kept_to_turn_to_later() {
+        let nan = ModuleState { velocity: AngularVelocity::from_rad_per_s(f32::NAN), ..go(80.0) };
+        for early in [ModuleState::default(), go(80.0), nan] {
+            let mut one = fresh();
+            assert_eq!(one.steer(early, None), (early.angle.as_degrees(), 0.0));
+            let _ = one.swerve.lock(&mut one.steering, [None; 2]);
+            assert!((one.steer(ModuleState::default(), Some(123.0)).0 - 123.0).abs() < 1e-3);
+        }
+        let lost = ModuleState { angle: Angle::from_radians(f32::NAN), ..go(0.0) };
+        assert_eq!(fresh().steer(lost, None), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_module_whose_angle_is_lost_stands_and_keeps_its_target() {
+        let mut one = fresh();
+        let _ = steered(&mut one, 60.0, 0.0);
+        for measured in [None, Some(f32::NAN)] {
+            let (angle, velocity) = one.steer(go(20.0), measured);
+            assert!((angle - 60.0).abs() < 1e-3 && velocity.abs() < 1e-9, "{angle} {velocity}");
+        }
+        assert!((steered(&mut one, 20.0, 50.0).0 - 20.0).abs() < 1e-3);
     }
 
     #[test]
@@ -264,29 +344,39 @@ mod tests {
 
     #[test]
     fn a_module_across_the_way_does_not_push() {
-        let mut steering = SwerveSteering::<1>::new(SteeringConfig::new());
-        let [module] = steering.steer(go(92.0), at(0.0));
-        assert!(module.velocity.as_rad_per_s().abs() < 1e-6);
+        let (_, velocity) = steered(&mut One::new(SteeringConfig::new()), 92.0, 0.0);
+        assert!(velocity.abs() < 1e-6);
+        let (_, velocity) = steered(&mut One::new(SteeringConfig::new()), 60.0, 0.0);
+        assert!((velocity - 5.0).abs() < 1e-5);
     }
 
     #[test]
     fn a_state_of_nan_holds() {
         let mut steering = fresh();
         let _ = steered(&mut steering, 30.0, 30.0);
-        let [module] = steering.steer(go(f32::NAN), at(31.0));
-        assert!((module.angle.as_degrees() - 30.0).abs() < 1e-3);
-        assert_eq!(module.velocity, AngularVelocity::ZERO);
+        let (angle, velocity) = steered(&mut steering, f32::NAN, 31.0);
+        assert!((angle - 30.0).abs() < 1e-3 && velocity.abs() < 1e-9);
     }
 
     #[test]
     fn the_lock_makes_an_x_by_the_shorter_way() {
-        let swerve = Swerve::new(0.05, [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3)]).unwrap();
-        let mut steering = SwerveSteering::<2>::new(SteeringConfig::new());
-        let [left, right] =
-            steering.lock(&swerve, [Some(Angle::ZERO), Some(Angle::from_degrees(170.0))]);
+        let One { swerve, mut steering } = One::new(SteeringConfig::new());
+        let measured = [0.0, 170.0].map(|degrees| Some(Angle::from_degrees(degrees)));
+        let [left, right] = swerve.lock(&mut steering, measured);
         assert!((left.angle.as_degrees() - 45.0).abs() < 0.3);
         assert!((right.angle.as_degrees() - 135.0).abs() < 0.3);
         assert_eq!(left.velocity, AngularVelocity::ZERO);
+        // Told to stand, the modules stay crossed.
+        let [still, _] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
+        assert_eq!(still, left);
+    }
+
+    #[test]
+    fn a_module_at_the_centre_holds_its_angle_in_the_lock() {
+        let swerve = Swerve::new(0.05, [Vec2::ZERO, Vec2::new(0.3, 0.0)]).unwrap();
+        let measured = [Some(Angle::from_degrees(70.0)); 2];
+        let [centre, _] = swerve.lock(&mut SwerveSteering::new(), measured);
+        assert!((centre.angle.as_degrees() - 70.0).abs() < 1e-3);
     }
 
     proptest! {

@@ -1,7 +1,7 @@
 use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
 use super::omni::zip_arrays;
-use super::{GeometryError, Kinematics, WheelSpeed};
+use super::{GeometryError, Kinematics, SteeringConfig, SwerveSteering, WheelSpeed};
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
 use crate::units::{Angle, AngularVelocity};
@@ -55,8 +55,8 @@ impl WheelSpeed for ModuleState {
 /// The kinematics of `N` steered and driven wheels.
 ///
 /// The module at `p` moves with `(vx - wz p.y, vy + wz p.x)`; its angle is the direction of that, its speed the length.
-/// The motion is the least-squares fit to all modules. What comes out of [`inverse`](Self::inverse) still goes through
-/// a [`SwerveSteering`](super::SwerveSteering), which finds the shorter way and keeps the angles at rest.
+/// The motion is the least-squares fit to all modules. What comes out of [`inverse`](Self::inverse) goes through
+/// [`steer`](Self::steer), which finds the shorter way and keeps the angles at rest; [`Chassis`](super::Chassis) does that.
 ///
 /// # Examples
 /// ```
@@ -78,6 +78,7 @@ pub struct Swerve<const N: usize> {
     shares: [[Twist<Body>; 2]; N],
     wheel_radius_m: f32,
     per_radius: f32,
+    steering: SteeringConfig,
 }
 
 /// What a module sees of a motion: the velocity of its place forward, and to the left.
@@ -90,7 +91,8 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Errors
     /// Names the value that is not finite or not above zero. [`GeometryError::Singular`] when there are fewer than two
-    /// modules, or all stand in one place.
+    /// modules, or all stand in one place, or nearly, as seen from the origin (two modules: when it is 8 times as far
+    /// off as they are from each other).
     pub fn new(wheel_radius_m: f32, positions_m: [Vec2; N]) -> Result<Self, GeometryError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !positions_m.iter().all(|position| position.is_finite()) {
@@ -101,7 +103,18 @@ impl<const N: usize> Swerve<N> {
             .ok_or(GeometryError::Singular("the rotation"))?;
         let shares = positions_m
             .map(|position| rows(position).map(|row| inverse.share(row) * wheel_radius_m));
-        Ok(Self { positions_m, shares, wheel_radius_m, per_radius: 1.0 / wheel_radius_m })
+        let (per_radius, steering) = (1.0 / wheel_radius_m, SteeringConfig::new());
+        Ok(Self { positions_m, shares, wheel_radius_m, per_radius, steering })
+    }
+
+    /// Sets how the modules are steered; [`SteeringConfig::new`] otherwise.
+    #[must_use]
+    pub const fn with_steering(self, steering: SteeringConfig) -> Self {
+        Self { steering, ..self }
+    }
+
+    pub(super) const fn steering_config(&self) -> SteeringConfig {
+        self.steering
     }
 
     /// Returns the places of the modules in m.
@@ -136,6 +149,9 @@ impl<const N: usize> Swerve<N> {
 impl<const N: usize> Kinematics for Swerve<N> {
     type Wheels<T: Copy> = [T; N];
     type Speed = ModuleState;
+    type Steering = SwerveSteering<N>;
+
+    const UNSTEERED: SwerveSteering<N> = SwerveSteering::new();
 
     fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.inverse(twist)
@@ -156,6 +172,23 @@ impl<const N: usize> Kinematics for Swerve<N> {
         }))
     }
 
+    fn steer(
+        &self,
+        steering: &mut SwerveSteering<N>,
+        wanted: [ModuleState; N],
+        measured: [Option<ModuleState>; N],
+    ) -> [ModuleState; N] {
+        self.steer(steering, wanted, angles(measured))
+    }
+
+    fn lock(
+        &self,
+        steering: &mut SwerveSteering<N>,
+        measured: [Option<ModuleState>; N],
+    ) -> [ModuleState; N] {
+        self.lock(steering, angles(measured))
+    }
+
     fn wheel_radius_m(&self) -> f32 {
         self.wheel_radius_m
     }
@@ -167,6 +200,10 @@ impl<const N: usize> Kinematics for Swerve<N> {
     fn zip<T: Copy, U: Copy>(a: [T; N], b: [U; N]) -> [(T, U); N] {
         zip_arrays(a, b)
     }
+}
+
+fn angles<const N: usize>(modules: [Option<ModuleState>; N]) -> [Option<Angle>; N] {
+    modules.map(|module| module.map(|module| module.angle))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, CanDevice, Claim, Edge, Ingest, Link, Missing, MotorName, Role};
 use crate::time::{Instant, Tick};
-use crate::units::AngularVelocity;
+use crate::units::{Angle, AngularVelocity};
 use embedded_can::StandardId;
 
 impl<B> CanDevice for Bus<B> {
@@ -162,6 +162,12 @@ impl<B> Bus<B> {
     pub(super) fn fresh_velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
         let slot = self.slot(motor)?;
         (slot.link() == Link::Online).then(|| slot.velocity())
+    }
+
+    /// Returns the measured angle of a motor that is online and knows where its shaft points.
+    pub(super) fn fresh_angle(&self, motor: AnyHandle<B>) -> Option<Angle> {
+        let state = self.slot(motor)?.state()?;
+        (state.link == Link::Online && state.homing.is_known()).then(|| state.position.angle())
     }
 }
 

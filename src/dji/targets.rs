@@ -4,7 +4,7 @@ use super::slot::Slot;
 use super::{AnyHandle, Bus, CurrentControlled, Handle, Model, VoltageControlled};
 use crate::control::PidConfig;
 use crate::encoder::Position;
-use crate::motor::{Capabilities, TargetError, VelocityDrive};
+use crate::motor::{AngleDrive, Capabilities, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
 
 /// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
@@ -236,5 +236,25 @@ impl<B> VelocityDrive<AnyHandle<B>> for Bus<B> {
         target: AngularVelocity,
     ) -> Result<(), TargetError> {
         Self::set_velocity(self, motor, target)
+    }
+}
+
+impl<M: Model, B> AngleDrive<Handle<M, B>> for Bus<B> {
+    fn angle(&self, motor: Handle<M, B>) -> Option<Angle> {
+        self.fresh_angle(motor.into())
+    }
+
+    fn set_angle(&mut self, motor: Handle<M, B>, target: Angle) -> Result<(), TargetError> {
+        Self::set_angle(self, motor, target)
+    }
+}
+
+impl<B> AngleDrive<AnyHandle<B>> for Bus<B> {
+    fn angle(&self, motor: AnyHandle<B>) -> Option<Angle> {
+        self.fresh_angle(motor)
+    }
+
+    fn set_angle(&mut self, motor: AnyHandle<B>, target: Angle) -> Result<(), TargetError> {
+        Self::set_angle(self, motor, target)
     }
 }

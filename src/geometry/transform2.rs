@@ -77,8 +77,8 @@ impl<From, To> Transform2<From, To> {
 
     /// Returns the transform that goes through `first` and then through `self`.
     ///
-    /// Rounding adds up as in [`Rotation2`]; call [`normalized`](Self::normalized) once in some thousand. Then a circle of
-    /// 1 m in 10^6 composed steps closes to 1 cm and 1e-3 rad.
+    /// Rounding adds up as in [`Rotation2`]; call [`normalized`](Self::normalized) once in a thousand. Then 10^6 composed
+    /// steps are right to 1e-3 rad and to 1e-3 of the largest distance on the way; a circle of 1 m closes to 1 cm.
     #[must_use]
     #[inline]
     pub const fn compose<Start>(self, first: Transform2<Start, From>) -> Transform2<Start, To> {

@@ -1,5 +1,5 @@
 use super::{Capabilities, Capability};
-use crate::units::AngularVelocity;
+use crate::units::{Angle, AngularVelocity};
 
 /// An owner of motors whose output shafts follow a velocity.
 ///
@@ -48,6 +48,30 @@ impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
 
     fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError> {
         (**self).set_velocity(motor, target)
+    }
+}
+
+/// An owner of motors whose output shafts go to an angle, by the shortest way: those that steer a wheel, say.
+///
+/// `H` is the owner's handle type. The motors have [`Capability::Angle`].
+pub trait AngleDrive<H: Copy> {
+    /// Returns the measured angle of the output shaft; `None` when there is no fresh feedback, or it is not homed.
+    fn angle(&self, motor: H) -> Option<Angle>;
+
+    /// Sets the angle that the output shaft is to go to; how many turns it has does not matter.
+    ///
+    /// # Errors
+    /// Says why the motor cannot take the target now. The value is then not kept for later.
+    fn set_angle(&mut self, motor: H, target: Angle) -> Result<(), TargetError>;
+}
+
+impl<H: Copy, D: AngleDrive<H>> AngleDrive<H> for &mut D {
+    fn angle(&self, motor: H) -> Option<Angle> {
+        (**self).angle(motor)
+    }
+
+    fn set_angle(&mut self, motor: H, target: Angle) -> Result<(), TargetError> {
+        (**self).set_angle(motor, target)
     }
 }
 

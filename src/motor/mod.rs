@@ -14,6 +14,7 @@
 //! |---|---|
 //! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
+//! | [`AngleDrive`] | an owner of motors that go to an angle: those that steer |
 //! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
@@ -48,7 +49,7 @@ pub use arming::{ArmError, Missing};
 pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
-pub use drive::{TargetError, VelocityDrive};
+pub use drive::{AngleDrive, TargetError, VelocityDrive};
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};

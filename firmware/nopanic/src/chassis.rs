@@ -29,10 +29,13 @@ pub fn call_all() {
     SteeringConfig::with_hold_below.call();
     SteeringConfig::without_cosine_compensation.call();
     SwerveSteering::<4>::new.call();
-    SwerveSteering::<4>::steer.call();
-    SwerveSteering::<4>::lock.call();
     ModuleState::new.call();
+    <AngularVelocity as WheelSpeed>::is_finite.call();
+    <ModuleState as WheelSpeed>::is_finite.call();
     Swerve::<4>::new.call();
+    Swerve::<4>::with_steering.call();
+    Swerve::<4>::steer.call();
+    Swerve::<4>::lock.call();
     Swerve::<4>::positions_m.call();
     Swerve::<4>::inverse.call();
     Swerve::<4>::forward.call();
@@ -42,6 +45,7 @@ pub fn call_all() {
     Chassis::<Mecanum>::set_world.call();
     Chassis::<Mecanum>::set_heading.call();
     Chassis::<Mecanum>::stop.call();
+    Chassis::<Mecanum>::lock.call();
     Chassis::<Mecanum>::restart.call();
     Chassis::<Mecanum>::update.call();
     Chassis::<Mecanum>::measured.call();
@@ -55,6 +59,20 @@ pub fn call_all() {
       wheels: MecanumWheels<AnyHandle>,
       tick: Tick| Chassis::drive(chassis, bus, wheels, tick))
     .call();
+    (|chassis: &mut Chassis<Swerve<4>>,
+      bus: &mut Bus,
+      modules: [ModuleMotors<AnyHandle, AnyHandle>; 4],
+      tick: Tick| Chassis::drive(chassis, bus, modules, tick))
+    .call();
+    (|chassis: &mut Chassis<Swerve<2>>,
+      drives: &mut Bus,
+      steerings: &mut Bus,
+      modules: [ModuleMotors<AnyHandle, AnyHandle>; 2],
+      tick: Tick| {
+        Chassis::drive(chassis, &mut SwerveBuses { drives, steerings }, modules, tick)
+    })
+    .call();
+    ModuleMotors::<AnyHandle, AnyHandle>::new.call();
     ChassisLimits::new.call();
     ChassisLimits::with_acceleration.call();
     ChassisLimits::with_wheel_speed.call();

@@ -160,3 +160,24 @@ fn gains_change_while_running() {
     let raw = sent(&mut bus)[0].1[0];
     assert!((3277..=6554).contains(&raw), "between the old and the new gain: {raw}");
 }
+
+#[test]
+fn the_angle_that_steers_is_known_while_the_motor_is_heard_and_homed() {
+    use crate::motor::AngleDrive;
+    let loops = |config: Config<Gm6020Voltage>| config.position_loop(SPEED, SPEED);
+    let (mut bus, [module]) = armed([loops(Config::new(1))]);
+    assert_eq!(bus.ingest(&feedback(0x205, 2048, 0), at_ms(2)), Ingest::Taken);
+    assert!(AngleDrive::angle(&bus, module).is_some_and(|a| (a.as_degrees() - 90.0).abs() < 1e-3));
+    AngleDrive::set_angle(&mut bus, AnyHandle::from(module), Angle::from_degrees(91.0)).unwrap();
+    step(&mut bus, 3);
+    assert!(sent(&mut bus)[0].1[0] > 0);
+    step(&mut bus, 500);
+    assert_eq!(AngleDrive::angle(&bus, module), None); // silent
+
+    let (mut bus, [geared]) = armed([Config::<M2006>::new(1).position_loop(SPEED, SPEED)]);
+    assert_eq!(AngleDrive::angle(&bus, geared), None);
+    let refused = AngleDrive::set_angle(&mut bus, geared, Angle::ZERO);
+    assert_eq!(refused, Err(TargetError::NotHomed));
+    bus.zero(geared).unwrap();
+    assert!(AngleDrive::angle(&bus, AnyHandle::from(geared)).is_some());
+}

@@ -6,6 +6,7 @@ can transmit: a mecanum wheel along its roller's axis, an omni wheel along its r
 
 Run: python3 generate.py > golden.txt
 Line: layout | vx vy wz | wheel values.  rad/s; for swerve: rad/s and degrees for each module.
+Line: layout | about x y wz | wheel values, for a pure rotation with wz about the point (x, y) of the body.
 """
 import cmath
 import math
@@ -22,12 +23,22 @@ def contact(point, vx, vy, wz):
     return (place(STEP) - place(-STEP)) / (2 * STEP)
 
 
+def about(point, x, y, wz):
+    """Velocity of a point of the body while the body turns about (x, y)."""
+    centre = complex(x, y)
+
+    def place(t):
+        return centre + (point - centre) * cmath.exp(1j * wz * t)
+
+    return (place(STEP) - place(-STEP)) / (2 * STEP)
+
+
 def through_roller(point, axis_degrees, radius):
     """Wheel rolling along x; its roller slides freely across its own axis and transmits along it."""
     axis = cmath.exp(1j * math.radians(axis_degrees))
 
-    def wheel(vx, vy, wz):
-        velocity = contact(point, vx, vy, wz)
+    def wheel(move, motion):
+        velocity = move(point, *motion)
         along = (velocity * axis.conjugate()).real
         return along / axis.real / radius  # the wheel's surface speed has the same part along the axis
 
@@ -36,7 +47,7 @@ def through_roller(point, axis_degrees, radius):
 
 def rolling(point, degrees, radius):
     direction = cmath.exp(1j * math.radians(degrees))
-    return lambda vx, vy, wz: (contact(point, vx, vy, wz) * direction.conjugate()).real / radius
+    return lambda move, motion: (move(point, *motion) * direction.conjugate()).real / radius
 
 
 R, A, B = 0.076, 0.20, 0.18
@@ -62,13 +73,16 @@ MOTIONS = [
     (0.7, -0.4, 2.5), (-1.3, 2.1, -3.2), (0.05, 0.02, 11.0),
 ]
 
+TURNS = [(0.3, -0.2, 2.0), (-0.5, 0.1, -1.5), (0.2, 0.18, 1.0)]
+CASES = [(contact, motion, "") for motion in MOTIONS] + [(about, turn, "about ") for turn in TURNS]
+
 for name, wheels in LAYOUTS.items():
-    for motion in MOTIONS:
-        values = " ".join(f"{wheel(*motion):.6f}" for wheel in wheels)
-        print(f"{name} | {' '.join(map(str, motion))} | {values}")
+    for move, motion, word in CASES:
+        values = " ".join(f"{wheel(move, motion):.6f}" for wheel in wheels)
+        print(f"{name} | {word}{' '.join(map(str, motion))} | {values}")
 SWERVES = {"swerve": CORNERS, "swerve_off_centre": [complex(0.3, 0.1), complex(0.0, -0.2), complex(-0.1, 0.3)]}
 for name, places in SWERVES.items():
-    for motion in MOTIONS:
-        velocities = [contact(p, *motion) for p in places]
+    for move, motion, word in CASES:
+        velocities = [move(p, *motion) for p in places]
         values = " ".join(f"{abs(v) / R:.6f} {math.degrees(cmath.phase(v)):.4f}" for v in velocities)
-        print(f"{name} | {' '.join(map(str, motion))} | {values}")
+        print(f"{name} | {word}{' '.join(map(str, motion))} | {values}")
