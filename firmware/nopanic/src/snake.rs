@@ -39,6 +39,10 @@ pub fn call_all() {
     Joints::with_bit_rate.call();
     Joints::with_tick_rate.call();
     Joints::load.call();
+    Joints::with_loopback.call();
+    Joints::health.call();
+    Joints::conditions.call();
+    Joints::next_edge.call();
     Joints::attach.call();
     Joints::detach.call();
     Joints::ingest.call();
