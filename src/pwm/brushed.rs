@@ -16,6 +16,7 @@ const LONGEST_STEP_S: f32 = 0.02;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
+    Rest,
     Duty(f32),
     Velocity(f32),
 }
@@ -103,7 +104,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             config,
             speed,
             guard: guard.with_timeouts(config.timeouts),
-            target: Target::Duty(0.0),
+            target: Target::Rest,
             way: Way::Coast,
             output: 0.0,
             held_steps: 0,
@@ -241,12 +242,12 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         match (self.target, &mut self.speed) {
             (Target::Duty(share), _) => share,
             (Target::Velocity(goal), Some(speed)) => speed.step(goal, self.rad_per_s, &step),
-            (Target::Velocity(_), None) => 0.0,
+            (Target::Rest, _) | (Target::Velocity(_), None) => 0.0,
         }
     }
 
     fn rest(&mut self) {
-        self.target = Target::Duty(0.0);
+        self.target = Target::Rest;
         self.speed.iter_mut().for_each(Pid::reset);
     }
 

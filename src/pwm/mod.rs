@@ -19,8 +19,8 @@
 //! | [`PwmError`], [`BrushedError`] | what is wrong with a configuration, or with a pin |
 //!
 //! They follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a target
-//! that is old, NaN or infinite, time that stands or goes back, lost feedback and an emergency stop give the safe output,
-//! and so does a bad time step where there is a loop. Each change is an [`Edge`](crate::motor::Edge) that waits in
+//! that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency stop give
+//! the safe output. Each change is an [`Edge`](crate::motor::Edge) that waits in
 //! `next_edge`. They are no
 //! [`CanDevice`](crate::motor::CanDevice), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.

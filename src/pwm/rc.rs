@@ -1,3 +1,4 @@
+use crate::control::TimeStep;
 use crate::motor::{
     Capabilities, Capability, Conditions, Edge, Guard, Health, MotorName, TargetError, Timeouts,
     VelocityDrive,
@@ -5,6 +6,9 @@ use crate::motor::{
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
+
+/// Nothing is integrated here.
+const ANY_STEP_S: f32 = f32::INFINITY;
 
 /// What an [`RcPwm`] sends when it is not to move.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -180,6 +184,7 @@ pub struct RcPwm<P> {
     guard: Guard,
     arming: Arming,
     throttle: f32,
+    held_steps: u8,
 }
 
 /// Where the arming sequence is.
@@ -201,7 +206,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
     pub fn new(channel: P, config: RcConfig) -> Result<Self, PwmError> {
         config.validate()?;
         let guard = Guard::without_feedback().with_timeouts(config.timeouts);
-        Ok(Self { channel, config, guard, arming: Arming::Idle, throttle: 0.0 })
+        Ok(Self { channel, config, guard, arming: Arming::Idle, throttle: 0.0, held_steps: 0 })
     }
 
     /// Begins to arm: the updates send neutral for the configured time, and targets are taken then. Without effect while
@@ -254,7 +259,9 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if self.arming != Arming::Idle {
             return self.go_on_arming(tick.now());
         }
-        if drives {
+        let holds = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        self.held_steps = if holds { self.held_steps.saturating_add(1) } else { 0 };
+        if drives && self.held_steps < 2 {
             self.send(self.pulse_us())
         } else if self.config.idle == Idle::Off {
             self.channel.set_duty_cycle_fully_off()

@@ -321,3 +321,20 @@ fn a_stall_that_is_ignored_is_none() {
     assert_eq!(run(&mut motor, 1..2_000, 30.0, |_| Some(0)), []);
     assert!(motor.is_armed());
 }
+
+#[test]
+fn from_rest_the_proportional_part_acts_at_once_and_from_a_duty_nothing_jumps() {
+    let log = Log::default();
+    let mut motor = motor(&log, WHEEL);
+    motor.ingest_counts(0, at_ms(0));
+    motor.arm(at_ms(0)).unwrap();
+    let goal = AngularVelocity::from_rad_per_s(10.0);
+    motor.set_velocity((), goal).unwrap();
+    motor.update(tick(1)).unwrap();
+    assert!((motor.duty() - 0.2).abs() < 1e-6, "kp of 0.02: {}", motor.duty());
+    motor.set_duty(0.5).unwrap();
+    motor.update(tick(2)).unwrap();
+    motor.set_velocity((), goal).unwrap();
+    motor.update(tick(3)).unwrap();
+    assert!((motor.duty() - 0.5).abs() < 1e-6, "{}", motor.duty());
+}
