@@ -443,4 +443,25 @@ mod tests {
         guard.clear_emergency_stop();
         assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
     }
+
+    #[test]
+    fn a_hundred_thousand_silences_end_with_the_first_tick_after_the_limit() {
+        let mut state = 1_u64;
+        let mut below = |limit: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) % limit
+        };
+        for _ in 0..100_000 {
+            let (mut guard, heard) = (Guard::new(), below(1_000_000_000));
+            guard.hear(Instant::from_micros(heard));
+            assert!(guard.engage(Instant::from_micros(heard)));
+            let (mut now, mut drives) = (heard, true);
+            while drives {
+                _ = guard.admit(true);
+                now += 800 + below(400);
+                drives = guard.drives(Instant::from_micros(now));
+                assert_eq!(drives, now <= heard + 10_000, "heard at {heard}, now {now}");
+            }
+        }
+    }
 }

@@ -25,6 +25,9 @@
 //! [`CanDevice`](crate::motor::CanDevice), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
 //!
+//! No runner watches them: where an [`EmergencyStop`](crate::runner::EmergencyStop) is set from an interrupt, call
+//! `emergency_stop` in the tick that finds it set.
+//!
 //! # Limits
 //! A pin that fails is reported by `update` and tried again in the next one; the hardware may then go on with what it
 //! had. When `update` is no longer called, the timer goes on with its last pulse: a hardware watchdog is needed.

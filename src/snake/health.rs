@@ -1,7 +1,7 @@
 //! What is wrong with the joints of a bus.
 
 use super::{Joint, Joints};
-use crate::motor::{Conditions, Edge, Health};
+use crate::motor::{Capabilities, Capability, Conditions, Edge, Health};
 
 /// Health: what is wrong with each joint, and every change of it.
 impl Joints {
@@ -11,6 +11,15 @@ impl Joints {
     pub const fn with_loopback(mut self) -> Self {
         self.echoes = true;
         self
+    }
+
+    /// Returns what a joint offers: positions over many turns, in radians or in its own pulses, and what it reports of
+    /// them. Nothing once it is detached. There is no function for any other target.
+    #[must_use]
+    pub fn capabilities(&self, joint: Joint) -> Capabilities {
+        const OFFERED: Capabilities =
+            Capabilities::of(&[Capability::Raw, Capability::Position, Capability::Feedback]);
+        self.slot(joint).map_or(Capabilities::NONE, |_| OFFERED)
     }
 
     /// Returns how a joint is; `None` once it is detached. Its feedback rate is that of positions, and its ambiguous gaps

@@ -46,6 +46,7 @@
 //! | late, offline | there is no fresh position; it is lost, until ten came in a row | is disabled; waits to be armed after *offline* |
 //! | ESC fault | it was found disabled, or further off than it can go, until it is armed | is disabled, waits to be armed |
 //! | position uncertain | the drive may have lost its zero, until that is set | goes on |
+//! | stalled | it has a way to go and does not move: blocked in either direction | as configured; goes on |
 //! | command lost | the application let its target grow too old | is disabled, until the next target |
 //! | second master | another node wrote to it or asked it within the last second | goes on, and is not armed |
 //!

@@ -2,6 +2,7 @@
 
 mod health;
 
+use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
 use super::{AttachError, Command, Config, Joint, Register, Reply, Settings, State};
 use crate::encoder::{Homing, Position};
@@ -10,6 +11,7 @@ use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::host_link::Offset;
 use core::f32::consts::TAU;
+use health::Standing;
 
 /// A relaxed joint is told again after this time: its drive may have missed it.
 const KEEP_RELAXED: Duration = Duration::from_millis(100);
@@ -52,6 +54,8 @@ pub(super) struct Slot {
     window_from: Instant,
     /// When another node wrote to the joint or asked it last.
     rival_heard: Option<Instant>,
+    stall: Stall,
+    stands: Standing,
 }
 
 impl Slot {
@@ -82,6 +86,8 @@ impl Slot {
         traffic: Traffic::NONE,
         window_from: Instant::START,
         rival_heard: None,
+        stall: Stall::USUAL,
+        stands: Standing { at: 0, since: Instant::START },
     };
 
     /// Makes the slot of a joint, validating its configuration.
@@ -106,6 +112,7 @@ impl Slot {
             reversed: config.reversed,
             settings: *config.settings(),
             guard: Guard::new().with_timeouts(timeouts),
+            stall: config.stall,
             speed: to_pulses(speed),
             ..Self::FREE
         })

@@ -20,6 +20,7 @@ pub fn call_all() {
     Config::new.call();
     Config::reversed.call();
     Config::with_speed.call();
+    Config::with_stall.call();
     Config::with_settings.call();
     Config::id.call();
     Config::settings.call();
@@ -41,6 +42,7 @@ pub fn call_all() {
     Joints::load.call();
     Joints::with_loopback.call();
     Joints::health.call();
+    Joints::capabilities.call();
     Joints::conditions.call();
     Joints::next_edge.call();
     Joints::attach.call();

@@ -245,3 +245,23 @@ fn what_is_offered_is_what_is_taken() {
         "raw, voltage, velocity, angle, position, feedback, temperature, absolute angle"
     );
 }
+
+#[test]
+fn a_sensor_that_dies_is_an_edge_with_its_time() {
+    let (mut bus, [yaw]) = armed([yaw_config()]);
+    let measured = imu(0.0, 0.0, at_ms(1_000));
+    for ms in 2..1_100 {
+        let at = at_ms(ms);
+        let _stale = bus.set_angle_measured(
+            yaw,
+            radians(0.1),
+            Measured { at: at.min(measured.at), ..measured },
+        );
+        run(&mut bus, ms, 0, 0);
+    }
+    let edge = bus.next_edge().unwrap();
+    assert_eq!((edge.condition, edge.began), (crate::motor::Condition::CommandLost, true));
+    // 20 ms old is too old.
+    assert!((1_019_000..=1_022_000).contains(&edge.at.as_micros()), "{edge}");
+    assert_eq!(bus.next_edge(), None);
+}

@@ -1,7 +1,7 @@
 //! Every change is an edge with its time, waits until it is read, and is read once.
 
 use super::*;
-use crate::motor::{Condition, Edge};
+use crate::motor::{Condition, Edge, Reaction};
 
 /// Reads all that waits: joint, condition, whether it began.
 fn edges(joints: &mut Joints) -> Vec<(u8, Condition, bool)> {
@@ -155,4 +155,72 @@ fn health_is_a_line_with_rate_and_longest_gap() {
     assert!(health.to_string().starts_with("snake joint #1: online, armed, healthy; 5"));
     bench.joints.detach(bench.handles[0]);
     assert_eq!(bench.joints.health(bench.handles[0]), None);
+}
+
+/// A joint with a stall window of 300 ms, at 10 rpm; it moves to its target as long as it is not blocked.
+fn run_to(bench: &mut Bench, pulses: i32, ms: u64, blocked: bool) -> Vec<(Condition, bool, u64)> {
+    let begin = bench.ms;
+    let mut seen = Vec::new();
+    for _ in 0..ms {
+        _ = bench.joints.set_pulses(bench.handles[0], pulses);
+        bench.run(1);
+        if bench.enabled[0] == 1 && !blocked {
+            let way = pulses - bench.raw[0];
+            bench.raw[0] += way.clamp(-11, 11); // 10 rpm
+        }
+        let told = read(&mut bench.joints);
+        seen.extend(told.iter().map(|edge| (edge.condition, edge.began, bench.ms - begin)));
+    }
+    seen
+}
+
+fn jaw(reaction: Reaction) -> Bench {
+    let mut bench = Bench::new(&[]);
+    let config = Config::new(1).with_stall(Duration::from_millis(300), reaction);
+    bench.handles.push(bench.joints.attach(config).unwrap());
+    bench.run(10);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    bench
+}
+
+#[test]
+fn a_blocked_joint_is_stalled_in_either_direction_and_relaxed_where_configured() {
+    for direction in [1, -1] {
+        let mut bench = jaw(Reaction::Report);
+        assert_eq!(run_to(&mut bench, 8_000 * direction, 400, false), []);
+        let seen = run_to(&mut bench, 8_000 * direction, 600, true);
+        assert!(matches!(seen[..], [(Condition::Stalled, true, 270..=330)]), "{seen:?}");
+        assert!(bench.state(0).is_driven);
+        let seen = run_to(&mut bench, 8_000 * direction, 2_000, false);
+        assert!(matches!(seen[..], [(Condition::Stalled, false, 10..=60)]), "{seen:?}");
+
+        let mut bench = jaw(Reaction::Relax);
+        let seen = run_to(&mut bench, 8_000 * direction, 600, true);
+        let [(Condition::Stalled, true, at), (Condition::Stalled, false, _)] = seen[..] else {
+            panic!("{seen:?}");
+        };
+        assert!((300..=330).contains(&at) && bench.enabled[0] == 0, "{at}");
+        assert_eq!(bench.joints.set_pulses(bench.handles[0], 0), Err(TargetError::Relaxed));
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+    }
+}
+
+#[test]
+fn a_joint_that_is_there_or_creeps_or_is_not_looked_at_is_not_stalled() {
+    let mut bench = jaw(Reaction::Report);
+    assert_eq!(run_to(&mut bench, 1_000, 2_000, true), [], "there");
+    assert_eq!(run_to(&mut bench, 30_000, 5_000, false), [], "on its way");
+    bench.joints.set_speed(bench.handles[0], AngularVelocity::from_rpm(1.0)).unwrap();
+    assert_eq!(run_to(&mut bench, 0, 2_000, true), [], "1 rpm is 328 pulses in 300 ms");
+    let mut bench = jaw(Reaction::Ignore);
+    assert_eq!(run_to(&mut bench, 30_000, 2_000, true), []);
+}
+
+#[test]
+fn it_offers_positions_and_nothing_once_it_is_detached() {
+    let mut bench = Bench::new(&[1]);
+    let neck = bench.handles[0];
+    assert_eq!(bench.joints.capabilities(neck).to_string(), "raw, position, feedback");
+    bench.joints.detach(neck);
+    assert_eq!(bench.joints.capabilities(neck).to_string(), "nothing");
 }
