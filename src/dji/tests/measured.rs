@@ -247,21 +247,26 @@ fn what_is_offered_is_what_is_taken() {
 }
 
 #[test]
-fn a_sensor_that_dies_is_an_edge_with_its_time() {
+fn a_sensor_that_dies_or_tells_old_news_is_an_edge_with_its_time() {
+    let lost = |bus: &mut Bus, from, until| {
+        let edge = bus.next_edge().unwrap();
+        assert_eq!((edge.condition, edge.began), (crate::motor::Condition::CommandLost, true));
+        assert!((from..=until).contains(&edge.at.as_micros()), "{edge}");
+        assert_eq!(bus.next_edge(), None);
+    };
     let (mut bus, [yaw]) = armed([yaw_config()]);
-    let measured = imu(0.0, 0.0, at_ms(1_000));
     for ms in 2..1_100 {
-        let at = at_ms(ms);
-        let _stale = bus.set_angle_measured(
-            yaw,
-            radians(0.1),
-            Measured { at: at.min(measured.at), ..measured },
-        );
+        // 20 ms old is too old: found by an update.
+        let at = at_ms(ms.min(1_000));
+        let _stale = bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at));
         run(&mut bus, ms, 0, 0);
     }
-    let edge = bus.next_edge().unwrap();
-    assert_eq!((edge.condition, edge.began), (crate::motor::Condition::CommandLost, true));
-    // 20 ms old is too old.
-    assert!((1_019_000..=1_022_000).contains(&edge.at.as_micros()), "{edge}");
-    assert_eq!(bus.next_edge(), None);
+    lost(&mut bus, 1_019_000, 1_022_000);
+    bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at_ms(1_099))).unwrap();
+    (1_100..1_110).for_each(|ms| _ = run(&mut bus, ms, 0, 0));
+    while bus.next_edge().is_some() {} // a target again
+    // Found when it is set.
+    let old = bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at_ms(1_060)));
+    assert_eq!(old, Err(TargetError::StaleMeasurement));
+    lost(&mut bus, 1_107_000, 1_110_000);
 }
