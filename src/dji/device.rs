@@ -102,6 +102,9 @@ impl<B> CanDevice for Bus<B> {
 impl<B> Bus<B> {
     /// Arms these motors only, whatever the others do.
     ///
+    /// It knows this bus alone: where it is a part of a device of several families, look at
+    /// [`clash`](CanDevice::clash) of the whole first.
+    ///
     /// # Errors
     /// As [`CanDevice::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
     ///

@@ -97,7 +97,12 @@ impl<B> Bus<B> {
         let is_far = is_ahead || self.updated.since(at) > timeouts.measured();
         let at = (!is_far).then(|| at.stamp());
         let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
-        slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)?;
+        let before = slot.conditions;
+        let outcome =
+            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts);
+        let after = slot.conditions;
+        self.journal.note(motor.key().place(), &before, &after, self.updated);
+        outcome?;
         // It lasts for a shorter time than other targets.
         self.disturb();
         Ok(())

@@ -31,10 +31,14 @@ use crate::time::{Instant, Tick};
 ///     fn requeue(&mut self, frame: &CanFrame) -> bool {
 ///         (&mut self.chassis, &mut self.gimbal).requeue(frame)
 ///     }
+///     fn superseded(&self) -> u32 { self.chassis.superseded().wrapping_add(self.gimbal.superseded()) }
 ///     fn claims(&self) -> impl Iterator<Item = Claim> { self.chassis.claims().chain(self.gimbal.claims()) }
 ///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
 ///         self.chassis.missing(now).chain(self.gimbal.missing(now))
 ///     }
+///     fn faulty(&self) -> impl Iterator<Item = MotorName> { self.chassis.faulty().chain(self.gimbal.faulty()) }
+///     fn second_master(&self) -> Option<Claim> { self.chassis.second_master().or_else(|| self.gimbal.second_master()) }
+///     fn next_edge(&mut self) -> Option<Edge> { (&mut self.chassis, &mut self.gimbal).next_edge() }
 ///     fn engage(&mut self, now: Instant) { (&mut self.chassis, &mut self.gimbal).engage(now) }
 ///     fn disarm(&mut self) { (&mut self.chassis, &mut self.gimbal).disarm() }
 ///     fn is_armed(&self) -> bool { self.chassis.is_armed() && self.gimbal.is_armed() }
@@ -84,7 +88,8 @@ pub trait CanDevice {
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
     /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say. None unless said
-    /// otherwise.
+    /// otherwise: a struct of devices has to forward it, and [`second_master`](Self::second_master), or it is armed in spite
+    /// of them.
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         core::iter::empty()
     }
@@ -95,7 +100,8 @@ pub trait CanDevice {
         None
     }
 
-    /// Returns the oldest change of a motor's condition that was not read yet. None for a device that notes none.
+    /// Returns the oldest change of a motor's condition that was not read yet; of a combined device, that of its first part
+    /// with one. None for a device that notes none.
     ///
     /// Changes wait until they are read, so it can be called as often or as seldom as is convenient.
     fn next_edge(&mut self) -> Option<Edge> {

@@ -1,11 +1,13 @@
-use super::{Condition, Conditions, Edge, Journal, Latch, Link, MotorName, TargetError, Timeouts};
-use crate::time::Instant;
+use super::{
+    Condition, Conditions, Edge, Health, Journal, Latch, Link, MotorName, TargetError, Timeouts,
+};
+use crate::time::{Duration, Instant};
 
 /// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
 ///
 /// It keeps the rules that all motors here have in common, so that an own motor has them too: nothing before it is
-/// armed; feedback that is late or lost, a target that is old, NaN or infinite, and time that goes back give zero; an
-/// emergency stop stays until it is cleared and armed. Times do not wrap.
+/// armed; feedback that is late or lost, a target that is old, NaN or infinite, and time that stands or goes back give
+/// zero; an emergency stop stays until it is cleared and armed. Times do not wrap.
 ///
 /// ```text
 /// feedback ──> hear(now)          target ──> admit(is_finite)?
@@ -30,6 +32,8 @@ use crate::time::Instant;
 pub struct Guard {
     timeouts: Timeouts,
     now: Instant,
+    /// How often in a row the time of a tick was that of the one before.
+    stands: u8,
     heard: Option<Instant>,
     commanded: Option<Instant>,
     link: Link,
@@ -52,6 +56,7 @@ impl Guard {
         Self {
             timeouts: Timeouts::new(),
             now: Instant::START,
+            stands: 0,
             heard: None,
             commanded: None,
             link: Link::Unheard,
@@ -132,8 +137,13 @@ impl Guard {
             // Ages cannot be told any more.
             self.reversals = self.reversals.saturating_add(1);
             self.heard = self.heard.map(|heard| heard.min(now));
+            if self.commanded.is_some() {
+                self.note(Condition::CommandLost, true, now);
+            }
             self.lose();
         }
+        // Ages stand as well then; one repetition is that of a tick in which it was armed.
+        self.stands = if now == self.now { self.stands.saturating_add(1) } else { 0 };
         self.now = now;
         self.age(now);
         if let Some(commanded) = self.commanded {
@@ -143,7 +153,7 @@ impl Guard {
                 self.note(Condition::CommandLost, true, now);
             }
         }
-        self.is_armed() && self.link == Link::Online && self.commanded.is_some()
+        self.is_armed() && self.link == Link::Online && self.has_target() && self.stands < 2
     }
 
     fn age(&mut self, now: Instant) {
@@ -225,6 +235,30 @@ impl Guard {
         let (condition, began) = self.latch.next()?;
         self.latch.take(condition, began);
         Some(Edge { motor, condition, began, at: self.journal.last_time(self.now) })
+    }
+
+    /// Returns what the guard knows of a motor's health.
+    pub(crate) const fn health(&self, motor: MotorName) -> Health {
+        Health {
+            motor,
+            link: self.link,
+            armed: self.is_armed(),
+            conditions: self.conditions(),
+            feedback_hz: 0,
+            longest_gap: Duration::ZERO,
+            temperature_c: None,
+            error_code: 0,
+            saturated: 0,
+            refused_targets: self.refused_targets,
+            forgotten_targets: self.forgotten_targets,
+            ambiguous_gaps: 0,
+        }
+    }
+
+    /// Returns when the change that [`next_edge`](Self::next_edge) returns next was noted: to read several motors in order.
+    pub(crate) fn next_edge_at(&self) -> Option<Instant> {
+        self.latch.next()?;
+        Some(self.journal.first_time(self.now).unwrap_or_else(|| self.journal.last_time(self.now)))
     }
 
     /// Tells whether there is a target that still counts.
@@ -323,7 +357,6 @@ impl Default for Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Duration;
 
     fn at_ms(ms: u64) -> Instant {
         Instant::START + Duration::from_millis(ms)
@@ -375,6 +408,23 @@ mod tests {
     }
 
     #[test]
+    fn time_that_stands_still_is_never_fresh_for_ever() {
+        for mut guard in [driving(), Guard { listens: false, ..driving() }] {
+            assert!(guard.drives(at_ms(1)), "the tick in which it was armed");
+            assert!(!guard.drives(at_ms(1)) && !guard.drives(at_ms(1)));
+            assert!(guard.has_target() && guard.drives(at_ms(2)), "it ends by itself");
+        }
+    }
+
+    #[test]
+    fn time_that_goes_back_is_an_edge_for_a_motor_that_is_not_heard_too() {
+        let mut guard = Guard { listens: false, ..driving() };
+        assert!(guard.drives(at_ms(5)) && !guard.drives(at_ms(4)));
+        let edge = guard.next_edge(MotorName::new("fan", 1)).unwrap();
+        assert_eq!((edge.condition, edge.began), (Condition::CommandLost, true));
+    }
+
+    #[test]
     fn a_stamp_a_little_ahead_is_fresh_and_one_far_ahead_is_not() {
         let mut guard = driving();
         guard.hear(at_ms(20));
@@ -392,5 +442,26 @@ mod tests {
         assert!(!guard.is_armed() && guard.is_stopped() && !guard.drives(at_ms(2)));
         guard.clear_emergency_stop();
         assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
+    }
+
+    #[test]
+    fn a_hundred_thousand_silences_end_with_the_first_tick_after_the_limit() {
+        let mut state = 1_u64;
+        let mut below = |limit: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) % limit
+        };
+        for _ in 0..100_000 {
+            let (mut guard, heard) = (Guard::new(), below(1_000_000_000));
+            guard.hear(Instant::from_micros(heard));
+            assert!(guard.engage(Instant::from_micros(heard)));
+            let (mut now, mut drives) = (heard, true);
+            while drives {
+                _ = guard.admit(true);
+                now += 800 + below(400);
+                drives = guard.drives(Instant::from_micros(now));
+                assert_eq!(drives, now <= heard + 10_000, "heard at {heard}, now {now}");
+            }
+        }
     }
 }

@@ -192,8 +192,7 @@ impl core::error::Error for HomingError {}
 /// bear and that is above the effort of the stop; and a speed loop with an integral, that presses until it gets there.
 ///
 /// # Examples
-/// The whole procedure with a DJI motor is a loop of a few lines; `examples/custom_motor.rs` shows what a motor of your
-/// own needs.
+/// The whole procedure with a DJI motor is a loop of a few lines, and with a motor of your own it is the same.
 /// ```
 /// use drivetrain::control::PidConfig;
 /// use drivetrain::dji::{Bus, Config, M2006};
@@ -326,8 +325,10 @@ impl StopHoming {
     }
 
     fn back_off(&mut self, shaft: ShaftState, from: Position) -> HomingStep {
-        let moved = (shaft.position - from).as_radians().abs();
-        if moved >= self.config.back_off.as_radians() {
+        let moved = (shaft.position - from).as_radians();
+        // A stop that yields is no way back.
+        let away = if self.config.velocity.as_rad_per_s() < 0.0 { moved } else { -moved };
+        if away >= self.config.back_off.as_radians() {
             self.phase = Phase::Done;
             return HomingStep::Done;
         }
@@ -402,6 +403,23 @@ mod tests {
         assert_eq!(homing.step(turned(0.11), tick(503)), HomingStep::Done);
         assert_eq!(homing.step(None, tick(9_999)), HomingStep::Done);
         assert!(homing.is_done());
+    }
+
+    #[test]
+    fn a_stop_that_yields_is_no_way_back_in_either_direction() {
+        let up = StopHomingConfig { velocity: AngularVelocity::from_rad_per_s(2.0), ..DOWN };
+        for (config, direction) in [(DOWN, -1.0), (up, 1.0)] {
+            let mut homing = StopHoming::new(config).unwrap();
+            let mut step = |radians: f32, ms| {
+                homing.step(at(radians * direction, 0.0, 9.0 * direction), tick(ms))
+            };
+            _ = step(0.0, 0);
+            assert!(matches!(step(0.0, 100), HomingStep::SetPresentPosition(_)));
+            for (ms, radians) in [(101, 0.0), (102, 0.2), (103, -0.09)] {
+                assert!(matches!(step(radians, ms), HomingStep::Drive(_)), "{radians} further on");
+            }
+            assert_eq!(step(-0.11, 104), HomingStep::Done);
+        }
     }
 
     #[test]

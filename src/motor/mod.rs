@@ -60,4 +60,4 @@ pub use measured::Measured;
 pub use name::MotorName;
 pub use own::{Own, OwnMotor};
 pub use vitals::{Severity, Vitals};
-use watch::Watch;
+pub(crate) use watch::Watch;

@@ -16,9 +16,9 @@ const PERIOD: Duration = Duration::from_millis(8);
 /// Frames are counted for this long.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// Looks after one own motor: counts its frames, and looks at what it tells of itself.
+/// Looks after one motor that is no DJI motor's slot: counts its frames, and looks at what it tells of itself.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Watch {
+pub(crate) struct Watch {
     config: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
@@ -33,7 +33,7 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self {
             config: &USUAL,
             monitor: Monitor::NEW,
@@ -48,13 +48,13 @@ impl Watch {
         }
     }
 
-    pub(super) fn with_config(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
+    pub(crate) fn with_config(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         config.validate()?;
         Ok(Self { config, ..self })
     }
 
     /// Feedback came.
-    pub(super) fn hear(&mut self, now: Instant) {
+    pub(crate) fn hear(&mut self, now: Instant) {
         match self.heard.replace(now) {
             Some(before) => {
                 let gap = now.since(before).micros_u32();
@@ -66,30 +66,30 @@ impl Watch {
     }
 
     /// Another node sent the command frame.
-    pub(super) fn hear_rival(&mut self, now: Instant) {
+    pub(crate) fn hear_rival(&mut self, now: Instant) {
         if !self.config.ignores(Condition::SecondMaster) {
             self.rival = Some(now);
         }
     }
 
-    pub(super) const fn has_rival(&self) -> bool {
+    pub(crate) const fn has_rival(&self) -> bool {
         self.rival.is_some()
     }
 
     /// Tells whether the motor must not be armed.
-    pub(super) fn is_faulty(&self, guard: &Guard) -> bool {
+    pub(crate) fn is_faulty(&self, guard: &Guard) -> bool {
         let fault = Conditions::NONE.with(Condition::Fault);
         !guard.conditions().and(fault).and(self.config.relaxing()).is_empty()
     }
 
     /// The motor is about to be driven.
-    pub(super) fn start(&mut self, guard: &mut Guard, now: Instant) {
+    pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
         guard.note(Condition::Runaway, false, now);
         self.monitor = Monitor::NEW;
     }
 
     /// Looks at the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
-    pub(super) fn look(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
+    pub(crate) fn look(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
         let before = guard.conditions();
         self.count_frames(now);
         self.rival = self.rival.filter(|rival| now.since(*rival) <= RIVAL_FORGOTTEN);
@@ -145,20 +145,14 @@ impl Watch {
         }
     }
 
-    pub(super) fn health(&self, motor: MotorName, guard: &Guard, vitals: &Vitals) -> Health {
+    pub(crate) fn health(&self, motor: MotorName, guard: &Guard, vitals: &Vitals) -> Health {
         Health {
-            motor,
-            link: guard.link(),
-            armed: guard.is_armed(),
-            conditions: guard.conditions(),
             feedback_hz: self.traffic.rate_hz(),
             longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
             temperature_c: vitals.temperature_c,
             error_code: vitals.error_code,
             saturated: self.saturated,
-            refused_targets: guard.refused_targets(),
-            forgotten_targets: guard.forgotten_targets(),
-            ambiguous_gaps: 0,
+            ..guard.health(motor)
         }
     }
 }

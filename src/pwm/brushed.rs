@@ -1,128 +1,22 @@
+mod config;
 mod drive;
+mod health;
 
 use super::rc::duty;
 use super::{Direction, Way};
-use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
-use crate::motor::{ArmError, Guard, Missing, MotorName, TargetError, Timeouts};
+use crate::control::{Pid, TimeStep};
+use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
 use crate::time::{Instant, Tick};
+pub use config::BrushedConfig;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
 
 /// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
 
-/// What a brushed motor needs to be known of.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::PidConfig;
-/// use drivetrain::pwm::BrushedConfig;
-///
-/// // 11 lines, counted fourfold, behind a gear of 30: 1320 counts a turn of the output shaft.
-/// const WHEEL: BrushedConfig = BrushedConfig::new(1)
-///     .with_encoder(11.0 * 4.0 * 30.0, 16)
-///     .with_speed_loop(PidConfig::new(0.02, 0.3, 0.0)) // of full duty, per rad/s and per rad
-///     .with_limit(0.8);
-/// assert!(WHEEL.validate().is_ok());
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BrushedConfig {
-    name: MotorName,
-    counts_per_turn: Option<f32>,
-    counter_bits: u32,
-    filter_s: f32,
-    speed: Option<PidConfig>,
-    limit: f32,
-    reversed: bool,
-    timeouts: Timeouts,
-}
-
-impl BrushedConfig {
-    /// Takes the number by which the motor is called in errors. Without encoder and loop, with full duty as its limit.
-    #[must_use]
-    pub const fn new(id: u8) -> Self {
-        Self {
-            name: MotorName::new("brushed", id),
-            counts_per_turn: None,
-            counter_bits: 32,
-            filter_s: 0.005,
-            speed: None,
-            limit: 1.0,
-            reversed: false,
-            timeouts: Timeouts::new(),
-        }
-    }
-
-    /// Adds an encoder: its counts for a turn of the output shaft, and the width of its counter in bits, 8 to 32.
-    #[must_use]
-    pub const fn with_encoder(self, counts_per_turn: f32, counter_bits: u32) -> Self {
-        Self { counts_per_turn: Some(counts_per_turn), counter_bits, ..self }
-    }
-
-    /// Sets the time constant that smooths the measured velocity, in s: 5 ms at first, 0 for none.
-    #[must_use]
-    pub const fn with_velocity_filter(self, time_constant_s: f32) -> Self {
-        Self { filter_s: time_constant_s, ..self }
-    }
-
-    /// Adds a speed loop: rad/s of the output shaft in, a share of full duty out. It needs the encoder.
-    #[must_use]
-    pub const fn with_speed_loop(self, speed: PidConfig) -> Self {
-        Self { speed: Some(speed), ..self }
-    }
-
-    /// Lowers the largest duty, for the loop and for direct commands alike: above 0, at most 1.
-    #[must_use]
-    pub const fn with_limit(self, share: f32) -> Self {
-        Self { limit: share, ..self }
-    }
-
-    /// Turns the positive direction around, of duty and encoder alike.
-    #[must_use]
-    pub const fn reversed(self) -> Self {
-        Self { reversed: !self.reversed, ..self }
-    }
-
-    /// Sets when counts and targets count as lost.
-    #[must_use]
-    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
-        Self { timeouts, ..self }
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    /// Names the first that is not usable.
-    pub fn validate(&self) -> Result<(), super::PwmError> {
-        let bad_counts = |counts: f32| !(counts.is_finite() && counts > 0.0);
-        Err(super::PwmError(if self.counts_per_turn.is_some_and(bad_counts) {
-            "counts per turn"
-        } else if !(8..=32).contains(&self.counter_bits) {
-            "counter width"
-        } else if !(self.filter_s.is_finite() && self.filter_s >= 0.0) {
-            "velocity filter"
-        } else if !(self.limit > 0.0 && self.limit <= 1.0) {
-            "limit"
-        } else if self.speed.is_some() && self.counts_per_turn.is_none() {
-            "speed loop without an encoder"
-        } else {
-            return self
-                .make_loop()
-                .map(|_| ())
-                .map_err(|error| super::PwmError(error.parameter()));
-        }))
-    }
-
-    fn make_loop(&self) -> Result<Option<Pid>, ConfigError> {
-        let Some(speed) = self.speed else { return Ok(None) };
-        let (lower, upper) = speed.output_range();
-        let limited = speed.with_output_range(lower.max(-self.limit), upper.min(self.limit));
-        Pid::new(limited).map(Some)
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
+    Rest,
     Duty(f32),
     Velocity(f32),
 }
@@ -190,6 +84,7 @@ pub struct Brushed<P, D> {
     counted: Option<(u32, Instant)>,
     counts: i64,
     rad_per_s: f32,
+    watch: Watch,
 }
 
 impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
@@ -202,19 +97,21 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         let speed = config.make_loop().map_err(|error| super::PwmError(error.parameter()))?;
         let guard =
             if config.counts_per_turn.is_some() { Guard::new() } else { Guard::without_feedback() };
+        let watch = Watch::new().with_config(config.health).map_err(super::PwmError)?;
         Ok(Self {
             channel,
             direction,
             config,
             speed,
             guard: guard.with_timeouts(config.timeouts),
-            target: Target::Duty(0.0),
+            target: Target::Rest,
             way: Way::Coast,
             output: 0.0,
             held_steps: 0,
             counted: None,
             counts: 0,
             rad_per_s: 0.0,
+            watch,
         })
     }
 
@@ -237,6 +134,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             self.counted = Some((before, then));
             self.counts = self.counts.wrapping_sub(moved);
         }
+        self.watch.hear(now);
         self.guard.hear(now);
     }
 
@@ -254,6 +152,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             return Err(ArmError::Missing(missing));
         }
         if self.guard.engage(now) {
+            self.watch.start(&mut self.guard, now);
             self.rest();
         }
         Ok(())
@@ -297,8 +196,13 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// That of a pin; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
-        let limit = self.config.limit;
-        self.output = self.command(tick).max(-limit).min(limit);
+        let limit = self.config.limit * self.look(tick.now());
+        let asked = self.command(tick);
+        self.output = asked.max(-limit).min(limit);
+        if limit < self.config.limit && asked.abs() > limit {
+            // The loop knows only the full limit, and would wind up.
+            self.speed.iter_mut().for_each(|speed| speed.reset_to(self.output));
+        }
         let output = if self.config.reversed { -self.output } else { self.output };
         let share = output.abs();
         let way = match duty(share, self.channel.max_duty_cycle()) {
@@ -338,12 +242,12 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         match (self.target, &mut self.speed) {
             (Target::Duty(share), _) => share,
             (Target::Velocity(goal), Some(speed)) => speed.step(goal, self.rad_per_s, &step),
-            (Target::Velocity(_), None) => 0.0,
+            (Target::Rest, _) | (Target::Velocity(_), None) => 0.0,
         }
     }
 
     fn rest(&mut self) {
-        self.target = Target::Duty(0.0);
+        self.target = Target::Rest;
         self.speed.iter_mut().for_each(Pid::reset);
     }
 

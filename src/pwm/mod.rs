@@ -15,12 +15,18 @@
 //! | [`RcPwm`], [`RcConfig`], [`Idle`] | an ESC or servo that listens to the length of a pulse |
 //! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
 //! | [`Direction`], [`OnePin`], [`TwoPins`] | how the bridge is told which way |
+//! | [`HealthConfig`](crate::motor::HealthConfig) | when a brushed motor with an encoder counts as stalled, or runs away |
 //! | [`PwmError`], [`BrushedError`] | what is wrong with a configuration, or with a pin |
 //!
 //! They follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a target
-//! that is old, NaN or infinite, a bad time step, lost feedback and an emergency stop give the safe output. They are no
+//! that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency stop give
+//! the safe output. Each change is an [`Edge`](crate::motor::Edge) that waits in
+//! `next_edge`. They are no
 //! [`CanDevice`](crate::motor::CanDevice), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
+//!
+//! No runner watches them: where an [`EmergencyStop`](crate::runner::EmergencyStop) is set from an interrupt, call
+//! `emergency_stop` in the tick that finds it set.
 //!
 //! # Limits
 //! A pin that fails is reported by `update` and tried again in the next one; the hardware may then go on with what it

@@ -1,16 +1,23 @@
-use crate::motor::{Capabilities, Capability, Guard, TargetError, Timeouts, VelocityDrive};
+use crate::control::TimeStep;
+use crate::motor::{
+    Capabilities, Capability, Conditions, Edge, Guard, Health, MotorName, TargetError, Timeouts,
+    VelocityDrive,
+};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;
+
+/// Nothing is integrated here.
+const ANY_STEP_S: f32 = f32::INFINITY;
 
 /// What an [`RcPwm`] sends when it is not to move.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Idle {
-    /// The neutral pulse: an ESC stops, a servo goes to its centre.
+    /// The neutral pulse: an ESC stops and stays armed, a servo goes to its centre.
     #[default]
     Neutral,
-    /// No pulse: a servo goes limp, and most ESCs disarm.
+    /// No pulse: a servo goes limp. Not for an ESC: most disarm then, and would have to see neutral again.
     Off,
 }
 
@@ -32,6 +39,7 @@ pub enum Idle {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RcConfig {
+    name: MotorName,
     low_us: u16,
     neutral_us: u16,
     high_us: u16,
@@ -47,6 +55,7 @@ impl RcConfig {
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            name: MotorName::new("RC PWM", 1),
             low_us: 1_000,
             neutral_us: 1_500,
             high_us: 2_000,
@@ -56,6 +65,12 @@ impl RcConfig {
             full_speed: None,
             timeouts: Timeouts::new(),
         }
+    }
+
+    /// Sets the number by which it is called in edges; 1 at first.
+    #[must_use]
+    pub const fn with_id(self, id: u8) -> Self {
+        Self { name: MotorName::new("RC PWM", id), ..self }
     }
 
     /// Sets the pulses for throttle -1, 0 and 1, in µs. One that turns one way only has `low` as its neutral.
@@ -76,7 +91,8 @@ impl RcConfig {
         Self { idle, ..self }
     }
 
-    /// Sets how long the neutral pulse is sent before targets are taken: what the ESC waits for. 2 s at first.
+    /// Sets how long the neutral pulse is sent before targets are taken: what the ESC waits for. 2 s at first, counted
+    /// from the first one that the channel took.
     #[must_use]
     pub const fn with_arming_time(self, time: Duration) -> Self {
         Self { arming: time, ..self }
@@ -152,7 +168,7 @@ impl core::error::Error for PwmError {}
 ///
 /// let mut esc = RcPwm::new(channel, RcConfig::new())?;
 /// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
-/// esc.arm(at_ms(0).now());
+/// esc.arm();
 /// for ms in 0..=2_000 {
 ///     esc.update(at_ms(ms))?; // neutral for 2 s
 /// }
@@ -166,8 +182,20 @@ pub struct RcPwm<P> {
     channel: P,
     config: RcConfig,
     guard: Guard,
-    arming_since: Option<Instant>,
+    arming: Arming,
     throttle: f32,
+    held_steps: u8,
+}
+
+/// Where the arming sequence is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Arming {
+    /// Nowhere: armed already, or not asked to.
+    Idle,
+    /// No neutral pulse was sent yet.
+    Asked,
+    /// Neutral since then.
+    Since(Instant),
 }
 
 impl<P: SetDutyCycle> RcPwm<P> {
@@ -178,27 +206,27 @@ impl<P: SetDutyCycle> RcPwm<P> {
     pub fn new(channel: P, config: RcConfig) -> Result<Self, PwmError> {
         config.validate()?;
         let guard = Guard::without_feedback().with_timeouts(config.timeouts);
-        Ok(Self { channel, config, guard, arming_since: None, throttle: 0.0 })
+        Ok(Self { channel, config, guard, arming: Arming::Idle, throttle: 0.0, held_steps: 0 })
     }
 
-    /// Begins to arm: sends neutral for the configured time, and takes targets then. Without effect while stopped or
-    /// armed.
-    pub fn arm(&mut self, now: Instant) {
-        if !self.guard.is_stopped() && !self.guard.is_armed() {
-            self.arming_since.get_or_insert(now);
+    /// Begins to arm: the updates send neutral for the configured time, and targets are taken then. Without effect while
+    /// stopped, armed or arming.
+    pub fn arm(&mut self) {
+        if !self.guard.is_stopped() && !self.guard.is_armed() && self.arming == Arming::Idle {
+            self.arming = Arming::Asked;
         }
     }
 
     /// Sends idle, and refuses targets until armed again.
     pub const fn disarm(&mut self) {
         self.guard.disarm();
-        self.arming_since = None;
+        self.arming = Arming::Idle;
     }
 
     /// Disarms, and stays so until it is cleared and armed.
     pub const fn emergency_stop(&mut self) {
         self.guard.emergency_stop();
-        self.arming_since = None;
+        self.arming = Arming::Idle;
     }
 
     /// Takes the emergency stop back; it stays disarmed.
@@ -228,20 +256,33 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// That of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
         let drives = self.guard.drives(tick.now());
-        if let Some(since) = self.arming_since {
-            if tick.now().since(since) >= self.config.arming {
-                self.arming_since = None;
-                self.guard.engage(tick.now());
-            }
-            return self.send(self.config.neutral_us.into());
+        if self.arming != Arming::Idle {
+            return self.go_on_arming(tick.now());
         }
-        if drives {
+        let holds = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
+        self.held_steps = if holds { self.held_steps.saturating_add(1) } else { 0 };
+        if drives && self.held_steps < 2 {
             self.send(self.pulse_us())
-        } else if self.config.idle == Idle::Off && !self.guard.is_armed() {
+        } else if self.config.idle == Idle::Off {
             self.channel.set_duty_cycle_fully_off()
         } else {
             self.send(self.config.neutral_us.into())
         }
+    }
+
+    /// Sends neutral. A pulse that the channel did not take does not count.
+    fn go_on_arming(&mut self, now: Instant) -> Result<(), P::Error> {
+        self.send(self.config.neutral_us.into())?;
+        let since = match self.arming {
+            Arming::Since(since) => since,
+            Arming::Idle | Arming::Asked => now,
+        };
+        self.arming = Arming::Since(since);
+        if now.since(since) >= self.config.arming {
+            self.arming = Arming::Idle;
+            self.guard.engage(now);
+        }
+        Ok(())
     }
 
     fn pulse_us(&self) -> f32 {
@@ -254,6 +295,24 @@ impl<P: SetDutyCycle> RcPwm<P> {
     fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {
         let share = pulse_us / self.config.period_us as f32;
         self.channel.set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
+    }
+
+    /// Returns what is wrong with it: that its targets grew too old, as it reports nothing.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.guard.conditions()
+    }
+
+    /// Returns how it is.
+    #[must_use]
+    pub const fn health(&self) -> Health {
+        self.guard.health(self.config.name)
+    }
+
+    /// Returns the oldest change of a condition that was not read yet. None is lost, however late it is read; while it
+    /// waits, the same change is not noted again.
+    pub fn next_edge(&mut self) -> Option<Edge> {
+        self.guard.next_edge(self.config.name)
     }
 
     /// Returns the channel.

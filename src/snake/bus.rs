@@ -65,6 +65,8 @@ pub struct Joints {
     pub(super) last_write: u8,
     pub(super) last_read: u8,
     held_steps: u8,
+    /// Frames that are sent are heard again.
+    pub(super) echoes: bool,
     pub(super) stopped: bool,
     pub(super) counters: Counters,
 }
@@ -115,6 +117,7 @@ impl Joints {
             last_write: 0,
             last_read: IDS / 2,
             held_steps: 0,
+            echoes: false,
             stopped: false,
             counters: Counters {
                 replies: 0,
@@ -188,7 +191,11 @@ impl Joints {
                 return Ingest::Taken;
             }
             Err(_) if Command::decode(frame.data()).is_some() => {
+                if self.echoes {
+                    return Ingest::Unrelated;
+                }
                 count(&mut counters.foreign_commands);
+                slot.hear_rival(now);
             }
             Err(ReplyError::Length(_)) => count(&mut counters.bad_length),
             Err(ReplyError::Kind(_) | ReplyError::Register(_)) => count(&mut counters.bad_field),

@@ -1,4 +1,6 @@
 use super::model::{ACCELERATION, CURRENT, POSITION_MODE};
+use crate::motor::Reaction;
+use crate::time::Duration;
 use crate::units::AngularVelocity;
 
 /// What [`Joints::attach`](super::Joints::attach) needs to know of a joint.
@@ -20,6 +22,19 @@ pub struct Config {
     pub(super) reversed: bool,
     pub(super) speed: AngularVelocity,
     settings: Settings,
+    pub(super) stall: Stall,
+}
+
+/// For how long a joint may stand although it has a way to go, and what follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stall {
+    pub(super) window: Duration,
+    pub(super) reaction: Reaction,
+}
+
+impl Stall {
+    pub(super) const USUAL: Self =
+        Self { window: Duration::from_secs(1), reaction: Reaction::Report };
 }
 
 impl Config {
@@ -27,7 +42,7 @@ impl Config {
     #[must_use]
     pub const fn new(id: u8) -> Self {
         let speed = AngularVelocity::from_rpm(10.0);
-        Self { id, reversed: false, speed, settings: Settings::new() }
+        Self { id, reversed: false, speed, settings: Settings::new(), stall: Stall::USUAL }
     }
 
     /// Turns the positive direction around, for position and speed alike.
@@ -41,6 +56,25 @@ impl Config {
     #[must_use]
     pub const fn with_speed(self, speed: AngularVelocity) -> Self {
         Self { speed, ..self }
+    }
+
+    /// Sets for how long a joint may stand although it is told to move, by more than a 64th of a turn, and what follows: a
+    /// stall after 1 s at first, which is reported. Relaxed, it is disabled and waits to be armed.
+    ///
+    /// A joint that is too slow to be seen to move in that time, by a 64th of a turn, is not looked at.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::Reaction;
+    /// use drivetrain::snake::{Config, Joints};
+    /// use drivetrain::time::Duration;
+    ///
+    /// let jaw = Config::new(12).with_stall(Duration::from_millis(300), Reaction::Relax);
+    /// assert!(Joints::new().attach(jaw).is_ok());
+    /// ```
+    #[must_use]
+    pub const fn with_stall(self, window: Duration, reaction: Reaction) -> Self {
+        Self { stall: Stall { window, reaction }, ..self }
     }
 
     /// Sets what is written before the joint is enabled.

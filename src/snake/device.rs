@@ -2,7 +2,7 @@
 
 use super::{Joints, slot::Slot};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Ingest, MotorName, Role};
+use crate::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Role};
 use crate::time::{Instant, Tick};
 use embedded_can::StandardId;
 
@@ -42,11 +42,21 @@ impl CanDevice for Joints {
         self.slots.iter().filter(move |slot| slot.is_missing(now)).filter_map(Slot::name)
     }
 
+    fn second_master(&self) -> Option<Claim> {
+        let slot = self.slots.iter().find(|slot| slot.has_rival())?;
+        let id = StandardId::new(u16::from(slot.id?))?;
+        Some(Claim::new(id, Role::Command, slot.name()?))
+    }
+
+    fn next_edge(&mut self) -> Option<Edge> {
+        Self::next_edge(self)
+    }
+
     fn engage(&mut self, now: Instant) {
         if !self.stopped {
             let heard = self.slots.iter_mut().filter(|slot| slot.id.is_some());
             for slot in heard.filter(|slot| !slot.is_missing(now)) {
-                _ = slot.guard.engage(now);
+                slot.engage(now);
             }
         }
     }

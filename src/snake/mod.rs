@@ -37,6 +37,19 @@
 //! The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
 //! ([`State::resets`]), and waits to be armed.
 //!
+//! # What is noticed
+//! Every change is an [`Edge`](crate::motor::Edge) with its time, which waits until [`Joints::next_edge`] reads it;
+//! [`Joints::health`] is the line for a log.
+//!
+//! | condition | it holds while | the joint |
+//! |---|---|---|
+//! | late, offline | there is no fresh position; it is lost, until ten came in a row | is disabled; waits to be armed after *offline* |
+//! | ESC fault | it was found disabled, or further off than it can go, until it is armed | is disabled, waits to be armed |
+//! | position uncertain | the drive may have lost its zero, until that is set | goes on |
+//! | stalled | it has a way to go and does not move: blocked in either direction | as configured; goes on |
+//! | command lost | the application let its target grow too old | is disabled, until the next target |
+//! | second master | another node wrote to it or asked it within the last second | goes on, and is not armed |
+//!
 //! # One id, two senders
 //! Two nodes that begin to send one id in the same bit do not arbitrate: they destroy each other's frames until one is
 //! off the bus. So while an answer is due, [`Joints`] sends nothing to that joint, a stop neither, for
@@ -75,6 +88,7 @@ mod device;
 mod error;
 mod feedback;
 mod handle;
+mod health;
 mod model;
 mod schedule;
 mod slot;

@@ -1,13 +1,17 @@
 //! One joint: replies in, the next frame for it out.
 
+mod health;
+
+use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
 use super::{AttachError, Command, Config, Joint, Register, Reply, Settings, State};
 use crate::encoder::{Homing, Position};
-use crate::motor::{Guard, Link, MotorName, Timeouts};
+use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::host_link::Offset;
 use core::f32::consts::TAU;
+use health::Standing;
 
 /// A relaxed joint is told again after this time: its drive may have missed it.
 const KEEP_RELAXED: Duration = Duration::from_millis(100);
@@ -46,6 +50,12 @@ pub(super) struct Slot {
     pub(super) bad_replies: u32,
     position_jumps: u16,
     resets: u16,
+    traffic: Traffic,
+    window_from: Instant,
+    /// When another node wrote to the joint or asked it last.
+    rival_heard: Option<Instant>,
+    stall: Stall,
+    stands: Standing,
 }
 
 impl Slot {
@@ -73,6 +83,11 @@ impl Slot {
         bad_replies: 0,
         position_jumps: 0,
         resets: 0,
+        traffic: Traffic::NONE,
+        window_from: Instant::START,
+        rival_heard: None,
+        stall: Stall::USUAL,
+        stands: Standing { at: 0, since: Instant::START },
     };
 
     /// Makes the slot of a joint, validating its configuration.
@@ -97,6 +112,7 @@ impl Slot {
             reversed: config.reversed,
             settings: *config.settings(),
             guard: Guard::new().with_timeouts(timeouts),
+            stall: config.stall,
             speed: to_pulses(speed),
             ..Self::FREE
         })
@@ -132,7 +148,7 @@ impl Slot {
             // What waits to be written says that the answer is from before.
             Register::Enable if self.driven && self.pending == 0 && reply.value() == 0 => {
                 self.resets = self.resets.saturating_add(1);
-                self.distrust();
+                self.distrust(now);
             }
             _ => {}
         }
@@ -149,23 +165,33 @@ impl Slot {
             let furthest = gap_ms.saturating_mul(2 * FASTEST.unsigned_abs() / 1_000);
             if way > furthest.saturating_add(JUMP.unsigned_abs()) {
                 self.position_jumps = self.position_jumps.saturating_add(1);
-                self.distrust();
+                self.distrust(now);
             }
         }
+        self.count_position(now);
         self.raw = Some(raw);
         self.heard = now;
         self.guard.hear(now);
     }
 
     /// The drive is not what it was: its zero may be another, so nothing moves until it is armed again.
-    fn distrust(&mut self) {
-        self.lose_zero();
+    fn distrust(&mut self, now: Instant) {
+        self.guard.note(Condition::Fault, true, now);
+        self.lose_zero(now);
         self.guard.disarm();
     }
 
-    fn lose_zero(&mut self) {
+    fn lose_zero(&mut self, now: Instant) {
+        self.guard.note(Condition::PositionUncertain, true, now);
         if self.homing == Homing::Homed {
             self.homing = Homing::Uncertain;
+        }
+    }
+
+    /// Takes targets from now on, if the joint is heard. What the drive did before no longer counts.
+    pub(super) fn engage(&mut self, now: Instant) {
+        if self.guard.engage(now) {
+            self.guard.note(Condition::Fault, false, now);
         }
     }
 
@@ -185,8 +211,9 @@ impl Slot {
     pub(super) fn update(&mut self, now: Instant) -> bool {
         let drives = self.guard.drives(now);
         if self.guard.link() == Link::Offline {
-            self.lose_zero();
+            self.lose_zero(now);
         }
+        self.look(now);
         let stops = self.driven && !drives;
         if drives && !self.driven {
             self.pending = ALL;
@@ -296,17 +323,18 @@ impl Slot {
     }
 
     /// Makes the present position zero; `false` when it is not known.
-    pub(super) fn zero(&mut self) -> bool {
+    pub(super) fn zero(&mut self, now: Instant) -> bool {
         match self.raw {
             Some(raw) if self.guard.link() == Link::Online => {
-                self.set_offset(Offset::new(raw));
+                self.set_offset(Offset::new(raw), now);
                 true
             }
             _ => false,
         }
     }
 
-    pub(super) fn set_offset(&mut self, offset: Offset) {
+    pub(super) fn set_offset(&mut self, offset: Offset, now: Instant) {
+        self.guard.note(Condition::PositionUncertain, false, now);
         self.offset = offset;
         self.homing = Homing::Homed;
     }

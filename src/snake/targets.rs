@@ -76,8 +76,9 @@ impl Joints {
     /// # Errors
     /// When the joint is detached, or not heard: where it is now is not known then.
     pub fn zero(&mut self, joint: Joint) -> Result<(), TargetError> {
+        let now = self.now;
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        if !slot.zero() {
+        if !slot.zero(now) {
             return Err(TargetError::NoFeedback);
         }
         self.relax(joint);
@@ -90,7 +91,8 @@ impl Joints {
     /// # Errors
     /// When the joint is detached.
     pub fn set_offset(&mut self, joint: Joint, offset: Offset) -> Result<(), TargetError> {
-        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(offset);
+        let now = self.now;
+        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(offset, now);
         self.relax(joint);
         Ok(())
     }

@@ -49,8 +49,11 @@ pub fn call_all() {
     BrushedConfig::with_limit.call();
     BrushedConfig::reversed.call();
     BrushedConfig::with_timeouts.call();
+    BrushedConfig::with_no_load_speed.call();
+    BrushedConfig::with_health.call();
     BrushedConfig::validate.call();
     RcConfig::new.call();
+    RcConfig::with_id.call();
     RcConfig::with_pulses_us.call();
     RcConfig::with_period.call();
     RcConfig::with_idle.call();
@@ -68,6 +71,9 @@ pub fn call_all() {
     RcPwm::<Channel>::update.call();
     RcPwm::<Channel>::channel.call();
     RcPwm::<Channel>::guard.call();
+    RcPwm::<Channel>::conditions.call();
+    RcPwm::<Channel>::health.call();
+    RcPwm::<Channel>::next_edge.call();
 }
 
 fn brushed<D: Direction>() {
@@ -85,4 +91,7 @@ fn brushed<D: Direction>() {
     Brushed::<Channel, D>::channel.call();
     Brushed::<Channel, D>::direction.call();
     Brushed::<Channel, D>::guard.call();
+    Brushed::<Channel, D>::conditions.call();
+    Brushed::<Channel, D>::health.call();
+    Brushed::<Channel, D>::next_edge.call();
 }

@@ -20,6 +20,7 @@ pub fn call_all() {
     Config::new.call();
     Config::reversed.call();
     Config::with_speed.call();
+    Config::with_stall.call();
     Config::with_settings.call();
     Config::id.call();
     Config::settings.call();
@@ -39,6 +40,11 @@ pub fn call_all() {
     Joints::with_bit_rate.call();
     Joints::with_tick_rate.call();
     Joints::load.call();
+    Joints::with_loopback.call();
+    Joints::health.call();
+    Joints::capabilities.call();
+    Joints::conditions.call();
+    Joints::next_edge.call();
     Joints::attach.call();
     Joints::detach.call();
     Joints::ingest.call();

@@ -245,3 +245,30 @@ fn what_is_offered_is_what_is_taken() {
         "raw, voltage, velocity, angle, position, feedback, temperature, absolute angle"
     );
 }
+
+#[test]
+fn a_sensor_that_dies_or_tells_old_news_is_an_edge_with_its_time() {
+    let lost = |bus: &mut Bus, from, until| {
+        let edge = bus.next_edge().unwrap();
+        assert_eq!((edge.condition, edge.began), (crate::motor::Condition::CommandLost, true));
+        assert!((from..=until).contains(&edge.at.as_micros()), "{edge}");
+        assert_eq!(bus.next_edge(), None);
+    };
+    let (mut bus, [yaw]) = armed([yaw_config()]);
+    for ms in 2..1_100 {
+        // 20 ms old is too old: found by an update.
+        let at = at_ms(ms.min(1_000));
+        let _stale = bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at));
+        run(&mut bus, ms, 0, 0);
+    }
+    lost(&mut bus, 1_019_000, 1_022_000);
+    for ms in 1_100..1_140 {
+        bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at_ms(ms))).unwrap();
+        run(&mut bus, ms, 0, 0);
+    }
+    assert!(bus.next_edge().is_some_and(|edge| !edge.began), "it has a target again");
+    // Found when it is set.
+    let old = bus.set_angle_measured(yaw, radians(0.1), imu(0.0, 0.0, at_ms(1_100)));
+    assert_eq!(old, Err(TargetError::StaleMeasurement));
+    lost(&mut bus, 1_137_000, 1_140_000);
+}

@@ -1,10 +1,11 @@
 //! Whether a device keeps what `CanDevice` promises.
 
+mod edges;
 mod rules;
 mod run;
 
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, TargetError};
+use crate::motor::{CanDevice, Claim, TargetError};
 
 /// What [`check_contract`] has to know of a device.
 pub trait Subject {
@@ -14,7 +15,8 @@ pub trait Subject {
     /// Returns the device.
     fn device(&mut self) -> &mut Self::Device;
 
-    /// Returns how many motors it has.
+    /// Returns how many motors it has that are heard; 0 for one that reports nothing, such as a servo, and what is about
+    /// feedback is not asked of it then.
     fn motors(&self) -> usize;
 
     /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame, in which it stands still.
@@ -33,6 +35,18 @@ pub trait Subject {
     /// Says why not, as has to be; and so it does by default, for a device whose functions offer no such thing.
     fn drive_unsupported(&mut self) -> Result<(), TargetError> {
         Err(TargetError::Unsupported)
+    }
+
+    /// Plays a motor whose ESC reports something for which it must not be driven; `None` for one that reports no errors.
+    fn fault(&self, motor: usize) -> Option<CanFrame> {
+        let _ = motor;
+        None
+    }
+
+    /// Plays another controller on the bus, by a frame with the id of one of the device's commands: eight zeros, unless
+    /// said otherwise. `None` when the device does not look for one.
+    fn rival(&self, command: &Claim) -> Option<CanFrame> {
+        embedded_can::Frame::new(command.id(), &[0; 8])
     }
 
     /// Tells whether a command frame asks for nothing: eight zeros, unless said otherwise.
@@ -94,6 +108,8 @@ pub enum Rule {
     UnsupportedIsAnError,
     /// A second bad time step in a row gives zero.
     BadStepsAreZero,
+    /// A third update in a row with the same time gives zero.
+    StandingTimeIsZero,
     /// A frame that is given back is taken, waits for the next update, and comes again with the newest values (I7).
     RequeuedComesAgain,
     /// A frame that is not its own is not taken back.
@@ -102,6 +118,16 @@ pub enum Rule {
     EmergencyStopStays,
     /// After disarming, and after arming again, all that comes is zero until there is a target (I9).
     StartsFromZero,
+    /// As long as a motor reports a fault it is not armed.
+    FaultIsNotArmed,
+    /// While another node sends one of its commands it is not armed.
+    SecondMasterIsNotArmed,
+    /// Each change is an edge that names its motor and has its time, and a healthy motor has none.
+    ChangeIsAnEdge,
+    /// An edge waits until it is read, and is read once.
+    EdgesWait,
+    /// What comes and goes before it is read is one edge each way.
+    EdgesDoNotFlood,
     /// The same inputs give the same frames (I10).
     IsDeterministic,
 }
@@ -152,7 +178,7 @@ impl core::error::Error for Violation {}
 ///     let wheel = bus.attach(Config::new(1)).expect("a free id");
 ///     OneWheel(bus, wheel)
 /// };
-/// assert_eq!(check_contract(make), Ok(20)); // rules
+/// assert_eq!(check_contract(make), Ok(26)); // rules
 /// ```
 ///
 /// # Errors
@@ -160,3 +186,5 @@ impl core::error::Error for Violation {}
 pub fn check_contract<S: Subject>(make: impl Fn() -> S) -> Result<usize, Violation> {
     rules::check(&make)
 }
+
+type Outcome = Result<(), Violation>;

@@ -1,11 +1,9 @@
 use super::run::{Output, Run};
-use super::{Rule, Subject, Violation};
+use super::{Outcome, Rule, Subject, Violation, edges};
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, CanDevice, Claim, Ingest, Role, TargetError};
 use crate::time::Tick;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
-
-type Outcome = Result<(), Violation>;
 
 /// Checks every rule on devices of its own; returns how many there are.
 pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violation> {
@@ -21,9 +19,16 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     nan(Run::driving(make())?)?;
     unsupported(Run::driving(make())?, Run::driving(make())?)?;
     bad_steps(make)?;
+    standing_time(Run::driving(make())?)?;
     requeue(Run::driving(make())?)?;
     emergency_stop(Run::driving(make())?)?;
     from_zero(Run::driving(make())?)?;
+    edges::fault(make)?;
+    edges::second_master(make)?;
+    edges::per_change(make)?;
+    edges::lost_command(Run::driving(make())?)?;
+    edges::wait(Run::driving(make())?)?;
+    edges::flood(Run::driving(make())?)?;
     deterministic(Run::driving(make())?, Run::driving(make())?)?;
     Ok(Rule::IsDeterministic as usize + 1)
 }
@@ -107,6 +112,9 @@ fn rejected<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
 }
 
 fn not_fresh<S: Subject>(mut run: Run<S>) -> Outcome {
+    if run.subject.motors() == 0 {
+        return Ok(());
+    }
     for _ in 0..run.subject.late_ms() {
         let now = run.now();
         for motor in 0..run.subject.motors() {
@@ -123,6 +131,9 @@ fn not_fresh<S: Subject>(mut run: Run<S>) -> Outcome {
 }
 
 fn late<S: Subject>(mut run: Run<S>) -> Outcome {
+    if run.subject.motors() == 0 {
+        return Ok(());
+    }
     run.step()?;
     for ms in 0..200 {
         _ = run.subject.drive(1.0);
@@ -185,13 +196,25 @@ fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     for dt_s in [0.0, -0.001, f32::NAN, f32::INFINITY] {
         let mut run = Run::driving(make())?;
         run.step()?;
-        run.update(dt_s)?;
-        let output = run.update(dt_s)?;
+        run.step_for(dt_s)?;
+        let output = run.step_for(dt_s)?;
         run.expect(output.driving == 0, Rule::BadStepsAreZero)?;
         let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
         run.expect(again, Rule::ArmedDrives)?;
     }
     Ok(())
+}
+
+fn standing_time<S: Subject>(mut run: Run<S>) -> Outcome {
+    run.step()?;
+    for update in 0..10 {
+        _ = run.subject.drive(1.0);
+        let output = run.update(0.001)?;
+        run.expect(output.driving == 0 || update < 2, Rule::StandingTimeIsZero)?;
+    }
+    run.step()?;
+    let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
+    run.expect(again, Rule::ArmedDrives)
 }
 
 fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {

@@ -56,6 +56,16 @@ impl<S: Subject> Run<S> {
         frame.is_some_and(|frame| self.subject.device().ingest(&frame, now) == Ingest::Taken)
     }
 
+    /// A millisecond with feedback from all motors, and a time step that says something else.
+    pub(super) fn step_for(&mut self, dt_s: f32) -> Result<Output, Violation> {
+        self.ms += 1;
+        for motor in 0..self.subject.motors() {
+            let taken = self.hear(motor);
+            self.expect(taken, Rule::ClaimsFeedback)?;
+        }
+        self.update(dt_s)
+    }
+
     /// A millisecond with feedback from all motors.
     pub(super) fn step(&mut self) -> Result<Output, Violation> {
         self.step_without(usize::MAX)

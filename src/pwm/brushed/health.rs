@@ -1,0 +1,56 @@
+use super::Brushed;
+use crate::motor::{Condition, Conditions, Edge, Health, HealthConfig, Reaction, Vitals};
+use crate::pwm::Direction;
+use crate::time::Instant;
+use core::f32::consts::TAU;
+use embedded_hal::pwm::SetDutyCycle;
+
+/// What is looked for unless the configuration says otherwise.
+pub(super) static USUAL: HealthConfig =
+    HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
+
+/// What turns when the no-load speed is not known, as a share of it: no stall, and never a runaway.
+const TURNS: f32 = 0.1;
+
+/// It turns when it moves a count in this time.
+const COUNT_S: f32 = 0.05;
+
+/// Health: what is wrong with the motor, and every change of it.
+impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
+    /// Returns what is wrong with the motor.
+    #[must_use]
+    pub const fn conditions(&self) -> Conditions {
+        self.guard.conditions()
+    }
+
+    /// Returns how the motor is; without an encoder it has neither rate nor gap.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.health(self.config.name, &self.guard, &self.vitals())
+    }
+
+    /// Returns the oldest change of a condition that was not read yet. None is lost, however late it is read; while it
+    /// waits, the same change is not noted again.
+    pub fn next_edge(&mut self) -> Option<Edge> {
+        self.guard.next_edge(self.config.name)
+    }
+
+    /// Looks after the motor, which may be relaxed for what is found; returns the share of its limit that it is left with.
+    pub(super) fn look(&mut self, now: Instant) -> f32 {
+        let vitals = self.vitals();
+        self.watch.look(&mut self.guard, &vitals, now)
+    }
+
+    /// A motor without an encoder is not known to turn or to stand.
+    fn vitals(&self) -> Vitals {
+        let Some(counts_per_turn) = self.config.counts_per_turn else { return Vitals::default() };
+        let speed = match self.config.no_load {
+            Some(no_load) => self.rad_per_s / no_load.as_rad_per_s(),
+            None if self.rad_per_s.abs() > TAU / (counts_per_turn * COUNT_S) => {
+                TURNS.copysign(self.rad_per_s)
+            }
+            None => 0.0,
+        };
+        Vitals { effort: self.output / self.config.limit, speed, ..Vitals::default() }
+    }
+}

@@ -1,0 +1,230 @@
+//! Rules about what a device tells of its motors.
+
+use super::run::Run;
+use super::{Outcome, Rule, Subject};
+use crate::motor::{
+    ArmError, CanDevice, Claim, Condition, Conditions, Edge, Ingest, MotorName, Role,
+};
+use crate::time::{Duration, Instant};
+use embedded_can::Frame;
+
+/// Of so many motors the edges are told apart.
+const MOST_MOTORS: usize = 64;
+
+/// Edges are stamped in units of this.
+const UNIT: Duration = Duration::from_micros(1_024);
+
+/// The changes that were read: of each motor, what began and what ended.
+struct Told([(Conditions, Conditions); MOST_MOTORS]);
+
+impl Told {
+    const NONE: Self = Self([(Conditions::NONE, Conditions::NONE); MOST_MOTORS]);
+
+    /// Reads all that waits. Each change comes once and names a motor; nothing waits afterwards.
+    fn read<S: Subject>(run: &mut Run<S>, rule: Rule) -> Result<Self, super::Violation> {
+        let mut told = Self::NONE;
+        while let Some(edge) = run.subject.device().next_edge() {
+            let motor = index(run, edge.motor);
+            run.expect(motor.is_some(), rule)?;
+            if let Some((began, ended)) = motor.and_then(|motor| told.0.get_mut(motor)) {
+                let place = if edge.began { began } else { ended };
+                let again = place.contains(edge.condition);
+                *place = place.with(edge.condition);
+                run.expect(!again && edge.at <= run.now(), rule)?;
+            }
+        }
+        Ok(told)
+    }
+
+    /// Tells whether a change was among them.
+    fn has(&self, motor: usize, condition: Condition, began: bool) -> bool {
+        self.0.get(motor).is_some_and(|told| {
+            let (begun, ended) = told;
+            if began { begun.contains(condition) } else { ended.contains(condition) }
+        })
+    }
+}
+
+/// Returns which motor of the subject has a name.
+fn index<S: Subject>(run: &mut Run<S>, name: MotorName) -> Option<usize> {
+    (0..run.subject.motors()).find(|motor| called(run, *motor) == Some(name))
+}
+
+/// Returns how a motor of the subject is called.
+fn called<S: Subject>(run: &mut Run<S>, motor: usize) -> Option<MotorName> {
+    let id = run.subject.feedback(motor)?.id();
+    let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.id() == id;
+    run.subject.device().claims().find(feedback).map(|claim| claim.motor())
+}
+
+/// Motors fall silent one after the other, and each change is read in the millisecond in which it happens.
+pub(super) fn per_change<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    let rule = Rule::ChangeIsAnEdge;
+    for silent in 0..make().motors() {
+        let mut run = Run::driving(make())?;
+        for _ in 0..50 {
+            _ = run.subject.drive(1.0);
+            run.step()?;
+            let edge = run.subject.device().next_edge();
+            run.expect(edge.is_none(), rule)?;
+        }
+        let name = called(&mut run, silent);
+        let late = |edge: &Edge, began| edge.condition == Condition::Late && edge.began == began;
+        for (began, ms) in [(true, run.subject.late_ms() + 2), (false, 20)] {
+            let mut changes = 0;
+            for _ in 0..ms {
+                _ = run.subject.drive(1.0);
+                run.step_without(if began { silent } else { usize::MAX })?;
+                while let Some(edge) = run.subject.device().next_edge() {
+                    let timely = edge.at + UNIT > run.now() && edge.at <= run.now();
+                    let named = Some(edge.motor) == name || edge.condition != Condition::Late;
+                    changes += u32::from(late(&edge, began));
+                    run.expect(timely && named && changes <= 1, rule)?;
+                }
+            }
+            run.expect(changes == 1, rule)?;
+        }
+    }
+    Ok(())
+}
+
+/// What nobody reads for long waits, with the time at which it was noticed.
+pub(super) fn wait<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::EdgesWait;
+    let motors = run.subject.motors();
+    if motors == 0 {
+        return Ok(());
+    }
+    let begun = run.now();
+    let limit = begun + Duration::from_millis(run.subject.late_ms() + 1);
+    for _ in 0..200 {
+        run.step_silent()?;
+    }
+    // Until each of them counts as heard again.
+    for _ in 0..500 {
+        run.step()?;
+    }
+    let first = run.subject.device().next_edge();
+    let in_time = |at: Instant| at + UNIT > begun && at <= limit;
+    let is_first = first.is_some_and(|edge| edge.began && in_time(edge.at));
+    run.expect(is_first, rule)?;
+    let told = Told::read(&mut run, rule)?;
+    for motor in 0..motors.min(MOST_MOTORS) {
+        let name = called(&mut run, motor);
+        let begins = Some((name, Condition::Late, true));
+        let read_first = first.map(|edge| (Some(edge.motor), edge.condition, edge.began)) == begins;
+        let has = |condition, began| told.has(motor, condition, began);
+        let both = (has(Condition::Late, true) || read_first) && has(Condition::Late, false);
+        run.expect(both, rule)?;
+    }
+    let rest = run.subject.device().next_edge();
+    run.expect(rest.is_none(), rule)
+}
+
+/// What comes and goes again and again before it is read is one edge each way.
+pub(super) fn flood<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::EdgesDoNotFlood;
+    for _ in 0..20 {
+        for _ in 0..run.subject.late_ms() + 2 {
+            _ = run.subject.drive(1.0);
+            run.step_silent()?;
+        }
+        for _ in 0..15 {
+            _ = run.subject.drive(1.0);
+            run.step()?;
+        }
+    }
+    let told = Told::read(&mut run, rule)?;
+    for motor in 0..run.subject.motors().min(MOST_MOTORS) {
+        let both = [true, false].map(|began| told.has(motor, Condition::Late, began));
+        run.expect(both == [true; 2], rule)?;
+    }
+    Ok(())
+}
+
+/// A target that grew too old is told, and that there is a new one.
+pub(super) fn lost_command<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::ChangeIsAnEdge;
+    let lost = |edge: &Edge, began| edge.condition == Condition::CommandLost && edge.began == began;
+    let (mut begun, mut ended) = (0, 0);
+    for _ in 0..run.subject.command_ms() + 50 {
+        run.step()?;
+        while let Some(edge) = run.subject.device().next_edge() {
+            let timely = edge.at + UNIT > run.now() && edge.at <= run.now();
+            run.expect(timely, rule)?;
+            begun += u32::from(lost(&edge, true));
+        }
+    }
+    for _ in 0..50 {
+        _ = run.subject.drive(1.0);
+        run.step()?;
+        while let Some(edge) = run.subject.device().next_edge() {
+            ended += u32::from(lost(&edge, false));
+        }
+    }
+    // Of one motor at least: the others may have kept theirs.
+    run.expect(begun > 0 && ended == begun, rule)
+}
+
+/// An error that comes and goes at up to 1 kHz is one edge; one that stays refuses arming.
+pub(super) fn fault<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    for motor in 0..make().motors() {
+        let mut run = Run::driving(make())?;
+        let Some(fault) = run.subject.fault(motor) else { continue };
+        let hear = |run: &mut Run<S>, holds: bool| {
+            run.step_without(motor)?;
+            let now = run.now();
+            let taken = if holds {
+                run.subject.device().ingest(&fault, now) == Ingest::Taken
+            } else {
+                run.hear(motor)
+            };
+            run.expect(taken, Rule::ClaimsFeedback)
+        };
+        for ms in 0..1_000 {
+            // Not in step with a device that looks at one motor after the other.
+            hear(&mut run, ms % 5 < 2)?;
+        }
+        let told = Told::read(&mut run, Rule::EdgesDoNotFlood)?;
+        let both = [true, false].map(|began| told.has(motor, Condition::Fault, began));
+        run.expect(both == [true; 2], Rule::ChangeIsAnEdge)?;
+        for _ in 0..100 {
+            hear(&mut run, true)?;
+        }
+        let now = run.now();
+        let refused = matches!(run.subject.device().arm(now), Err(ArmError::Faulty(_)));
+        let zero = run.step_without(motor)?.driving == 0;
+        let alone = run.subject.motors() == 1;
+        run.expect(refused && (zero || !alone), Rule::FaultIsNotArmed)?;
+        for _ in 0..100 {
+            hear(&mut run, false)?;
+        }
+        let now = run.now();
+        let armed = run.subject.device().arm(now).is_ok();
+        run.expect(armed, Rule::FaultIsNotArmed)?;
+    }
+    Ok(())
+}
+
+/// Another node sends a command of the device: one after the other.
+pub(super) fn second_master<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    let rule = Rule::SecondMasterIsNotArmed;
+    let commands = |run: &mut Run<S>, nth| {
+        let command = |claim: &Claim| claim.role() == Role::Command;
+        run.subject.device().claims().filter(command).nth(nth)
+    };
+    for nth in 0.. {
+        let mut run = Run::new(make());
+        run.step()?;
+        let Some(claim) = commands(&mut run, nth) else { break };
+        let Some(frame) = run.subject.rival(&claim) else { continue };
+        let now = run.now();
+        let taken = run.subject.device().ingest(&frame, now) == Ingest::Taken;
+        run.expect(!taken, rule)?;
+        let outcome = run.subject.device().arm(now);
+        let refused = matches!(outcome, Err(ArmError::SecondMaster(found)) if found == claim);
+        let armed = run.subject.device().is_armed();
+        run.expect(refused && !armed, rule)?;
+    }
+    Ok(())
+}

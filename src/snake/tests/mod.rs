@@ -1,0 +1,113 @@
+//! Rules of the joints, driven through their public face.
+
+mod attaching;
+mod commanding;
+mod health;
+mod polling;
+mod receiving;
+mod safety;
+
+use super::*;
+use crate::encoder::{Homing, Position};
+use crate::frame::CanFrame;
+use crate::motor::{ArmError, CanDevice, Ingest, Link, Malformed, TargetError};
+use crate::time::{Duration, Instant, Tick};
+use crate::units::{Angle, AngularVelocity};
+use embedded_can::{Frame, StandardId};
+use std::string::ToString;
+use std::vec::Vec;
+
+fn at_ms(ms: u64) -> Instant {
+    Instant::START + Duration::from_millis(ms)
+}
+
+fn frame(id: u8, data: &[u8]) -> CanFrame {
+    CanFrame::new(StandardId::new(u16::from(id)).unwrap(), data).unwrap()
+}
+
+fn reply(id: u8, register: Register, value: i32) -> CanFrame {
+    frame(id, &Reply::new(register, value).encode())
+}
+
+/// Joints that answer at once, with drives that stand where they are told to stand.
+struct Bench {
+    joints: Joints,
+    handles: Vec<Joint>,
+    /// By the index of the id.
+    raw: [i32; 12],
+    enabled: [i32; 12],
+    silent: Vec<u8>,
+    ms: u64,
+}
+
+impl Bench {
+    fn new(ids: &[u8]) -> Self {
+        let mut joints = Joints::new();
+        let handles = ids.iter().map(|id| joints.attach(Config::new(*id)).unwrap()).collect();
+        Self { joints, handles, raw: [0; 12], enabled: [0; 12], silent: Vec::new(), ms: 0 }
+    }
+
+    /// Some milliseconds; returns all that was sent.
+    fn run(&mut self, ms: u64) -> Vec<(u8, Command)> {
+        let mut sent = Vec::new();
+        for _ in 0..ms {
+            self.ms += 1;
+            self.joints.update(Tick::new(at_ms(self.ms), 0.001));
+            while let Some(frame) = self.joints.next_frame() {
+                let id = u8::try_from(frame.header()).unwrap();
+                let command = Command::decode(frame.data()).unwrap();
+                sent.push((id, command));
+                self.answer(id, command);
+            }
+        }
+        sent
+    }
+
+    fn answer(&mut self, id: u8, command: Command) {
+        let index = usize::from(id - 1);
+        match command {
+            Command::Write(Register::Enable, value) => self.enabled[index] = value,
+            Command::Write(..) => {}
+            Command::Read(_) if self.silent.contains(&id) => {}
+            Command::Read(register) => {
+                let value = match register {
+                    Register::ActualPosition => self.raw[index],
+                    Register::ActualSpeed => 65_536,
+                    Register::Enable => self.enabled[index],
+                    _ => 77,
+                };
+                let outcome = self.joints.ingest(&reply(id, register, value), at_ms(self.ms));
+                assert_eq!(outcome, Ingest::Taken);
+            }
+        }
+    }
+
+    /// The same with targets in each millisecond.
+    fn drive(&mut self, ms: u64) -> Vec<(u8, Command)> {
+        let mut sent = Vec::new();
+        for _ in 0..ms {
+            for joint in self.handles.clone() {
+                _ = self.joints.set_pulses(joint, 1_000);
+            }
+            sent.extend(self.run(1));
+        }
+        sent
+    }
+
+    fn armed(ids: &[u8]) -> Self {
+        let mut bench = Self::new(ids);
+        bench.run(30);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench
+    }
+
+    fn state(&self, joint: usize) -> State {
+        self.joints.state(self.handles[joint]).unwrap()
+    }
+}
+
+const ALL: [u8; 12] = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
+
+fn writes(sent: &[(u8, Command)]) -> Vec<Command> {
+    sent.iter().map(|(_, command)| *command).filter(|c| matches!(c, Command::Write(..))).collect()
+}

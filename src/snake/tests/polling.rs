@@ -1,0 +1,116 @@
+//! Who is asked and written to, and when.
+
+use super::*;
+
+#[test]
+fn a_controller_that_starts_disables_every_joint_first() {
+    let mut bench = Bench::new(&ALL);
+    let sent = bench.run(1);
+    assert_eq!(sent[..12], ALL.map(|id| (id, Command::DISABLE)));
+    assert!(sent[12..].iter().all(|(_, command)| matches!(command, Command::Read(_))));
+}
+
+#[test]
+fn each_joint_of_twelve_is_asked_each_12_ms_for_two_positions_and_a_speed() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    let sent = bench.drive(12 * 24);
+    let asked = |id, wanted| {
+        let asks = |(to, command): &&(u8, Command)| *to == id && *command == Command::Read(wanted);
+        sent.iter().filter(asks).count()
+    };
+    for id in ALL {
+        let counts = [Register::ActualPosition, Register::ActualSpeed, Register::Enable];
+        assert_eq!(counts.map(|register| asked(id, register)), [16, 7, 1], "{id}");
+    }
+    // One question and one write in each millisecond, no more and no less: what `load` reckons.
+    assert_eq!(sent.len(), 2 * 12 * 24);
+    assert_eq!(bench.joints.load().frames_per_s(), 3_000);
+    assert!((bench.joints.load().worst_case() - 0.305).abs() < 1e-6);
+}
+
+#[test]
+fn a_joint_is_brought_up_in_order_with_its_enable_last() {
+    let mut bench = Bench::armed(&[4]);
+    let sent = bench.drive(9);
+    use Register::{Acceleration, Current, Deceleration, Enable, Mode, Speed};
+    let expected = [
+        (Mode, 1),
+        (Current, 2_000),
+        (Acceleration, 0x0010_AAAA),
+        (Deceleration, 0x0010_AAAA),
+        (Speed, 10_923),
+        (Register::Position, 1_000),
+        (Enable, 1),
+        (Register::Position, 1_000),
+        (Register::Position, 1_000),
+    ];
+    assert_eq!(writes(&sent), expected.map(|(register, value)| Command::Write(register, value)));
+}
+
+#[test]
+fn news_go_before_repetitions_and_only_what_changed_is_written() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    let (first, last) = (bench.handles[0], bench.handles[11]);
+    bench.joints.set_speed(last, AngularVelocity::from_rpm(-20.0)).unwrap();
+    bench.joints.set_pulses(first, -5).unwrap();
+    let sent = bench.run(3);
+    let mut news = sent.iter().filter(|(_, command)| matches!(command, Command::Write(..)));
+    let two = [*news.next().unwrap(), *news.next().unwrap()];
+    assert!(two.contains(&(12, Command::Write(Register::Speed, 21_845))));
+    assert!(two.contains(&(1, Command::Write(Register::Position, -5))));
+    assert!(matches!(news.next(), Some((_, Command::Write(Register::Position, 1_000)))));
+}
+
+#[test]
+fn a_joint_that_gets_a_new_target_at_once_is_disabled_before_it_is_brought_up() {
+    let mut bench = Bench::armed(&[2]);
+    bench.drive(20);
+    bench.joints.relax(bench.handles[0]);
+    bench.joints.set_pulses(bench.handles[0], 5).unwrap();
+    let sent = writes(&bench.run(9));
+    assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
+    assert_eq!(sent[7], Command::Write(Register::Enable, 1));
+    // The same when the driver gives the disable back.
+    bench.joints.relax(bench.handles[0]);
+    bench.joints.set_pulses(bench.handles[0], 6).unwrap();
+    let refused = bench.joints.next_frame().unwrap();
+    assert!(bench.joints.requeue(&refused));
+    let sent = writes(&bench.run(9));
+    assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
+}
+
+#[test]
+fn a_relaxed_joint_is_told_again_each_100_ms() {
+    let mut bench = Bench::new(&[7]);
+    bench.run(1);
+    let sent = bench.run(1_000);
+    assert_eq!(writes(&sent), [Command::DISABLE; 10]);
+}
+
+#[test]
+fn a_driver_that_takes_one_frame_a_tick_starves_no_joint() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    let mut asked = [0; 12];
+    let mut written = [0; 12];
+    for _ in 0..2_400 {
+        bench.ms += 1;
+        for joint in bench.handles.clone() {
+            _ = bench.joints.set_pulses(joint, 1_000);
+        }
+        bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+        let sent = bench.joints.next_frame().unwrap();
+        if let Some(refused) = bench.joints.next_frame() {
+            assert!(bench.joints.requeue(&refused));
+        }
+        let id = u8::try_from(sent.header()).unwrap();
+        let command = Command::decode(sent.data()).unwrap();
+        let counts = if command.is_safe() { &mut asked } else { &mut written };
+        counts[usize::from(id - 1)] += 1;
+        bench.answer(id, command);
+    }
+    assert!(written.iter().all(|count| *count > 20), "{written:?}");
+    assert!(asked.iter().all(|count| *count > 20), "{asked:?}");
+}

@@ -1,0 +1,97 @@
+//! What has to make a joint safe.
+
+use super::*;
+
+#[test]
+fn while_an_answer_is_due_nothing_is_sent_to_that_joint_a_stop_neither() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(100);
+    bench.silent = ALL.to_vec();
+    let sent = bench.drive(1);
+    let asked = sent.iter().find(|(_, command)| matches!(command, Command::Read(_))).unwrap().0;
+    assert_eq!(
+        bench.joints.awaited(bench.handles[usize::from(asked - 1)]),
+        Some(Register::ActualPosition)
+    );
+    bench.joints.emergency_stop();
+    let sent = bench.run(1);
+    assert!(sent.iter().filter(|(_, command)| *command == Command::DISABLE).count() == 11);
+    assert!(sent.iter().all(|(id, _)| *id != asked));
+    // After 2 ms it gets its stop in any case.
+    assert!(bench.run(2).contains(&(asked, Command::DISABLE)));
+    assert!(bench.joints.counters().unanswered >= 1);
+}
+
+#[test]
+fn a_silent_joint_is_late_after_40_ms_and_offline_after_100_and_the_others_go_on() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    bench.joints.zero(bench.handles[4]).unwrap();
+    bench.drive(20);
+    bench.silent = std::vec![5];
+    let heard = bench.ms;
+    let mut late = None;
+    for _ in 0..140 {
+        let sent = bench.drive(1);
+        if sent.contains(&(5, Command::DISABLE)) {
+            late.get_or_insert(bench.ms - heard);
+        }
+        assert!(writes(&sent).iter().any(|command| !command.is_safe()), "the others go on");
+    }
+    assert!(late.unwrap() <= 43, "{late:?}");
+    let state = bench.state(4);
+    assert_eq!((state.link, state.homing), (Link::Offline, Homing::Uncertain));
+    assert!(state.unanswered > 5 && !bench.joints.is_armed());
+    assert!(bench.joints.is_joint_armed(bench.handles[3]));
+    let missing = bench.joints.arm(at_ms(bench.ms)).unwrap_err();
+    assert_eq!(missing.to_string(), "no feedback from snake joint #5");
+    // Ten positions in a row bring it back, but it moves only when it is armed again.
+    bench.silent.clear();
+    let sent = bench.drive(250);
+    assert!(!sent.iter().any(|(id, command)| *id == 5 && !command.is_safe()));
+    assert_eq!(bench.state(4).link, Link::Online);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    assert!(bench.drive(100).iter().any(|(id, command)| *id == 5 && !command.is_safe()));
+}
+
+#[test]
+fn a_drive_that_lost_its_enable_is_noticed_and_waits_to_be_armed() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    bench.enabled[8] = 0; // its supply was away for a moment
+    bench.drive(300);
+    let state = bench.state(8);
+    assert_eq!((state.resets, state.is_driven, bench.enabled[8]), (1, false, 0));
+    assert!(!bench.joints.is_armed() && bench.state(7).is_driven);
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+    bench.drive(100);
+    assert_eq!(bench.enabled, [1; 12]);
+}
+
+#[test]
+fn a_position_further_off_than_a_joint_can_go_disarms_it() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(100);
+    bench.raw[2] = 5_000; // 28 degrees
+    bench.drive(30);
+    assert_eq!(bench.state(2).position_jumps, 0);
+    bench.raw[2] = -60_000;
+    bench.drive(30);
+    let state = bench.state(2);
+    assert_eq!((state.position_jumps, state.is_driven, state.pulses), (1, false, -60_000));
+    assert_eq!(bench.joints.set_pulses(bench.handles[2], 0), Err(TargetError::Disarmed));
+    bench.joints.arm(at_ms(bench.ms)).unwrap();
+}
+
+#[test]
+fn an_emergency_stop_in_the_middle_of_a_tick_disables_all_with_the_next_frames() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    bench.ms += 1;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    bench.joints.emergency_stop();
+    let sent: Vec<_> = core::iter::from_fn(|| bench.joints.next_frame()).collect();
+    let stops = sent.iter().filter(|frame| Command::decode(frame.data()) == Some(Command::DISABLE));
+    assert_eq!((stops.count(), sent.len()), (12, 13)); // and one question
+    assert_eq!(bench.joints.arm(at_ms(bench.ms)), Err(ArmError::Stopped));
+}

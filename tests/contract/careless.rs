@@ -1,0 +1,331 @@
+//! The check finds what a careless device gets wrong.
+
+use super::dji::OneModel;
+use super::*;
+use drivetrain::dji::M3508;
+use drivetrain::motor::{Claim, Edge, Ingest, MotorName};
+use drivetrain::sim::{Rule, Violation};
+use drivetrain::time::{Duration, Instant, Tick};
+
+/// What a careless device gets wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mistake {
+    None,
+    MovesDisarmed,
+    OffersForEver,
+    SendsUnclaimed,
+    TakesShortFrames,
+    HearsRemoteFrames,
+    ForgetsTheLimit,
+    ForgetsTheDeadline,
+    IgnoresTheStop,
+    RequeuesAnything,
+    OffersAtOnce,
+    ArmsUnheard,
+    KeepsItsTarget,
+    KeepsNan,
+    TrustsTheStep,
+}
+
+/// An own motor with a mistake of its maker in front of it.
+struct Careless(Own<MyMotor>, Mistake, Option<CanFrame>, f32);
+
+impl CanDevice for Careless {
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let same_number = frame.id() == id(0x143).into();
+        let long = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
+        match self.1 {
+            Mistake::TakesShortFrames if same_number && frame.is_data_frame() => {
+                self.0.ingest(&long, now)
+            }
+            Mistake::HearsRemoteFrames if same_number => self.0.ingest(&long, now),
+            _ => self.0.ingest(frame, now),
+        }
+    }
+    fn update(&mut self, tick: Tick) {
+        match self.1 {
+            Mistake::ForgetsTheLimit | Mistake::ForgetsTheDeadline => {
+                let forgets_limit = self.1 == Mistake::ForgetsTheLimit;
+                if forgets_limit && self.0.is_armed() {
+                    let long = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
+                    _ = self.0.ingest(&long, tick.now());
+                } else if self.0.is_armed() && self.3 != 0.0 {
+                    _ = drive_own(&mut self.0, self.3);
+                }
+                self.0.update(tick);
+            }
+            Mistake::TrustsTheStep => self.0.update(Tick::new(tick.now(), 0.001)),
+            _ => self.0.update(tick),
+        }
+        if self.1 == Mistake::MovesDisarmed
+            || (self.1 == Mistake::IgnoresTheStop && self.is_stopped())
+        {
+            self.2 = CanFrame::standard(0x123, [1; 8]);
+        }
+    }
+    fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
+        let frame = self.2.take().or_else(|| self.0.next_frame(turn));
+        match self.1 {
+            Mistake::OffersForEver => frame.or(CanFrame::standard(0x123, [0; 8])),
+            Mistake::SendsUnclaimed => {
+                frame.and_then(|frame| CanFrame::standard(0x100, *frame.bytes()))
+            }
+            _ => frame,
+        }
+    }
+    fn requeue(&mut self, frame: &CanFrame) -> bool {
+        if self.1 == Mistake::OffersAtOnce {
+            self.2 = Some(*frame);
+        }
+        self.0.requeue(frame) || self.1 == Mistake::RequeuesAnything
+    }
+    fn claims(&self) -> impl Iterator<Item = Claim> {
+        self.0.claims()
+    }
+    fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
+        self.0.missing(now).filter(|_| self.1 != Mistake::ArmsUnheard)
+    }
+    fn second_master(&self) -> Option<Claim> {
+        self.0.second_master()
+    }
+    fn next_edge(&mut self) -> Option<Edge> {
+        self.0.next_edge()
+    }
+    fn engage(&mut self, now: Instant) {
+        self.0.engage(now);
+        if self.1 == Mistake::KeepsItsTarget && self.3 != 0.0 {
+            _ = drive_own(&mut self.0, self.3);
+        }
+    }
+    fn disarm(&mut self) {
+        self.0.disarm();
+    }
+    fn is_armed(&self) -> bool {
+        self.0.is_armed()
+    }
+    fn emergency_stop(&mut self) {
+        self.0.emergency_stop();
+    }
+    fn clear_emergency_stop(&mut self) {
+        self.0.clear_emergency_stop();
+    }
+    fn is_stopped(&self) -> bool {
+        self.0.is_stopped()
+    }
+}
+
+fn careless(mistake: Mistake) -> Result<usize, Violation> {
+    check_contract(|| Mixed {
+        device: Careless(Own::new(MyMotor::new(3).unwrap()), mistake, None, 0.0),
+        ids: vec![0x143],
+        drive: |device: &mut Careless, share| {
+            let share = match device.1 {
+                Mistake::KeepsNan if share.is_nan() => 1.0,
+                _ => share,
+            };
+            drive_own(&mut device.0, share)?;
+            device.3 = share;
+            Ok(())
+        },
+    })
+}
+
+/// A wheel that takes another target for one that it does not offer; and says so, or not.
+struct Obliging(OneModel<M3508, 1>, Result<(), TargetError>);
+
+impl Subject for Obliging {
+    type Device = Bus;
+    fn device(&mut self) -> &mut Bus {
+        self.0.device()
+    }
+    fn motors(&self) -> usize {
+        1
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        self.0.feedback(motor)
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        self.0.drive(share)
+    }
+    fn drive_unsupported(&mut self) -> Result<(), TargetError> {
+        self.0.drive(0.5)?;
+        self.1
+    }
+}
+
+#[test]
+fn the_check_finds_a_target_that_is_taken_without_being_offered() {
+    for answer in [Ok(()), Err(TargetError::Unsupported)] {
+        let found = check_contract(|| Obliging(OneModel::new([1], |config| config), answer));
+        assert_eq!(found.map_err(|violation| violation.rule), Err(Rule::UnsupportedIsAnError));
+    }
+}
+
+#[test]
+fn the_check_finds_what_a_careless_device_gets_wrong() {
+    assert_eq!(careless(Mistake::None), Ok(RULES));
+    for (mistake, rule) in [
+        (Mistake::MovesDisarmed, Rule::DisarmedIsZero),
+        (Mistake::OffersForEver, Rule::IsBounded),
+        (Mistake::SendsUnclaimed, Rule::SendsWhatItClaims),
+        (Mistake::TakesShortFrames, Rule::ShortIsNotTaken),
+        (Mistake::HearsRemoteFrames, Rule::ForeignIsUnrelated),
+        (Mistake::ForgetsTheLimit, Rule::RejectedIsNotFresh),
+        (Mistake::ForgetsTheDeadline, Rule::OldTargetsAreZero),
+        (Mistake::IgnoresTheStop, Rule::EmergencyStopStays),
+        (Mistake::RequeuesAnything, Rule::ForeignIsNotRequeued),
+        (Mistake::OffersAtOnce, Rule::RequeuedComesAgain),
+        (Mistake::ArmsUnheard, Rule::MissingAreNamed),
+        (Mistake::KeepsItsTarget, Rule::StartsFromZero),
+        (Mistake::KeepsNan, Rule::NanIsZero),
+        (Mistake::TrustsTheStep, Rule::BadStepsAreZero),
+    ] {
+        assert_eq!(careless(mistake).map_err(|violation| violation.rule), Err(rule), "{mistake:?}");
+    }
+}
+
+/// What a struct of devices forgets to forward, or gets wrong on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Slip {
+    None,
+    ArmsFaulty,
+    ArmsBesideAnother,
+    HasNoEdges,
+    DropsEdges,
+    RepeatsEdges,
+    SwapsEdges,
+    StampsWhenRead,
+    NamesAnother,
+    CountsItsOwnTime,
+}
+
+/// Two wheels behind somebody's own struct.
+struct Slipping {
+    wheels: OneModel<M3508, 2>,
+    slip: Slip,
+    last: Option<Edge>,
+    repeated: u32,
+    now: Instant,
+}
+
+impl CanDevice for Slipping {
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        self.wheels.device().ingest(frame, now)
+    }
+    fn update(&mut self, tick: Tick) {
+        let own_time = self.slip == Slip::CountsItsOwnTime && tick.now() <= self.now;
+        let now = if own_time { self.now + Duration::from_millis(1) } else { tick.now() };
+        self.now = now;
+        self.wheels.device().update(Tick::new(now, tick.dt_s()));
+        if self.slip == Slip::DropsEdges {
+            self.last = self.wheels.device().next_edge().or(self.last);
+        }
+    }
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        self.wheels.device().next_frame()
+    }
+    fn requeue(&mut self, frame: &CanFrame) -> bool {
+        self.wheels.device().requeue(frame)
+    }
+    fn claims(&self) -> impl Iterator<Item = Claim> {
+        self.wheels.bus().claims()
+    }
+    fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
+        self.wheels.bus().missing(now)
+    }
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.wheels.bus().faulty().filter(|_| self.slip != Slip::ArmsFaulty)
+    }
+    fn second_master(&self) -> Option<Claim> {
+        self.wheels.bus().second_master().filter(|_| self.slip != Slip::ArmsBesideAnother)
+    }
+    fn next_edge(&mut self) -> Option<Edge> {
+        let edge = match self.slip {
+            Slip::HasNoEdges => None,
+            Slip::DropsEdges => self.last.take(),
+            _ => self.wheels.device().next_edge(),
+        };
+        match (self.slip, edge) {
+            (Slip::RepeatsEdges, Some(edge)) if self.repeated < 3 => self.last = Some(edge),
+            (Slip::RepeatsEdges, None) if self.repeated < 3 => {
+                self.repeated += 1;
+                return self.last.take();
+            }
+            _ => {}
+        }
+        edge.map(|edge| Edge {
+            at: if self.slip == Slip::StampsWhenRead { self.now } else { edge.at },
+            began: edge.began ^ (self.slip == Slip::SwapsEdges),
+            motor: match self.slip {
+                Slip::NamesAnother => MotorName::new("M3508", 3 - edge.motor.id()),
+                _ => edge.motor,
+            },
+            ..edge
+        })
+    }
+    fn engage(&mut self, now: Instant) {
+        self.wheels.device().engage(now);
+    }
+    fn disarm(&mut self) {
+        self.wheels.device().disarm();
+    }
+    fn is_armed(&self) -> bool {
+        self.wheels.bus().is_armed()
+    }
+    fn emergency_stop(&mut self) {
+        self.wheels.device().emergency_stop();
+    }
+    fn clear_emergency_stop(&mut self) {
+        self.wheels.device().clear_emergency_stop();
+    }
+    fn is_stopped(&self) -> bool {
+        self.wheels.bus().is_stopped()
+    }
+}
+
+impl Subject for Slipping {
+    type Device = Self;
+    fn device(&mut self) -> &mut Self {
+        self
+    }
+    fn motors(&self) -> usize {
+        self.wheels.motors()
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        self.wheels.feedback(motor)
+    }
+    fn fault(&self, motor: usize) -> Option<CanFrame> {
+        self.wheels.fault(motor)
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        self.wheels.drive(share)
+    }
+}
+
+#[test]
+fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
+    let slipping = |slip| {
+        let check = check_contract(|| Slipping {
+            wheels: OneModel::new([1, 2], |config| config),
+            slip,
+            last: None,
+            repeated: 0,
+            now: Instant::START,
+        });
+        check.map_err(|violation| violation.rule)
+    };
+    assert_eq!(slipping(Slip::None), Ok(RULES));
+    for (slip, rule) in [
+        (Slip::CountsItsOwnTime, Rule::StandingTimeIsZero),
+        (Slip::ArmsFaulty, Rule::FaultIsNotArmed),
+        (Slip::ArmsBesideAnother, Rule::SecondMasterIsNotArmed),
+        (Slip::HasNoEdges, Rule::ChangeIsAnEdge),
+        (Slip::NamesAnother, Rule::ChangeIsAnEdge),
+        (Slip::SwapsEdges, Rule::ChangeIsAnEdge),
+        (Slip::DropsEdges, Rule::ChangeIsAnEdge),
+        (Slip::RepeatsEdges, Rule::EdgesDoNotFlood),
+        (Slip::StampsWhenRead, Rule::EdgesWait),
+    ] {
+        assert_eq!(slipping(slip), Err(rule), "{slip:?}");
+    }
+}

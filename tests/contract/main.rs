@@ -1,0 +1,81 @@
+//! Every device keeps the contract of `CanDevice`: each model, tuples and arrays of buses, a motor of one's own, joints, and
+//! motors on pins; and the check finds devices that do not.
+
+#![cfg(test)]
+
+mod careless;
+mod dji;
+mod joints;
+#[cfg(feature = "hal")]
+mod pins;
+
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{AnyHandle, Bus, Config, Model};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{CanDevice, Own, TargetError, VelocityDrive};
+use drivetrain::sim::{Subject, check_contract};
+use drivetrain::units::AngularVelocity;
+use embedded_can::Frame;
+
+#[expect(dead_code, reason = "the example's own main and simulation")]
+#[path = "../../examples/custom_motor.rs"]
+mod custom_motor;
+use custom_motor::MyMotor;
+
+const SPEED: PidConfig = PidConfig::new(1.0, 4.0, 0.0);
+const RULES: usize = 26;
+
+fn velocity(share: f32) -> AngularVelocity {
+    AngularVelocity::from_rad_per_s(5.0 * share)
+}
+
+fn rest(id: u16) -> Option<CanFrame> {
+    CanFrame::standard(id, [0x10, 0, 0, 0, 0, 0, 30, 0])
+}
+
+/// Anything with a list of feedback ids and a function that drives it.
+struct Mixed<D> {
+    device: D,
+    ids: Vec<u16>,
+    drive: fn(&mut D, f32) -> Result<(), TargetError>,
+}
+
+impl<D: CanDevice> Subject for Mixed<D> {
+    type Device = D;
+    fn device(&mut self) -> &mut D {
+        &mut self.device
+    }
+    fn motors(&self) -> usize {
+        self.ids.len()
+    }
+    fn feedback(&self, motor: usize) -> Option<CanFrame> {
+        match self.ids[motor] {
+            own @ 0x140..0x150 => CanFrame::new(id(own), &[0, 0, 30]),
+            dji => rest(dji),
+        }
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        (self.drive)(&mut self.device, share)
+    }
+}
+
+fn id(raw: u16) -> embedded_can::StandardId {
+    embedded_can::StandardId::new(raw).unwrap()
+}
+
+fn bus<M: Model>(ids: &[u8]) -> Bus {
+    let mut bus = Bus::new();
+    for id in ids {
+        bus.attach(Config::<M>::new(*id).speed_loop(SPEED)).unwrap();
+    }
+    bus
+}
+
+fn drive_all(bus: &mut Bus, share: f32) -> Result<(), TargetError> {
+    let motors: Vec<AnyHandle> = bus.motors().map(|(motor, _)| motor).collect();
+    bus.drive(motors.into_iter().map(|motor| (motor, velocity(share))))
+}
+
+fn drive_own(motor: &mut Own<MyMotor>, share: f32) -> Result<(), TargetError> {
+    motor.set_velocity((), velocity(share))
+}
