@@ -5,7 +5,7 @@ use drivetrain::control::{
     Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
     MotionLimits, MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator,
     PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
-    SpeedActuatorConfig, StepResponse,
+    SpeedActuatorConfig, StepResponse, TimeStep,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -64,12 +64,12 @@ fn pid(mut input: Input) {
         match input.byte() {
             0..=223 => {
                 let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-                pid.step(range, Pid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+                update(&mut pid, range, [setpoint, measured, dt_s]);
             }
             224..=231 => {
                 let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
                 pid.step(range, Pid::rejected, |pid| {
-                    let step = drivetrain::control::TimeStep::of(dt_s);
+                    let step = TimeStep::of(dt_s);
                     pid.step_error(error, rate, &step)
                 });
             }
@@ -86,6 +86,7 @@ fn pid(mut input: Input) {
             }
             244..=249 => {
                 let (kp, ki, kd) = (input.positive(), input.positive(), input.positive());
+                pid.forgive();
                 pid.change(|pid| {
                     _ = pid.set_gains(kp, ki, kd);
                     pid.output()
@@ -93,17 +94,38 @@ fn pid(mut input: Input) {
             }
             _ => {
                 let config = pid_config(&mut input);
-                let mut kept = false;
+                pid.forgive();
                 pid.change(|pid| {
                     let before = pid.output();
-                    kept = pid.set_config(config).is_ok();
+                    _ = pid.set_config(config);
                     assert_eq!(pid.output().to_bits(), before.to_bits());
                     pid.output()
                 });
                 range = pid_range(&pid);
-                _ = kept;
             }
         }
+    }
+}
+
+/// A bad sample leaves every term as it is (I5), and D rests in the next good step: it keeps its value.
+fn update(pid: &mut Observed<Pid>, range: (f32, f32), [setpoint, measured, dt_s]: [f32; 3]) {
+    let before = (*pid.get(), pid.differs());
+    let bits = |pid: &Pid| {
+        let terms = pid.terms();
+        [terms.p, terms.i, terms.d, terms.feed_forward].map(f32::to_bits)
+    };
+    let taken =
+        pid.step(range, Pid::rejected, |pid: &mut Pid| pid.update(setpoint, measured, dt_s));
+    let ([.., before_d, _], [.., d, _]) = (bits(&before.0), bits(pid.get()));
+    match (taken, before.1) {
+        (false, _) => {
+            assert_eq!(bits(&before.0), bits(pid.get()), "I5: {pid:?}");
+            if !TimeStep::of(dt_s).is_hold() {
+                pid.rests();
+            }
+        }
+        (true, true) => assert_eq!(before_d, d, "D does not rest: {pid:?}"),
+        (true, false) => {}
     }
 }
 
@@ -137,7 +159,11 @@ fn incremental(mut input: Input) {
     let range = (range.0.min(0.0), range.1.max(0.0));
     while !input.is_empty() {
         let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-        pid.step(range, IncrementalPid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+        let taken =
+            pid.step(range, IncrementalPid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+        if !taken && gains[2] > 0.0 && !TimeStep::of(dt_s).is_hold() {
+            pid.rests();
+        }
     }
 }
 
@@ -162,9 +188,13 @@ fn speed_actuator(mut input: Input) {
     let mut actuator = Observed::new(actuator);
     while !input.is_empty() {
         let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
-        actuator.step(range, SpeedActuator::rejected, |actuator| {
+        let taken = actuator.step(range, SpeedActuator::rejected, |actuator| {
             actuator.update(setpoint, speed, dt_s)
         });
+        // D rests, and the filter before it starts anew.
+        if !taken && !TimeStep::of(dt_s).is_hold() {
+            actuator.rests();
+        }
     }
 }
 
@@ -269,8 +299,8 @@ fn slew(mut input: Input) {
     while !input.is_empty() {
         let (target, dt_s) = (input.float(), input.step_s());
         let before = limiter.get().value();
-        let after =
-            limiter.step(ANY, SlewLimiter::rejected, |limiter| limiter.update(target, dt_s));
+        limiter.step(ANY, SlewLimiter::rejected, |limiter| limiter.update(target, dt_s));
+        let after = limiter.get().value();
         let towards = if before <= target {
             before <= after && after <= target
         } else {

@@ -34,7 +34,11 @@ impl Input<'_> {
             212..=215 => f32::INFINITY,
             216..=219 => f32::MAX,
             220..=223 => f32::MIN_POSITIVE,
-            _ => f32::from_le_bytes(self.bytes()),
+            _ => {
+                let value = f32::from_le_bytes(self.bytes());
+                // One NaN is as bad as another, but for the one by which a `Pid` knows that there is no setpoint.
+                if value.is_nan() { f32::NAN } else { value }
+            }
         }
     }
 
