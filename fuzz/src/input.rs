@@ -61,7 +61,8 @@ impl Input<'_> {
         match self.byte() {
             jump @ 0..=191 => now + u64::from(jump) * 100,
             jump @ 192..=239 => now + (u64::from(self.byte()) << (jump - 192).min(31)),
-            jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)),
+            // Not to 0, where a bus that has no frame and no update yet stands.
+            jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)).max(1),
         }
     }
 

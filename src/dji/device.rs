@@ -46,7 +46,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let unwatched = self.running && now > self.updated + LONGEST_PAUSE;
+        let unwatched = now > self.updated + LONGEST_PAUSE;
         let missing = move |slot: &&Slot| unwatched || slot.is_missing(now.stamp(), &self.timeouts);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
