@@ -59,24 +59,30 @@ fn pid_config(input: &mut Input) -> PidConfig {
 fn pid(mut input: Input) {
     let Ok(pid) = Pid::new(pid_config(&mut input)) else { return };
     let mut pid = Observed::new(pid);
-    let mut range = pid_range(&pid);
     while !input.is_empty() {
         match input.byte() {
             0..=223 => {
                 let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-                update(&mut pid, range, [setpoint, measured, dt_s]);
+                update(&mut pid, [setpoint, measured, dt_s]);
             }
             224..=231 => {
                 let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
+                let range = pid.get().config().output_range();
                 pid.step(range, Pid::rejected, |pid| {
                     let step = TimeStep::of(dt_s);
                     pid.step_error(error, rate, &step)
                 });
             }
-            232..=237 => pid.change(|pid| {
-                pid.reset();
-                pid.output()
-            }),
+            232..=237 => {
+                pid.change(|pid| {
+                    pid.reset();
+                    pid.output()
+                });
+                // I9: nothing of before is left.
+                let fresh = Pid::new(pid.get().config()).expect("it was valid");
+                assert_eq!(pid.get().terms(), fresh.terms(), "I9: {pid:?}");
+                pid.start_from(fresh);
+            }
             238..=243 => {
                 let output = input.float();
                 pid.change(|pid| {
@@ -101,19 +107,19 @@ fn pid(mut input: Input) {
                     assert_eq!(pid.output().to_bits(), before.to_bits());
                     pid.output()
                 });
-                range = pid_range(&pid);
             }
         }
     }
 }
 
 /// A bad sample leaves every term as it is (I5), and D rests in the next good step: it keeps its value.
-fn update(pid: &mut Observed<Pid>, range: (f32, f32), [setpoint, measured, dt_s]: [f32; 3]) {
+fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
     let before = (*pid.get(), pid.differs());
     let bits = |pid: &Pid| {
         let terms = pid.terms();
         [terms.p, terms.i, terms.d, terms.feed_forward].map(f32::to_bits)
     };
+    let range = pid.get().config().output_range();
     let taken =
         pid.step(range, Pid::rejected, |pid: &mut Pid| pid.update(setpoint, measured, dt_s));
     let ([.., before_d, _], [.., d, _]) = (bits(&before.0), bits(pid.get()));
@@ -127,13 +133,6 @@ fn update(pid: &mut Observed<Pid>, range: (f32, f32), [setpoint, measured, dt_s]
         (true, true) => assert_eq!(before_d, d, "D does not rest: {pid:?}"),
         (true, false) => {}
     }
-}
-
-/// The output that a held step repeats may be one from before the limits were changed.
-fn pid_range(pid: &Observed<Pid>) -> (f32, f32) {
-    let (lower, upper) = pid.get().config().output_range();
-    let output = pid.get().output();
-    (lower.min(output), upper.max(output))
 }
 
 fn incremental(mut input: Input) {
@@ -155,8 +154,6 @@ fn incremental(mut input: Input) {
     }
     let Ok(pid) = IncrementalPid::new(config) else { return };
     let mut pid = Observed::new(pid);
-    // Zero is where it starts, within the limits or not.
-    let range = (range.0.min(0.0), range.1.max(0.0));
     while !input.is_empty() {
         let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
         let taken =
@@ -179,12 +176,15 @@ fn speed_config(input: &mut Input) -> SpeedActuatorConfig {
     config
 }
 
+/// The output filter comes after the limits, and may round by the last digits of the larger one.
+fn rounded((lower, upper): (f32, f32)) -> (f32, f32) {
+    let slack = 1e-6 * lower.abs().max(upper.abs());
+    ((lower - slack).max(f32::MIN), (upper + slack).min(f32::MAX))
+}
+
 fn speed_actuator(mut input: Input) {
     let Ok(actuator) = SpeedActuator::new(speed_config(&mut input)) else { return };
-    let (lower, upper) = actuator.pid().config().output_range();
-    // The output filter comes after the limits, and may round.
-    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
-    let range = (rounded(lower.min(0.0)), rounded(upper.max(0.0)));
+    let range = rounded(actuator.pid().config().output_range());
     let mut actuator = Observed::new(actuator);
     while !input.is_empty() {
         let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
@@ -209,9 +209,7 @@ fn position_actuator(mut input: Input) {
         config = config.with_outer_divider(input.byte());
     }
     let Ok(mut actuator) = PositionActuator::new(config) else { return };
-    let (lower, upper) = actuator.cascade().speed().config().output_range();
-    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
-    let (lower, upper) = (rounded(lower), rounded(upper));
+    let (lower, upper) = rounded(actuator.cascade().speed().config().output_range());
     while !input.is_empty() {
         let (setpoint, angle, speed) = (input.float(), input.float(), input.float());
         let dt_s = input.step_s();
