@@ -1,7 +1,7 @@
 //! Every input, one after the other, against an oracle that is not our code: integers and `f64`.
 //!
-//! Ignored in the everyday run: minutes in release. `.ci/run` runs them; the four sweeps of conversions take turns there,
-//! one a day. All of it:
+//! Ignored in the everyday run: minutes in release. `.ci/run` runs them; the five sweeps of conversions take turns there,
+//! one a day, so that five days see every value of every scale. All of it:
 //! `DRIVETRAIN_EXHAUSTIVE=full cargo test --release --all-features --test exhaustive -- --ignored --nocapture --test-threads 1`
 
 #![cfg(test)]
@@ -91,13 +91,14 @@ fn check_word(word: i16, value: f32, scale: f64, limit: i16) {
     assert!(off <= 0.5 + saturated.abs() / 4e6, "{value:e} gives {word}, not {exact}");
 }
 
-/// A sweep of minutes takes its turn with the others: one of four a day, unless all are asked for.
+/// A sweep of minutes takes its turn with the others: one of five a day, unless all are asked for.
 fn has_its_turn(what: &str, turn: u64) -> bool {
+    const TURNS: u64 = 5;
     let everything = std::env::var("DRIVETRAIN_EXHAUSTIVE").is_ok_and(|share| share == "full");
     let day = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs() / 86_400;
-    let now = everything || day % 4 == turn;
+    let now = everything || day % TURNS == turn;
     if !now {
-        let days = (turn + 4 - day % 4) % 4;
+        let days = (turn + TURNS - day % TURNS) % TURNS;
         println!(
             "exhaustive: {what}: not today, in {days} days; DRIVETRAIN_EXHAUSTIVE=full runs all"
         );
@@ -107,20 +108,21 @@ fn has_its_turn(what: &str, turn: u64) -> bool {
 
 /// Every `f32`: to the nearest, saturated, odd-symmetric, monotone; what is not finite is refused and gives 0.
 fn every_value<M: Model, const N: usize>(
-    turn: u64,
+    (turn, scale_name): (u64, &str),
     limit: i16,
     full_scale: f64,
     config: impl Fn(u8) -> Config<M> + Sync,
     set: impl Fn(&mut Bus, Handle<M>, f32) -> Result<(), TargetError> + Sync,
 ) {
     const VALUES_A_BUS: u64 = 1 << 12;
-    if !has_its_turn(M::FACTS.name, turn) {
+    let what = format!("values of {}{scale_name}", M::FACTS.name);
+    if !has_its_turn(&what, turn) {
         return;
     }
     let scale = f64::from(limit) / full_scale;
     let pairs = N as u64 / 2;
     // The sign bit is the negative of each pair.
-    both_halves(&format!("values of {}", M::FACTS.name), 0..1 << 31, |bits| {
+    both_halves(&what, 0..1 << 31, |bits| {
         let mut last = i16::MIN;
         let mut next = bits.start;
         while next < bits.end {
@@ -168,25 +170,38 @@ fn set_volts(bus: &mut Bus, motor: Handle<Gm6020Voltage>, value: f32) -> Result<
 #[test]
 #[ignore = "2^32 values: in release, by .ci/run"]
 fn every_f32_of_an_m2006_is_the_nearest_word() {
-    every_value::<M2006, 8>(0, 10_000, 10.0, Config::new, set_amperes);
+    every_value::<M2006, 8>((0, ""), 10_000, 10.0, Config::new, set_amperes);
 }
 
 #[test]
 #[ignore = "2^32 values: in release, by .ci/run"]
 fn every_f32_of_an_m3508_is_the_nearest_word() {
-    every_value::<M3508, 8>(1, 16_384, 20.0, Config::new, set_amperes);
+    every_value::<M3508, 8>((1, ""), 16_384, 20.0, Config::new, set_amperes);
 }
 
 #[test]
 #[ignore = "2^32 values: in release, by .ci/run"]
 fn every_f32_of_a_gm6020_in_voltage_mode_is_the_nearest_word() {
-    every_value::<Gm6020Voltage, 6>(2, 25_000, 24.0, Config::new, set_volts);
+    every_value::<Gm6020Voltage, 6>((2, ""), 25_000, 24.0, Config::new, set_volts);
+}
+
+/// The scale of motors of 2020 and before.
+#[test]
+#[ignore = "2^32 values: in release, by .ci/run"]
+fn every_f32_of_a_gm6020_with_the_legacy_scale_is_the_nearest_word() {
+    every_value::<Gm6020Voltage, 6>(
+        (4, ", legacy scale"),
+        30_000,
+        24.0,
+        |id| Config::new(id).with_legacy_full_scale(),
+        set_volts,
+    );
 }
 
 #[test]
 #[ignore = "2^32 values: in release, by .ci/run"]
 fn every_f32_of_a_gm6020_in_current_mode_is_the_nearest_word() {
-    every_value::<Gm6020Current, 6>(3, 16_384, 3.0, Config::new, set_amperes);
+    every_value::<Gm6020Current, 6>((3, ""), 16_384, 3.0, Config::new, set_amperes);
 }
 
 /// How far two angles are apart, whole periods not counted.
