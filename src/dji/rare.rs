@@ -31,8 +31,8 @@ impl<B> Bus<B> {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };
-        if !self.running && self.updated == Instant::START {
-            // Until the first update, the first frame is where the pause is counted from.
+        if !self.running && (self.updated == Instant::START || now < self.updated) {
+            // Until the first update, the pause is counted from the earliest frame.
             self.updated = now;
         }
         let before = slot.conditions;
@@ -103,11 +103,14 @@ impl<B> Bus<B> {
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
         self.end_pause(before);
-        self.running = true;
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
+        // Nobody looks at ages here: many of these in a row are one pause.
+        if core::mem::replace(&mut self.running, true) {
+            self.updated = self.updated.min(before);
+        }
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }

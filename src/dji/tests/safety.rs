@@ -360,4 +360,14 @@ fn a_pause_of_a_whole_turn_of_the_stamps_revives_nobody() {
         bus.update(Tick::new(at_ms(2) + turn, dt_s));
         assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
     }
+
+    // Updates without a usable step, however close to each other, do not end the pause.
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    step(&mut bus, 2);
+    for seconds in 1..=4294 {
+        bus.update(Tick::new(at_ms(seconds * 1_000), 0.0));
+    }
+    assert!(bus.arm_only(&[wheel.erase()], at_ms(2) + turn).is_err(), "heard an hour ago");
+    bus.update(Tick::new(at_ms(2) + turn, 0.001));
+    assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
 }
