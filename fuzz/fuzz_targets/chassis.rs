@@ -1,4 +1,5 @@
-//! Any layout, any wheels, any commands, any steps: what the wheels are told is finite and within their limit.
+//! Any layout, any wheels, any commands, any steps: what the wheels are told is finite, within their limit, and nothing when
+//! the command is old or no number.
 #![no_main]
 
 use drivetrain::chassis::{
@@ -73,17 +74,29 @@ fn drive<K: Kinematics>(
     let mut chassis = Chassis::new(layout);
     let mut now = 1_000;
     let mut limit = f32::MAX;
+    // Seconds since the command was renewed.
+    let mut age_s = f64::MAX;
+    let mut ramps = false;
     while !input.is_empty() {
         match input.byte() {
             0..=31 => {
-                chassis.set_body(Twist::new(input.float(), input.float(), input.float()));
+                let twist = Twist::new(input.float(), input.float(), input.float());
+                if !twist.is_finite() {
+                    check_refusal(chassis, twist);
+                }
+                chassis.set_body(twist);
+                age_s = 0.0;
             }
             32..=63 => {
                 let twist = Twist::new(input.float(), input.float(), input.float());
                 chassis.set_world(twist, Heading::new(Angle::from_radians(input.float())));
+                age_s = 0.0;
             }
             64..=71 => chassis.set_heading(Heading::new(Angle::from_radians(input.float()))),
-            72..=79 => chassis.stop(),
+            72..=79 => {
+                chassis.stop();
+                age_s = 0.0;
+            }
             80..=87 => chassis.restart(),
             88..=91 => chassis.set_pose(Pose2::ORIGIN),
             92..=111 => {
@@ -93,6 +106,7 @@ fn drive<K: Kinematics>(
                     .with_wheel_speed(AngularVelocity::from_rad_per_s(wheel));
                 if chassis.set_limits(limits).is_ok() {
                     limit = wheel;
+                    ramps = true;
                 }
             }
             lost => {
@@ -100,7 +114,13 @@ fn drive<K: Kinematics>(
                 let wheels = K::map(layout_wheels(&chassis), |_: K::Speed| {
                     (lost < 240 || input.byte() % 2 == 0).then(|| measured(&mut input))
                 });
-                let tick = Tick::new(Instant::from_micros(now), input.step_s());
+                let dt_s = input.step_s();
+                let tick = Tick::new(Instant::from_micros(now), dt_s);
+                // Open: the step of the tick that finds it old counts from the next tick on.
+                let old = age_s > 0.101;
+                if dt_s.is_finite() && dt_s > 0.0 {
+                    age_s += f64::from(dt_s);
+                }
                 let mut same = chassis;
                 let targets = chassis.update(wheels, tick);
                 let again = same.update(wheels, tick);
@@ -111,7 +131,10 @@ fn drive<K: Kinematics>(
                     let slack = if limit >= 1.0 { 1e-5 } else { 1e-2 };
                     assert!(speed.abs() <= limit + limit * slack + 1e-6, "I2: {speed} of {limit}");
                     assert_eq!(speed.to_bits(), again.velocity().as_rad_per_s().to_bits(), "I10");
+                    let rests = !old || dt_s <= 0.0 || !dt_s.is_finite() || ramps || speed == 0.0;
+                    assert!(rests, "I4: {speed} after {age_s} s");
                 });
+                assert!(!old || chassis.status().command_stale, "I4: {age_s} s");
                 let (pose, moves) = (chassis.pose(), chassis.measured());
                 assert!(moves.is_finite(), "{moves:?}");
                 assert!(pose.angle.is_finite(), "{pose:?}");
@@ -119,6 +142,24 @@ fn drive<K: Kinematics>(
             }
         }
     }
+}
+
+/// I5: a command that is no number stops the chassis as `stop` does, and is counted.
+fn check_refusal<K: Kinematics>(mut chassis: Chassis<K>, twist: Twist<drivetrain::geometry::Body>)
+where
+    Chassis<K>: Copy,
+{
+    let (mut stopped, before) = (chassis, chassis.status().rejected);
+    chassis.set_body(twist);
+    stopped.stop();
+    assert_eq!(chassis.status().rejected, before.saturating_add(1), "I6");
+    let wheels = K::map(layout_wheels(&chassis), |_: K::Speed| None);
+    let tick = Tick::new(Instant::from_micros(1), 0.001);
+    let both = K::zip(chassis.update(wheels, tick), stopped.update(wheels, tick));
+    let _: K::Wheels<()> = K::map(both, |(one, other)| {
+        let [one, other] = [one, other].map(|speed| speed.velocity().as_rad_per_s());
+        assert_eq!(one.to_bits(), other.to_bits(), "I5");
+    });
 }
 
 fn layout_wheels<K: Kinematics>(chassis: &Chassis<K>) -> K::Wheels<K::Speed> {
@@ -131,25 +172,47 @@ fn modes(mut input: Input) {
         config = config.with_rotor(input.positive(), input.positive(), input.positive());
         config = config.with_transition(input.positive());
     }
+    let timeout_s = input.positive();
+    let instead = if input.byte() % 2 == 0 { Mode::Relax } else { Mode::Independent };
     config = config.with_spin(Spin::Alternate).with_gimbal_timeout(
-        input.positive(),
-        if input.byte() % 2 == 0 { WithoutGimbal::Relax } else { WithoutGimbal::Independent },
+        timeout_s,
+        if instead == Mode::Relax { WithoutGimbal::Relax } else { WithoutGimbal::Independent },
     );
     let Ok(mut modes) = Modes::new(config) else { return };
+    // Seconds since the gimbal told its yaw.
+    let mut age_s = f64::MAX;
     while !input.is_empty() {
         let kind = input.byte();
-        modes.set_mode(match kind % 4 {
+        let mode = match kind % 4 {
             0 => Mode::Relax,
             1 => Mode::FollowGimbal,
             2 => Mode::Rotor,
             _ => Mode::Independent,
-        });
+        };
+        modes.set_mode(mode);
         let command = Twist::new(input.float(), input.float(), input.float());
         let yaw = (kind < 192).then(|| Angle::from_radians(input.float()));
         let dt_s = input.step_s();
-        if let Some(twist) = modes.update(command, yaw, dt_s) {
+        let known = yaw.filter(|yaw| yaw.is_finite());
+        match known {
+            Some(_) => age_s = 0.0,
+            None if dt_s.is_finite() && dt_s > 0.0 => age_s += f64::from(dt_s),
+            None => {}
+        }
+        // I5 and I10: what is no number counts as nothing, and otherwise the same gives the same.
+        let mut same = modes;
+        let twist = modes.update(command, yaw, dt_s);
+        let clean = if command.is_finite() { command } else { Twist::ZERO };
+        let again = same.update(clean, known, dt_s);
+        assert_eq!(format!("{twist:?}"), format!("{again:?}"), "I5 or I10");
+        if let Some(twist) = twist {
             assert!(twist.is_finite(), "{twist:?} of {command:?}");
-            assert!(modes.acting() != Mode::Relax);
+        }
+        assert_eq!(twist.is_none(), modes.acting() == Mode::Relax);
+        // Sums of f32 and of f64 may differ by a step or so.
+        let lost = age_s > f64::from(timeout_s) * 1.01 + 0.001;
+        if lost && matches!(mode, Mode::FollowGimbal | Mode::Rotor) {
+            assert_eq!(modes.acting(), instead, "I4: no yaw for {age_s} s");
         }
         for edges in 0.. {
             if modes.take_edge().is_none() {

@@ -5,7 +5,7 @@ use drivetrain::control::{
     Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
     MotionLimits, MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator,
     PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
-    SpeedActuatorConfig, StepResponse,
+    SpeedActuatorConfig, StepResponse, TimeStep,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -59,24 +59,30 @@ fn pid_config(input: &mut Input) -> PidConfig {
 fn pid(mut input: Input) {
     let Ok(pid) = Pid::new(pid_config(&mut input)) else { return };
     let mut pid = Observed::new(pid);
-    let mut range = pid_range(&pid);
     while !input.is_empty() {
         match input.byte() {
             0..=223 => {
                 let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-                pid.step(range, Pid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+                update(&mut pid, [setpoint, measured, dt_s]);
             }
             224..=231 => {
                 let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
+                let range = pid.get().config().output_range();
                 pid.step(range, Pid::rejected, |pid| {
-                    let step = drivetrain::control::TimeStep::of(dt_s);
+                    let step = TimeStep::of(dt_s);
                     pid.step_error(error, rate, &step)
                 });
             }
-            232..=237 => pid.change(|pid| {
-                pid.reset();
-                pid.output()
-            }),
+            232..=237 => {
+                pid.change(|pid| {
+                    pid.reset();
+                    pid.output()
+                });
+                // I9: nothing of before is left.
+                let fresh = Pid::new(pid.get().config()).expect("it was valid");
+                assert_eq!(pid.get().terms(), fresh.terms(), "I9: {pid:?}");
+                pid.start_from(fresh);
+            }
             238..=243 => {
                 let output = input.float();
                 pid.change(|pid| {
@@ -86,6 +92,7 @@ fn pid(mut input: Input) {
             }
             244..=249 => {
                 let (kp, ki, kd) = (input.positive(), input.positive(), input.positive());
+                pid.forgive();
                 pid.change(|pid| {
                     _ = pid.set_gains(kp, ki, kd);
                     pid.output()
@@ -93,25 +100,39 @@ fn pid(mut input: Input) {
             }
             _ => {
                 let config = pid_config(&mut input);
-                let mut kept = false;
+                pid.forgive();
                 pid.change(|pid| {
                     let before = pid.output();
-                    kept = pid.set_config(config).is_ok();
+                    _ = pid.set_config(config);
                     assert_eq!(pid.output().to_bits(), before.to_bits());
                     pid.output()
                 });
-                range = pid_range(&pid);
-                _ = kept;
             }
         }
     }
 }
 
-/// The output that a held step repeats may be one from before the limits were changed.
-fn pid_range(pid: &Observed<Pid>) -> (f32, f32) {
-    let (lower, upper) = pid.get().config().output_range();
-    let output = pid.get().output();
-    (lower.min(output), upper.max(output))
+/// A bad sample leaves every term as it is (I5), and D rests in the next good step: it keeps its value.
+fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
+    let before = (*pid.get(), pid.differs());
+    let bits = |pid: &Pid| {
+        let terms = pid.terms();
+        [terms.p, terms.i, terms.d, terms.feed_forward].map(f32::to_bits)
+    };
+    let range = pid.get().config().output_range();
+    let taken =
+        pid.step(range, Pid::rejected, |pid: &mut Pid| pid.update(setpoint, measured, dt_s));
+    let ([.., before_d, _], [.., d, _]) = (bits(&before.0), bits(pid.get()));
+    match (taken, before.1) {
+        (false, _) => {
+            assert_eq!(bits(&before.0), bits(pid.get()), "I5: {pid:?}");
+            if !TimeStep::of(dt_s).is_hold() {
+                pid.rests();
+            }
+        }
+        (true, true) => assert_eq!(before_d, d, "D does not rest: {pid:?}"),
+        (true, false) => {}
+    }
 }
 
 fn incremental(mut input: Input) {
@@ -133,11 +154,13 @@ fn incremental(mut input: Input) {
     }
     let Ok(pid) = IncrementalPid::new(config) else { return };
     let mut pid = Observed::new(pid);
-    // Zero is where it starts, within the limits or not.
-    let range = (range.0.min(0.0), range.1.max(0.0));
     while !input.is_empty() {
         let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-        pid.step(range, IncrementalPid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+        let taken =
+            pid.step(range, IncrementalPid::rejected, |pid| pid.update(setpoint, measured, dt_s));
+        if !taken && gains[2] > 0.0 && !TimeStep::of(dt_s).is_hold() {
+            pid.rests();
+        }
     }
 }
 
@@ -153,18 +176,25 @@ fn speed_config(input: &mut Input) -> SpeedActuatorConfig {
     config
 }
 
+/// The output filter comes after the limits, and may round by the last digits of the larger one.
+fn rounded((lower, upper): (f32, f32)) -> (f32, f32) {
+    let slack = 1e-6 * lower.abs().max(upper.abs());
+    ((lower - slack).max(f32::MIN), (upper + slack).min(f32::MAX))
+}
+
 fn speed_actuator(mut input: Input) {
     let Ok(actuator) = SpeedActuator::new(speed_config(&mut input)) else { return };
-    let (lower, upper) = actuator.pid().config().output_range();
-    // The output filter comes after the limits, and may round.
-    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
-    let range = (rounded(lower.min(0.0)), rounded(upper.max(0.0)));
+    let range = rounded(actuator.pid().config().output_range());
     let mut actuator = Observed::new(actuator);
     while !input.is_empty() {
         let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
-        actuator.step(range, SpeedActuator::rejected, |actuator| {
+        let taken = actuator.step(range, SpeedActuator::rejected, |actuator| {
             actuator.update(setpoint, speed, dt_s)
         });
+        // D rests, and the filter before it starts anew.
+        if !taken && !TimeStep::of(dt_s).is_hold() {
+            actuator.rests();
+        }
     }
 }
 
@@ -179,9 +209,7 @@ fn position_actuator(mut input: Input) {
         config = config.with_outer_divider(input.byte());
     }
     let Ok(mut actuator) = PositionActuator::new(config) else { return };
-    let (lower, upper) = actuator.cascade().speed().config().output_range();
-    let rounded = |limit: f32| (limit * 1.000_001).clamp(f32::MIN, f32::MAX);
-    let (lower, upper) = (rounded(lower), rounded(upper));
+    let (lower, upper) = rounded(actuator.cascade().speed().config().output_range());
     while !input.is_empty() {
         let (setpoint, angle, speed) = (input.float(), input.float(), input.float());
         let dt_s = input.step_s();
@@ -269,8 +297,8 @@ fn slew(mut input: Input) {
     while !input.is_empty() {
         let (target, dt_s) = (input.float(), input.step_s());
         let before = limiter.get().value();
-        let after =
-            limiter.step(ANY, SlewLimiter::rejected, |limiter| limiter.update(target, dt_s));
+        limiter.step(ANY, SlewLimiter::rejected, |limiter| limiter.update(target, dt_s));
+        let after = limiter.get().value();
         let towards = if before <= target {
             before <= after && after <= target
         } else {

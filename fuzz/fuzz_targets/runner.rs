@@ -143,6 +143,10 @@ fuzz_target!(|data: &[u8]| {
             160..=162 => STOP.set(),
             163..=167 => runner.clear_emergency_stop(),
             168 => runner.device_mut().plug(input.byte().into()),
+            169..=171 => {
+                while runner.device_mut().next_edge().is_some() {}
+                assert!(runner.edges().count() <= 32, "an edge is told again and again");
+            }
             kind => {
                 clock.set(Instant::from_micros(input.time(clock.now().as_micros())));
                 let tick = if kind < 180 {

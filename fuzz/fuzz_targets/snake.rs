@@ -1,97 +1,288 @@
 //! Any frame, any time, any call: the joints keep their promises.
 #![no_main]
 
+use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice;
-use drivetrain::snake::{Command, Config, Joints, Settings};
+use drivetrain::motor::{CanDevice, Ingest};
+use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply, Settings};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{ExtendedId, Frame, StandardId};
 use libfuzzer_sys::fuzz_target;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// The joints of the test.
+const IDS: [u8; 3] = [1, 2, 12];
+
+/// From the documentation: late after 40 ms, targets count for 100 ms, at most 255 rpm of 65536 pulses a turn.
+const LATE_US: u64 = 40_000;
+const COMMAND_US: u64 = 100_000;
+const FASTEST: i32 = 255 * 65_536 / 60;
+
+/// What has to be written before a joint is enabled.
+const BEFORE_ENABLE: [Register; 6] = [
+    Register::Mode,
+    Register::Current,
+    Register::Acceleration,
+    Register::Deceleration,
+    Register::Speed,
+    Register::Position,
+];
 
 fuzz_target!(|data: &[u8]| {
-    let mut joints = Joints::new().with_frames_per_update(2, 3);
-    let attached = [1, 2, 12].map(|id| joints.attach(Config::new(id)));
-    let [Ok(first), Ok(second), Ok(last)] = attached else { return };
+    let mut all = Story::new();
+    let digest = all.play(data, None);
+    // I5 and I10: without the frames that were refused, and otherwise the same, the same is sent, bit for bit.
+    assert_eq!(Story::new().play(data, Some(&all.refused)), digest, "a refused frame shows");
+});
 
-    let mut now = 0_u64;
-    for step in data.as_chunks::<14>().0 {
-        let [op, flags, register, length, id, time, payload @ ..] = *step;
-        // Forward, and sometimes back.
-        let jump = u64::from(time) << (flags & 31);
-        now = if flags & 32 == 0 { now.wrapping_add(jump) } else { now.saturating_sub(jump) };
-        let at = Instant::from_micros(now);
+/// What is known of one joint apart from the crate.
+#[derive(Debug, Default)]
+struct Known {
+    heard: Option<u64>,
+    asked: Option<u64>,
+    /// The target that counts, where it can be told exactly.
+    target: Option<i32>,
+    written: Vec<Register>,
+}
+
+struct Story {
+    joints: Joints,
+    handles: Vec<Joint>,
+    known: [Known; 3],
+    now: u64,
+    /// The time of the last good update, or of arming: what new targets get.
+    updated: u64,
+    held: u32,
+    taken: u32,
+    malformed: u32,
+    unrelated: u32,
+    refused: Vec<bool>,
+    sent: DefaultHasher,
+}
+
+impl Story {
+    fn new() -> Self {
+        let mut joints = Joints::new().with_frames_per_update(2, 3);
+        let handles = IDS.map(|id| joints.attach(Config::new(id)).expect("a free id")).to_vec();
+        Self {
+            joints,
+            handles,
+            known: Default::default(),
+            now: 0,
+            updated: 0,
+            held: 0,
+            taken: 0,
+            malformed: 0,
+            unrelated: 0,
+            refused: Vec::new(),
+            sent: DefaultHasher::new(),
+        }
+    }
+
+    fn play(&mut self, data: &[u8], without: Option<&[bool]>) -> u64 {
+        let mut frames = 0;
+        for step in data.as_chunks::<14>().0 {
+            let [op, flags, register, length, id, time, payload @ ..] = *step;
+            // Forward, and sometimes back.
+            let jump = u64::from(time) << (flags & 31);
+            self.now = if flags & 32 == 0 {
+                self.now.wrapping_add(jump)
+            } else {
+                self.now.saturating_sub(jump)
+            };
+            let index = usize::from(id) % 3;
+            match op % 12 {
+                // Mostly replies, sometimes anything.
+                0..=3 => {
+                    let Some(frame) = frame(op, flags, register, length, id, payload) else {
+                        continue;
+                    };
+                    if !without.is_some_and(|refused| refused[frames]) {
+                        self.ingest(&frame);
+                    }
+                    frames += 1;
+                }
+                9.. => self.update(flags, payload),
+                op => self.call(op, flags, index, payload),
+            }
+        }
+        self.sent.finish()
+    }
+
+    fn ingest(&mut self, frame: &CanFrame) {
+        let outcome = self.joints.ingest(frame, Instant::from_micros(self.now));
+        self.refused.push(outcome != Ingest::Taken);
+        match outcome {
+            Ingest::Taken => {
+                self.taken += 1;
+                let reply = Reply::decode(frame.data()).expect("a reply");
+                let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
+                let known = &mut self.known[index.expect("of an attached joint")];
+                if reply.register() == Register::ActualPosition {
+                    known.heard = known.heard.max(Some(self.now));
+                }
+            }
+            Ingest::Malformed(_) => self.malformed += 1,
+            Ingest::Unrelated => self.unrelated += 1,
+        }
+    }
+
+    fn call(&mut self, op: u8, flags: u8, index: usize, payload: [u8; 8]) {
         let bits = u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]);
         let value = f32::from_bits(bits);
-        let joint = [first, second, last][usize::from(id) % 3];
-        match op % 12 {
-            // Mostly replies, sometimes anything.
-            0..=3 => {
-                let mut bytes = payload;
-                if flags & 64 == 0 {
-                    (bytes[0], bytes[1]) = (4, register % 0x12);
-                }
-                let length = if flags & 128 == 0 { 6 } else { usize::from(length % 9) };
-                let id = u16::from(id % 16);
-                let frame = match (op, StandardId::new(id), ExtendedId::new(u32::from(id))) {
-                    (0..=100, Some(id), _) => CanFrame::new(id, &bytes[..length]),
-                    (101..=150, Some(id), _) => CanFrame::new_remote(id, length),
-                    (_, _, Some(id)) => CanFrame::new(id, &bytes[..length]),
-                    _ => None,
-                };
-                if let Some(frame) = frame {
-                    _ = joints.ingest(&frame, at);
-                }
-            }
+        let (joints, joint) = (&mut self.joints, self.handles[index]);
+        let known = &mut self.known[index];
+        match op {
             4 => {
-                let turns = Angle::from_turns(value);
-                _ = joints.set_position(joint, drivetrain::encoder::Position::from_angle(turns));
+                let position = Position::from_angle(Angle::from_turns(value));
+                if joints.set_position(joint, position).is_ok() {
+                    (known.asked, known.target) = (Some(self.updated), None);
+                }
             }
             5 => {
-                _ = joints.set_pulses(joint, bits.cast_signed());
+                let pulses = bits.cast_signed();
+                let offset = joints.offset(joint);
+                if joints.set_pulses(joint, pulses).is_ok() {
+                    let target = offset.map(|offset| offset.target(pulses));
+                    (known.asked, known.target) = (Some(self.updated), target);
+                }
                 _ = joints.set_speed(joint, AngularVelocity::from_rad_per_s(value));
             }
-            6 => _ = joints.arm(at),
+            6 => {
+                let at = Instant::from_micros(self.now);
+                if joints.arm(at).is_ok() {
+                    assert!(!joints.is_stopped() && joints.is_armed());
+                    self.updated = self.updated.max(self.now);
+                }
+            }
             7 => match flags & 3 {
                 0 => joints.emergency_stop(),
                 1 => joints.clear_emergency_stop(),
                 2 => joints.disarm(),
                 _ => joints.relax(joint),
             },
-            8 => match flags & 3 {
+            _ => match flags & 3 {
                 0 => _ = joints.zero(joint),
                 1 => {
-                    _ = joints.set_settings(joint, Settings::new().with_current(bits.cast_signed()))
+                    let settings = Settings::new().with_current(bits.cast_signed());
+                    _ = joints.set_settings(joint, settings);
                 }
                 2 => _ = joints.answer(joint),
-                _ => joints.detach(last),
+                _ => joints.detach(self.handles[2]),
             },
-            _ => {
-                let dt_s = if flags & 1 == 0 { 0.001 } else { value };
-                joints.update(Tick::new(at, dt_s));
-                let mut sent = 0;
-                loop {
-                    let awaited: Vec<_> = joints
-                        .joints()
-                        .map(|(joint, name)| (name.id(), joints.awaited(joint)))
-                        .collect();
-                    let Some(frame) = joints.next_frame() else { break };
-                    sent += 1;
-                    assert!(sent <= 12 + 2 + 3, "bounded");
-                    let command = Command::decode(frame.data()).expect("a command");
-                    let owes = |(id, register): &(u8, Option<_>)| {
-                        u32::from(*id) == frame.header() && register.is_some()
-                    };
-                    assert!(!awaited.iter().any(owes), "sent while an answer is due");
-                    let of =
-                        joints.joints().find(|(_, name)| u32::from(name.id()) == frame.header());
-                    let armed = of.is_some_and(|(joint, _)| joints.is_joint_armed(joint));
-                    assert!(command.is_safe() || armed, "moves while disarmed");
-                    if flags & 2 != 0 {
-                        assert!(joints.requeue(&frame));
-                    }
-                }
-            }
         }
     }
-});
+
+    fn update(&mut self, flags: u8, payload: [u8; 8]) {
+        let dt_s = if flags & 1 == 0 {
+            0.001
+        } else {
+            f32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]])
+        };
+        let bad_steps = self.joints.counters().bad_steps;
+        self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
+        let holds = self.joints.counters().bad_steps != bad_steps;
+        assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
+        self.held = if holds { self.held + 1 } else { 0 };
+        if !holds {
+            self.updated = self.now;
+        }
+        for sent in 0.. {
+            let awaited: Vec<_> = self
+                .joints
+                .joints()
+                .map(|(joint, name)| (name.id(), self.joints.awaited(joint)))
+                .collect();
+            let Some(frame) = self.joints.next_frame() else { break };
+            assert!(sent < 12 + 2 + 3, "I1: bounded");
+            let owes = |(id, register): &(u8, Option<_>)| {
+                u32::from(*id) == frame.header() && register.is_some()
+            };
+            assert!(!awaited.iter().any(owes), "sent while an answer is due");
+            (frame.header(), frame.data()).hash(&mut self.sent);
+            self.check(&frame);
+            if flags & 2 != 0 {
+                assert!(self.joints.requeue(&frame));
+                self.take_back(&frame);
+            }
+        }
+        self.add_up();
+    }
+
+    fn check(&mut self, frame: &CanFrame) {
+        assert!(frame.is_data_frame(), "I3: {frame:?}");
+        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
+        let index = index.unwrap_or_else(|| panic!("I3: nobody's id: {frame:?}"));
+        let command = Command::decode(frame.data()).expect("I3: a command");
+        let known = &mut self.known[index];
+        if let Command::Write(register, value) = command {
+            match register {
+                Register::Speed => assert!((0..=FASTEST).contains(&value), "I2: {frame:?}"),
+                Register::Current => assert!(value > 0, "I2: {frame:?}"),
+                Register::Position => {
+                    assert!(known.target.is_none_or(|target| target == value), "I7: {frame:?}");
+                }
+                Register::Enable if value != 0 => {
+                    let ready = BEFORE_ENABLE.iter().all(|other| known.written.contains(other));
+                    assert!(ready, "I9: enabled after {:?} only", known.written);
+                }
+                _ => {}
+            }
+            if command == Command::DISABLE {
+                known.written.clear();
+            } else {
+                known.written.push(register);
+            }
+        }
+        if command.is_safe() {
+            return;
+        }
+        assert!(self.joints.is_joint_armed(self.handles[index]), "moves while disarmed: {frame:?}");
+        assert!(!self.joints.is_stopped() && self.held < 2, "moves while stopped: {frame:?}");
+        let fresh =
+            |at: Option<u64>, limit: u64| at.is_some_and(|at| self.updated.abs_diff(at) <= limit);
+        let fresh = fresh(known.heard, LATE_US) && fresh(known.asked, COMMAND_US);
+        assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.updated);
+    }
+
+    fn take_back(&mut self, frame: &CanFrame) {
+        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
+        let known = &mut self.known[index.expect("checked before")];
+        match Command::decode(frame.data()) {
+            Some(Command::DISABLE) => known.written.clear(),
+            Some(Command::Write(register, _)) => known.written.retain(|other| *other != register),
+            _ => {}
+        }
+    }
+
+    /// I6: every frame that came is somewhere.
+    fn add_up(&self) {
+        let counters = self.joints.counters();
+        assert_eq!(counters.replies, self.taken, "I6");
+        let malformed = counters.bad_length + counters.bad_field + counters.foreign_commands;
+        assert_eq!(malformed, self.malformed, "I6");
+        assert!(counters.unattached <= self.unrelated, "I6");
+    }
+}
+
+fn frame(
+    op: u8,
+    flags: u8,
+    register: u8,
+    length: u8,
+    id: u8,
+    payload: [u8; 8],
+) -> Option<CanFrame> {
+    let mut bytes = payload;
+    if flags & 64 == 0 {
+        (bytes[0], bytes[1]) = (4, register % 0x12);
+    }
+    let length = if flags & 128 == 0 { 6 } else { usize::from(length % 9) };
+    let id = u16::from(id % 16);
+    match (op, StandardId::new(id)?, ExtendedId::new(u32::from(id))?) {
+        (0..=100, id, _) => CanFrame::new(id, &bytes[..length]),
+        (101..=150, id, _) => CanFrame::new_remote(id, length),
+        (_, _, id) => CanFrame::new(id, &bytes[..length]),
+    }
+}

@@ -6,18 +6,20 @@ pub struct Observed<C> {
     controller: C,
     clean: C,
     output: f32,
+    /// The next good step may differ from that of the copy.
+    differs: bool,
 }
 
 impl<C: Copy + Debug> Observed<C> {
     pub fn new(controller: C) -> Self {
-        Self { controller, clean: controller, output: 0.0 }
+        Self { controller, clean: controller, output: 0.0, differs: false }
     }
 
     pub fn get(&self) -> &C {
         &self.controller
     }
 
-    /// Does the same to both: a reset, a change of gains.
+    /// Does the same to both: a reset, a new output.
     pub fn change(&mut self, mut work: impl FnMut(&mut C) -> f32) {
         self.output = work(&mut self.controller);
         assert_eq!(self.output.to_bits(), work(&mut self.clean).to_bits());
@@ -26,27 +28,49 @@ impl<C: Copy + Debug> Observed<C> {
     /// Starts the copy anew from the controller: where a refused step is allowed to show.
     pub fn forgive(&mut self) {
         self.clean = self.controller;
+        self.differs = false;
     }
 
-    /// Steps, and checks what holds for any bits: the output is finite and within `range`; a step that is refused gives
-    /// the output before and changes nothing (I5); the copy gives the same, bit for bit (I10).
+    /// Lets the copy be another one from now on, which has to do the same.
+    pub fn start_from(&mut self, clean: C) {
+        self.clean = clean;
+        self.differs = false;
+    }
+
+    pub fn differs(&self) -> bool {
+        self.differs
+    }
+
+    /// Lets the next good step differ: time passed with a sample that was refused, and D rests.
+    pub fn rests(&mut self) {
+        self.differs = true;
+    }
+
+    /// Steps, and checks what holds for any bits: the output is finite and, of a step that was taken, within `range`; a step that
+    /// is refused gives the output before and changes nothing (I5); the copy gives the same, bit for bit (I10). Tells whether it was taken.
     pub fn step(
         &mut self,
         range: (f32, f32),
         rejected: impl Fn(&C) -> u16,
         mut work: impl FnMut(&mut C) -> f32,
-    ) -> f32 {
+    ) -> bool {
         let before = rejected(&self.controller);
+        let mut same = self.controller;
         let output = work(&mut self.controller);
+        assert_eq!(output.to_bits(), work(&mut same).to_bits(), "I10: {self:?}");
+        let taken = rejected(&self.controller) == before;
         let (lower, upper) = range;
-        assert!(output.is_finite() && lower <= output && output <= upper, "{output} of {self:?}");
-        if rejected(&self.controller) == before {
-            let clean = work(&mut self.clean);
-            assert_eq!(output.to_bits(), clean.to_bits(), "what was refused shows: {self:?}");
+        let within = !taken || lower <= output && output <= upper;
+        assert!(output.is_finite() && within, "I2: {output} of {self:?}");
+        if !taken {
+            assert_eq!(output, self.output, "I5: a refused step changes the output: {self:?}");
+        } else if self.differs {
+            self.forgive();
         } else {
-            assert_eq!(output, self.output, "a refused step changes the output: {self:?}");
+            let clean = work(&mut self.clean);
+            assert_eq!(output.to_bits(), clean.to_bits(), "I5: what was refused shows: {self:?}");
         }
         self.output = output;
-        output
+        taken
     }
 }

@@ -34,7 +34,11 @@ impl Input<'_> {
             212..=215 => f32::INFINITY,
             216..=219 => f32::MAX,
             220..=223 => f32::MIN_POSITIVE,
-            _ => f32::from_le_bytes(self.bytes()),
+            _ => {
+                let value = f32::from_le_bytes(self.bytes());
+                // One NaN is as bad as another, but for the one by which a `Pid` knows that there is no setpoint.
+                if value.is_nan() { f32::NAN } else { value }
+            }
         }
     }
 
@@ -57,7 +61,8 @@ impl Input<'_> {
         match self.byte() {
             jump @ 0..=191 => now + u64::from(jump) * 100,
             jump @ 192..=239 => now + (u64::from(self.byte()) << (jump - 192).min(31)),
-            jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)),
+            // Not to 0, where a bus that has no frame and no update yet stands.
+            jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)).max(1),
         }
     }
 

@@ -1,13 +1,15 @@
 //! What the fuzz targets share: the oracle, and how bytes become input.
 
+mod alone;
 mod controllers;
 mod input;
 mod motors;
 mod split;
 mod watched;
 
+pub use alone::words;
 pub use controllers::Observed;
 pub use input::Input;
 pub use motors::{COUNT, Target};
 pub use split::any_split_gives_the_same;
-pub use watched::{Watched, words};
+pub use watched::Watched;

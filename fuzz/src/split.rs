@@ -2,14 +2,43 @@
 
 use std::fmt::Debug;
 
-use drivetrain::wire::{Counts, Deframer, Protocol};
+use drivetrain::wire::{Counts, Deframer, Protocol, Reject};
+use std::cell::Cell;
 
 /// Long enough for every frame of every protocol.
 const BUFFER: usize = 160;
 
+/// A protocol that notes how many bytes were frames.
+struct Counted<'a, P> {
+    protocol: P,
+    bytes: &'a Cell<usize>,
+}
+
+impl<P: Protocol> Protocol for Counted<'_, P> {
+    type Frame = P::Frame;
+    const PREFIX: usize = P::PREFIX;
+
+    fn header(&self) -> &[u8] {
+        self.protocol.header()
+    }
+
+    fn length(&self, prefix: &[u8]) -> Option<usize> {
+        self.protocol.length(prefix)
+    }
+
+    fn parse(&self, frame: &[u8]) -> Result<P::Frame, Reject> {
+        let outcome = self.protocol.parse(frame);
+        if matches!(outcome, Ok(_) | Err(Reject::Foreign)) {
+            self.bytes.set(self.bytes.get() + frame.len());
+        }
+        outcome
+    }
+}
+
 /// Reads `bytes` in pieces of `piece` bytes and checks what holds for any bytes.
 fn read<P: Protocol>(protocol: P, bytes: &[u8], piece: usize) -> (Vec<P::Frame>, Counts) {
-    let mut decoder = Deframer::<P, BUFFER>::new(protocol);
+    let in_frames = Cell::new(0);
+    let mut decoder = Deframer::<_, BUFFER>::new(Counted { protocol, bytes: &in_frames });
     let mut frames = Vec::new();
     for mut piece in bytes.chunks(piece) {
         while let Some(frame) = decoder.read(&mut piece) {
@@ -18,8 +47,10 @@ fn read<P: Protocol>(protocol: P, bytes: &[u8], piece: usize) -> (Vec<P::Frame>,
         assert!(piece.is_empty());
     }
     let counts = decoder.counts();
-    assert_eq!(counts.frames as usize, frames.len());
-    assert!(counts.skipped_bytes as usize <= bytes.len());
+    assert_eq!(counts.frames as usize, frames.len(), "I6");
+    // I6: every byte was in a frame, was skipped, or waits for the end of its frame.
+    let waiting = bytes.len().checked_sub(in_frames.get() + counts.skipped_bytes as usize);
+    assert!(waiting.is_some_and(|waiting| waiting <= BUFFER), "I6: {counts:?}, {in_frames:?}");
     (frames, counts)
 }
 

@@ -1,82 +1,26 @@
 //! The oracle of the fuzz targets: a bus whose every output is compared with what must hold.
 //!
-//! Each motor of the bus also runs alone, on a bus of its own that gets no frame but the motor's good ones and whose
-//! frames are always taken. What the whole bus sends must be, word for word, the newest of what the motors alone would
-//! send. That is I3 (a slot of nobody is zero), I5 (refused input changes nothing), I7 (never an older command), I8
-//! (one motor's trouble is no other's) and I10 (the same inputs, the same outputs) in one comparison. I2, I4, I6 and
-//! I9 are asserted from what is counted and timed here. I1 is what the fuzzer itself looks for.
+//! Each motor of the bus also runs alone, on a bus of its own that gets no frame but the motor's good ones, whose frames
+//! are always taken and which compares every age in each update. What the whole bus sends must be, word for word, the newest of
+//! what the motors alone would send. That is I3 (a slot of nobody is zero), I5 (refused input changes nothing), I7
+//! (never an older command), I8 (one motor's trouble is no other's) and I10 (the same inputs, the same outputs) in one
+//! comparison; states, conditions and edges are compared too. I2, I4, I6 and I9 are asserted from what is counted and
+//! timed here. I1 is what the fuzzer itself looks for.
+//!
+//! Feedback stamped in the future is the one thing that the whole bus may notice later than a motor alone: `Bus::ingest`
+//! promises twice the time after which it is late. Until then, or until the time has caught up, either answer is right,
+//! for that motor only; then both start anew from a motor that is attached again.
 
+use crate::alone::{Alone, COMMAND_US, LATE_US, is_old, lies_ahead, sorted, words};
 use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
 use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ArmError, CanDevice, Claim, Ingest, Link, MotorName, TargetError};
+use drivetrain::motor::{
+    ArmError, CanDevice, Claim, Condition, Edge, Ingest, Link, MotorName, TargetError,
+};
 use drivetrain::time::{Instant, Tick};
-
-const LATE_US: u64 = 10_000;
-const COMMAND_US: u64 = 100_000;
-
-/// A motor alone, and what is known of it.
-struct Alone {
-    bus: Bus,
-    motor: Option<Motor>,
-    /// What it sent last.
-    word: i16,
-    heard: Option<u64>,
-    /// When the target that counts was set, by the clock of the bus.
-    commanded: Option<u64>,
-    /// It was driven by a target since it was last at rest.
-    moved: bool,
-    /// The target that counts is a velocity, and the first one since the motor was at rest.
-    first_velocity: bool,
-}
-
-impl core::fmt::Debug for Alone {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { word, heard, commanded, moved, first_velocity, .. } = self;
-        write!(
-            f,
-            "word {word}, heard {heard:?}, commanded {commanded:?}, moved {moved}, first {first_velocity}"
-        )
-    }
-}
-
-impl Alone {
-    fn new(index: usize) -> Self {
-        let mut bus = Bus::new();
-        let motor = Motor::attach(&mut bus, index).ok();
-        Self {
-            bus,
-            motor,
-            word: 0,
-            heard: None,
-            commanded: None,
-            moved: false,
-            first_velocity: false,
-        }
-    }
-
-    fn rest(&mut self) {
-        self.commanded = None;
-        self.moved = false;
-        self.first_velocity = false;
-    }
-
-    fn drain(&mut self, index: usize) {
-        let facts = &FACTS[index];
-        let mut frames = 0;
-        while let Some(frame) = self.bus.next_frame() {
-            frames += 1;
-            assert!(frames <= 1, "one motor, one frame");
-            assert_eq!(frame.header(), u32::from(facts.command_id));
-            let words = words(&frame);
-            let others = words.iter().enumerate().filter(|(place, _)| *place != facts.place);
-            assert!(others.into_iter().all(|(_, word)| *word == 0), "I3: {frame:?}");
-            self.word = words[facts.place];
-        }
-        assert!(self.word.unsigned_abs() <= facts.limit, "I2: {} of {}", self.word, facts.limit);
-    }
-}
+use std::collections::VecDeque;
 
 /// A bus of five motors under observation, a device like any other.
 #[derive(Debug)]
@@ -87,6 +31,8 @@ pub struct Watched {
     /// The time that new targets get.
     now: u64,
     updated: Option<u64>,
+    /// The time of the earliest frame.
+    first_heard: Option<u64>,
     held: u32,
     stopped: bool,
     /// Frames by what became of them.
@@ -94,6 +40,10 @@ pub struct Watched {
     unattached: u32,
     taken_out: u32,
     given_back: u32,
+    edges: VecDeque<Edge>,
+    /// The times of the edges that wait need not be those of the motors alone: one left, and the room of its edges is
+    /// not free yet; or there was no update that told the time.
+    untimed: bool,
 }
 
 impl Default for Watched {
@@ -114,12 +64,15 @@ impl Watched {
             alone: core::array::from_fn(Alone::new),
             now: 0,
             updated: None,
+            first_heard: None,
             held: 0,
             stopped: false,
             malformed: 0,
             unattached: 0,
             taken_out: 0,
             given_back: 0,
+            edges: VecDeque::new(),
+            untimed: true,
         }
     }
 
@@ -128,7 +81,7 @@ impl Watched {
     }
 
     pub fn set(&mut self, index: usize, target: Target) {
-        let index = index % COUNT;
+        let index = self.settled(index);
         let alone = &mut self.alone[index];
         let (Some(motor), Some(same)) = (self.motors[index], alone.motor) else { return };
         let outcome = motor.set(&mut self.bus, target);
@@ -136,10 +89,7 @@ impl Watched {
         match outcome {
             Ok(()) => {
                 assert!(self.bus.is_motor_armed(motor.handle()) && !self.stopped, "disarmed");
-                let velocity = matches!(target, Target::Velocity(_));
-                alone.first_velocity =
-                    velocity && !alone.moved && (alone.first_velocity || alone.commanded.is_none());
-                alone.commanded = Some(self.now);
+                alone.follow(target, self.now);
             }
             // A target that cannot be followed takes the one before away: no older one acts in its place.
             Err(TargetError::NotFinite | TargetError::NoFeedback) => alone.commanded = None,
@@ -148,7 +98,7 @@ impl Watched {
     }
 
     pub fn relax(&mut self, index: usize) {
-        let index = index % COUNT;
+        let index = self.settled(index);
         let alone = &mut self.alone[index];
         if let (Some(motor), Some(same)) = (self.motors[index], alone.motor) {
             self.bus.relax(motor.handle());
@@ -158,7 +108,7 @@ impl Watched {
     }
 
     pub fn zero(&mut self, index: usize) {
-        let index = index % COUNT;
+        let index = self.settled(index);
         let alone = &mut self.alone[index];
         if let (Some(motor), Some(same)) = (self.motors[index], alone.motor) {
             let outcome = self.bus.zero(motor.handle());
@@ -173,12 +123,14 @@ impl Watched {
         match (self.motors[index], alone.motor) {
             (Some(motor), Some(same)) => {
                 self.bus.detach(motor.handle());
+                self.untimed = true;
                 alone.bus.detach(same.handle());
                 (self.motors[index], alone.motor) = (None, None);
                 alone.drain(index);
                 // Alone it leaves its frame for good, after zeros; beside others its word waits for the next update.
                 alone.word = 0;
                 alone.heard = None;
+                alone.doubted = None;
                 alone.rest();
             }
             _ => {
@@ -189,17 +141,28 @@ impl Watched {
         }
     }
 
-    /// I6: every frame is somewhere.
-    pub fn add_up(&self) {
+    /// A motor that may be called and compared: one in doubt starts anew before.
+    fn settled(&mut self, index: usize) -> usize {
+        let index = index % COUNT;
+        if self.alone[index].doubted.is_some() {
+            self.plug(index);
+            self.plug(index);
+        }
+        index
+    }
+
+    /// I6: every frame is somewhere. Returns how many wait.
+    pub fn add_up(&self) -> u32 {
         let counters = self.bus.counters();
         assert_eq!(counters.bad_length + counters.bad_field, self.malformed, "I6");
         assert_eq!(counters.unattached, self.unattached, "I6");
         let came = counters.packed + self.given_back;
         let gone = self.taken_out + counters.superseded;
         let waiting = came.checked_sub(gone);
-        // Open: a frame that is given back while a newer one waits is not counted as superseded. Then at most 5 wait.
-        let most = 5 + self.given_back;
-        assert!(waiting.is_some_and(|waiting| waiting <= most), "I6: {came} came, {gone} gone");
+        let Some(waiting) = waiting.filter(|waiting| *waiting <= 3) else {
+            panic!("I6: {came} came, {gone} gone, of three frames");
+        };
+        waiting
     }
 
     fn each_alone(&mut self, mut work: impl FnMut(&mut Alone)) {
@@ -235,8 +198,13 @@ impl Watched {
             let owner = FACTS
                 .iter()
                 .position(|facts| u32::from(facts.command_id) == header && facts.place == place);
+            let doubted = owner.is_some_and(|owner| self.alone[owner].doubted.is_some());
             let newest = owner.map_or(0, |owner| self.alone[owner].word);
-            assert_eq!(word, newest, "I3, I5, I7, I8 or I10: place {place} of {frame:?}");
+            assert!(
+                word == newest || doubted,
+                "I3, I5, I7, I8 or I10: place {place} of {frame:?}, not {newest}: {:?}",
+                self.alone
+            );
             let Some(owner) = owner.filter(|_| word != 0) else { continue };
             assert!(word.unsigned_abs() <= FACTS[owner].limit, "I2: {frame:?}");
             assert!(!self.stopped, "moves after an emergency stop: {frame:?}");
@@ -260,8 +228,102 @@ impl Watched {
             if is_old(now, alone.commanded, COMMAND_US) && !is_old(now, alone.heard, LATE_US) {
                 alone.commanded = None;
             }
-            if alone.bus.link(motor.handle()) == Some(Link::Offline) {
+            if !alone.is_armed() || alone.bus.link(motor.handle()) == Some(Link::Offline) {
                 alone.rest();
+            }
+        }
+    }
+
+    /// Feedback from the future: the whole bus may notice it later than the motor alone, but not after twice the limit.
+    fn look_at_what_lies_ahead(&mut self, now: u64) {
+        for index in 0..COUNT {
+            let alone = &mut self.alone[index];
+            let Some(motor) = self.motors[index] else { continue };
+            let noticed = self.bus.link(motor.handle()) != Some(Link::Online);
+            let ahead = lies_ahead(now, alone.heard, LATE_US);
+            if alone.doubted.is_none() {
+                if noticed || !ahead || alone.link() == Some(Link::Online) {
+                    continue;
+                }
+                alone.doubted = Some(now);
+            }
+            let since = alone.doubted.map_or(0, |since| now.saturating_sub(since));
+            // Where the time has caught up, it need not be noticed any more.
+            if noticed || !ahead {
+                self.settled(index);
+            } else {
+                assert!(since < 2 * LATE_US, "I4: {index} lies ahead for {since} us: {alone:?}");
+            }
+        }
+    }
+
+    /// A first update long after the first frame of any motor: all are lost, also those that were heard just now. A motor
+    /// alone counts from its own first frame.
+    fn start_late(&mut self, now: u64) {
+        let first = self.first_heard.unwrap_or(now);
+        if self.updated.is_some() || now.saturating_sub(first) <= 60_000_000 {
+            return;
+        }
+        for index in 0..COUNT {
+            let Some(motor) = self.motors[index] else { continue };
+            assert_ne!(self.bus.link(motor.handle()), Some(Link::Online), "F30: {index}");
+            self.plug(index);
+            self.plug(index);
+        }
+    }
+
+    /// What is known of each motor does not depend on the others.
+    fn compare(&self) {
+        for (motor, alone) in self.motors.iter().zip(&self.alone) {
+            let (Some(motor), Some(same)) = (motor, alone.motor) else { continue };
+            if alone.doubted.is_none() {
+                let (one, other) = (motor.handle(), same.handle());
+                assert_eq!(self.bus.state(one), alone.bus.state(other), "I8: depends on others");
+                assert_eq!(self.bus.conditions(one), alone.bus.conditions(other), "I8");
+                assert_eq!(self.bus.is_motor_armed(one), alone.is_armed(), "I8");
+            }
+        }
+    }
+
+    /// Reads every edge that waits: each motor's are those of the motor alone, none lost and none told twice. With more
+    /// than the journal holds, their times are not.
+    fn read_edges(&mut self) {
+        let edges: Vec<Edge> = core::iter::from_fn(|| self.bus.next_edge()).collect();
+        let untimed = core::mem::replace(&mut self.untimed, self.updated.is_none());
+        let timed = edges.len() <= 12 && !untimed;
+        let known = |edge: &Edge| (edge.condition, edge.began, timed.then_some(edge.at));
+        for alone in &mut self.alone {
+            let same = alone.edges();
+            let Some(name) = alone
+                .motor
+                .and_then(|motor| alone.bus.motors().find(|(handle, _)| *handle == motor.handle()))
+            else {
+                continue;
+            };
+            if alone.doubted.is_some() {
+                continue;
+            }
+            let mine = sorted(edges.iter().filter(|edge| edge.motor == name.1).copied().collect());
+            assert!(mine.iter().map(known).eq(same.iter().map(known)), "I8: {mine:?} and {same:?}");
+        }
+        self.edges.extend(edges);
+    }
+
+    /// A command frame of another node: a second master of the motors in it. It is remembered for the whole bus, so that
+    /// a motor with an older one is told of it again.
+    fn hear_rival(&mut self, frame: &CanFrame, now: Instant) {
+        let header = frame.header();
+        let in_use = |(facts, motor): (&crate::motors::Facts, &Option<Motor>)| {
+            motor.is_some() && u32::from(facts.command_id) == header
+        };
+        if !FACTS.iter().zip(&self.motors).any(in_use) {
+            return;
+        }
+        for (alone, facts) in self.alone.iter_mut().zip(&FACTS) {
+            let own = CanFrame::standard(facts.command_id, [0; 8]);
+            if u32::from(facts.command_id) == header || alone.has(Condition::SecondMaster) {
+                let outcome = own.map(|own| alone.bus.ingest(&own, now));
+                assert_eq!(outcome, Some(Ingest::Unrelated));
             }
         }
     }
@@ -278,6 +340,9 @@ enum Verdict {
 impl CanDevice for Watched {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let (owner, expected) = self.expected(frame);
+        if let (Verdict::Taken, Some(owner)) = (expected, owner) {
+            self.settled(owner);
+        }
         let outcome = self.bus.ingest(frame, now);
         let verdict = match outcome {
             Ingest::Taken => Verdict::Taken,
@@ -291,10 +356,12 @@ impl CanDevice for Watched {
                 let alone = &mut self.alone[owner];
                 assert_eq!(alone.bus.ingest(frame, now), Ingest::Taken, "I8");
                 alone.heard = Some(now.as_micros());
+                let heard = now.as_micros();
+                self.first_heard = Some(self.first_heard.map_or(heard, |first| first.min(heard)));
             }
             (Verdict::Malformed, _) => self.malformed += 1,
             (Verdict::Unattached, _) => self.unattached += 1,
-            _ => {}
+            _ => self.hear_rival(frame, now),
         }
         outcome
     }
@@ -304,33 +371,27 @@ impl CanDevice for Watched {
         let stands = self.updated.is_some_and(|updated| now <= updated);
         let holds = stands || TimeStep::new(tick.dt_s(), 0.02).is_hold();
         self.bus.update(tick);
-        self.each_alone(|alone| alone.bus.update(tick));
-        let pause = self.updated.replace(now).map(|updated| now.saturating_sub(updated));
+        self.each_alone(|alone| alone.update(tick));
+        self.start_late(now);
+        self.updated = Some(now);
         self.now = now;
         self.held = if holds { self.held + 1 } else { 0 };
         if holds {
             let zero = self.held < 2 || self.alone.iter().all(|alone| alone.word == 0);
             assert!(zero, "driven without time: {:?}", self.alone);
-        } else if pause.is_some() || now < 1 << 31 {
+        } else {
             self.check_motors(now);
+            self.look_at_what_lies_ahead(now);
         }
-        // Open: an update that ends a pause of more than 60 s takes every motor for lost, because stamps of 32 bits do not
-        // tell; but not when it is the first one, nor when its time step is unusable. After a pause of 71 minutes
-        // and 35 seconds, to 10 ms, what was heard before it then counts as fresh.
-        if pause.map_or(now > 1 << 31, |pause| holds && pause > 60_000_000) {
-            self.disarm();
-        }
-        for (motor, alone) in self.motors.iter().zip(&self.alone) {
-            if let (Some(motor), Some(same)) = (motor, alone.motor) {
-                let same = alone.bus.state(same.handle());
-                assert_eq!(self.bus.state(motor.handle()), same, "I8: depends on others");
-            }
-        }
+        self.compare();
         self.add_up();
     }
 
     fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
-        let frame = self.bus.next_frame()?;
+        let Some(frame) = self.bus.next_frame() else {
+            assert_eq!(self.add_up(), 0, "I6: nothing waits, and something is missing");
+            return None;
+        };
         self.taken_out += 1;
         self.check_frame(&frame);
         Some(frame)
@@ -356,12 +417,31 @@ impl CanDevice for Watched {
         self.bus.missing(now)
     }
 
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.bus.faulty()
+    }
+
+    fn second_master(&self) -> Option<Claim> {
+        self.bus.second_master()
+    }
+
+    fn next_edge(&mut self) -> Option<Edge> {
+        if self.edges.is_empty() {
+            self.read_edges();
+        }
+        self.edges.pop_front()
+    }
+
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let outcome = self.bus.arm(now);
         if outcome.is_ok() {
             assert!(!self.stopped, "armed while stopped");
             let missing = self.alone.iter().map(|alone| alone.bus.missing(now).count());
             assert_eq!(missing.sum::<usize>(), 0, "armed without all motors");
+            let unfit = self.alone.iter().any(|alone| {
+                alone.has(Condition::SecondMaster) || alone.bus.faulty().next().is_some()
+            });
+            assert!(!unfit, "armed beside a second master, or with a fault: {:?}", self.alone);
             self.engaged(now);
         }
         outcome
@@ -415,30 +495,11 @@ impl Watched {
         }
         self.now = now.as_micros();
         for alone in &mut self.alone {
-            let armed = |alone: &Alone| {
-                alone.motor.is_some_and(|motor| alone.bus.is_motor_armed(motor.handle()))
-            };
-            let before = armed(alone);
+            let before = alone.is_armed();
             alone.bus.engage(now);
-            if !before && armed(alone) {
+            if !before && alone.is_armed() {
                 alone.rest();
             }
         }
     }
-}
-
-/// Tells whether a stamp is too old, or further ahead than a stamp of 32 bits may be.
-fn is_old(now: u64, stamp: Option<u64>, limit: u64) -> bool {
-    stamp.is_none_or(|stamp| match now.checked_sub(stamp) {
-        Some(age) => age > limit,
-        None => {
-            let ahead = (stamp - now) & 0xFFFF_FFFF;
-            ahead > limit && ahead < (1 << 32) - limit
-        }
-    })
-}
-
-pub fn words(frame: &CanFrame) -> [i16; 4] {
-    let [a, b, c, d, e, f, g, h] = *frame.bytes();
-    [[a, b], [c, d], [e, f], [g, h]].map(i16::from_be_bytes)
 }

@@ -46,8 +46,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let unwatched = self.running && now > self.updated + LONGEST_PAUSE;
-        let missing = move |slot: &&Slot| unwatched || slot.is_missing(now.stamp(), &self.timeouts);
+        let missing = move |slot: &&Slot| self.misses(slot, now);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
@@ -65,8 +64,7 @@ impl<B> CanDevice for Bus<B> {
 
     fn engage(&mut self, now: Instant) {
         if !self.stopped {
-            self.now = now.stamp();
-            self.disturb();
+            self.begin(now);
             for motor in 0..self.used {
                 self.engage_slot(motor, now);
             }
@@ -133,7 +131,7 @@ impl<B> Bus<B> {
         if chosen().next().is_none() {
             return Err(ArmError::NoMotors);
         }
-        let missing = chosen().filter(|slot| slot.is_missing(now.stamp(), &self.timeouts));
+        let missing = chosen().filter(|slot| self.misses(slot, now));
         if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
             return Err(ArmError::Missing(missing));
         }
@@ -144,14 +142,27 @@ impl<B> Bus<B> {
         if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
             return Err(ArmError::Faulty(faulty));
         }
-        self.now = now.stamp();
-        self.disturb();
+        self.begin(now);
         for motor in motors {
             if self.slot(*motor).is_some() {
                 self.engage_slot(motor.key().place(), now);
             }
         }
         Ok(())
+    }
+
+    /// Tells whether a motor has no fresh feedback, also after a pause that its stamp does not tell.
+    fn misses(&self, slot: &Slot, now: Instant) -> bool {
+        now > self.updated + LONGEST_PAUSE || slot.is_missing(now.stamp(), &self.timeouts)
+    }
+
+    /// Targets may come from now on, with this time until the next update.
+    fn begin(&mut self, now: Instant) {
+        self.now = now.stamp();
+        if !self.running {
+            self.updated = self.updated.min(now);
+        }
+        self.disturb();
     }
 
     fn engage_slot(&mut self, motor: u8, now: Instant) {

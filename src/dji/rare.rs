@@ -31,6 +31,10 @@ impl<B> Bus<B> {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };
+        if !self.running && (self.updated == Instant::START || now < self.updated) {
+            // Until the first update, the pause is counted from the earliest frame.
+            self.updated = now;
+        }
         let before = slot.conditions;
         slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
         self.journal.note(motor, &before, &slot.conditions, now);
@@ -46,9 +50,7 @@ impl<B> Bus<B> {
         if self.running && self.updated <= before {
             return false;
         }
-        if self.running && self.updated > before + LONGEST_PAUSE {
-            self.lose_all();
-        }
+        self.end_pause(before);
         self.running = true;
         self.held_steps = 0;
         let keep_alive_us = self.outbox.keep_alive(self.now);
@@ -85,9 +87,10 @@ impl<B> Bus<B> {
     }
 
     /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
-    #[cold]
-    #[inline(never)]
-    fn lose_all(&mut self) {
+    fn end_pause(&mut self, before: Instant) {
+        if self.updated <= before + LONGEST_PAUSE {
+            return;
+        }
         for (motor, slot) in (0..).zip(&mut self.slots) {
             let before = slot.conditions;
             slot.lose();
@@ -99,11 +102,15 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
-        self.running = true;
+        self.end_pause(before);
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
+        // Nobody looks at ages here: many of these in a row are one pause.
+        if core::mem::replace(&mut self.running, true) {
+            self.updated = self.updated.min(before);
+        }
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }

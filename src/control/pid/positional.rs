@@ -1,6 +1,6 @@
 use super::PidConfig;
 use super::settings::{REST_DERIVATIVE, Settings, TRACK_OUTPUT};
-use super::work::{CLOSED, UNKNOWN, passes};
+use super::work::{CLOSED, NO_SETPOINT, UNKNOWN, passes};
 use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -137,7 +137,7 @@ impl Pid {
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let integral = self.integral + self.growth(error, step);
         if !passes(integral, self.settings.integral_gate) {
-            return self.work_with_options(0.0, UNKNOWN, error, rate, step);
+            return self.work_with_options(NO_SETPOINT, UNKNOWN, error, rate, step);
         }
         self.finish(UNKNOWN, error, rate, integral, step)
     }
@@ -413,7 +413,7 @@ mod tests {
             for sample in 0..100_u8 {
                 at += 10.0 * DT_S;
                 let bad = (20..70).contains(&sample);
-                pid.update(0.0, if bad { f32::NAN } else { at }, DT_S);
+                pid.update(0.0, if bad { BAD[usize::from(sample) % 3] } else { at }, DT_S);
                 assert!(sample < 19 || (pid.terms().d + 0.5).abs() < 0.01, "{:?}", pid.terms());
             }
             assert_eq!(pid.rejected(), 50);

@@ -19,6 +19,10 @@ use crate::math;
 /// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
 pub(super) const UNKNOWN: f32 = f32::INFINITY;
 
+/// Stands in for the setpoint of an error that was formed elsewhere: a NaN that no arithmetic gives, because a
+/// measurement of +infinity must not be taken for one that is [`UNKNOWN`].
+pub(super) const NO_SETPOINT: f32 = f32::from_bits(0x7FC5_E790);
+
 /// A gate that nothing passes.
 pub(super) const CLOSED: u32 = 0;
 
@@ -141,7 +145,7 @@ impl Pid {
         self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
     }
 
-    /// Works on an error that was formed elsewhere when the measurement is [`UNKNOWN`].
+    /// Works on an error that was formed elsewhere when there is [`NO_SETPOINT`].
     #[inline(never)]
     pub(super) fn work_with_options(
         &mut self,
@@ -153,7 +157,9 @@ impl Pid {
     ) -> f32 {
         match self.work::<false>(measurement, error, rate, step) {
             Some(output) => output,
-            None if measurement == UNKNOWN => self.step_error_carefully(error, rate, step),
+            None if measurement == UNKNOWN && setpoint.to_bits() == NO_SETPOINT.to_bits() => {
+                self.step_error_carefully(error, rate, step)
+            }
             None => self.step_carefully(setpoint, measurement, step),
         }
     }

@@ -343,3 +343,31 @@ fn each_of_several_motors_stops_at_its_own_limit_however_the_ages_are_mixed() {
     }
     assert!(stops > 10_000, "{stops}");
 }
+
+/// What was heard one turn of the stamps ago, to the microsecond, is not fresh: neither when the first update comes that
+/// late, nor when the update that ends the pause has no usable time step.
+#[test]
+fn a_pause_of_a_whole_turn_of_the_stamps_revives_nobody() {
+    let turn = Duration::from_micros(1 << 32);
+    for dt_s in [0.001, 0.0] {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        assert!(bus.arm(at_ms(1) + turn).is_err(), "heard an hour ago");
+        bus.update(Tick::new(at_ms(1) + turn, dt_s));
+        assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
+
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        step(&mut bus, 2);
+        bus.update(Tick::new(at_ms(2) + turn, dt_s));
+        assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
+    }
+
+    // Updates without a usable step, however close to each other, do not end the pause.
+    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    step(&mut bus, 2);
+    for seconds in 1..=4294 {
+        bus.update(Tick::new(at_ms(seconds * 1_000), 0.0));
+    }
+    assert!(bus.arm_only(&[wheel.erase()], at_ms(2) + turn).is_err(), "heard an hour ago");
+    bus.update(Tick::new(at_ms(2) + turn, 0.001));
+    assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
+}

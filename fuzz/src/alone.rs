@@ -1,0 +1,137 @@
+//! One motor alone on a bus of its own: what the same motor has to do among others.
+
+use crate::motors::{COUNT, FACTS, Motor, Target};
+use drivetrain::dji::Bus;
+use drivetrain::motor::{Condition, Edge, Link, Timeouts};
+use drivetrain::time::Tick;
+
+/// Feedback is late above this age, and targets are old above the other: the values of the documentation.
+pub const LATE_US: u64 = 10_000;
+pub const COMMAND_US: u64 = 100_000;
+
+/// A motor alone, and what is known of it.
+pub struct Alone {
+    pub bus: Bus,
+    pub motor: Option<Motor>,
+    /// What it sent last.
+    pub word: i16,
+    pub heard: Option<u64>,
+    /// When the target that counts was set, by the clock of the bus.
+    pub commanded: Option<u64>,
+    /// It was driven by a target since it was last at rest.
+    pub moved: bool,
+    /// The target that counts is a velocity, and the first one since the motor was at rest.
+    pub first_velocity: bool,
+    /// Since when its last frame lies so far ahead that it counts as late here, and the whole bus has not noticed.
+    pub doubted: Option<u64>,
+}
+
+impl core::fmt::Debug for Alone {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { word, heard, commanded, moved, first_velocity, doubted, .. } = self;
+        write!(
+            f,
+            "word {word}, heard {heard:?}, commanded {commanded:?}, moved {moved}, first {first_velocity}, in doubt {doubted:?}"
+        )
+    }
+}
+
+impl Alone {
+    pub fn new(index: usize) -> Self {
+        let mut bus = Bus::new();
+        let motor = Motor::attach(&mut bus, index).ok();
+        Self {
+            bus,
+            motor,
+            word: 0,
+            heard: None,
+            commanded: None,
+            moved: false,
+            first_velocity: false,
+            doubted: None,
+        }
+    }
+
+    pub fn rest(&mut self) {
+        self.commanded = None;
+        self.moved = false;
+        self.first_velocity = false;
+    }
+
+    /// A target was taken at `now`.
+    pub fn follow(&mut self, target: Target, now: u64) {
+        let velocity = matches!(target, Target::Velocity(_));
+        // The loop that takes over from it goes on from its output.
+        self.moved |= !velocity;
+        self.first_velocity =
+            velocity && !self.moved && (self.first_velocity || self.commanded.is_none());
+        self.commanded = Some(now);
+    }
+
+    /// Updates, and has the bus compare every age: setting the timeouts, to what they are, makes it look. The whole bus
+    /// looks when it must, so that what it leaves out shows as a difference.
+    pub fn update(&mut self, tick: Tick) {
+        self.bus = core::mem::take(&mut self.bus).with_timeouts(Timeouts::new());
+        self.bus.update(tick);
+    }
+
+    pub fn drain(&mut self, index: usize) {
+        let facts = &FACTS[index];
+        let mut frames = 0;
+        while let Some(frame) = self.bus.next_frame() {
+            frames += 1;
+            assert!(frames <= 1, "one motor, one frame");
+            assert_eq!(frame.header(), u32::from(facts.command_id));
+            let words = words(&frame);
+            let others = words.iter().enumerate().filter(|(place, _)| *place != facts.place);
+            assert!(others.into_iter().all(|(_, word)| *word == 0), "I3: {frame:?}");
+            self.word = words[facts.place];
+        }
+        assert!(self.word.unsigned_abs() <= facts.limit, "I2: {} of {}", self.word, facts.limit);
+    }
+
+    pub fn link(&self) -> Option<Link> {
+        self.bus.link(self.motor?.handle())
+    }
+
+    pub fn is_armed(&self) -> bool {
+        self.motor.is_some_and(|motor| self.bus.is_motor_armed(motor.handle()))
+    }
+
+    pub fn has(&self, condition: Condition) -> bool {
+        self.motor.is_some_and(|motor| self.bus.conditions(motor.handle()).contains(condition))
+    }
+
+    /// The edges that were not read yet, in an order that does not depend on how many there were.
+    pub fn edges(&mut self) -> Vec<Edge> {
+        sorted(core::iter::from_fn(|| self.bus.next_edge()).collect())
+    }
+}
+
+/// Edges in the order of motors and conditions.
+pub fn sorted(mut edges: Vec<Edge>) -> Vec<Edge> {
+    assert!(edges.len() <= 2 * 15 * COUNT, "an edge is told again and again");
+    edges.sort_by_key(|edge| (edge.motor.to_string(), edge.condition, edge.began));
+    edges
+}
+
+/// Tells whether a stamp is too old, or further ahead than a stamp of 32 bits may be.
+pub fn is_old(now: u64, stamp: Option<u64>, limit: u64) -> bool {
+    stamp.is_none_or(|stamp| match now.checked_sub(stamp) {
+        Some(age) => age > limit,
+        None => lies_ahead(now, Some(stamp), limit),
+    })
+}
+
+/// Tells whether a stamp lies ahead by more than a limit, as far as stamps of 32 bits can tell.
+pub fn lies_ahead(now: u64, stamp: Option<u64>, limit: u64) -> bool {
+    stamp.and_then(|stamp| stamp.checked_sub(now)).is_some_and(|ahead| {
+        let ahead = ahead & 0xFFFF_FFFF;
+        ahead > limit && ahead < (1 << 32) - limit
+    })
+}
+
+pub fn words(frame: &drivetrain::frame::CanFrame) -> [i16; 4] {
+    let [a, b, c, d, e, f, g, h] = *frame.bytes();
+    [[a, b], [c, d], [e, f], [g, h]].map(i16::from_be_bytes)
+}
