@@ -16,7 +16,7 @@ use crate::control::step::TimeStep;
 ///
 /// # Edge behaviour
 /// * The first call gives P and feed-forward only: there is no interval yet to integrate or to differentiate over.
-///   It does not matter how long ago the controller was made.
+///   It does not matter how long ago the controller was made. [`step_error`](Self::step_error) gives D too: the rate is given.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`]: the integral and D stay for this step, P and feed-forward follow.
 /// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
@@ -24,6 +24,10 @@ use crate::control::step::TimeStep;
 /// * `ki` zero: the integral is zero and stays zero.
 /// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
 ///   what is stored stays finite.
+/// * An increment of the integral smaller than half the spacing of `f32` at it (6e-8 of the integral) is lost: the integral
+///   stands still where `ki |e| dt` is less than that. At an integral of 10, 1 kHz and `ki` = 1 those are errors below 6e-4.
+/// * At the threshold itself: an error of exactly the dead band's width counts in full, one of exactly the integral's separation
+///   is integrated, and the ends of the variable rate are those of the line between them.
 ///
 /// # Examples
 /// The gains are those of continuous time: one second of a constant error of 1 integrates to `ki` at any rate, and a
@@ -131,7 +135,7 @@ impl Pid {
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
     ///
-    /// D is `-kd * rate`, so a positive `kd` damps; there is no feed-forward. Options on the circle and on the
+    /// D is `-kd * rate`, on the first call too, so a positive `kd` damps; there is no feed-forward. Options on the circle and on the
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
@@ -175,7 +179,7 @@ impl Pid {
     }
 
     /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
-    /// measurements. The next step gives P, the integral as it was, and feed-forward.
+    /// measurements. The next step gives what a first one does, and the integral as it was.
     ///
     /// # Examples
     /// ```
@@ -201,13 +205,9 @@ impl Pid {
     ///
     /// The integral carries the difference to P, as far as its limit reaches. Without an integral (`ki` zero) nothing can carry
     /// it, and `output` is only where a slew limit starts from. NaN and infinity count as zero.
-    pub fn reset_to(&mut self, output: f32) {
+    pub const fn reset_to(&mut self, output: f32) {
         self.reset();
-        self.output = limited(
-            if output.is_finite() { output } else { 0.0 },
-            self.settings.output_lower,
-            self.settings.output_upper,
-        );
+        self.output = self.within_output_range(if output.is_finite() { output } else { 0.0 });
         self.options |= TRACK_OUTPUT;
     }
 
@@ -268,6 +268,11 @@ impl Pid {
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
+    }
+
+    /// Returns what the output limits leave of `value`.
+    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
+        limited(value, self.settings.output_lower, self.settings.output_upper)
     }
 
     fn change(&mut self, config: PidConfig) {
@@ -611,6 +616,74 @@ mod tests {
     }
 
     #[test]
+    fn an_error_at_the_very_edge_of_a_threshold() {
+        let below = f32::from_bits(1.0_f32.to_bits() - 1);
+        let above = f32::from_bits(1.0_f32.to_bits() + 1);
+        let p = |error| {
+            pid(PidConfig::new(10.0, 0.0, 0.0).with_dead_band(1.0)).update(error, 0.0, DT_S)
+        };
+        assert_eq!((p(below), p(-below)), (0.0, 0.0));
+        assert_eq!((p(1.0), p(-1.0)), (10.0, -10.0)); // the edge itself counts in full
+        let integral = |config: PidConfig, error| {
+            let mut pid = pid(config);
+            pid.update(error, 0.0, DT_S);
+            pid.update(error, 0.0, DT_S);
+            pid.terms().i
+        };
+        let only_i = PidConfig::new(0.0, 1.0, 0.0);
+        for sign in [1.0, -1.0] {
+            let in_band = only_i.with_dead_band(1.0);
+            assert_eq!(integral(in_band, sign * below), 0.0);
+            assert_eq!(integral(in_band, sign), sign * DT_S);
+            let separated = only_i.with_integral_separation(1.0);
+            assert_eq!(
+                (integral(separated, sign), integral(separated, sign * above)),
+                (sign * DT_S, 0.0)
+            );
+            let variable = only_i.with_variable_integral(1.0, 2.0);
+            assert_eq!(
+                (integral(variable, sign), integral(variable, sign * 2.0)),
+                (sign * DT_S, 0.0)
+            );
+        }
+    }
+
+    #[test]
+    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+        // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
+        for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
+            let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0));
+            pid.reset_to(10.0);
+            for _ in 0..1_000 {
+                pid.update(error, 0.0, DT_S);
+            }
+            assert_eq!(pid.terms().i > 10.0, moves, "{error}");
+        }
+    }
+
+    #[test]
+    fn by_error_d_is_there_from_the_first_call_on_and_after_a_reset() {
+        let step = TimeStep::of(DT_S);
+        let config = PidConfig::new(2.0, 5.0, 0.5);
+        for config in [config, config.with_slew_limit(1e9)] {
+            let mut pid = pid(config);
+            let first = Terms { p: 2.0, d: -1.5, ..Terms::default() };
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            pid.reset();
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            pid.interrupt();
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            // From a measurement, there is nothing yet to differentiate over.
+            pid.reset();
+            pid.step(1.0, 0.0, &step);
+            assert_eq!(pid.terms(), Terms { p: 2.0, ..Terms::default() });
+        }
+    }
+
+    #[test]
     fn circular_goes_the_short_way_in_both_directions() {
         let circle = PidConfig::new(1.0, 0.0, 0.0).with_period(360.0);
         assert_eq!(pid(circle).update(10.0, 350.0, DT_S), 20.0);
@@ -871,17 +944,32 @@ mod tests {
         }
 
         #[test]
-        fn damping_never_feeds_energy_in(kd in 0.001_f32..10.0, path in prop::collection::vec(-100.0_f32..100.0, 2..50)) {
-            let mut pid = pid(PidConfig::new(1.0, 1.0, kd));
-            let (mut work, mut last) = (0.0_f64, None);
-            for measurement in path {
-                pid.update(0.0, measurement, DT_S);
+        fn damping_never_feeds_energy_in(
+            gains in (0.0_f32..100.0, 0.0_f32..100.0, 0.001_f32..10.0), on_error in prop::bool::ANY,
+            setpoint in any_value(), path in prop::collection::vec((any_value(), 1e-5_f32..0.1), 2..50),
+        ) {
+            let config = PidConfig::new(gains.0, gains.1, gains.2);
+            let mut pid = pid(if on_error { config.with_derivative_on_error() } else { config });
+            let mut last = None;
+            for (measurement, dt_s) in path {
+                pid.update(setpoint, measurement, dt_s);
                 if let Some(last) = last {
-                    work += f64::from(pid.terms().d) * f64::from(measurement - last);
+                    let work = f64::from(pid.terms().d) * (f64::from(measurement) - f64::from(last));
+                    prop_assert!(work <= 0.0, "{work}"); // in each step, so in their sum too
                 }
                 last = Some(measurement);
             }
-            prop_assert!(work <= 0.0);
+        }
+
+        #[test]
+        fn damping_by_a_given_rate_never_feeds_energy_in(
+            kd in 0.001_f32..10.0, path in prop::collection::vec((any_value(), any_value()), 1..50),
+        ) {
+            let mut pid = pid(PidConfig::new(1.0, 1.0, kd));
+            for (error, rate) in path {
+                pid.step_error(error, rate, &TimeStep::of(DT_S));
+                prop_assert!(pid.terms().d * rate <= 0.0);
+            }
         }
 
         #[test]
