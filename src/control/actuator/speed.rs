@@ -107,7 +107,7 @@ impl SpeedFilters {
     ) -> f32 {
         let wanted = pid.step(setpoint, self.feedback.pass(speed, step), step);
         self.value = match &mut self.output.0 {
-            Some(filter) => pid.within_output_range(filter.step(wanted, step)),
+            Some(filter) => pid.within_output_range(filter.pass(wanted, step)),
             None => wanted,
         };
         self.value

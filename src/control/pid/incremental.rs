@@ -171,7 +171,6 @@ impl IncrementalPid {
             self.rest_derivative |= !step.is_hold();
             return self.output;
         }
-        let config = &self.config;
         let first = self.measurement == UNKNOWN;
         let target = match &mut self.tracking {
             Some(tracking) => {
@@ -183,47 +182,49 @@ impl IncrementalPid {
             None => setpoint,
         };
         let error = finite(target - measurement);
-        let (growth, others) = if first {
-            (0.0, if self.track_output { 0.0 } else { config.kp * error })
-        } else if step.is_frozen() {
-            (0.0, config.kp * (error - self.error))
-        } else {
-            let rate = if self.rest_derivative {
-                self.rate
-            } else {
-                (measurement - self.measurement) * step.per_dt
-            };
-            let (growth, others) = self.changes::<false>(error, rate, step);
-            if (growth + others + rate).is_finite() {
-                self.rate = rate;
-                (growth, others)
-            } else {
-                let rate = finite(rate);
-                let changes = self.changes::<true>(error, rate, step);
-                self.rate = rate;
-                changes
-            }
+        let before = match (first, self.track_output) {
+            (false, _) => self.error,
+            (true, false) => 0.0,
+            (true, true) => error,
         };
-        self.track_output = false;
-        self.rest_derivative = false;
-        self.error = error;
-        self.measurement = measurement;
-        let sum = finite(self.sum + finite(others));
+        let (mut rate, mut half_dt_s) = (self.rate, 0.0);
+        if !(first || step.is_frozen()) {
+            half_dt_s = step.half_dt_s;
+            if !self.rest_derivative {
+                rate = (measurement - self.measurement) * step.per_dt;
+            }
+        }
+        let (mut growth, mut sum) = self.add::<false>(error, before, rate, half_dt_s);
+        if !(sum + growth + rate).is_finite() {
+            rate = finite(rate);
+            (growth, sum) = self.add::<true>(error, before, rate, half_dt_s);
+        }
         let wanted = finite(sum + growth);
-        self.output = limited(wanted, config.output_lower, config.output_upper);
+        self.output = limited(wanted, self.config.output_lower, self.config.output_upper);
         let outward = (wanted - self.output) * growth > 0.0;
         self.sum = if outward { sum } else { wanted };
+        self.error = error;
+        self.measurement = measurement;
+        self.rate = rate;
+        (self.track_output, self.rest_derivative) = (false, false);
         self.output
     }
 
-    /// What a normal step adds to the sum: by I, and by P and D.
+    /// Returns what I adds to the sum, and the sum with what P and D add.
     #[inline]
-    fn changes<const CAREFUL: bool>(&self, error: f32, rate: f32, step: &TimeStep) -> (f32, f32) {
+    fn add<const CAREFUL: bool>(
+        &self,
+        error: f32,
+        before: f32,
+        rate: f32,
+        half_dt_s: f32,
+    ) -> (f32, f32) {
         let finite = |value| if CAREFUL { finite(value) } else { value };
         let config = &self.config;
-        let proportional = finite(config.kp * (error - self.error));
-        let growth = finite(config.ki * step.half_dt_s * (error + self.error));
-        (growth, proportional - finite(config.kd * (rate - self.rate)))
+        let proportional = finite(config.kp * finite(error - before));
+        let growth = finite(config.ki * half_dt_s * finite(error + before));
+        let derivative = finite(config.kd * finite(rate - self.rate));
+        (growth, finite(self.sum + finite(proportional - derivative)))
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.

@@ -120,7 +120,7 @@ pub struct RelayTuner {
     shorter_half: u8,
     rejected: u16,
     up: bool,
-    /// The periods that are summed are too short to be measured.
+    /// One of the periods that are summed is too short to be measured.
     coarse: bool,
     state: State,
 }
@@ -248,24 +248,24 @@ impl RelayTuner {
 
     fn end_period(&mut self) {
         let swing = 0.5 * self.highest - 0.5 * self.lowest;
-        let coarse = self.shorter_half < Self::LEAST_SAMPLES;
-        let steady = (swing - self.last_swing).abs() <= STEADY * swing && coarse == self.coarse;
-        if steady {
+        if (swing - self.last_swing).abs() <= STEADY * swing {
+            self.coarse |= self.shorter_half < Self::LEAST_SAMPLES;
             self.sum_of_periods_s += self.period.seconds();
             self.sum_of_swings += swing;
             self.periods += 1;
         } else {
             self.start_sums();
         }
-        (self.last_swing, self.coarse) = (swing, coarse);
+        self.last_swing = swing;
         if self.periods >= self.config.cycles {
-            self.state = if coarse { State::TooFast } else { State::Done };
+            self.state = if self.coarse { State::TooFast } else { State::Done };
         }
         self.next_period();
     }
 
     const fn start_sums(&mut self) {
         (self.periods, self.sum_of_periods_s, self.sum_of_swings) = (0, 0.0, 0.0);
+        self.coarse = false;
     }
 
     /// Returns the output for the plant: the bias, plus or minus the amplitude while it runs.
