@@ -77,7 +77,7 @@ impl Pid {
     /// The same with any option, of which the slew limit has left `bounded` of what is wanted. Pairs travel in registers, and
     /// stand in the order of [`keep`](Self::keep).
     #[inline(never)]
-    fn bound(
+    fn bound<const CAREFUL: bool>(
         &mut self,
         (wanted, measurement): (f32, f32),
         (error, rate): (f32, f32),
@@ -85,7 +85,7 @@ impl Pid {
         setpoint: f32,
         step: &TimeStep,
     ) -> f32 {
-        if !wanted.is_finite() {
+        if !CAREFUL && !wanted.is_finite() {
             return self.give_up(setpoint, measurement, error, step);
         }
         let output = self.within_output_range(bounded);
@@ -311,12 +311,12 @@ impl Pid {
             let (way, reach) = (wanted - self.output, settings.slew_per_s * step.dt_s);
             if way.abs() > reach {
                 let bounded = self.output + reach.copysign(way);
-                return self.bound(first, second, (integral, bounded), setpoint, step);
+                return self.bound::<CAREFUL>(first, second, (integral, bounded), setpoint, step);
             }
         }
         // Written so that NaN is not within.
         if !(wanted <= settings.output_upper && wanted >= settings.output_lower) {
-            return self.bound(first, second, (integral, wanted), setpoint, step);
+            return self.bound::<CAREFUL>(first, second, (integral, wanted), setpoint, step);
         }
         self.keep(wanted, measurement, error, rate, integral);
         wanted
