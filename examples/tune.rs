@@ -53,7 +53,7 @@ const YAW: Plan<Gm6020Voltage> = Plan {
     simulated: SimModel::Gm6020Voltage,
     swing_about: 8.0,
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
-    relay: RelayTunerConfig::new(4.0, 2.5).with_bias(6.0),
+    relay: RelayTunerConfig::new(4.0, 3.0).with_bias(6.0),
     guessed: PidConfig::new(0.2, 4.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 12.0,

@@ -1,4 +1,4 @@
-use super::work::UNKNOWN;
+use super::gate::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
 use crate::control::error::{ConfigError, check, gains, output_ends, positive};
 use crate::control::number::{finite, limited};

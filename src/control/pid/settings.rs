@@ -1,5 +1,5 @@
 use super::config::PidConfig;
-use super::work::{CLOSED, gate, limit_of, open_gate};
+use super::gate::{CLOSED, gate, limit_of, open_gate};
 
 const ASYMMETRIC: u16 = 1;
 const INTEGRAL_WEIGHT: u16 = 1 << 1;
@@ -14,11 +14,9 @@ const NOT_PLAIN: u16 = 0xFF;
 pub(super) const WIND_UP: u16 = 1 << 8;
 /// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
 pub(super) const REST_DERIVATIVE: u16 = 1 << 9;
-/// Never stored: tells a step that error and rate were formed elsewhere.
-pub(super) const GIVEN: u16 = 1 << 10;
 /// Set by `reset_to` until the first step after it.
-pub(super) const TRACK_OUTPUT: u16 = 1 << 11;
-pub(super) const BACK_CALCULATION: u16 = 1 << 12;
+pub(super) const TRACK_OUTPUT: u16 = 1 << 10;
+pub(super) const BACK_CALCULATION: u16 = 1 << 11;
 
 /// A [`PidConfig`] in the form in which a step reads it, and no larger: what is on or off is in the options.
 #[derive(Debug, Clone, Copy, PartialEq)]

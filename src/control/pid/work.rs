@@ -3,51 +3,20 @@
 //! ```text
 //! step, step_error     gains and symmetric limits: whatever passes both gates is done here
 //!   ├─ saturate           gains and symmetric limits, with the output at its limit
-//!   └─ step_with_options  every option, without guards; gives up when something is not finite
+//!   └─ step_with_options, step_given
+//!        │               every option, without guards; gives up when something is not finite
 //!        └─ *_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
 //! ```
 
+use super::gate::{CLOSED, UNKNOWN, limit_of, passes};
 use super::positional::{Pid, Terms};
 use super::settings::{
-    BACK_CALCULATION, CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, GIVEN,
+    BACK_CALCULATION, CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD,
     REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, WIND_UP,
 };
 use crate::control::number::finite;
 use crate::control::step::TimeStep;
 use crate::math;
-
-/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
-pub(super) const UNKNOWN: f32 = f32::INFINITY;
-
-/// A gate that nothing passes.
-pub(super) const CLOSED: u32 = 0;
-
-/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
-pub(super) const fn gate(limit: f32) -> u32 {
-    open_gate(limit) + 1
-}
-
-/// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
-pub(super) const fn open_gate(limit: f32) -> u32 {
-    limit.to_bits() << 1
-}
-
-/// Returns the limit that a gate encodes.
-#[inline]
-pub(super) const fn limit_of(gate: u32) -> f32 {
-    f32::from_bits(gate >> 1)
-}
-
-#[inline]
-pub(super) const fn passes(value: f32, gate: u32) -> bool {
-    magnitude(value) < gate
-}
-
-/// Sizes in an order that one integer comparison tells; NaN is larger than all numbers.
-#[inline]
-const fn magnitude(value: f32) -> u32 {
-    value.to_bits() << 1
-}
 
 impl Pid {
     /// A plain controller whose integral passed its gate, so that all but `rate` is finite, and whose output did not.
@@ -94,8 +63,7 @@ impl Pid {
         output
     }
 
-    /// Steps with what `options` say, which are words for the sake of speed. With [`GIVEN`], `travel` is the rate, and the
-    /// measurement may be [`UNKNOWN`]; then `setpoint` is the rate too.
+    /// Steps with what `options` say, which are words for the sake of speed.
     #[inline(never)]
     pub(super) fn step_with_options(
         &mut self,
@@ -107,16 +75,29 @@ impl Pid {
         options: u32,
     ) -> f32 {
         let on = |option: u16| options & u32::from(option) != 0;
-        let (mut error, mut travel) = (error, travel);
-        if !on(GIVEN | DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
-            if on(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
-                return self.step_by_turns(setpoint, measurement, step);
-            }
-            travel *= step.per_dt;
-        } else if !on(GIVEN) {
+        if on(DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
             return self.step_on_error(setpoint, measurement, step);
         }
-        self.work::<false>(setpoint, measurement, error, travel, step, options)
+        let (mut error, mut travel) = (error, travel);
+        if on(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
+            return self.step_by_turns(setpoint, measurement, step);
+        }
+        self.work::<false>(setpoint, measurement, error, travel * step.per_dt, step, options)
+    }
+
+    /// The same with an error and a rate that were formed elsewhere. The measurement may be [`UNKNOWN`]; then `setpoint` is the
+    /// rate too.
+    #[inline(never)]
+    pub(super) fn step_given(
+        &mut self,
+        setpoint: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        step: &TimeStep,
+        options: u32,
+    ) -> f32 {
+        self.work::<false>(setpoint, measurement, error, rate, step, options)
     }
 
     #[inline(never)]
@@ -129,8 +110,8 @@ impl Pid {
         if self.has(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
             return self.step_by_turns(setpoint, measurement, step);
         }
-        let (rate, options) = (travel * step.per_dt, self.options | GIVEN);
-        self.step_with_options(setpoint, measurement, error, rate, step, options.into())
+        let rate = travel * step.per_dt;
+        self.step_given(setpoint, measurement, error, rate, step, self.options.into())
     }
 
     /// Takes the shorter way round if that is at most one turn off, and tells whether it was.
@@ -162,8 +143,8 @@ impl Pid {
         if !(self.is_short(error) && self.is_short(travel)) {
             return self.step_carefully(setpoint, measurement, step);
         }
-        let (rate, options) = (travel * step.per_dt, self.options | GIVEN);
-        self.step_with_options(setpoint, measurement, error, rate, step, options.into())
+        let rate = travel * step.per_dt;
+        self.step_given(setpoint, measurement, error, rate, step, self.options.into())
     }
 
     /// Something was not finite, and nothing has changed.
@@ -268,7 +249,8 @@ impl Pid {
     }
 
     /// The whole controller. Unless `CAREFUL`, it gives up before anything has changed when something is not finite.
-    #[inline]
+    // It stands in each of its callers: a call moves what is in registers.
+    #[inline(always)]
     fn work<const CAREFUL: bool>(
         &mut self,
         setpoint: f32,

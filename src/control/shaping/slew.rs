@@ -61,8 +61,9 @@ impl SlewLimiter {
             let left = target - self.value;
             let change = limited(left, lowest, highest);
             let value = finite(self.value + change);
+            let within_reach = left >= lowest && left <= highest;
             // The rounding of the sum must not take it past the target.
-            if change == left || (target - value) * left <= 0.0 {
+            if within_reach || (target - value) * left <= 0.0 {
                 (self.value, self.rest) = (target, 0.0);
             } else {
                 (self.value, self.rest) = (value, change - (value - self.value));

@@ -35,7 +35,8 @@ class Pid:
     """The positional controller as the sums that define it, over the whole history."""
 
     def __init__(self, kp, ki, kd, lower=-1e30, upper=1e30, integral_limit=1e30, separation=1e30, full=None, none=None,
-                 band=0.0, ks=0.0, kv=0.0, slew=None, period=None, cutoff=None, on_error=False, tracking=None):
+                 band=0.0, ks=0.0, kv=0.0, slew=None, period=None, cutoff=None, on_error=False, tracking=None,
+                 wind_up=False):
         self.__dict__.update(locals())
         self.errors, self.measurements = [], []
         self.integral = self.rate = self.last = 0.0
@@ -79,7 +80,7 @@ class Pid:
             if self.tracking:
                 grown -= (wanted - output) * min(1.0, dt / self.tracking)
                 grown = max(-self.integral_limit, min(self.integral_limit, grown))
-            elif sign(wanted - output) == sign(growth):
+            elif sign(wanted - output) == sign(growth) and not self.wind_up:
                 grown = self.integral
         self.integral = grown
         self.errors.append(error)
@@ -127,6 +128,7 @@ CASES = {
     "output_range": (Pid(4.0, 40.0, 0.0, lower=-0.25, upper=1.5), LINEAR),
     "integral_limit": (Pid(1.0, 40.0, 0.0, integral_limit=0.5), LINEAR),
     "back_calculation": (Pid(4.0, 40.0, 0.01, lower=-1.5, upper=1.5, tracking=0.02), LINEAR),
+    "without_anti_windup": (Pid(4.0, 40.0, 0.01, lower=-1.5, upper=1.5, wind_up=True), LINEAR),
     "integral_separation": (Pid(2.0, 30.0, 0.0, separation=0.6), LINEAR),
     "variable_integral": (Pid(2.0, 30.0, 0.0, full=0.2, none=0.8), LINEAR),
     "dead_band": (Pid(2.0, 30.0, 0.0, band=0.1), LINEAR),
