@@ -39,7 +39,8 @@ const WHEEL: Plan<M3508> = Plan {
     unit: "A",
     simulated: SimModel::M3508,
     swing_about: 15.0,
-    relay: RelayTunerConfig::new(3.0, 0.05),
+    // The hysteresis slows the swing down to 8 samples of the loop in half a period, and more.
+    relay: RelayTunerConfig::new(3.0, 0.5),
     guessed: PidConfig::new(0.1, 2.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 30.0,
@@ -52,7 +53,7 @@ const YAW: Plan<Gm6020Voltage> = Plan {
     simulated: SimModel::Gm6020Voltage,
     swing_about: 8.0,
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
-    relay: RelayTunerConfig::new(8.0, 0.15).with_bias(6.0),
+    relay: RelayTunerConfig::new(4.0, 3.0).with_bias(6.0),
     guessed: PidConfig::new(0.2, 4.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 12.0,
@@ -102,7 +103,11 @@ fn identify<M: Model>(plan: &Plan<M>) -> Outcome<Oscillation> {
     run(plan, plan.guessed, 3, |bus, motor, speed, dt_s| {
         (plan.effort)(bus, motor, tuner.update(plan.swing_about, speed, dt_s));
     })?;
-    Ok(tuner.oscillation().ok_or("the motor did not swing steadily")?)
+    match (tuner.oscillation(), tuner.failure()) {
+        (Some(found), _) => Ok(found),
+        (None, Some(failure)) => Err(format!("{}: {failure}", plan.name).into()),
+        (None, None) => Err(format!("{}: still swinging after 3 s", plan.name).into()),
+    }
 }
 
 fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepMeasures, Curve)> {
@@ -155,14 +160,19 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
     let root = SVGBackend::new(path, (900, 640)).into_drawing_area();
     root.fill(&WHITE)?;
     for (area, motor) in root.split_evenly((motors.len(), 1)).iter().zip(motors) {
-        let title = format!("{}, rad/s (grey: target, red: guessed, blue: tuned)", motor.name);
+        let title = format!("{} (grey: target, red: guessed, blue: tuned)", motor.name);
         let mut chart = ChartBuilder::on(area)
             .caption(title, ("sans-serif", 16))
             .margin(8)
-            .x_label_area_size(24)
-            .y_label_area_size(40)
+            .x_label_area_size(44)
+            .y_label_area_size(52)
             .build_cartesian_2d(0.0_f32..0.6, 0.0..1.6 * motor.target)?;
-        chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .x_desc("time since the step, s")
+            .y_desc("speed, rad/s")
+            .draw()?;
         let target = [(0.0, motor.target), (0.6, motor.target)];
         chart.draw_series(LineSeries::new(target, &RGBColor(150, 150, 150)))?;
         for (curve, colour) in [(&motor.before, RED), (&motor.after, BLUE)] {

@@ -326,12 +326,12 @@ fn without_ki_nothing_is_wound_up() {
         subject.step([0.0; 3], DT_S);
         assert_eq!(subject.step([0.0; 3], DT_S), 0.0, "{subject:?}");
     }
-    // Without `ki`, what the limit cut off the incremental form stays off: 200 was cut to 50, and -200 comes on top.
+    // The incremental form: P of 200 and 180 is cut to 50, and no more than that is gone.
     let config = IncrementalPidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0);
     let mut incremental = IncrementalPid::new(config).unwrap();
     assert_eq!(incremental.update(100.0, 0.0, DT_S), 50.0);
-    assert_eq!(incremental.update(90.0, 0.0, DT_S), 30.0);
-    assert_eq!(incremental.update(0.0, 0.0, DT_S), -50.0);
+    assert_eq!(incremental.update(90.0, 0.0, DT_S), 50.0);
+    assert_eq!(incremental.update(0.0, 0.0, DT_S), 0.0);
 }
 
 #[test]

@@ -36,6 +36,7 @@ fn controller(case: &str) -> Option<Controller> {
         "back_calculation" => {
             pid(4.0, 40.0, 0.01).with_output_limit(1.5).with_back_calculation(0.02)
         }
+        "without_anti_windup" => pid(4.0, 40.0, 0.01).with_output_limit(1.5).without_anti_windup(),
         "integral_separation" => pid(2.0, 30.0, 0.0).with_integral_separation(0.6),
         "variable_integral" => pid(2.0, 30.0, 0.0).with_variable_integral(0.2, 0.8),
         "dead_band" => pid(2.0, 30.0, 0.0).with_dead_band(0.1),
@@ -88,7 +89,7 @@ fn pid_with_each_option_alone_and_all_together() {
         };
         assert_close(output, row[4], 5e-5, case);
     }
-    assert_eq!(cases, 17);
+    assert_eq!(cases, 18);
 }
 
 #[test]

@@ -57,5 +57,6 @@ pub use pid::{IncrementalPid, IncrementalPidConfig, Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
 pub use tuning::{
-    Gains, Oscillation, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
+    Gains, Oscillation, RelayFailure, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse,
+    TuningRule,
 };

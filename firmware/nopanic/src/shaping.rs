@@ -21,6 +21,10 @@ pub fn call_all() {
     PositionActuator::new.call();
     PositionActuator::update.call();
     PositionActuator::update_error.call();
+    PositionActuator::step.call();
+    PositionActuator::step_error.call();
+    PositionActuator::interrupt.call();
+    PositionActuator::reset_to.call();
     PositionActuator::reset.call();
     PositionActuator::output.call();
     PositionActuator::speed_setpoint.call();
@@ -35,6 +39,7 @@ pub fn call_all() {
     SpeedActuator::step.call();
     SpeedActuator::reset.call();
     SpeedActuator::reset_to.call();
+    SpeedActuator::interrupt.call();
     SpeedActuator::output.call();
     SpeedActuator::pid.call();
     SpeedActuator::pid_mut.call();
@@ -94,6 +99,7 @@ pub fn call_all() {
     RelayTuner::is_complete.call();
     RelayTuner::rejected.call();
     RelayTuner::oscillation.call();
+    RelayTuner::failure.call();
     StepResponse::new.call();
     StepResponse::record.call();
     StepResponse::is_complete.call();

@@ -240,17 +240,27 @@ pub fn control() {
     let all = plain
         .with_output_range(-20.0, 19.0)
         .with_integral_separation(50.0)
-        .with_variable_integral(1.0, 40.0)
+        .with_variable_integral(0.1, 40.0)
         .with_dead_band(0.01)
         .with_feed_forward(0.1, 0.01)
         .with_slew_limit(1e5)
-        .with_derivative_filter(100.0)
-        .with_back_calculation(0.1);
+        .with_derivative_filter(100.0);
+    let (conditional, all) = (all, all.with_back_calculation(0.1));
     row("pid_step", &[pid_step(plain)]);
     row("pid_update", &[pid_update(plain)]);
     row("pid_limit", &[pid_step(plain.with_output_limit(0.1))]);
     row("pid_options_step", &[pid_step(all)]);
     row("pid_options_update", &[pid_update(all)]);
+    // In the dead band; with D of the error; at a limit, with back-calculation and with conditional integration; at the slew
+    // limit; at both.
+    row("pid_options_band", &[pid_step(all.with_dead_band(1.0))]);
+    row("pid_options_on_error", &[pid_step(all.with_derivative_on_error())]);
+    row("pid_options_limit", &[pid_step(all.with_output_range(-0.01, 0.02))]);
+    row("pid_options_held", &[pid_step(conditional.with_output_range(-0.01, 0.02))]);
+    row("pid_options_slew", &[pid_step(all.with_slew_limit(10.0))]);
+    let both = all.with_slew_limit(10.0).with_output_range(-0.02, 0.01);
+    row("pid_options_both", &[pid_step(both)]);
+    row("pid_options_worst", &[pid_step(both.with_period(0.375))]);
     row("pid_circle_step", &[pid_step(all.with_period(360.0))]);
     row("pid_circle_update", &[pid_update(all.with_period(360.0))]);
     row("pid_circle_across", &[pid_step_to(361.0, all.with_period(360.0))]);

@@ -13,7 +13,8 @@ use crate::control::step::TimeStep;
 /// positive `kd` damps, and its output limit is the speed limit. A [`PositionActuator`](super::PositionActuator) is this with filters.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`], loop by loop: an error that is NaN or infinite holds the velocity that is wanted, a velocity that is
+/// That of the [`Pid`], loop by loop: on the first call, the position loop gives P and D, since the rate is given, and the
+/// speed loop P. An error that is NaN or infinite holds the velocity that is wanted, a velocity that is
 /// NaN or infinite, or a step on hold, holds the output; each loop counts what it refused. A step that is frozen freezes the
 /// integral and D of both. After a bad velocity, the D of the speed loop rests in the next good step.
 ///
@@ -148,6 +149,13 @@ mod tests {
         assert_eq!((cascade.position().terms().i, cascade.speed().terms().i), terms);
         cascade.reset();
         assert_eq!(cascade, Cascade::new(POSITION, SPEED).unwrap());
+    }
+
+    #[test]
+    fn the_position_loop_damps_from_the_first_call_on() {
+        let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
+        cascade.step(0.1, 2.0, &TimeStep::of(0.001));
+        assert_eq!((cascade.position().terms().d, cascade.speed().terms().d), (-0.2, 0.0));
     }
 
     #[test]

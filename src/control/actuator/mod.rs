@@ -38,9 +38,10 @@ impl OptionalFilter {
         }
     }
 
+    /// Filters what is finite, by a time that is not on hold.
     const fn pass(&mut self, value: f32, step: &TimeStep) -> f32 {
         match &mut self.0 {
-            Some(filter) => filter.step(value, step),
+            Some(filter) => filter.pass(value, step),
             None => value,
         }
     }

@@ -1,7 +1,6 @@
 use super::speed::{SpeedActuatorConfig, SpeedFilters};
 use super::{Cascade, OptionalFilter};
 use crate::control::error::{ConfigError, ConfigFault};
-use crate::control::number::limited;
 use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 
@@ -53,7 +52,7 @@ impl PositionActuatorConfig {
 /// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward. A `dt_s` that is zero, negative, NaN or
+/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward, and by error the D of the angle loop too. A `dt_s` that is zero, negative, NaN or
 /// infinite, and a setpoint, angle or speed that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected)
 /// grows; after a bad input, the next values pass their filters as first ones, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D of both loops, and
 /// counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
@@ -77,11 +76,13 @@ pub struct PositionActuator {
     filter: OptionalFilter,
     cascade: Cascade,
     filters: SpeedFilters,
-    /// Since the last step of the angle loop; `f32::MAX` when one step since was above the maximum.
+    /// Since the last step of the angle loop.
     passed_s: f32,
     rejected: u16,
     outer_divider: u8,
     until_outer: u8,
+    /// One of the steps that have passed was above the maximum.
+    froze: bool,
 }
 
 impl PositionActuator {
@@ -110,37 +111,51 @@ impl PositionActuator {
                 rejected: 0,
                 outer_divider: config.outer_divider,
                 until_outer: 0,
+                froze: false,
             }),
             (Err(error), _) | (_, Err(error)) => Err(error),
         }
     }
 
-    /// Steps by `dt_s` seconds and returns the output.
+    /// Steps by `dt_s` seconds, of which [`TimeStep::MAX_S`] are believed, and returns the output.
     pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::of(dt_s);
+        self.step(setpoint, angle, speed, &TimeStep::of(dt_s))
+    }
+
+    /// Steps by a time that was validated before, and returns the output.
+    pub fn step(&mut self, setpoint: f32, angle: f32, speed: f32, step: &TimeStep) -> f32 {
         let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
         if !step.admits(finite, &mut self.rejected) {
-            return self.miss(&step);
+            if !step.is_hold() {
+                self.filter.reset();
+                self.cascade.position_mut().rest_derivative();
+            }
+            return self.miss(step);
         }
-        let angle = self.filter.pass(angle, &step);
-        if let Some(outer) = self.outer_step(&step) {
+        let angle = self.filter.pass(angle, step);
+        if let Some(outer) = self.outer_step(step) {
             self.cascade.position_mut().step(setpoint, angle, &outer);
         }
-        self.step_speed(speed, &step)
+        self.step_speed(speed, step)
     }
 
     /// Steps with an angle error that was formed elsewhere (from integers, on a circle): the measured speed is its rate.
     ///
-    /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right. The angle filter does not apply.
+    /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right, which is there from the
+    /// first call on. The angle filter does not apply.
     pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::of(dt_s);
+        self.step_error(error, speed, &TimeStep::of(dt_s))
+    }
+
+    /// As [`update_error`](Self::update_error), by a time that was validated before.
+    pub fn step_error(&mut self, error: f32, speed: f32, step: &TimeStep) -> f32 {
         if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
-            return self.miss(&step);
+            return self.miss(step); // the rate of the angle is given: none of it is missed
         }
-        if let Some(outer) = self.outer_step(&step) {
+        if let Some(outer) = self.outer_step(step) {
             self.cascade.step_position(error, speed, &outer);
         }
-        self.step_speed(speed, &step)
+        self.step_speed(speed, step)
     }
 
     /// Forgets everything but the configuration and the count of rejected steps.
@@ -148,7 +163,36 @@ impl PositionActuator {
         self.filter.reset();
         self.cascade.reset();
         self.filters.reset();
-        (self.passed_s, self.until_outer) = (0.0, 0);
+        self.await_outer();
+    }
+
+    /// Resets, and lets the first call return `output` as [`Pid::reset_to`](crate::control::Pid::reset_to) of the speed loop does,
+    /// whatever the angle loop wants: for taking over from another controller without a jump.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
+    ///
+    /// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0));
+    /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
+    /// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
+    /// arm.reset_to(3.0);
+    /// assert_eq!((arm.output(), arm.update(1.0, 0.0, 0.0, 0.001)), (3.0, 3.0));
+    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// ```
+    pub const fn reset_to(&mut self, output: f32) {
+        self.reset();
+        self.cascade.speed_mut().reset_to(output);
+        self.filters.reset_to(self.cascade.output());
+    }
+
+    /// Keeps the integrals of both loops over a gap in the measurements, as [`Pid::interrupt`](crate::control::Pid::interrupt) does; the
+    /// next angle and the next speed pass their filters as first ones, and the angle loop runs with the next step.
+    pub const fn interrupt(&mut self) {
+        self.filter.reset();
+        self.cascade.interrupt();
+        self.filters.interrupt();
+        self.await_outer();
     }
 
     /// Returns the last output.
@@ -180,11 +224,9 @@ impl PositionActuator {
         self.rejected
     }
 
-    /// What was measured is too old by the time of this step: filters take the next values as first ones, and D rests.
+    /// The speed that was measured is too old by the time of this step: its filter takes the next one as a first one, and D rests.
     const fn miss(&mut self, step: &TimeStep) -> f32 {
         if !step.is_hold() {
-            self.filter.reset();
-            self.cascade.position_mut().rest_derivative();
             self.cascade.speed_mut().rest_derivative();
         }
         self.filters.miss(step);
@@ -193,24 +235,31 @@ impl PositionActuator {
 
     fn step_speed(&mut self, speed: f32, step: &TimeStep) -> f32 {
         let wanted = self.speed_setpoint();
-        self.filters.around(speed, step, |speed| self.cascade.step_speed(wanted, speed, step))
+        self.filters.around(self.cascade.speed_mut(), wanted, speed, step)
+    }
+
+    /// Has the angle loop run with the next step.
+    const fn await_outer(&mut self) {
+        (self.passed_s, self.froze, self.until_outer) = (0.0, false, 0);
     }
 
     /// Returns the time for the angle loop when it is its turn.
     fn outer_step(&mut self, step: &TimeStep) -> Option<TimeStep> {
-        self.passed_s = if step.is_frozen() { f32::MAX } else { self.passed_s + step.dt_s() };
+        self.passed_s += step.dt_s();
+        self.froze |= step.is_frozen();
         if self.until_outer > 0 {
             self.until_outer -= 1;
             return None;
         }
-        let longest_s = f32::from(self.outer_divider) * TimeStep::MAX_S;
-        let passed_s = match self.passed_s {
-            f32::MAX => f32::MAX,
-            // The rounding of a sum freezes nothing.
-            passed_s => limited(passed_s, 0.0, longest_s),
+        // The steps it consists of were validated: their sum is not compared with a maximum again.
+        let outer = if self.froze {
+            TimeStep::new(f32::MAX, self.passed_s)
+        } else {
+            TimeStep::new(self.passed_s, f32::MAX)
         };
-        (self.passed_s, self.until_outer) = (0.0, self.outer_divider - 1);
-        Some(TimeStep::new(passed_s, longest_s))
+        self.await_outer();
+        self.until_outer = self.outer_divider - 1;
+        Some(outer)
     }
 }
 
@@ -316,8 +365,99 @@ mod tests {
             SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0)),
         );
         let mut actuator = PositionActuator::new(damper).unwrap();
-        assert!(actuator.update_error(0.0, 2.0, DT_S) < 0.0);
-        assert!(actuator.update_error(0.0, -2.0, DT_S) > 0.0);
+        for speed in [2.0, -2.0] {
+            actuator.update_error(0.0, speed, DT_S); // on the first call too
+            assert_eq!(actuator.speed_setpoint(), -speed);
+        }
+        actuator.reset();
+        assert_eq!(actuator.update(0.0, 2.0, 0.0, DT_S), 0.0); // by angles, there is no travel yet
+    }
+
+    #[test]
+    fn taking_over_gives_the_output_that_was_and_then_moves_from_there() {
+        for divider in [1, 3] {
+            let speed =
+                SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0));
+            for speed in [speed, speed.with_output_filter(50.0).with_feedback_filter(50.0)] {
+                let config =
+                    PositionActuatorConfig::new(config().angle, speed).with_outer_divider(divider);
+                let mut actuator = PositionActuator::new(config).unwrap();
+                for _ in 0..20 {
+                    actuator.update(1.0, 0.0, 0.0, DT_S);
+                }
+                actuator.reset_to(3.0);
+                assert_eq!((actuator.output(), actuator.speed_setpoint()), (3.0, 0.0));
+                assert!((actuator.update(0.5, 0.2, 0.1, DT_S) - 3.0).abs() < 1e-5);
+                assert!((actuator.update(0.5, 0.2, 0.1, DT_S) - 3.0).abs() < 0.05);
+                actuator.reset_to(100.0);
+                assert_eq!(actuator.output(), 20.0);
+                actuator.reset_to(f32::NAN);
+                assert_eq!(actuator.output(), 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn an_interruption_keeps_both_integrals_and_kicks_neither_d_nor_a_filter() {
+        let speed =
+            SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.5)).with_feedback_filter(5.0);
+        let config = PositionActuatorConfig::new(PidConfig::new(1.0, 1.0, 0.1), speed)
+            .with_angle_filter(5.0)
+            .with_outer_divider(4);
+        let mut actuator = PositionActuator::new(config).unwrap();
+        for _ in 0..10 {
+            actuator.update(1.0, 0.0, 0.0, DT_S);
+        }
+        let integrals = |actuator: &PositionActuator| {
+            (actuator.cascade().position().terms().i, actuator.cascade().speed().terms().i)
+        };
+        let before = integrals(&actuator);
+        assert!(before.0 > 0.0 && before.1 > 0.0);
+        actuator.interrupt();
+        actuator.update(1.0, 0.7, 0.4, DT_S);
+        assert_eq!(integrals(&actuator), before);
+        let (position, speed) =
+            (actuator.cascade().position().terms(), actuator.cascade().speed().terms());
+        assert_eq!((position.d, speed.d), (0.0, 0.0));
+        // The angle loop ran at once, and both filters let the values through.
+        assert!(
+            (position.p - 0.3).abs() < 1e-6
+                && (speed.p - 2.0 * (actuator.speed_setpoint() - 0.4)).abs() < 1e-6
+        );
+    }
+
+    #[test]
+    fn a_step_that_was_validated_with_another_maximum_counts_in_full() {
+        let integral = PidConfig::new(0.0, 1.0, 0.0);
+        let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+        for divider in [1, 2, 5] {
+            let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(divider);
+            let mut actuator = PositionActuator::new(config).unwrap();
+            let step = TimeStep::new(0.5, 1.0);
+            for _ in 0..=20 {
+                actuator.step(1.0, 0.0, 0.0, &step);
+            }
+            assert_eq!(actuator.speed_setpoint(), 10.0, "{divider}"); // 20 steps of 0.5 s
+        }
+    }
+
+    #[test]
+    fn a_bad_error_or_speed_leaves_the_given_rate_of_the_angle_as_it_is() {
+        let damper = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+        let config = PositionActuatorConfig::new(PidConfig::new(0.0, 0.0, 1.0), damper);
+        let mut actuator = PositionActuator::new(config).unwrap();
+        actuator.update_error(0.0, 2.0, DT_S);
+        actuator.update_error(f32::NAN, 2.0, DT_S);
+        actuator.update_error(0.0, f32::NAN, DT_S);
+        actuator.update_error(0.0, 5.0, DT_S);
+        assert_eq!(actuator.cascade().position().terms().d, -5.0); // and not that of two steps ago
+        // By angles, the travel since the last good one is not that of one step: D keeps its value once.
+        let mut actuator = PositionActuator::new(config).unwrap();
+        actuator.update(0.0, 0.0, 0.0, DT_S);
+        actuator.update(0.0, 0.002, 0.0, DT_S);
+        actuator.update(0.0, f32::NAN, 0.0, DT_S);
+        actuator.update(0.0, 0.5, 0.0, DT_S);
+        assert!((actuator.cascade().position().terms().d + 2.0).abs() < 1e-5);
     }
 
     #[test]

@@ -60,12 +60,19 @@ impl LowPass {
     #[inline]
     pub const fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
         if step.admits(input.is_finite(), &mut self.rejected) {
-            if self.started {
-                let gain = step.dt_s / (step.dt_s + self.time_constant_s);
-                self.value = finite(self.value + gain * finite(input - self.value));
-            } else {
-                self.reset_to(input);
-            }
+            self.pass(input, step);
+        }
+        self.value
+    }
+
+    /// Steps by a time that is not on hold, to an input that is finite.
+    #[inline]
+    pub(in crate::control) const fn pass(&mut self, input: f32, step: &TimeStep) -> f32 {
+        if self.started {
+            let gain = step.dt_s / (step.dt_s + self.time_constant_s);
+            self.value = finite(self.value + gain * finite(input - self.value));
+        } else {
+            (self.value, self.started) = (input, true);
         }
         self.value
     }

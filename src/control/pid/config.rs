@@ -122,7 +122,7 @@ impl PidConfig {
         Self { tracking_time_s: 0.0, wind_up: true, ..self }
     }
 
-    /// Counts an error within ±`width` as none. Zero or more; zero, the default, is off.
+    /// Counts an error smaller than `width` as none; one of exactly `width` counts in full. Zero or more; zero, the default, is off.
     ///
     /// Inside the band P is zero and the integral moves towards zero only: it does not grow, but one that is wound up
     /// is not frozen either.

@@ -1,4 +1,4 @@
-use super::work::UNKNOWN;
+use super::gate::UNKNOWN;
 use crate::control::differentiator::LinearDifferentiator;
 use crate::control::error::{ConfigError, check, gains, output_ends, positive};
 use crate::control::number::{finite, limited};
@@ -88,21 +88,24 @@ impl IncrementalPidConfig {
     }
 }
 
-/// An incremental (velocity-form) PID controller: every step adds to the last output.
+/// An incremental (velocity-form) PID controller: every step adds to a sum.
 ///
 /// ```text
-/// output += kp (e - e1) + ki dt (e + e1) / 2 - kd (rate - rate1),   rate = (measurement - measurement1) / dt
+/// sum += kp (e - e1) + ki dt (e + e1) / 2 - kd (rate - rate1),   rate = (measurement - measurement1) / dt
+/// output = sum within its limits
 /// ```
-/// D is the second difference of the measurement. The only memory of the past is the output, and that is limited: the controller
-/// cannot wind up. Without limits it gives what [`Pid`](super::Pid) gives, to rounding.
+/// D is the second difference of the measurement. While the sum is beyond a limit, what I would add towards that side is left
+/// out: the controller cannot wind up. P and D are never left out, so the output leaves the limit when P says so, as that of
+/// [`Pid`](super::Pid) with conditional integration does: the two give the same, to rounding, with limits and without.
 ///
 /// # Edge behaviour
 /// * The first call gives P only, or after [`reset_to`](Self::reset_to) the given output.
 /// * `dt_s` zero, negative, NaN or infinite, and NaN or infinity in an input: the last output is returned, and
 ///   [`rejected`](Self::rejected) grows. After a bad input, D rests in the next good step, as that of [`Pid`](super::Pid) does.
 /// * `dt_s` above the maximum of the [`TimeStep`]: only the change of P is added.
-/// * `ki` zero: nothing brings the output back after it was limited; what the limit cut off stays off.
-/// * Overflow of `f32`: the output is the limit, never NaN.
+/// * `ki` zero: the output is that of P and D, within the limits. What rounding takes from the sum is not given back.
+/// * Overflow of `f32`: the sum stays at ±`f32::MAX` and the output at its limit, never NaN. What was cut off the sum is lost.
+/// * A change smaller than half the spacing of `f32` at the sum (6e-8 of it) is lost: it stands still where `ki dt e` is less.
 ///
 /// # Examples
 /// ```
@@ -121,6 +124,8 @@ pub struct IncrementalPid {
     error: f32,
     measurement: f32,
     rate: f32,
+    /// The output without its limits.
+    sum: f32,
     output: f32,
     rejected: u16,
     track_output: bool,
@@ -147,6 +152,7 @@ impl IncrementalPid {
             error: UNKNOWN,
             measurement: UNKNOWN,
             rate: 0.0,
+            sum: 0.0,
             output: 0.0,
             rejected: 0,
             track_output: false,
@@ -165,7 +171,6 @@ impl IncrementalPid {
             self.rest_derivative |= !step.is_hold();
             return self.output;
         }
-        let config = &self.config;
         let first = self.measurement == UNKNOWN;
         let target = match &mut self.tracking {
             Some(tracking) => {
@@ -177,44 +182,49 @@ impl IncrementalPid {
             None => setpoint,
         };
         let error = finite(target - measurement);
-        let change = if first {
-            if self.track_output { 0.0 } else { config.kp * error }
-        } else if step.is_frozen() {
-            config.kp * (error - self.error)
-        } else {
-            let rate = if self.rest_derivative {
-                self.rate
-            } else {
-                (measurement - self.measurement) * step.per_dt
-            };
-            let change = self.change::<false>(error, rate, step);
-            if (change + rate).is_finite() {
-                self.rate = rate;
-                change
-            } else {
-                let rate = finite(rate);
-                let change = self.change::<true>(error, rate, step);
-                self.rate = rate;
-                change
-            }
+        let before = match (first, self.track_output) {
+            (false, _) => self.error,
+            (true, false) => 0.0,
+            (true, true) => error,
         };
-        self.track_output = false;
-        self.rest_derivative = false;
+        let (mut rate, mut half_dt_s) = (self.rate, 0.0);
+        if !(first || step.is_frozen()) {
+            half_dt_s = step.half_dt_s;
+            if !self.rest_derivative {
+                rate = (measurement - self.measurement) * step.per_dt;
+            }
+        }
+        let (mut growth, mut sum) = self.add::<false>(error, before, rate, half_dt_s);
+        if !(sum + growth + rate).is_finite() {
+            rate = finite(rate);
+            (growth, sum) = self.add::<true>(error, before, rate, half_dt_s);
+        }
+        let wanted = finite(sum + growth);
+        self.output = limited(wanted, self.config.output_lower, self.config.output_upper);
+        let outward = (wanted - self.output) * growth > 0.0;
+        self.sum = if outward { sum } else { wanted };
         self.error = error;
         self.measurement = measurement;
-        let wanted = self.output + finite(change);
-        self.output = limited(wanted, config.output_lower, config.output_upper);
+        self.rate = rate;
+        (self.track_output, self.rest_derivative) = (false, false);
         self.output
     }
 
-    /// What a normal step adds to the output.
+    /// Returns what I adds to the sum, and the sum with what P and D add.
     #[inline]
-    fn change<const CAREFUL: bool>(&self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+    fn add<const CAREFUL: bool>(
+        &self,
+        error: f32,
+        before: f32,
+        rate: f32,
+        half_dt_s: f32,
+    ) -> (f32, f32) {
         let finite = |value| if CAREFUL { finite(value) } else { value };
         let config = &self.config;
-        let proportional = finite(config.kp * (error - self.error));
-        let integral = finite(config.ki * step.half_dt_s * (error + self.error));
-        finite(proportional + integral) - finite(config.kd * (rate - self.rate))
+        let proportional = finite(config.kp * finite(error - before));
+        let growth = finite(config.ki * half_dt_s * finite(error + before));
+        let derivative = finite(config.kd * finite(rate - self.rate));
+        (growth, finite(self.sum + finite(proportional - derivative)))
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
@@ -222,6 +232,7 @@ impl IncrementalPid {
         self.error = UNKNOWN;
         self.measurement = UNKNOWN;
         self.rate = 0.0;
+        self.sum = 0.0;
         self.output = 0.0;
         self.track_output = false;
         self.rest_derivative = false;
@@ -237,15 +248,27 @@ impl IncrementalPid {
             self.config.output_lower,
             self.config.output_upper,
         );
+        self.sum = self.output;
         self.track_output = true;
     }
 
-    /// Changes the gains; the output does not jump, because it is the memory.
+    /// Changes the gains; the output does not jump, because the sum is the memory.
+    ///
+    /// At a limit, the sum follows the new P as far as the output stays there, so that the integral does not take up what was cut off.
     ///
     /// # Errors
     /// Names the gain that is NaN, infinite or negative; then nothing changes.
     pub const fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
         check!(gains(kp, ki, kd));
+        if self.error != UNKNOWN {
+            let (lower, upper) = (self.config.output_lower, self.config.output_upper);
+            let follows = finite(self.sum + finite((kp - self.config.kp) * self.error));
+            if self.sum > upper {
+                self.sum = limited(follows, upper, f32::MAX);
+            } else if self.sum < lower {
+                self.sum = limited(follows, -f32::MAX, lower);
+            }
+        }
         self.config.kp = kp;
         self.config.ki = ki;
         self.config.kd = kd;
@@ -407,7 +430,52 @@ mod tests {
         assert!(pid.set_gains(1.0, f32::NAN, 0.0).is_err());
     }
 
+    #[test]
+    fn a_setpoint_that_comes_back_leaves_no_trace_of_the_limit() {
+        // P of 200 and of 180 are both cut to 50; what comes next is P again, and not 50 less the difference.
+        for ki in [0.0, 5.0] {
+            let config = IncrementalPidConfig::new(2.0, ki, 0.0).with_output_limit(50.0);
+            let mut pid = pid(config);
+            assert_eq!((pid.update(100.0, 0.0, DT_S), pid.update(90.0, 0.0, DT_S)), (50.0, 50.0));
+            let back = pid.update(1.0, 0.0, DT_S);
+            assert!((back - 2.0 - ki * 45.5 * DT_S).abs() < 1e-4, "{back}");
+        }
+    }
+
+    #[test]
+    fn new_gains_at_the_limit_do_not_move_the_output_and_wind_nothing_up() {
+        let mut pid = pid(IncrementalPidConfig::new(2.0, 1.0, 0.0).with_output_limit(50.0));
+        pid.update(100.0, 0.0, DT_S);
+        assert_eq!(pid.update(100.0, 0.0, DT_S), 50.0);
+        pid.set_gains(1.0, 1.0, 0.0).unwrap();
+        assert_eq!(pid.output(), 50.0);
+        assert_eq!(pid.update(100.0, 0.0, DT_S), 50.0);
+        assert!(pid.update(1.0, 0.0, DT_S).abs() < 1.1); // P of 1, and a step's growth
+        pid.set_gains(f32::MAX, 1.0, 0.0).unwrap();
+        assert!(pid.update(-100.0, 0.0, DT_S).abs() <= 50.0);
+    }
+
     proptest! {
+        #[test]
+        fn with_limits_it_equals_the_positional_form_with_conditional_integration(
+            kp in 0_u8..16, ki in 0_u8..64, kd in 0_u8..8, limit in 1_u8..60,
+            samples in prop::collection::vec((-50_i8..50, -50_i8..50), 1..80),
+        ) {
+            // All of it is exact in f32: quarters, a step of 2^-6 s, and a derivative in whole numbers.
+            let step = TimeStep::of(1.0 / 64.0);
+            let gains = (f32::from(kp) / 4.0, f32::from(ki), f32::from(kd) / 64.0);
+            let limit = f32::from(limit);
+            let positional = PidConfig::new(gains.0, gains.1, gains.2).with_output_limit(limit);
+            let mut positional = Pid::new(positional).unwrap();
+            let incremental = IncrementalPidConfig::new(gains.0, gains.1, gains.2);
+            let mut incremental = pid(incremental.with_output_limit(limit));
+            for (setpoint, measurement) in samples {
+                let (setpoint, measurement) = (f32::from(setpoint), f32::from(measurement));
+                let expected = positional.step(setpoint, measurement, &step);
+                prop_assert_eq!(incremental.step(setpoint, measurement, &step), expected);
+            }
+        }
+
         #[test]
         fn without_limits_it_equals_the_positional_form(
             kp in 0.0_f32..10.0, ki in 0.0_f32..10.0, kd in 0.0_f32..0.1,

@@ -2,6 +2,7 @@
 
 mod config;
 mod cut;
+mod gate;
 mod incremental;
 mod positional;
 mod settings;

@@ -1,6 +1,6 @@
 use super::PidConfig;
-use super::settings::{REST_DERIVATIVE, Settings, TRACK_OUTPUT};
-use super::work::{CLOSED, NO_SETPOINT, UNKNOWN, passes};
+use super::gate::{CLOSED, UNKNOWN, passes};
+use super::settings::{FEED_FORWARD, REST_DERIVATIVE, Settings, TRACK_OUTPUT};
 use crate::control::error::{ConfigError, gains};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
@@ -16,7 +16,7 @@ use crate::control::step::TimeStep;
 ///
 /// # Edge behaviour
 /// * The first call gives P and feed-forward only: there is no interval yet to integrate or to differentiate over.
-///   It does not matter how long ago the controller was made.
+///   It does not matter how long ago the controller was made. [`step_error`](Self::step_error) gives D too: the rate is given.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`]: the integral and D stay for this step, P and feed-forward follow.
 /// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
@@ -24,6 +24,10 @@ use crate::control::step::TimeStep;
 /// * `ki` zero: the integral is zero and stays zero.
 /// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
 ///   what is stored stays finite.
+/// * An increment of the integral smaller than half the spacing of `f32` at it (6e-8 of the integral) is lost: the integral
+///   stands still where `ki |e| dt` is less than that. At an integral of 10, 1 kHz and `ki` = 1 those are errors below 6e-4.
+/// * At the threshold itself: an error of exactly the dead band's width counts in full, one of exactly the integral's separation
+///   is integrated, and the ends of the variable rate are those of the line between them.
 ///
 /// # Examples
 /// The gains are those of continuous time: one second of a constant error of 1 integrates to `ki` at any rate, and a
@@ -116,28 +120,36 @@ impl Pid {
     /// The same as [`update`](Self::update) for several loops that share a tick.
     #[inline]
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        if self.settings.integral_gate == CLOSED {
-            return self.step_with_options(setpoint, measurement, step);
-        }
         let error = setpoint - measurement;
-        let rate = (measurement - self.measurement) * step.per_dt;
-        let integral = self.integral + self.growth(error, step);
-        // The first call, a step that is not normal, NaN and overflow: none of them passes.
-        if !passes(integral, self.settings.integral_gate) {
-            return self.step_with_options(setpoint, measurement, step);
+        'options: {
+            if self.settings.integral_gate == CLOSED {
+                break 'options;
+            }
+            let integral = self.integral + self.growth(error, step);
+            // The first call, a step that is not normal, NaN and overflow: none of them passes.
+            if !passes(integral, self.settings.integral_gate) {
+                break 'options;
+            }
+            let rate = (measurement - self.measurement) * step.per_dt;
+            return self.finish(measurement, error, rate, integral, step);
         }
-        self.finish(measurement, error, rate, integral, step)
+        let travel = measurement - self.measurement;
+        self.step_with_options(setpoint, measurement, error, travel, step, self.options.into())
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
     ///
-    /// D is `-kd * rate`, so a positive `kd` damps; there is no feed-forward. Options on the circle and on the
+    /// D is `-kd * rate`, on the first call too, so a positive `kd` damps; there is no feed-forward. Options on the circle and on the
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let integral = self.integral + self.growth(error, step);
         if !passes(integral, self.settings.integral_gate) {
-            return self.work_with_options(NO_SETPOINT, UNKNOWN, error, rate, step);
+            if !error.is_finite() {
+                return self.step_error_carefully(error, rate, step);
+            }
+            let options = self.options & !FEED_FORWARD;
+            return self.step_given(rate, UNKNOWN, error, rate, step, options.into());
         }
         self.finish(UNKNOWN, error, rate, integral, step)
     }
@@ -155,11 +167,7 @@ impl Pid {
         if !passes(output, self.settings.output_gate) {
             return self.saturate(output, measurement, error, rate, integral, step);
         }
-        self.output = output;
-        self.measurement = measurement;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
+        self.keep(output, measurement, error, rate, integral);
         output
     }
 
@@ -175,7 +183,7 @@ impl Pid {
     }
 
     /// Keeps the integral, and forgets what the next step would integrate and differentiate over: for a gap in the
-    /// measurements. The next step gives P, the integral as it was, and feed-forward.
+    /// measurements. The next step gives what a first one does, and the integral as it was.
     ///
     /// # Examples
     /// ```
@@ -201,13 +209,9 @@ impl Pid {
     ///
     /// The integral carries the difference to P, as far as its limit reaches. Without an integral (`ki` zero) nothing can carry
     /// it, and `output` is only where a slew limit starts from. NaN and infinity count as zero.
-    pub fn reset_to(&mut self, output: f32) {
+    pub const fn reset_to(&mut self, output: f32) {
         self.reset();
-        self.output = limited(
-            if output.is_finite() { output } else { 0.0 },
-            self.settings.output_lower,
-            self.settings.output_upper,
-        );
+        self.output = self.within_output_range(if output.is_finite() { output } else { 0.0 });
         self.options |= TRACK_OUTPUT;
     }
 
@@ -248,7 +252,12 @@ impl Pid {
             p: settings.kp * error,
             i: self.integral,
             d: -(settings.kd * self.rate),
-            feed_forward: self.feed_forward(self.measurement, self.error),
+            // There is none when the error was formed elsewhere.
+            feed_forward: if self.measurement == UNKNOWN || self.error == UNKNOWN {
+                0.0
+            } else {
+                self.feed_forward(self.measurement, self.error)
+            },
         }
     }
 
@@ -270,6 +279,11 @@ impl Pid {
         self.rejected
     }
 
+    /// Returns what the output limits leave of `value`.
+    pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
+        limited(value, self.settings.output_lower, self.settings.output_upper)
+    }
+
     fn change(&mut self, config: PidConfig) {
         let before = self.terms();
         let options = config.options();
@@ -288,12 +302,9 @@ impl Pid {
         };
     }
 
-    /// For the setpoint as a later call can know it too; zero when the error was formed elsewhere.
+    /// For the setpoint as a later call can know it too.
     #[inline]
     pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
-        if measurement == UNKNOWN || error == UNKNOWN {
-            return 0.0;
-        }
         let setpoint = measurement + error;
         let moving = self.settings.velocity_gain * setpoint;
         if setpoint > 0.0 {
@@ -311,7 +322,6 @@ impl Pid {
 mod tests {
     use super::*;
     use crate::control::ConfigFault;
-    use crate::control::pid::settings::FEED_FORWARD;
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -572,6 +582,20 @@ mod tests {
     }
 
     #[test]
+    fn separation_holds_within_the_full_rate_of_a_variable_integral_too() {
+        for (error, rests) in [(4.0, false), (5.0, false), (6.0, true), (15.0, true), (30.0, true)]
+        {
+            for error in [error, -error] {
+                let variable = PidConfig::new(0.0, 10.0, 0.0).with_variable_integral(10.0, 20.0);
+                let mut pid = pid(variable.with_integral_separation(5.0));
+                pid.update(error, 0.0, DT_S);
+                pid.update(error, 0.0, DT_S);
+                assert_eq!(pid.terms().i == 0.0, rests, "{error}");
+            }
+        }
+    }
+
+    #[test]
     fn variable_integral_works_at_half_rate_half_way() {
         for (error, part) in [(10.0, 1.0), (15.0, 0.5), (-15.0, 0.5), (20.0, 0.0), (30.0, 0.0)] {
             let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0).with_variable_integral(10.0, 20.0));
@@ -608,6 +632,74 @@ mod tests {
         assert_eq!(pid.update(0.99, 0.0, DT_S), 0.0);
         assert_eq!(pid.terms().p, 0.0);
         assert_eq!(pid.update(-1.5, 0.0, DT_S), -15.0);
+    }
+
+    #[test]
+    fn an_error_at_the_very_edge_of_a_threshold() {
+        let below = f32::from_bits(1.0_f32.to_bits() - 1);
+        let above = f32::from_bits(1.0_f32.to_bits() + 1);
+        let p = |error| {
+            pid(PidConfig::new(10.0, 0.0, 0.0).with_dead_band(1.0)).update(error, 0.0, DT_S)
+        };
+        assert_eq!((p(below), p(-below)), (0.0, 0.0));
+        assert_eq!((p(1.0), p(-1.0)), (10.0, -10.0)); // the edge itself counts in full
+        let integral = |config: PidConfig, error| {
+            let mut pid = pid(config);
+            pid.update(error, 0.0, DT_S);
+            pid.update(error, 0.0, DT_S);
+            pid.terms().i
+        };
+        let only_i = PidConfig::new(0.0, 1.0, 0.0);
+        for sign in [1.0, -1.0] {
+            let in_band = only_i.with_dead_band(1.0);
+            assert_eq!(integral(in_band, sign * below), 0.0);
+            assert_eq!(integral(in_band, sign), sign * DT_S);
+            let separated = only_i.with_integral_separation(1.0);
+            assert_eq!(
+                (integral(separated, sign), integral(separated, sign * above)),
+                (sign * DT_S, 0.0)
+            );
+            let variable = only_i.with_variable_integral(1.0, 2.0);
+            assert_eq!(
+                (integral(variable, sign), integral(variable, sign * 2.0)),
+                (sign * DT_S, 0.0)
+            );
+        }
+    }
+
+    #[test]
+    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+        // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
+        for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
+            let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0));
+            pid.reset_to(10.0);
+            for _ in 0..1_000 {
+                pid.update(error, 0.0, DT_S);
+            }
+            assert_eq!(pid.terms().i > 10.0, moves, "{error}");
+        }
+    }
+
+    #[test]
+    fn by_error_d_is_there_from_the_first_call_on_and_after_a_reset() {
+        let step = TimeStep::of(DT_S);
+        let config = PidConfig::new(2.0, 5.0, 0.5);
+        for config in [config, config.with_slew_limit(1e9)] {
+            let mut pid = pid(config);
+            let first = Terms { p: 2.0, d: -1.5, ..Terms::default() };
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            pid.reset();
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            pid.interrupt();
+            pid.step_error(1.0, 3.0, &step);
+            assert_eq!(pid.terms(), first);
+            // From a measurement, there is nothing yet to differentiate over.
+            pid.reset();
+            pid.step(1.0, 0.0, &step);
+            assert_eq!(pid.terms(), Terms { p: 2.0, ..Terms::default() });
+        }
     }
 
     #[test]
@@ -825,6 +917,16 @@ mod tests {
 
     proptest! {
         #[test]
+        fn the_configuration_comes_back_as_it_was_given(
+            config in any_config(), separation in 0.1_f32..100.0, edges in (0.0_f32..40.0, 41.0_f32..100.0),
+        ) {
+            let rates = config.with_integral_separation(separation).with_variable_integral(edges.0, edges.1);
+            for config in [config, rates, rates.without_anti_windup()] {
+                prop_assert_eq!(pid(config).config(), config);
+            }
+        }
+
+        #[test]
         fn output_and_integral_are_within_limits_for_any_finite_input(
             config in any_config(),
             samples in prop::collection::vec((any_value(), any_value(), 0.0_f32..0.2), 1..40),
@@ -871,17 +973,32 @@ mod tests {
         }
 
         #[test]
-        fn damping_never_feeds_energy_in(kd in 0.001_f32..10.0, path in prop::collection::vec(-100.0_f32..100.0, 2..50)) {
-            let mut pid = pid(PidConfig::new(1.0, 1.0, kd));
-            let (mut work, mut last) = (0.0_f64, None);
-            for measurement in path {
-                pid.update(0.0, measurement, DT_S);
+        fn damping_never_feeds_energy_in(
+            gains in (0.0_f32..100.0, 0.0_f32..100.0, 0.001_f32..10.0), on_error in prop::bool::ANY,
+            setpoint in any_value(), path in prop::collection::vec((any_value(), 1_u16..1000), 2..50),
+        ) {
+            let config = PidConfig::new(gains.0, gains.1, gains.2);
+            let mut pid = pid(if on_error { config.with_derivative_on_error() } else { config });
+            let mut last = None;
+            for (measurement, steps) in path {
+                pid.update(setpoint, measurement, f32::from(steps) * 1e-4);
                 if let Some(last) = last {
-                    work += f64::from(pid.terms().d) * f64::from(measurement - last);
+                    let work = f64::from(pid.terms().d) * (f64::from(measurement) - f64::from(last));
+                    prop_assert!(work <= 0.0, "{work}"); // in each step, so in their sum too
                 }
                 last = Some(measurement);
             }
-            prop_assert!(work <= 0.0);
+        }
+
+        #[test]
+        fn damping_by_a_given_rate_never_feeds_energy_in(
+            kd in 0.001_f32..10.0, path in prop::collection::vec((any_value(), any_value()), 1..50),
+        ) {
+            let mut pid = pid(PidConfig::new(1.0, 1.0, kd));
+            for (error, rate) in path {
+                pid.step_error(error, rate, &TimeStep::of(DT_S));
+                prop_assert!(pid.terms().d * rate <= 0.0);
+            }
         }
 
         #[test]

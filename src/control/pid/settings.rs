@@ -1,22 +1,22 @@
 use super::config::PidConfig;
-use super::work::{CLOSED, gate, limit_of, open_gate};
+use super::gate::{CLOSED, gate, limit_of, open_gate};
 
-pub(super) const DERIVATIVE_ON_ERROR: u16 = 1;
+const ASYMMETRIC: u16 = 1;
 const INTEGRAL_WEIGHT: u16 = 1 << 1;
 const DEAD_BAND: u16 = 1 << 2;
 pub(super) const FEED_FORWARD: u16 = 1 << 3;
 pub(super) const SLEW_LIMIT: u16 = 1 << 4;
 pub(super) const CIRCLE: u16 = 1 << 5;
 pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
-const ASYMMETRIC: u16 = 1 << 7;
+pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 7;
 /// The options that the plain path does not know.
 const NOT_PLAIN: u16 = 0xFF;
 pub(super) const WIND_UP: u16 = 1 << 8;
-pub(super) const SEPARATION_INSIDE: u16 = 1 << 9;
+/// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
+pub(super) const REST_DERIVATIVE: u16 = 1 << 9;
 /// Set by `reset_to` until the first step after it.
 pub(super) const TRACK_OUTPUT: u16 = 1 << 10;
-/// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
-pub(super) const REST_DERIVATIVE: u16 = 1 << 11;
+pub(super) const BACK_CALCULATION: u16 = 1 << 11;
 
 /// A [`PidConfig`] in the form in which a step reads it, and no larger: what is on or off is in the options.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,8 +33,9 @@ pub(super) struct Settings {
     pub(super) output_lower: f32,
     pub(super) output_upper: f32,
     pub(super) integral_limit_gate: u32,
-    /// The smaller one of `integral_separation` and `full_rate_below`, and the larger one.
+    /// The smaller one of `integral_separation` and `full_rate_below`.
     pub(super) full_weight_gate: u32,
+    /// The larger one: the separation; or the full rate, negative, so that every error is beyond it.
     pub(super) other_edge: f32,
     pub(super) no_rate_above: f32,
     pub(super) dead_band_gate: u32,
@@ -49,7 +50,7 @@ impl Settings {
     /// Takes a configuration that was checked, and its options.
     pub(super) const fn new(config: &PidConfig, options: u16) -> Self {
         let (separation, full_rate) = (config.integral_separation, config.full_rate_below);
-        let inside = options & SEPARATION_INSIDE != 0;
+        let inside = separation < full_rate;
         let plain = options & NOT_PLAIN == 0;
         Self {
             integral_gate: if plain { gate(config.integral_limit) } else { CLOSED },
@@ -65,7 +66,7 @@ impl Settings {
             output_upper: config.output_upper,
             integral_limit_gate: gate(config.integral_limit),
             full_weight_gate: gate(if inside { separation } else { full_rate }),
-            other_edge: if inside { full_rate } else { separation },
+            other_edge: if inside { -full_rate } else { separation },
             no_rate_above: config.no_rate_above,
             dead_band_gate: open_gate(config.dead_band),
             static_gain: config.static_gain,
@@ -80,7 +81,7 @@ impl Settings {
     pub(super) const fn config(&self, options: u16) -> PidConfig {
         let (first, other) = (limit_of(self.full_weight_gate), self.other_edge);
         let (integral_separation, full_rate_below) =
-            if options & SEPARATION_INSIDE != 0 { (first, other) } else { (other, first) };
+            if other < 0.0 { (first, -other) } else { (other, first) };
         PidConfig {
             kp: self.kp,
             ki: self.ki,
@@ -141,6 +142,6 @@ impl PidConfig {
             | set(DERIVATIVE_FILTER, self.derivative_time_s > 0.0)
             | set(ASYMMETRIC, self.output_lower + self.output_upper != 0.0)
             | set(WIND_UP, self.wind_up)
-            | set(SEPARATION_INSIDE, self.integral_separation < self.full_rate_below)
+            | set(BACK_CALCULATION, self.tracking_time_s > 0.0 && self.ki > 0.0)
     }
 }

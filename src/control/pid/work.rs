@@ -2,56 +2,21 @@
 //!
 //! ```text
 //! step, step_error     gains and symmetric limits: whatever passes both gates is done here
-//!   ├─ saturate        gains and symmetric limits, with the output at its limit
-//!   └─ *_with_options  every option, without guards; gives up when something is not finite
+//!   ├─ saturate           gains and symmetric limits, with the output at its limit
+//!   └─ step_with_options, step_given
+//!        │               every option, without guards; gives up when something is not finite
 //!        └─ *_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
 //! ```
 
+use super::gate::{CLOSED, UNKNOWN, limit_of, passes};
 use super::positional::{Pid, Terms};
 use super::settings::{
-    CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, REST_DERIVATIVE,
-    SEPARATION_INSIDE, SLEW_LIMIT, TRACK_OUTPUT, WIND_UP,
+    BACK_CALCULATION, CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD,
+    REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, WIND_UP,
 };
-use crate::control::number::{finite, limited};
+use crate::control::number::finite;
 use crate::control::step::TimeStep;
 use crate::math;
-
-/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
-pub(super) const UNKNOWN: f32 = f32::INFINITY;
-
-/// Stands in for the setpoint of an error that was formed elsewhere: a NaN that no arithmetic gives, because a
-/// measurement of +infinity must not be taken for one that is [`UNKNOWN`].
-pub(super) const NO_SETPOINT: f32 = f32::from_bits(0x7FC5_E790);
-
-/// A gate that nothing passes.
-pub(super) const CLOSED: u32 = 0;
-
-/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
-pub(super) const fn gate(limit: f32) -> u32 {
-    open_gate(limit) + 1
-}
-
-/// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
-pub(super) const fn open_gate(limit: f32) -> u32 {
-    limit.to_bits() << 1
-}
-
-/// Returns the limit that a gate encodes.
-#[inline]
-pub(super) const fn limit_of(gate: u32) -> f32 {
-    f32::from_bits(gate >> 1)
-}
-
-#[inline]
-pub(super) const fn passes(value: f32, gate: u32) -> bool {
-    magnitude(value) < gate
-}
-
-/// Sizes in an order that one integer comparison tells; NaN is larger than all numbers.
-#[inline]
-const fn magnitude(value: f32) -> u32 {
-    value.to_bits() << 1
-}
 
 impl Pid {
     /// A plain controller whose integral passed its gate, so that all but `rate` is finite, and whose output did not.
@@ -73,26 +38,66 @@ impl Pid {
             return self.work_carefully(measurement, error, rate, step);
         }
         let output = self.settings.output_upper.copysign(wanted);
-        let growth = integral - self.integral;
-        self.integral = self.without_windup(wanted - output, integral, growth, step);
-        self.output = output;
-        self.measurement = measurement;
-        self.error = error;
-        self.rate = rate;
+        let integral = self.without_windup(wanted - output, integral, step);
+        self.keep(output, measurement, error, rate, integral);
         output
     }
 
+    /// The same with any option, of which the slew limit has left `bounded` of what is wanted. Pairs travel in registers, and
+    /// stand in the order of [`keep`](Self::keep).
+    #[inline(never)]
+    fn bound<const CAREFUL: bool>(
+        &mut self,
+        (wanted, measurement): (f32, f32),
+        (error, rate): (f32, f32),
+        (integral, bounded): (f32, f32),
+        setpoint: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        if !CAREFUL && !wanted.is_finite() {
+            return self.give_up(setpoint, measurement, error, step);
+        }
+        let output = self.within_output_range(bounded);
+        let integral = self.without_windup(wanted - output, integral, step);
+        self.keep(output, measurement, error, rate, integral);
+        output
+    }
+
+    /// Steps with what `options` say, which are words for the sake of speed.
     #[inline(never)]
     pub(super) fn step_with_options(
         &mut self,
         setpoint: f32,
         measurement: f32,
+        error: f32,
+        travel: f32,
         step: &TimeStep,
+        options: u32,
     ) -> f32 {
-        if self.has(DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
+        let on = |option: u16| options & u32::from(option) != 0;
+        if on(DERIVATIVE_ON_ERROR | REST_DERIVATIVE) {
             return self.step_on_error(setpoint, measurement, step);
         }
-        self.step_by(setpoint, measurement, measurement - self.measurement, step)
+        let (mut error, mut travel) = (error, travel);
+        if on(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
+            return self.step_by_turns(setpoint, measurement, step);
+        }
+        self.work::<false>(setpoint, measurement, error, travel * step.per_dt, step, options)
+    }
+
+    /// The same with an error and a rate that were formed elsewhere. The measurement may be [`UNKNOWN`]; then `setpoint` is the
+    /// rate too.
+    #[inline(never)]
+    pub(super) fn step_given(
+        &mut self,
+        setpoint: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        step: &TimeStep,
+        options: u32,
+    ) -> f32 {
+        self.work::<false>(setpoint, measurement, error, rate, step, options)
     }
 
     #[inline(never)]
@@ -100,17 +105,13 @@ impl Pid {
         if self.has(REST_DERIVATIVE) {
             return self.step_carefully(setpoint, measurement, step);
         }
-        let travel = self.error - (setpoint - measurement);
-        self.step_by(setpoint, measurement, travel, step)
-    }
-
-    #[inline]
-    fn step_by(&mut self, setpoint: f32, measurement: f32, travel: f32, step: &TimeStep) -> f32 {
-        let (mut error, mut travel) = (setpoint - measurement, travel);
+        let mut error = setpoint - measurement;
+        let mut travel = self.error - error;
         if self.has(CIRCLE) && !(self.shorten(&mut error) && self.shorten(&mut travel)) {
             return self.step_by_turns(setpoint, measurement, step);
         }
-        self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
+        let rate = travel * step.per_dt;
+        self.step_given(setpoint, measurement, error, rate, step, self.options.into())
     }
 
     /// Takes the shorter way round if that is at most one turn off, and tells whether it was.
@@ -142,25 +143,19 @@ impl Pid {
         if !(self.is_short(error) && self.is_short(travel)) {
             return self.step_carefully(setpoint, measurement, step);
         }
-        self.work_with_options(setpoint, measurement, error, travel * step.per_dt, step)
+        let rate = travel * step.per_dt;
+        self.step_given(setpoint, measurement, error, rate, step, self.options.into())
     }
 
-    /// Works on an error that was formed elsewhere when there is [`NO_SETPOINT`].
+    /// Something was not finite, and nothing has changed.
+    #[cold]
     #[inline(never)]
-    pub(super) fn work_with_options(
-        &mut self,
-        setpoint: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
-        match self.work::<false>(measurement, error, rate, step) {
-            Some(output) => output,
-            None if measurement == UNKNOWN && setpoint.to_bits() == NO_SETPOINT.to_bits() => {
-                self.step_error_carefully(error, rate, step)
-            }
-            None => self.step_carefully(setpoint, measurement, step),
+    fn give_up(&mut self, setpoint: f32, measurement: f32, error: f32, step: &TimeStep) -> f32 {
+        // A measurement of infinity looks unknown, but leaves no error.
+        if measurement == UNKNOWN && error.is_finite() {
+            self.step_error_carefully(error, setpoint, step)
+        } else {
+            self.step_carefully(setpoint, measurement, step)
         }
     }
 
@@ -182,7 +177,7 @@ impl Pid {
 
     #[cold]
     #[inline(never)]
-    fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
+    pub(super) fn step_error_carefully(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !error.is_finite() || !rate.is_finite() {
             return self.refuse(&TimeStep::of(0.0)); // the rate is given: no travel is missed
         }
@@ -219,12 +214,14 @@ impl Pid {
             (rate, step.half_dt_s) = (self.rate, 0.0);
         }
         if self.has(TRACK_OUTPUT) {
-            self.take_over(measurement, error, self.filtered(rate, &step));
+            self.take_over(measurement, error, self.filtered(rate, &step, self.options.into()));
         }
         if self.error == UNKNOWN {
             self.error = -error; // no interval yet: a mean of zero
         }
-        self.work::<true>(measurement, error, rate, &step).unwrap_or(self.output)
+        let unused = if measurement == UNKNOWN { FEED_FORWARD } else { 0 };
+        let options = self.options & !unused;
+        self.work::<true>(0.0, measurement, error, rate, &step, options.into())
     }
 
     /// A way on the circle, exact and finite.
@@ -252,18 +249,22 @@ impl Pid {
         }
     }
 
-    /// The whole controller. Unless `CAREFUL`, `None` says that something was not finite, and nothing has changed.
-    #[inline]
+    /// The whole controller. Unless `CAREFUL`, it gives up before anything has changed when something is not finite.
+    // It stands in each of its callers: a call moves what is in registers.
+    #[inline(always)]
     fn work<const CAREFUL: bool>(
         &mut self,
+        setpoint: f32,
         measurement: f32,
         error: f32,
         rate: f32,
         step: &TimeStep,
-    ) -> Option<f32> {
+        options: u32,
+    ) -> f32 {
+        let on = |option: u16| options & u32::from(option) != 0;
         let finite = |value| if CAREFUL { finite(value) } else { value };
         let settings = &self.settings;
-        let rate = finite(self.filtered(rate, step));
+        let rate = finite(self.filtered(rate, step, options));
         let mut proportional = finite(settings.kp * error);
         let mut growth = finite(self.growth(error, step));
         if !passes(error, settings.full_weight_gate) {
@@ -277,63 +278,66 @@ impl Pid {
             }
         }
         let mut others = finite(proportional - finite(settings.kd * rate));
-        if self.has(FEED_FORWARD) {
+        if on(FEED_FORWARD) {
             others = finite(others + self.feed_forward(measurement, error));
         }
         let mut integral = finite(self.integral + growth);
-        let mut wanted = others + integral;
         if !passes(integral, settings.integral_limit_gate) {
             if !CAREFUL && !integral.is_finite() {
-                return None;
+                return self.give_up(setpoint, measurement, error, step);
             }
             integral = limit_of(settings.integral_limit_gate).copysign(integral);
-            wanted = others + integral;
         }
-        let mut output = wanted;
-        // Written so that NaN is not free, nor is what is infinite.
-        let free = wanted <= settings.output_upper
-            && wanted >= settings.output_lower
-            && !(self.has(SLEW_LIMIT)
-                && (wanted - self.output).abs() > settings.slew_per_s * step.dt_s);
-        if !free {
-            if !CAREFUL && !wanted.is_finite() {
-                return None;
+        let wanted = finite(others + integral);
+        let (first, second) = ((wanted, measurement), (error, rate));
+        if on(SLEW_LIMIT) {
+            let (way, reach) = (wanted - self.output, settings.slew_per_s * step.dt_s);
+            if way.abs() > reach {
+                let bounded = self.output + reach.copysign(way);
+                return self.bound::<CAREFUL>(first, second, (integral, bounded), setpoint, step);
             }
-            (output, integral) = self.saturated(wanted, integral, growth, step);
         }
+        // Written so that NaN is not within.
+        if !(wanted <= settings.output_upper && wanted >= settings.output_lower) {
+            return self.bound::<CAREFUL>(first, second, (integral, wanted), setpoint, step);
+        }
+        self.keep(wanted, measurement, error, rate, integral);
+        wanted
+    }
+
+    #[inline]
+    pub(super) const fn keep(
+        &mut self,
+        output: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+    ) {
         self.output = output;
         self.measurement = measurement;
         self.error = error;
         self.rate = rate;
         self.integral = integral;
-        Some(output)
-    }
-
-    /// The output within its limits, and the integral after anti-windup.
-    #[inline]
-    fn saturated(&self, wanted: f32, integral: f32, growth: f32, step: &TimeStep) -> (f32, f32) {
-        let settings = &self.settings;
-        let mut output = wanted;
-        if self.has(SLEW_LIMIT) {
-            let reach = settings.slew_per_s * step.dt_s;
-            output = limited(output, self.output - reach, self.output + reach);
-        }
-        output = limited(output, settings.output_lower, settings.output_upper);
-        (output, self.without_windup(wanted - output, integral, growth, step))
     }
 
     /// The integral after anti-windup, for an `excess` that the limits cut off the output.
     #[inline]
-    fn without_windup(&self, excess: f32, integral: f32, growth: f32, step: &TimeStep) -> f32 {
-        let settings = &self.settings;
-        if settings.tracking_time_s > 0.0 && settings.ki > 0.0 {
-            let part = limited(step.dt_s / settings.tracking_time_s, 0.0, 1.0);
-            let drained = finite(integral - finite(excess) * part);
-            let limit = limit_of(settings.integral_limit_gate);
-            return limited(drained, -limit, limit);
+    fn without_windup(&self, excess: f32, integral: f32, step: &TimeStep) -> f32 {
+        if !self.has(BACK_CALCULATION) {
+            let outward = excess * (integral - self.integral) > 0.0;
+            return if outward && !self.has(WIND_UP) { self.integral } else { integral };
         }
-        let outward = excess * growth > 0.0;
-        if outward && !self.has(WIND_UP) { self.integral } else { integral }
+        let part = step.dt_s / self.settings.tracking_time_s;
+        let drained = integral - excess * if part < 1.0 { part } else { 1.0 };
+        let gate = self.settings.integral_limit_gate;
+        if passes(drained, gate) {
+            drained
+        } else if drained.is_nan() {
+            integral // an excess beyond f32, of which no part is drained
+        } else {
+            limit_of(gate).copysign(drained)
+        }
     }
 
     #[inline]
@@ -342,8 +346,8 @@ impl Pid {
     }
 
     #[inline]
-    fn filtered(&self, rate: f32, step: &TimeStep) -> f32 {
-        if self.has(DERIVATIVE_FILTER) {
+    fn filtered(&self, rate: f32, step: &TimeStep, options: u32) -> f32 {
+        if options & u32::from(DERIVATIVE_FILTER) != 0 {
             let gain = step.dt_s / (step.dt_s + self.settings.derivative_time_s);
             self.rate + gain * (rate - self.rate)
         } else {
@@ -356,10 +360,7 @@ impl Pid {
     fn weight(&self, error: f32) -> f32 {
         let settings = &self.settings;
         let size = error.abs();
-        if self.has(SEPARATION_INSIDE)
-            || size > settings.other_edge
-            || size >= settings.no_rate_above
-        {
+        if size > settings.other_edge || size >= settings.no_rate_above {
             0.0
         } else {
             let full_rate_below = limit_of(settings.full_weight_gate);

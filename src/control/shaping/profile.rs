@@ -1,4 +1,5 @@
 use crate::control::error::{ConfigError, check, finite, positive};
+use crate::control::number;
 use crate::math;
 
 /// How fast a [`Profile`] may go.
@@ -73,7 +74,8 @@ pub struct ProfileState {
 ///
 /// # Edge behaviour
 /// Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
-/// at exactly the end. A move of no length lasts 0 s. A move whose length, or time, is beyond `f32` is an error.
+/// at exactly the end. A move of no length lasts 0 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
+/// shorter than `f32` can tell (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps its limit.
 ///
 /// # Examples
 /// ```
@@ -129,10 +131,11 @@ impl Profile {
         let duration_s = 2.0 * rise_time_s + cruise_s;
         finite("distance", duration_s)?;
         let peak_velocity = distance / (rise_time_s + cruise_s);
-        let peak_acceleration = peak_velocity / (jerk_s + full_s);
-        if !(peak_acceleration.is_finite() && peak_velocity > 0.0) {
+        if !(peak_velocity.is_finite() && peak_velocity > 0.0) {
             return Ok(Self::at_rest(end, end)); // too short for f32 to tell its parts
         }
+        // A rise shorter than f32 can tell is a jump of the speed.
+        let peak_acceleration = number::finite(peak_velocity / (jerk_s + full_s));
         Ok(Self {
             start,
             end,
@@ -141,7 +144,7 @@ impl Profile {
             rise_time_s,
             peak_velocity,
             peak_acceleration,
-            peak_jerk: if jerk_s > 0.0 { peak_acceleration / jerk_s } else { 0.0 },
+            peak_jerk: if jerk_s > 0.0 { number::finite(peak_acceleration / jerk_s) } else { 0.0 },
         })
     }
 
@@ -282,6 +285,35 @@ mod tests {
                 assert_eq!(profile.at(f32::INFINITY), rest);
                 assert_eq!(profile.end(), end);
             }
+        }
+    }
+
+    #[test]
+    fn an_acceleration_or_a_jerk_near_the_largest_number_leaves_the_speed_limit_as_it_is() {
+        for huge in [1e30, 1e38, 3e38, f32::MAX] {
+            for limits in [
+                MotionLimits::new(1.0, huge),
+                MotionLimits::new(1.0, huge).with_jerk(huge),
+                MotionLimits::new(1.0, 4.0).with_jerk(huge),
+                MotionLimits::new(1.0, huge).with_jerk(1e-3 * huge),
+            ] {
+                let profile = Profile::plan(0.0, 3.0, &limits).unwrap();
+                assert!((3.0..=3.2501).contains(&profile.duration_s()), "{profile:?}");
+                for step in 1..30_u8 {
+                    let time_s = f32::from(step) * 0.1;
+                    let ProfileState { position, velocity, acceleration } = profile.at(time_s);
+                    assert!((position - time_s).abs() < 0.126, "{limits:?} {position} at {time_s}");
+                    assert!((0.39..=1.000_001).contains(&velocity) && acceleration.is_finite());
+                }
+            }
+            // A speed limit as large: the move is over before a clock can tell.
+            let profile = Profile::plan(0.0, 3.0, &MotionLimits::new(huge, huge)).unwrap();
+            assert!(profile.duration_s() < 1e-14 && profile.at(1e-9).position == 3.0);
+            let slow = Profile::plan(0.0, 1e-3, &MotionLimits::new(1e-6, huge)).unwrap();
+            assert!(
+                (slow.duration_s() - 1000.0).abs() < 1e-3
+                    && (slow.at(500.0).position - 5e-4).abs() < 1e-9
+            );
         }
     }
 

@@ -1,5 +1,5 @@
 use crate::control::error::{ConfigError, check, positive};
-use crate::control::number::limited;
+use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 
 /// Bounds the rate at which a value rises and falls.
@@ -7,7 +7,8 @@ use crate::control::step::TimeStep;
 /// # Edge behaviour
 /// Starts from zero, or from what was given to [`reset_to`](Self::reset_to). `dt_s` zero, negative, NaN or infinite, or a target
 /// that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s (see
-/// [`with_max_step`](Self::with_max_step)) counts as that: a pause is no permission to jump.
+/// [`with_max_step`](Self::with_max_step)) counts as that: a pause is no permission to jump. Steps smaller than the spacing of
+/// `f32` at the value add up: it arrives, however slow the rate.
 ///
 /// # Examples
 /// ```
@@ -25,6 +26,8 @@ pub struct SlewLimiter {
     down_per_s: f32,
     max_step_s: f32,
     value: f32,
+    /// What the value could not take yet of the way it may go.
+    rest: f32,
     rejected: u16,
 }
 
@@ -37,7 +40,7 @@ impl SlewLimiter {
         check!(positive("up", up_per_s));
         check!(positive("down", down_per_s));
         let max_step_s = TimeStep::MAX_S;
-        Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rejected: 0 })
+        Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rest: 0.0, rejected: 0 })
     }
 
     /// Sets the longest step in seconds that is believed.
@@ -53,8 +56,18 @@ impl SlewLimiter {
     pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
         let step = TimeStep::new(dt_s, self.max_step_s);
         if step.admits(target.is_finite(), &mut self.rejected) {
-            let lowest = self.value - self.down_per_s * step.dt_s;
-            self.value = limited(target, lowest, self.value + self.up_per_s * step.dt_s);
+            let lowest = self.rest - self.down_per_s * step.dt_s;
+            let highest = self.rest + self.up_per_s * step.dt_s;
+            let left = target - self.value;
+            let change = limited(left, lowest, highest);
+            let value = finite(self.value + change);
+            let within_reach = left >= lowest && left <= highest;
+            // The rounding of the sum must not take it past the target.
+            if within_reach || (target - value) * left <= 0.0 {
+                (self.value, self.rest) = (target, 0.0);
+            } else {
+                (self.value, self.rest) = (value, change - (value - self.value));
+            }
         }
         self.value
     }
@@ -62,6 +75,7 @@ impl SlewLimiter {
     /// Puts the value at `value`. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, value: f32) {
         self.value = if value.is_finite() { value } else { 0.0 };
+        self.rest = 0.0;
     }
 
     /// Returns the last output.
@@ -88,6 +102,34 @@ mod tests {
         let mut limiter = SlewLimiter::new(1.0, 1.0).unwrap();
         assert_eq!(limiter.update(100.0, 10.0), 0.1);
         assert_eq!(limiter.with_max_step(2.0).unwrap().update(100.0, 10.0), 2.1);
+    }
+
+    #[test]
+    fn steps_below_the_spacing_of_f32_add_up() {
+        // At 1000, the spacing is 6e-5; a step is 1e-5.
+        let mut limiter = SlewLimiter::new(0.01, 0.01).unwrap();
+        limiter.reset_to(1000.0);
+        for (target, expected) in [(2000.0, 1000.1), (-2000.0, 1000.0), (1000.0, 1000.0)] {
+            for _ in 0..10_000 {
+                limiter.update(target, 0.001);
+            }
+            assert!((limiter.value() - expected).abs() < 1e-4, "{}", limiter.value());
+        }
+        assert_eq!(limiter.value(), 1000.0);
+    }
+
+    #[test]
+    fn from_one_end_of_f32_to_the_other_it_stays_finite() {
+        let mut limiter = SlewLimiter::new(f32::MAX, 1.0).unwrap();
+        limiter.reset_to(f32::MIN);
+        let mut last = f32::MIN;
+        for _ in 0..40 {
+            let value = limiter.update(f32::MAX, 0.1);
+            assert!(value.is_finite() && value >= last);
+            last = value;
+        }
+        assert_eq!(last, f32::MAX);
+        assert_eq!(limiter.with_max_step(f32::MAX).unwrap().update(0.0, 1e30), f32::MAX - 1e30);
     }
 
     #[test]

@@ -5,7 +5,9 @@
 //! 3. [`StepResponse`] measures what the loop with these gains does.
 
 mod relay;
+mod rules;
 mod step_response;
 
-pub use relay::{Gains, Oscillation, RelayTuner, RelayTunerConfig, TuningRule};
+pub use relay::{RelayFailure, RelayTuner, RelayTunerConfig};
+pub use rules::{Gains, Oscillation, TuningRule};
 pub use step_response::{StepMeasures, StepResponse};

@@ -1,99 +1,10 @@
+use super::Oscillation;
 use crate::control::error::{ConfigError, check, finite, not_negative, positive};
-use crate::control::number;
-use crate::control::pid::PidConfig;
+use crate::control::number::{self, Elapsed};
 use crate::control::step::TimeStep;
 use crate::math;
 use core::f32::consts::PI;
-
-/// The gains of a PID, in its units: `kp`, `ki` a second, `kd` seconds; and the rule that they follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Gains {
-    /// Proportional gain.
-    pub kp: f32,
-    /// Integral gain, 1/s times the unit of `kp`.
-    pub ki: f32,
-    /// Derivative gain, s times the unit of `kp`.
-    pub kd: f32,
-    /// What they follow from the ultimate gain and period by.
-    pub rule: TuningRule,
-}
-
-impl Gains {
-    /// Returns a configuration with these gains and no option.
-    #[must_use]
-    pub const fn config(self) -> PidConfig {
-        PidConfig::new(self.kp, self.ki, self.kd)
-    }
-}
-
-/// How gains follow from the ultimate gain `Ku` and period `Tu` of a plant.
-///
-/// | rule | kp | integral time | derivative time | character |
-/// |---|---|---|---|---|
-/// | `ZieglerNicholsP` | 0.5 Ku | | | steady error |
-/// | `ZieglerNicholsPi` | 0.45 Ku | Tu / 1.2 | | quick, overshoots |
-/// | `ZieglerNicholsPid` | 0.6 Ku | Tu / 2 | Tu / 8 | quick, overshoots by a quarter and more |
-/// | `TyreusLuybenPi` | Ku / 3.2 | 2.2 Tu | | calm; for speed loops start here |
-/// | `TyreusLuybenPid` | Ku / 2.2 | 2.2 Tu | Tu / 6.3 | calm |
-///
-/// Sources: Ziegler and Nichols, "Optimum Settings for Automatic Controllers", Transactions of the ASME 64 (1942);
-/// Tyreus and Luyben, "Tuning PI Controllers for Integrator/Dead Time Processes", Industrial and Engineering Chemistry
-/// Research 31 (1992), its PID as in Luyben and Luyben, "Essentials of Process Control" (1997).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum TuningRule {
-    /// Proportional only.
-    ZieglerNicholsP,
-    /// Proportional and integral.
-    ZieglerNicholsPi,
-    /// All three terms.
-    ZieglerNicholsPid,
-    /// Proportional and integral, with large margins.
-    TyreusLuybenPi,
-    /// All three terms, with large margins.
-    TyreusLuybenPid,
-}
-
-/// What a [`RelayTuner`] found out about the plant.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{Oscillation, TuningRule};
-///
-/// let found = Oscillation { ultimate_gain: 10.0, ultimate_period_s: 0.2 };
-/// let gains = found.gains(TuningRule::ZieglerNicholsPid);
-/// assert_eq!((gains.kp, gains.ki, gains.kd), (6.0, 60.0, 0.15));
-/// assert_eq!(gains.rule, TuningRule::ZieglerNicholsPid);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Oscillation {
-    /// `Ku`, the proportional gain at which the loop would just keep oscillating, in units of the output over the measurement.
-    pub ultimate_gain: f32,
-    /// `Tu`, the period of that oscillation in seconds.
-    pub ultimate_period_s: f32,
-}
-
-impl Oscillation {
-    /// Returns the gains by `rule`.
-    #[must_use]
-    pub const fn gains(&self, rule: TuningRule) -> Gains {
-        let (ku, tu) = (self.ultimate_gain, self.ultimate_period_s);
-        let (kp, ki, kd) = match rule {
-            TuningRule::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
-            TuningRule::ZieglerNicholsPi => (0.45 * ku, 0.54 * ku / tu, 0.0),
-            TuningRule::ZieglerNicholsPid => (0.6 * ku, 1.2 * ku / tu, 0.075 * ku * tu),
-            TuningRule::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
-            TuningRule::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
-        };
-        Gains { kp, ki, kd, rule }
-    }
-}
+use core::fmt;
 
 /// What a [`RelayTuner`] is made from.
 ///
@@ -170,7 +81,8 @@ impl RelayTunerConfig {
 /// # Edge behaviour
 /// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned,
 /// nothing changes and [`rejected`](Self::rejected) grows. The first call starts the measurement, whenever it comes; a `dt_s` above
-/// [`TimeStep::MAX_S`] spoils it: it starts anew. When done or out of time, the output is the bias. A swing beyond `f32` gives no result.
+/// [`TimeStep::MAX_S`] spoils it: it starts anew. When done or failed, the output is the bias. A swing faster than
+/// [`LEAST_SAMPLES`](Self::LEAST_SAMPLES) a half-period, one within the hysteresis and one beyond `f32` are a [`RelayFailure`].
 ///
 /// # Examples
 /// ```
@@ -195,18 +107,49 @@ impl RelayTunerConfig {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayTuner {
     config: RelayTunerConfig,
-    passed_s: f32,
-    period_s: f32,
+    passed: Elapsed,
+    period: Elapsed,
     lowest: f32,
     highest: f32,
     sum_of_periods_s: f32,
     sum_of_swings: f32,
     last_swing: f32,
     periods: u8,
+    /// Samples since the output switched, and of the shorter half of this period; no more than count.
+    samples: u8,
+    shorter_half: u8,
     rejected: u16,
     up: bool,
+    /// One of the periods that are summed is too short to be measured.
+    coarse: bool,
     state: State,
 }
+
+/// Why a [`RelayTuner`] that is complete has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum RelayFailure {
+    /// No steady swing within the time limit: too small an amplitude, a bias that does not hold, or too much hysteresis.
+    OutOfTime,
+    /// A half-period has fewer than [`RelayTuner::LEAST_SAMPLES`] samples: take more hysteresis, less amplitude or a faster loop.
+    TooFewSamples,
+    /// The swing is no larger than the hysteresis, or beyond `f32`, so that no gain follows from it.
+    NoGain,
+}
+
+impl fmt::Display for RelayFailure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::OutOfTime => "no steady swing within the time limit",
+            Self::TooFewSamples => "fewer than 8 samples in half a period of the swing",
+            Self::NoGain => "the swing is not larger than the hysteresis, or beyond f32",
+        })
+    }
+}
+
+impl core::error::Error for RelayFailure {}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -214,6 +157,7 @@ enum State {
     Idle,
     Swinging,
     Done,
+    TooFast,
     OutOfTime,
 }
 
@@ -221,6 +165,10 @@ enum State {
 const STEADY: f32 = 0.1;
 
 impl RelayTuner {
+    /// The fewest samples in half a period from which amplitude and period can be told: with 8, the period is known to an eighth
+    /// and the peak of a sine to 2 %.
+    pub const LEAST_SAMPLES: u8 = 8;
+
     /// Takes and checks the configuration.
     ///
     /// # Errors
@@ -229,16 +177,19 @@ impl RelayTuner {
         check!(config.validate());
         Ok(Self {
             config,
-            passed_s: 0.0,
-            period_s: 0.0,
+            passed: Elapsed::ZERO,
+            period: Elapsed::ZERO,
             lowest: f32::MAX,
             highest: f32::MIN,
             sum_of_periods_s: 0.0,
             sum_of_swings: 0.0,
             last_swing: 0.0,
             periods: 0,
+            samples: 0,
+            shorter_half: u8::MAX,
             rejected: 0,
             up: true,
+            coarse: false,
             state: State::Idle,
         })
     }
@@ -251,8 +202,8 @@ impl RelayTuner {
         if !step.admits(finite, &mut self.rejected) || self.is_complete() {
             return self.output();
         }
-        self.passed_s += step.dt_s();
-        if self.passed_s >= self.config.time_limit_s {
+        self.passed.add(step.dt_s());
+        if self.passed.seconds() >= self.config.time_limit_s {
             self.state = State::OutOfTime;
             return self.output();
         }
@@ -260,13 +211,16 @@ impl RelayTuner {
             self.begin(error);
             return self.output();
         }
-        self.period_s += step.dt_s();
+        self.period.add(step.dt_s());
+        self.samples = self.samples.saturating_add(1);
         self.lowest = if error < self.lowest { error } else { self.lowest };
         self.highest = if error > self.highest { error } else { self.highest };
         if self.up && error < -self.config.hysteresis {
             self.up = false;
+            self.end_half();
         } else if !self.up && error > self.config.hysteresis {
             self.up = true;
+            self.end_half();
             self.end_period();
         }
         self.output()
@@ -281,13 +235,22 @@ impl RelayTuner {
     }
 
     const fn next_period(&mut self) {
-        (self.period_s, self.lowest, self.highest) = (0.0, f32::MAX, f32::MIN);
+        (self.period, self.lowest, self.highest) = (Elapsed::ZERO, f32::MAX, f32::MIN);
+        (self.samples, self.shorter_half) = (0, u8::MAX);
+    }
+
+    const fn end_half(&mut self) {
+        if self.samples < self.shorter_half {
+            self.shorter_half = self.samples;
+        }
+        self.samples = 0;
     }
 
     fn end_period(&mut self) {
         let swing = 0.5 * self.highest - 0.5 * self.lowest;
         if (swing - self.last_swing).abs() <= STEADY * swing {
-            self.sum_of_periods_s += self.period_s;
+            self.coarse |= self.shorter_half < Self::LEAST_SAMPLES;
+            self.sum_of_periods_s += self.period.seconds();
             self.sum_of_swings += swing;
             self.periods += 1;
         } else {
@@ -295,13 +258,14 @@ impl RelayTuner {
         }
         self.last_swing = swing;
         if self.periods >= self.config.cycles {
-            self.state = State::Done;
+            self.state = if self.coarse { State::TooFast } else { State::Done };
         }
         self.next_period();
     }
 
     const fn start_sums(&mut self) {
         (self.periods, self.sum_of_periods_s, self.sum_of_swings) = (0, 0.0, 0.0);
+        self.coarse = false;
     }
 
     /// Returns the output for the plant: the bias, plus or minus the amplitude while it runs.
@@ -310,14 +274,40 @@ impl RelayTuner {
         match self.state {
             State::Swinging if self.up => self.config.bias + self.config.amplitude,
             State::Swinging => self.config.bias - self.config.amplitude,
-            State::Idle | State::Done | State::OutOfTime => self.config.bias,
+            State::Idle | State::Done | State::TooFast | State::OutOfTime => self.config.bias,
         }
     }
 
-    /// Tells whether it has finished, with a result or out of time.
+    /// Tells whether it has finished, with a result or a failure.
     #[must_use]
-    pub fn is_complete(&self) -> bool {
-        matches!(self.state, State::Done | State::OutOfTime)
+    pub const fn is_complete(&self) -> bool {
+        matches!(self.state, State::Done | State::TooFast | State::OutOfTime)
+    }
+
+    /// Returns why there is no result; `None` while it runs, and when there is one.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{RelayFailure, RelayTuner, RelayTunerConfig};
+    ///
+    /// // A speed that follows at once: it swings from one sample to the next.
+    /// let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.0))?;
+    /// let mut speed = 0.0;
+    /// while !tuner.is_complete() {
+    ///     speed = tuner.update(0.0, speed, 0.001);
+    /// }
+    /// assert_eq!((tuner.oscillation(), tuner.failure()), (None, Some(RelayFailure::TooFewSamples)));
+    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub fn failure(&self) -> Option<RelayFailure> {
+        match self.state {
+            State::Idle | State::Swinging => None,
+            State::Done if self.oscillation().is_some() => None,
+            State::Done => Some(RelayFailure::NoGain),
+            State::TooFast => Some(RelayFailure::TooFewSamples),
+            State::OutOfTime => Some(RelayFailure::OutOfTime),
+        }
     }
 
     /// Returns the number of steps that were refused; stays at 65535.
@@ -326,7 +316,7 @@ impl RelayTuner {
         self.rejected
     }
 
-    /// Returns the result: `None` while it runs, when it ran out of time, and when the swing was not larger than the hysteresis.
+    /// Returns the result: `None` while it runs, and when there is a [`failure`](Self::failure).
     #[must_use]
     pub fn oscillation(&self) -> Option<Oscillation> {
         if self.state != State::Done {
@@ -349,7 +339,7 @@ impl RelayTuner {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
-    use crate::control::{Pid, StepResponse};
+    use crate::control::{Pid, StepResponse, TuningRule};
     use std::collections::VecDeque;
 
     const DT_S: f32 = 0.001;
@@ -437,6 +427,80 @@ mod tests {
         }
         assert!((499..=501).contains(&steps));
         assert_eq!((tuner.oscillation(), tuner.output()), (None, 0.0));
+        assert_eq!(tuner.failure(), Some(RelayFailure::OutOfTime));
+    }
+
+    /// An integrator seen `delay` samples late, swung to the end.
+    fn integrator(delay: usize, config: RelayTunerConfig) -> RelayTuner {
+        let mut tuner = RelayTuner::new(config).unwrap();
+        let (mut speed, mut seen) =
+            (0.0, VecDeque::from_iter(core::iter::repeat_n(0.0_f32, delay)));
+        while !tuner.is_complete() {
+            seen.push_back(speed);
+            let output = tuner.update(0.0, seen.pop_front().unwrap(), DT_S);
+            speed += 50.0 * output * DT_S;
+        }
+        tuner
+    }
+
+    #[test]
+    fn a_swing_of_a_few_samples_is_a_failure_and_one_of_eight_a_half_period_is_a_result() {
+        let mut results = 0;
+        for delay in 0..10 {
+            let tuner = integrator(delay, RelayTunerConfig::new(1.0, 0.01));
+            match tuner.oscillation() {
+                Some(found) => {
+                    assert!(found.ultimate_period_s >= 0.016, "{delay}: {found:?}");
+                    assert_eq!(tuner.failure(), None);
+                    results += 1;
+                }
+                None => {
+                    assert_eq!(tuner.failure(), Some(RelayFailure::TooFewSamples), "{delay}");
+                    assert!(delay < 5, "{delay}");
+                }
+            }
+        }
+        assert!(results >= 5, "{results}");
+    }
+
+    #[test]
+    fn more_hysteresis_makes_a_swing_of_a_few_samples_one_that_counts() {
+        let found = integrator(1, RelayTunerConfig::new(1.0, 0.4)).oscillation().unwrap();
+        assert!(found.ultimate_period_s >= 0.016, "{found:?}");
+    }
+
+    #[test]
+    fn one_switch_of_noise_does_not_end_a_slow_swing() {
+        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.05)).unwrap();
+        let (mut speed, mut seen, mut step) = (0.0, VecDeque::from([0.0_f32; 12]), 0);
+        while !tuner.is_complete() {
+            step += 1;
+            seen.push_back(speed);
+            let late = seen.pop_front().unwrap();
+            let noise = if step == 90 || step == 91 { -late.signum() } else { 0.0 };
+            speed += 50.0 * tuner.update(0.0, late + noise, DT_S) * DT_S;
+        }
+        assert!(tuner.oscillation().is_some() && tuner.failure().is_none(), "{tuner:?}");
+    }
+
+    #[test]
+    fn a_swing_within_the_hysteresis_has_no_gain() {
+        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, f32::MAX)).unwrap();
+        tuner.state = State::Done;
+        assert_eq!((tuner.oscillation(), tuner.failure()), (None, Some(RelayFailure::NoGain)));
+    }
+
+    #[test]
+    fn a_time_limit_of_hours_ends_at_short_steps_too() {
+        let config = RelayTunerConfig::new(1.0, 0.1).with_time_limit(20_000.0);
+        let mut tuner = RelayTuner::new(config).unwrap();
+        tuner.passed = Elapsed::after(19_999.0);
+        let mut steps = 0_u32;
+        while !tuner.is_complete() && steps < 3_000 {
+            tuner.update(1.0, 0.0, 0.000_5);
+            steps += 1;
+        }
+        assert!(steps.abs_diff(2_000) < 10, "{steps}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use crate::control::error::{self, ConfigError, ConfigFault, check, positive};
-use crate::control::number::finite;
+use crate::control::number::{Elapsed, finite};
 use crate::control::step::TimeStep;
 
 /// How well a loop follows a step of its setpoint.
@@ -47,7 +47,7 @@ pub struct StepResponse {
     target: f32,
     duration_s: f32,
     tolerance: f32,
-    passed_s: f32,
+    passed: Elapsed,
     tenth_at_s: Option<f32>,
     nine_tenths_at_s: Option<f32>,
     outside_until_s: f32,
@@ -81,7 +81,7 @@ impl StepResponse {
             target,
             duration_s,
             tolerance,
-            passed_s: 0.0,
+            passed: Elapsed::ZERO,
             tenth_at_s: None,
             nine_tenths_at_s: None,
             outside_until_s: 0.0,
@@ -101,22 +101,23 @@ impl StepResponse {
         if !TimeStep::new(dt_s, f32::MAX).admits(value.is_finite(), &mut self.rejected) {
             return;
         }
-        self.passed_s += dt_s;
+        self.passed.add(dt_s);
+        let passed_s = self.passed.seconds();
         let part = finite((value - self.start) / (self.target - self.start));
         if part >= 0.1 && self.tenth_at_s.is_none() {
-            self.tenth_at_s = Some(self.passed_s);
+            self.tenth_at_s = Some(passed_s);
         }
         if part >= 0.9 && self.nine_tenths_at_s.is_none() {
-            self.nine_tenths_at_s = Some(self.passed_s);
+            self.nine_tenths_at_s = Some(passed_s);
         }
         if part > self.peak {
             self.peak = part;
         }
         self.inside = (part - 1.0).abs() <= self.tolerance;
         if !self.inside {
-            self.outside_until_s = self.passed_s;
+            self.outside_until_s = passed_s;
         }
-        if self.passed_s >= 0.9 * self.duration_s {
+        if passed_s >= 0.9 * self.duration_s {
             self.late_samples = self.late_samples.saturating_add(1);
             let weight = 1.0 / self.late_samples as f32;
             let error = finite(self.target - value);
@@ -126,8 +127,8 @@ impl StepResponse {
 
     /// Tells whether the time is over.
     #[must_use]
-    pub fn is_complete(&self) -> bool {
-        self.passed_s >= self.duration_s
+    pub const fn is_complete(&self) -> bool {
+        self.passed.seconds() >= self.duration_s
     }
 
     /// Returns the measures of what was recorded so far.
@@ -191,6 +192,18 @@ mod tests {
         let measures = response.measures();
         assert_eq!((measures.rise_time_s, measures.settling_time_s), (None, None));
         assert!(response.is_complete() && (measures.steady_error - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_last_of_many_hours_ends_at_short_steps_too() {
+        let mut response = StepResponse::new(0.0, 1.0, 20_000.0, 0.02).unwrap();
+        response.passed = Elapsed::after(19_999.0);
+        let mut samples = 0_u32;
+        while !response.is_complete() && samples < 3_000 {
+            response.record(1.0, 0.000_5);
+            samples += 1;
+        }
+        assert!(samples.abs_diff(2_000) < 10, "{samples}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the golden sequences of the controllers: `python3 tests/data/control/generate.py`.
+"""Writes the golden sequences of the controllers: `python3 tests/data/control/generate.py [FOLDER]`, beside itself by default.
 
 Independent of the crate: double precision, written from the formulas in the documentation and, for `fhan`, from the paper in
 its original form with sign functions. Nothing but the standard library. Every input is rounded to f32 first, so that the crate sees the
@@ -8,8 +8,9 @@ same numbers (nine digits give an f32 back exactly); `tests/control_golden.rs` h
 import math
 import pathlib
 import struct
+import sys
 
-HERE = pathlib.Path(__file__).parent
+FOLDER = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parent
 
 
 def f32(value):
@@ -19,7 +20,7 @@ def f32(value):
 def write(name, header, rows):
     lines = [",".join(header)]
     lines += [",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows]
-    (HERE / name).write_text("\n".join(lines) + "\n")
+    (FOLDER / name).write_text("\n".join(lines) + "\n")
 
 
 def sign(value):
@@ -34,7 +35,8 @@ class Pid:
     """The positional controller as the sums that define it, over the whole history."""
 
     def __init__(self, kp, ki, kd, lower=-1e30, upper=1e30, integral_limit=1e30, separation=1e30, full=None, none=None,
-                 band=0.0, ks=0.0, kv=0.0, slew=None, period=None, cutoff=None, on_error=False, tracking=None):
+                 band=0.0, ks=0.0, kv=0.0, slew=None, period=None, cutoff=None, on_error=False, tracking=None,
+                 wind_up=False):
         self.__dict__.update(locals())
         self.errors, self.measurements = [], []
         self.integral = self.rate = self.last = 0.0
@@ -78,7 +80,7 @@ class Pid:
             if self.tracking:
                 grown -= (wanted - output) * min(1.0, dt / self.tracking)
                 grown = max(-self.integral_limit, min(self.integral_limit, grown))
-            elif sign(wanted - output) == sign(growth):
+            elif sign(wanted - output) == sign(growth) and not self.wind_up:
                 grown = self.integral
         self.integral = grown
         self.errors.append(error)
@@ -88,12 +90,12 @@ class Pid:
 
 
 class Incremental:
-    """The controller in differences, from three samples."""
+    """The controller in differences, from three samples; at a limit, what I adds outward is left out."""
 
     def __init__(self, kp, ki, kd, lower=-1e30, upper=1e30, tracking=None):
         self.kp, self.ki, self.kd, self.lower, self.upper = kp, ki, kd, lower, upper
         self.r, self.x1, self.x2 = tracking, None, 0.0
-        self.e, self.y, self.dt, self.output = [], [], [], 0.0
+        self.e, self.y, self.dt, self.sum = [], [], [], 0.0
 
     def __call__(self, setpoint, measurement, dt):
         if self.r:
@@ -106,13 +108,17 @@ class Incremental:
         self.y.append(measurement)
         self.dt.append(dt)
         e, y = self.e, self.y
-        change = self.kp * e[0]
+        others, growth = self.kp * e[0], 0.0
         if len(e) > 1:
             older = (y[-2] - y[-3]) / self.dt[-2] if len(y) > 2 else 0.0
             bend = (y[-1] - y[-2]) / dt - older
-            change = self.kp * (e[-1] - e[-2]) + self.ki * dt * (e[-1] + e[-2]) / 2 - self.kd * bend
-        self.output = max(self.lower, min(self.upper, self.output + change))
-        return self.output
+            others = self.kp * (e[-1] - e[-2]) - self.kd * bend
+            growth = self.ki * dt * (e[-1] + e[-2]) / 2
+        wanted = self.sum + others + growth
+        output = max(self.lower, min(self.upper, wanted))
+        outward = output != wanted and sign(wanted - output) == sign(growth)
+        self.sum = wanted - growth if outward else wanted
+        return output
 
 
 LINEAR = [(0.0, 1.0), (0.15, -0.5), (0.3, 0.2)]
@@ -122,6 +128,7 @@ CASES = {
     "output_range": (Pid(4.0, 40.0, 0.0, lower=-0.25, upper=1.5), LINEAR),
     "integral_limit": (Pid(1.0, 40.0, 0.0, integral_limit=0.5), LINEAR),
     "back_calculation": (Pid(4.0, 40.0, 0.01, lower=-1.5, upper=1.5, tracking=0.02), LINEAR),
+    "without_anti_windup": (Pid(4.0, 40.0, 0.01, lower=-1.5, upper=1.5, wind_up=True), LINEAR),
     "integral_separation": (Pid(2.0, 30.0, 0.0, separation=0.6), LINEAR),
     "variable_integral": (Pid(2.0, 30.0, 0.0, full=0.2, none=0.8), LINEAR),
     "dead_band": (Pid(2.0, 30.0, 0.0, band=0.1), LINEAR),

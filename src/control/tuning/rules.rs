@@ -1,0 +1,91 @@
+use crate::control::pid::PidConfig;
+
+/// The gains of a PID, in its units: `kp`, `ki` a second, `kd` seconds; and the rule that they follow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Gains {
+    /// Proportional gain.
+    pub kp: f32,
+    /// Integral gain, 1/s times the unit of `kp`.
+    pub ki: f32,
+    /// Derivative gain, s times the unit of `kp`.
+    pub kd: f32,
+    /// What they follow from the ultimate gain and period by.
+    pub rule: TuningRule,
+}
+
+impl Gains {
+    /// Returns a configuration with these gains and no option.
+    #[must_use]
+    pub const fn config(self) -> PidConfig {
+        PidConfig::new(self.kp, self.ki, self.kd)
+    }
+}
+
+/// How gains follow from the ultimate gain `Ku` and period `Tu` of a plant.
+///
+/// | rule | kp | integral time | derivative time | character |
+/// |---|---|---|---|---|
+/// | `ZieglerNicholsP` | 0.5 Ku | | | steady error |
+/// | `ZieglerNicholsPi` | 0.45 Ku | Tu / 1.2 | | quick, overshoots |
+/// | `ZieglerNicholsPid` | 0.6 Ku | Tu / 2 | Tu / 8 | quick, overshoots by a quarter and more |
+/// | `TyreusLuybenPi` | Ku / 3.2 | 2.2 Tu | | calm; for speed loops start here |
+/// | `TyreusLuybenPid` | Ku / 2.2 | 2.2 Tu | Tu / 6.3 | calm |
+///
+/// Sources: Ziegler and Nichols, "Optimum Settings for Automatic Controllers", Transactions of the ASME 64 (1942);
+/// Tyreus and Luyben, "Tuning PI Controllers for Integrator/Dead Time Processes", Industrial and Engineering Chemistry
+/// Research 31 (1992), its PID as in Luyben and Luyben, "Essentials of Process Control" (1997).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum TuningRule {
+    /// Proportional only.
+    ZieglerNicholsP,
+    /// Proportional and integral.
+    ZieglerNicholsPi,
+    /// All three terms.
+    ZieglerNicholsPid,
+    /// Proportional and integral, with large margins.
+    TyreusLuybenPi,
+    /// All three terms, with large margins.
+    TyreusLuybenPid,
+}
+
+/// What a [`RelayTuner`](super::RelayTuner) found out about the plant.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Oscillation, TuningRule};
+///
+/// let found = Oscillation { ultimate_gain: 10.0, ultimate_period_s: 0.2 };
+/// let gains = found.gains(TuningRule::ZieglerNicholsPid);
+/// assert_eq!((gains.kp, gains.ki, gains.kd), (6.0, 60.0, 0.15));
+/// assert_eq!(gains.rule, TuningRule::ZieglerNicholsPid);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Oscillation {
+    /// `Ku`, the proportional gain at which the loop would just keep oscillating, in units of the output over the measurement.
+    pub ultimate_gain: f32,
+    /// `Tu`, the period of that oscillation in seconds.
+    pub ultimate_period_s: f32,
+}
+
+impl Oscillation {
+    /// Returns the gains by `rule`.
+    #[must_use]
+    pub const fn gains(&self, rule: TuningRule) -> Gains {
+        let (ku, tu) = (self.ultimate_gain, self.ultimate_period_s);
+        let (kp, ki, kd) = match rule {
+            TuningRule::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
+            TuningRule::ZieglerNicholsPi => (0.45 * ku, 0.54 * ku / tu, 0.0),
+            TuningRule::ZieglerNicholsPid => (0.6 * ku, 1.2 * ku / tu, 0.075 * ku * tu),
+            TuningRule::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
+            TuningRule::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
+        };
+        Gains { kp, ki, kd, rule }
+    }
+}

@@ -1,0 +1,66 @@
+//! Both forms of the PID on a simulated M3508, with a step that takes the output to its limit.
+
+#![cfg(test)]
+#![cfg(feature = "sim")]
+
+use drivetrain::control::{
+    IncrementalPid, IncrementalPidConfig, Pid, PidConfig, StepMeasures, StepResponse,
+};
+use drivetrain::dji::{Bus, Config, M3508};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::time::Duration;
+use drivetrain::units::Current;
+
+const TARGET: f32 = 30.0; // rad/s
+const LIMIT: f32 = 6.0; // A
+
+/// Steps the speed of a motor from rest; `control` gets setpoint, speed and time step, and gives amperes.
+fn step_response(mut control: impl FnMut(f32, f32, f32) -> f32) -> StepMeasures {
+    let world = World::new(1);
+    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let mut bus = Bus::new();
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let mut response = StepResponse::new(0.0, TARGET, 3.0, 0.05).unwrap();
+    let mut armed = false;
+    while !response.is_complete() {
+        world.advance(Duration::from_micros(100));
+        runner.poll(8);
+        let Some(tick) = runner.due() else { continue };
+        armed = armed || runner.arm(tick).is_ok();
+        let speed = runner.device().state(motor).map(|state| state.velocity.as_rad_per_s());
+        if let (true, Some(speed)) = (armed, speed) {
+            let amperes = control(TARGET, speed, tick.dt_s());
+            runner.device_mut().set_current(motor, Current::from_amperes(amperes)).unwrap();
+            response.record(speed, tick.dt_s());
+        }
+        runner.tick(tick);
+    }
+    response.measures()
+}
+
+#[test]
+fn after_a_step_that_saturates_the_incremental_form_settles_as_fast_as_the_positional_one() {
+    for (kp, ki) in [(0.6, 0.3), (0.6, 1.5), (0.6, 6.0), (2.0, 10.0), (4.0, 4.0)] {
+        let config = PidConfig::new(kp, ki, 0.0).with_output_limit(LIMIT);
+        let mut positional = Pid::new(config).unwrap();
+        let config = IncrementalPidConfig::new(kp, ki, 0.0).with_output_limit(LIMIT);
+        let mut incremental = IncrementalPid::new(config).unwrap();
+        let mut most = 0.0_f32;
+        let expected = step_response(|setpoint, speed, dt_s| {
+            let amperes = positional.update(setpoint, speed, dt_s);
+            most = most.max(amperes);
+            amperes
+        });
+        let measured =
+            step_response(|setpoint, speed, dt_s| incremental.update(setpoint, speed, dt_s));
+        assert!((most - LIMIT).abs() < 1e-6, "{most}"); // the step does saturate
+        let settled = |measures: &StepMeasures| measures.settling_time_s.unwrap_or(f32::INFINITY);
+        assert!(settled(&expected) < 3.0, "kp {kp}, ki {ki}: {expected:?}");
+        assert!(
+            settled(&measured) <= 1.2 * settled(&expected),
+            "kp {kp}, ki {ki}: {measured:?}, positional {expected:?}"
+        );
+    }
+}
