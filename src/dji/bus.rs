@@ -222,9 +222,11 @@ impl<B> Bus<B> {
         }
         self.check_one_slot();
         let step = self.step;
-        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
-            let raw = slot.update(&step);
+        let mut rest = self.slots.get_mut(..usize::from(self.used)).unwrap_or_default();
+        while let [slot, others @ ..] = rest {
+            let raw = slot.update(&step, &self.step);
             self.outbox.put(slot.place, raw);
+            rest = others;
         }
         self.outbox.finish_update();
     }

@@ -68,11 +68,12 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     saturate((halves >> 1) + (halves & !(halves >> 31) & 1), Range::within(limit))
 }
 
+/// From 2^23 to 2^24 floats are the whole numbers: a sum with this is rounded, and its last bits count from here.
+const WHOLE: f32 = 1.5 * 8_388_608.0;
+
 /// As [`to_raw`], for what a loop gives in every update: half a count goes to the even neighbour.
 #[inline]
 pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
-    // From 2^23 to 2^24 floats are the whole numbers: this sum is rounded, and its last bits count from here.
-    const WHOLE: f32 = 1.5 * 8_388_608.0;
     let sum = value * raw_per_unit + WHOLE;
     let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
     if !range.contains(raw) {
@@ -81,6 +82,16 @@ pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> 
     #[expect(clippy::cast_possible_truncation, reason = "within the range")]
     let raw = raw as i16;
     raw
+}
+
+/// As [`loop_to_raw`], for an output that is within the motor's limit and so within 16 bits.
+#[inline]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "within 16 bits, and the last bits count from zero"
+)]
+pub(super) const fn free_to_raw(value: f32, raw_per_unit: f32) -> i16 {
+    (value * raw_per_unit + WHOLE).to_bits() as i16
 }
 
 /// Out of the line of [`loop_to_raw`]: also for what is no number, or too large for its sum.

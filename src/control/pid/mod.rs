@@ -3,10 +3,12 @@
 mod config;
 mod cut;
 mod incremental;
+mod plain;
 mod positional;
 mod settings;
 mod work;
 
 pub use config::PidConfig;
 pub use incremental::{IncrementalPid, IncrementalPidConfig};
+pub(crate) use plain::{Plain, Wanted};
 pub use positional::{Pid, Terms};

@@ -10,7 +10,7 @@ pub(super) const CIRCLE: u16 = 1 << 5;
 pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
 const ASYMMETRIC: u16 = 1 << 7;
 /// The options that the plain path does not know.
-const NOT_PLAIN: u16 = 0xFF;
+pub(super) const NOT_PLAIN: u16 = 0xFF;
 pub(super) const WIND_UP: u16 = 1 << 8;
 pub(super) const SEPARATION_INSIDE: u16 = 1 << 9;
 /// Set by `reset_to` until the first step after it.

@@ -66,6 +66,7 @@ impl Slot {
         if self.arming == Arming::Latched && self.ramp_ms.is_some() {
             self.arming = Arming::Armed;
             self.range = Range::ZERO;
+            self.settle();
             self.is_ramping = true;
             self.ramp_started = coarse(self.heard);
         }

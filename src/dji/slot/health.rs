@@ -148,6 +148,7 @@ impl Slot {
         if negative_only {
             self.range = self.range.without_positive();
         }
+        self.settle();
     }
 
     /// Returns whether the shaft may turn up only, and whether down only.

@@ -23,7 +23,7 @@ use arming::Arming;
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
 pub(super) use health::Look;
-use target::{Action, Goal};
+use target::{Action, Duty, Goal};
 pub(super) use update::Ages;
 
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ pub(super) struct Slot {
     shaft: Shaft,
     rad_per_s_per_rpm: f32,
     /// What an update does: what is asked for, or nothing while the feedback is late.
-    action: Action,
+    duty: Duty,
     asked: Action,
     pub(super) place: Place,
     link: Link,
@@ -83,7 +83,7 @@ const NO_LOOPS: Cascade = match Cascade::new(NO_LOOP, NO_LOOP) {
 impl Slot {
     pub(super) const FREE: Self = Self {
         facts: None,
-        action: Action::Rest,
+        duty: Duty::Rest,
         asked: Action::Rest,
         goal: Goal::NONE,
         shaft: Shaft::new(GearRatio::DIRECT, false),

@@ -1,4 +1,3 @@
-use super::target::Action;
 use super::{Slot, age, is_near};
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
@@ -118,19 +117,19 @@ impl Slot {
 
     fn set_online(&mut self, facts: &Facts) {
         self.link = Link::Online;
-        self.action = self.asked;
         self.trusted_gap_us = if self.traffic.is_crowded() { 0 } else { trusted_gap_us(facts) };
         self.conditions.set(Condition::Late, false);
         self.conditions.set(Condition::Offline, false);
+        self.settle();
     }
 
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
         self.conditions.set(Condition::Late, true);
-        self.action = Action::Rest;
         self.trusted_gap_us = 0;
         self.loops.interrupt();
+        self.settle();
     }
 
     /// Nobody knows any more when the motor was heard.

@@ -1,7 +1,7 @@
-use super::target::Action;
+use super::target::{Action, Duty};
 use super::{Slot, age, is_near};
-use crate::control::TimeStep;
-use crate::dji::command::{loop_to_raw, saturate};
+use crate::control::{Plain, TimeStep, Wanted};
+use crate::dji::command::{free_to_raw, loop_to_raw, saturate};
 use crate::motor::{Condition, Link, Timeouts};
 
 /// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
@@ -29,26 +29,108 @@ impl Ages {
 }
 
 impl Slot {
-    /// Runs the loops of this motor and returns its raw command.
+    /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
+    /// stays in registers, because nobody else gets to see it.
     #[inline]
-    pub(in crate::dji) fn update(&mut self, step: &TimeStep) -> i16 {
-        let mut velocity = self.velocity().as_rad_per_s();
-        let goal = if self.action == Action::Velocity {
-            self.goal.rad_per_s()
-        } else {
-            let way = match self.action {
-                Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
-                Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
-                Action::Measured => {
-                    velocity = self.goal.rate();
-                    self.goal.way()
+    pub(in crate::dji) fn update(&mut self, plain: &TimeStep, step: &TimeStep) -> i16 {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
+                match self.loops.position_mut().try_step_error(way, velocity, plain) {
+                    Plain::Within(goal) => goal,
+                    Plain::Beyond(Wanted { output, error, integral, .. }) => {
+                        return self.limit_velocity(output, error, velocity, integral, step);
+                    }
+                    Plain::Otherwise => return self.update_carefully(step),
                 }
-                Action::Raw => return saturate(self.goal.raw(), self.range),
-                Action::Rest | Action::Velocity => return 0,
-            };
-            self.loops.step_position(way, velocity, step)
+            }
+            Duty::Raw => return saturate(self.goal.raw(), self.range),
+            Duty::Rest => return 0,
+            Duty::Other => return self.update_carefully(step),
         };
+        self.try_velocity(goal, velocity, plain, step)
+    }
+
+    /// Runs a speed loop that is free: without options and with the full output.
+    #[inline(always)]
+    fn try_velocity(&mut self, goal: f32, velocity: f32, plain: &TimeStep, step: &TimeStep) -> i16 {
+        match self.loops.speed_mut().try_step(goal, velocity, plain) {
+            Plain::Within(output) => free_to_raw(output, self.raw_per_unit),
+            Plain::Beyond(Wanted { output, error, rate, integral, .. }) => {
+                self.limit_output(output, velocity, error, rate, integral, step)
+            }
+            Plain::Otherwise => self.follow_velocity(goal, velocity, step),
+        }
+    }
+
+    /// The position loop asks for more than its limit.
+    // What follows it stands at the end of each of these, so that none needs registers of its own.
+    #[inline(never)]
+    fn limit_velocity(
+        &mut self,
+        output: f32,
+        error: f32,
+        velocity: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> i16 {
+        let wanted = Wanted::by_error(output, error, velocity, integral);
+        match self.loops.position_mut().saturate(&wanted, step) {
+            Some(goal) => self.try_velocity(goal, velocity, step, step),
+            None => self.update_carefully(step),
+        }
+    }
+
+    /// The speed loop asks for more than its limit.
+    #[inline(never)]
+    fn limit_output(
+        &mut self,
+        output: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> i16 {
+        let wanted = Wanted { output, measurement, error, rate, integral };
+        match self.loops.speed_mut().saturate(&wanted, step) {
+            Some(output) => free_to_raw(output, self.raw_per_unit),
+            None => self.overflow(measurement, error, rate, step),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn overflow(&mut self, measurement: f32, error: f32, rate: f32, step: &TimeStep) -> i16 {
+        let output = self.loops.speed_mut().overflow(measurement, error, rate, step);
+        free_to_raw(output, self.raw_per_unit)
+    }
+
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
         loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
+    }
+
+    /// Runs the loops whatever they are and however far the output is limited.
+    #[inline(never)]
+    fn update_carefully(&mut self, step: &TimeStep) -> i16 {
+        let mut velocity = self.velocity().as_rad_per_s();
+        let way = match self.asked {
+            Action::Velocity => {
+                return self.follow_velocity(self.goal.rad_per_s(), velocity, step);
+            }
+            Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
+            Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+            Action::Measured => {
+                velocity = self.goal.rate();
+                self.goal.way()
+            }
+            Action::Rest | Action::Raw => return 0,
+        };
+        let goal = self.loops.step_position(way, velocity, step);
+        self.follow_velocity(goal, velocity, step)
     }
 
     /// Adds the ages of this motor's feedback and target, when it is heard.
