@@ -4,7 +4,7 @@ use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
-use crate::encoder::{Position, Turns};
+use crate::encoder::Position;
 use crate::motor::{Link, TargetError};
 
 /// What a motor is asked to do.
@@ -45,8 +45,9 @@ pub(super) enum Duty {
 /// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Goal {
-    turns: Turns,
-    /// Raw command, bits of the rad/s, or phase of the shaft.
+    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
+    turns: u32,
+    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
     value: i32,
 }
 
@@ -54,7 +55,7 @@ impl Goal {
     pub(super) const NONE: Self = Self::of(0);
 
     const fn of(value: i32) -> Self {
-        Self { turns: Turns::new(0), value }
+        Self { turns: 0, value }
     }
 
     pub(super) const fn raw(&self) -> i32 {
@@ -69,14 +70,13 @@ impl Goal {
         self.value
     }
 
-    pub(super) const fn turns(&self) -> Turns {
+    pub(super) const fn turns(&self) -> u32 {
         self.turns
     }
 
     /// A way in rad, and the rate in rad/s that goes with it.
     pub(super) const fn measured(way: f32, rad_per_s: f32) -> Self {
-        let rate = Turns::new(rad_per_s.to_bits() as i64);
-        Self { turns: rate, value: way.to_bits().cast_signed() }
+        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
     }
 
     pub(super) const fn way(&self) -> f32 {
@@ -84,7 +84,7 @@ impl Goal {
     }
 
     pub(super) const fn rate(&self) -> f32 {
-        f32::from_bits(self.turns.low())
+        f32::from_bits(self.turns)
     }
 }
 
@@ -152,7 +152,8 @@ impl Slot {
         needs(self.loops.position())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         self.enter_position_loop();
-        self.start(Action::Position, Goal { turns, value: phase }, now);
+        let goal = Goal { turns: self.shaft.near(turns), value: phase };
+        self.start(Action::Position, goal, now);
         Ok(())
     }
 
