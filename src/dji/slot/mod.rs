@@ -103,7 +103,7 @@ impl Slot {
         forgotten_targets: 0,
         loops: NO_LOOPS,
         generation: 0,
-        place: Place::NOWHERE,
+        place: Place::Nowhere,
         link: Link::Unheard,
         good_frames: 0,
         homing: Homing::Relative,
