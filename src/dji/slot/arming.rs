@@ -68,6 +68,7 @@ impl Slot {
             self.range = Range::ZERO;
             self.settle();
             self.is_ramping = true;
+            self.attend();
             self.ramp_started = coarse(self.heard);
         }
     }

@@ -61,7 +61,8 @@ pub(super) struct Slot {
     generation: u8,
     is_ramping: bool,
     error_code: u8,
-    /// Below this temperature byte and this command the motor need not be looked at closely.
+    /// Below this temperature byte and this command the motor need not be looked at closely; 0 unless all was well when it
+    /// was looked at last, and nothing has begun since.
     cool_below: u8,
     calm_word: u16,
     saturated: u16,
@@ -163,7 +164,6 @@ impl Slot {
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));
         }
-        let (calm_word, cool_below) = Self::calm(facts, config.health, limit_raw);
         let direct = config.gear.rotor() == config.gear.output();
         Ok(Self {
             facts: Some(facts),
@@ -178,8 +178,7 @@ impl Slot {
             generation,
             place,
             health: config.health,
-            calm_word,
-            cool_below,
+            calm_word: Self::calm_word(config.health, limit_raw),
             homing: if direct { Homing::Absolute } else { Homing::Relative },
             ..Self::FREE
         })

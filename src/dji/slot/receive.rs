@@ -90,7 +90,7 @@ impl Slot {
         self.traffic.compare(counts, predicted as i32, tolerance as i32);
         if self.traffic.is_double() && !self.health.ignores(Condition::DuplicateId) {
             let before = self.conditions.active();
-            self.conditions.set(Condition::DuplicateId, true);
+            self.begin(Condition::DuplicateId);
             self.react(before);
         }
     }
@@ -102,7 +102,7 @@ impl Slot {
 
     fn doubt_position(&mut self) {
         self.ambiguous_gaps = self.ambiguous_gaps.saturating_add(1);
-        self.conditions.set(Condition::PositionUncertain, true);
+        self.begin(Condition::PositionUncertain);
         if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
@@ -120,13 +120,14 @@ impl Slot {
         self.trusted_gap_us = if self.traffic.is_crowded() { 0 } else { trusted_gap_us(facts) };
         self.conditions.set(Condition::Late, false);
         self.conditions.set(Condition::Offline, false);
+        self.relent(facts);
         self.settle();
     }
 
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
-        self.conditions.set(Condition::Late, true);
+        self.begin(Condition::Late);
         self.trusted_gap_us = 0;
         self.loops.interrupt();
         self.settle();
@@ -143,8 +144,8 @@ impl Slot {
     /// The motor is lost: relaxed, and latched until it is armed again or ramps back.
     pub(super) fn set_offline(&mut self) {
         self.link = Link::Offline;
-        self.conditions.set(Condition::Late, true);
-        self.conditions.set(Condition::Offline, true);
+        self.begin(Condition::Late);
+        self.begin(Condition::Offline);
         self.trusted_gap_us = 0;
         self.latch();
         self.relax();

@@ -177,7 +177,7 @@ impl Slot {
     /// The application has not set a target for too long.
     pub(super) fn forget_target(&mut self) {
         self.relax();
-        self.conditions.set(Condition::CommandLost, true);
+        self.begin(Condition::CommandLost);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 }
