@@ -46,8 +46,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let unwatched = self.running && now > self.updated + LONGEST_PAUSE;
-        let missing = move |slot: &&Slot| unwatched || slot.is_missing(now.stamp(), &self.timeouts);
+        let missing = move |slot: &&Slot| self.misses(slot, now);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
@@ -130,7 +129,7 @@ impl<B> Bus<B> {
         if chosen().next().is_none() {
             return Err(ArmError::NoMotors);
         }
-        let missing = chosen().filter(|slot| slot.is_missing(now.stamp(), &self.timeouts));
+        let missing = chosen().filter(|slot| self.misses(slot, now));
         if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
             return Err(ArmError::Missing(missing));
         }
@@ -151,7 +150,16 @@ impl<B> Bus<B> {
         Ok(())
     }
 
+    /// Tells whether a motor has no fresh feedback, as far as its stamp tells.
+    fn misses(&self, slot: &Slot, now: Instant) -> bool {
+        now > self.updated + LONGEST_PAUSE || slot.is_missing(now.stamp(), &self.timeouts)
+    }
+
     fn engage_slot(&mut self, motor: u8, now: Instant) {
+        let slot = self.slots.get(usize::from(motor));
+        if slot.is_none_or(|slot| self.misses(slot, now)) {
+            return;
+        }
         let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
         let before = slot.conditions;
         slot.engage(now.stamp(), &self.timeouts);

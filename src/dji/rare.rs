@@ -31,8 +31,13 @@ impl<B> Bus<B> {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };
+        if !self.running {
+            let before = core::mem::replace(&mut self.updated, now);
+            self.forget_bygones(before);
+        }
+        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let before = slot.conditions;
-        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
+        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts, self.running);
         self.journal.note(motor, &before, &slot.conditions, now);
         self.disturb();
         Ingest::Taken
@@ -46,8 +51,8 @@ impl<B> Bus<B> {
         if self.running && self.updated <= before {
             return false;
         }
-        if self.running && self.updated > before + LONGEST_PAUSE {
-            self.lose_all();
+        if !self.running || self.updated > before + LONGEST_PAUSE {
+            self.forget_bygones(before);
         }
         self.running = true;
         self.held_steps = 0;
@@ -84,14 +89,17 @@ impl<B> Bus<B> {
         }
     }
 
-    /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
+    /// Gives up what is too old for a stamp of 32 bits to tell how old it is, and everything after a pause, of which no
+    /// stamp tells how long it was. Whatever makes time pass without looking at ages has to ask for this.
     #[cold]
     #[inline(never)]
-    fn lose_all(&mut self) {
+    fn forget_bygones(&mut self, before: Instant) {
+        let now = self.updated;
+        let is_pause = now > before + LONGEST_PAUSE;
         for (motor, slot) in (0..).zip(&mut self.slots) {
             let before = slot.conditions;
-            slot.lose();
-            self.journal.note(motor, &before, &slot.conditions, self.updated);
+            slot.forget_bygones(now.stamp(), is_pause);
+            self.journal.note(motor, &before, &slot.conditions, now);
         }
     }
 
@@ -99,6 +107,7 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
+        self.forget_bygones(before);
         self.running = true;
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);

@@ -1,4 +1,6 @@
+use super::target::Action;
 use super::{Slot, age, is_near};
+use crate::dji::bus::LONGEST_PAUSE_US;
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
 use crate::motor::{Condition, Link, Timeouts};
@@ -25,6 +27,7 @@ impl Slot {
         feedback: Feedback,
         now: u32,
         timeouts: &Timeouts,
+        running: bool,
     ) {
         if self.link != Link::Unheard {
             self.traffic.gap(age(now, self.heard));
@@ -36,7 +39,12 @@ impl Slot {
                 self.set_online(facts);
             }
             Link::Online | Link::Late => {
-                self.follow(facts, feedback, age(now, self.heard));
+                let in_time = now.wrapping_sub(self.heard) < trusted_gap_us(facts);
+                if in_time && !running {
+                    self.move_shortest(feedback);
+                } else {
+                    self.follow(facts, feedback, age(now, self.heard));
+                }
                 self.set_online(facts);
             }
             Link::Offline => {
@@ -55,6 +63,10 @@ impl Slot {
         }
         self.feedback = feedback;
         self.heard = now;
+        if !running {
+            // Nobody looks at ages yet, so every frame has to: it comes this way.
+            self.trusted_gap_us = 0;
+        }
     }
 
     /// Follows the angle of a motor that was heard `gap_us` ago.
@@ -133,11 +145,14 @@ impl Slot {
         self.settle();
     }
 
-    /// Nobody knows any more when the motor was heard.
-    #[inline(never)]
-    pub(in crate::dji) fn lose(&mut self) {
-        if self.link != Link::Unheard {
+    /// Gives up what nobody knows any more how old it is: after a pause everything, otherwise what is so old that nobody
+    /// will know.
+    pub(in crate::dji) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
+        let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
+        if self.link != Link::Unheard && is_bygone(self.heard) {
             self.set_offline();
+        } else if self.asked != Action::Rest && is_bygone(self.commanded) {
+            self.forget_target();
         }
     }
 
