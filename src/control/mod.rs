@@ -54,7 +54,6 @@ pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::{ConfigError, ConfigFault};
 pub use filter::{Biquad, LowPass, Median, MovingAverage};
 pub use pid::{IncrementalPid, IncrementalPidConfig, Pid, PidConfig, Terms};
-pub(crate) use pid::{Plain, Wanted};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
 pub use tuning::{

@@ -10,5 +10,4 @@ mod work;
 
 pub use config::PidConfig;
 pub use incremental::{IncrementalPid, IncrementalPidConfig};
-pub(crate) use plain::{Plain, Wanted};
 pub use positional::{Pid, Terms};

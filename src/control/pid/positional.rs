@@ -1,5 +1,4 @@
 use super::PidConfig;
-use super::plain::{Plain, Wanted};
 use super::settings::{REST_DERIVATIVE, Settings, TRACK_OUTPUT};
 use super::work::{CLOSED, UNKNOWN, passes};
 use crate::control::error::{ConfigError, gains};
@@ -120,13 +119,14 @@ impl Pid {
         if self.settings.integral_gate == CLOSED {
             return self.step_with_options(setpoint, measurement, step);
         }
-        match self.try_step(setpoint, measurement, step) {
-            Plain::Within(output) => output,
-            Plain::Beyond(Wanted { output, measurement, error, rate, integral }) => {
-                self.saturate_apart(output, measurement, error, rate, integral, step)
-            }
-            Plain::Otherwise => self.step_with_options(setpoint, measurement, step),
+        let error = setpoint - measurement;
+        let rate = (measurement - self.measurement) * step.per_dt;
+        let integral = self.integral + self.growth(error, step);
+        // The first call, a step that is not normal, NaN and overflow: none of them passes.
+        if !passes(integral, self.settings.integral_gate) {
+            return self.step_with_options(setpoint, measurement, step);
         }
+        self.finish(measurement, error, rate, integral, step)
     }
 
     /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
@@ -135,13 +135,32 @@ impl Pid {
     /// derivative of the error do not apply. Everything else is as for [`step`](Self::step), which may be mixed with it.
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        match self.try_step_error(error, rate, step) {
-            Plain::Within(output) => output,
-            Plain::Beyond(Wanted { output, measurement, error, rate, integral }) => {
-                self.saturate_apart(output, measurement, error, rate, integral, step)
-            }
-            Plain::Otherwise => self.work_with_options(0.0, UNKNOWN, error, rate, step),
+        let integral = self.integral + self.growth(error, step);
+        if !passes(integral, self.settings.integral_gate) {
+            return self.work_with_options(0.0, UNKNOWN, error, rate, step);
         }
+        self.finish(UNKNOWN, error, rate, integral, step)
+    }
+
+    #[inline]
+    fn finish(
+        &mut self,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> f32 {
+        let output = self.settings.kp * error + integral - self.settings.kd * rate;
+        if !passes(output, self.settings.output_gate) {
+            return self.saturate(output, measurement, error, rate, integral, step);
+        }
+        self.output = output;
+        self.measurement = measurement;
+        self.error = error;
+        self.rate = rate;
+        self.integral = integral;
+        output
     }
 
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.

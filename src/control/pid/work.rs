@@ -7,7 +7,6 @@
 //!        └─ *_carefully   bad arguments, the first call, a frozen step, overflow: guarded, seldom
 //! ```
 
-use super::plain::Wanted;
 use super::positional::{Pid, Terms};
 use super::settings::{
     CIRCLE, DERIVATIVE_FILTER, DERIVATIVE_ON_ERROR, FEED_FORWARD, REST_DERIVATIVE,
@@ -51,13 +50,23 @@ const fn magnitude(value: f32) -> u32 {
 }
 
 impl Pid {
-    /// Ends a step whose output did not pass its gate, unless that overflowed: then nothing changes.
-    // Its callers are out of line themselves.
-    #[inline(always)]
-    pub(crate) fn saturate(&mut self, wanted: &Wanted, step: &TimeStep) -> Option<f32> {
-        let Wanted { output: wanted, measurement, error, rate, integral } = *wanted;
+    /// A plain controller whose integral passed its gate, so that all but `rate` is finite, and whose output did not.
+    #[inline(never)]
+    pub(super) fn saturate(
+        &mut self,
+        wanted: f32,
+        measurement: f32,
+        error: f32,
+        rate: f32,
+        integral: f32,
+        step: &TimeStep,
+    ) -> f32 {
         if !wanted.is_finite() {
-            return None;
+            if measurement == UNKNOWN {
+                return self.step_error_carefully(error, rate, step);
+            }
+            let rate = self.rate_at(measurement, error, step);
+            return self.work_carefully(measurement, error, rate, step);
         }
         let output = self.settings.output_upper.copysign(wanted);
         let growth = integral - self.integral;
@@ -66,24 +75,7 @@ impl Pid {
         self.measurement = measurement;
         self.error = error;
         self.rate = rate;
-        Some(output)
-    }
-
-    /// Ends a step whose integral passed its gate, so that all but `rate` is finite, and whose output overflowed.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn overflow(
-        &mut self,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        step: &TimeStep,
-    ) -> f32 {
-        if measurement == UNKNOWN {
-            return self.step_error_carefully(error, rate, step);
-        }
-        let rate = self.rate_at(measurement, error, step);
-        self.work_carefully(measurement, error, rate, step)
+        output
     }
 
     #[inline(never)]

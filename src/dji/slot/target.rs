@@ -34,7 +34,7 @@ impl Action {
 pub(super) enum Duty {
     Rest,
     Raw,
-    /// The speed loop, without options and with the full output: what it gives within its limit needs no other.
+    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
     Velocity,
     /// Both loops, as above.
     Position,

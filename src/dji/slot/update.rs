@@ -1,6 +1,6 @@
 use super::target::{Action, Duty};
 use super::{Slot, age, is_near};
-use crate::control::{Plain, TimeStep, Wanted};
+use crate::control::TimeStep;
 use crate::dji::command::{free_to_raw, loop_to_raw, saturate};
 use crate::motor::{Condition, Link, Timeouts};
 
@@ -39,73 +39,18 @@ impl Slot {
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
                 match self.loops.position_mut().try_step_error(way, velocity, plain) {
-                    Plain::Within(goal) => goal,
-                    Plain::Beyond(Wanted { output, error, integral, .. }) => {
-                        return self.limit_velocity(output, error, velocity, integral, step);
-                    }
-                    Plain::Otherwise => return self.update_carefully(step),
+                    Some(goal) => goal,
+                    None => return self.update_carefully(step),
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             Duty::Rest => return 0,
             Duty::Other => return self.update_carefully(step),
         };
-        self.try_velocity(goal, velocity, plain, step)
-    }
-
-    /// Runs a speed loop that is free: without options and with the full output.
-    #[inline(always)]
-    fn try_velocity(&mut self, goal: f32, velocity: f32, plain: &TimeStep, step: &TimeStep) -> i16 {
         match self.loops.speed_mut().try_step(goal, velocity, plain) {
-            Plain::Within(output) => free_to_raw(output, self.raw_per_unit),
-            Plain::Beyond(Wanted { output, error, rate, integral, .. }) => {
-                self.limit_output(output, velocity, error, rate, integral, step)
-            }
-            Plain::Otherwise => self.follow_velocity(goal, velocity, step),
-        }
-    }
-
-    /// The position loop asks for more than its limit.
-    // What follows it stands at the end of each of these, so that none needs registers of its own.
-    #[inline(never)]
-    fn limit_velocity(
-        &mut self,
-        output: f32,
-        error: f32,
-        velocity: f32,
-        integral: f32,
-        step: &TimeStep,
-    ) -> i16 {
-        let wanted = Wanted::by_error(output, error, velocity, integral);
-        match self.loops.position_mut().saturate(&wanted, step) {
-            Some(goal) => self.try_velocity(goal, velocity, step, step),
-            None => self.update_carefully(step),
-        }
-    }
-
-    /// The speed loop asks for more than its limit.
-    #[inline(never)]
-    fn limit_output(
-        &mut self,
-        output: f32,
-        measurement: f32,
-        error: f32,
-        rate: f32,
-        integral: f32,
-        step: &TimeStep,
-    ) -> i16 {
-        let wanted = Wanted { output, measurement, error, rate, integral };
-        match self.loops.speed_mut().saturate(&wanted, step) {
             Some(output) => free_to_raw(output, self.raw_per_unit),
-            None => self.overflow(measurement, error, rate, step),
+            None => self.follow_velocity(goal, velocity, step),
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn overflow(&mut self, measurement: f32, error: f32, rate: f32, step: &TimeStep) -> i16 {
-        let output = self.loops.speed_mut().overflow(measurement, error, rate, step);
-        free_to_raw(output, self.raw_per_unit)
     }
 
     #[inline(never)]
