@@ -44,8 +44,8 @@ impl Slot {
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
-            Duty::Rest => return 0,
-            Duty::Other => return self.update_carefully(step),
+            // Out of line too: a zero for these would be loaded in every update of every motor.
+            Duty::Rest | Duty::Other => return self.update_carefully(step),
         };
         match self.loops.speed_mut().try_step(goal, velocity, plain) {
             Some(output) => free_to_raw(output, self.raw_per_unit),
@@ -58,9 +58,12 @@ impl Slot {
         loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
     }
 
-    /// Runs the loops whatever they are and however far the output is limited.
+    /// Runs the loops whatever they are and however far the output is limited; or rests.
     #[inline(never)]
     fn update_carefully(&mut self, step: &TimeStep) -> i16 {
+        if self.duty == Duty::Rest {
+            return 0;
+        }
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {
             Action::Velocity => {
