@@ -53,12 +53,15 @@ impl Slot {
         }
     }
 
+    // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
+    #[cold]
     #[inline(never)]
     fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
         loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
     }
 
     /// Runs the loops whatever they are and however far the output is limited; or rests.
+    #[cold]
     #[inline(never)]
     fn update_carefully(&mut self, step: &TimeStep) -> i16 {
         if self.duty == Duty::Rest {
