@@ -84,7 +84,7 @@ pub struct Bus<B = ()> {
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3776);
+const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3720);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]

@@ -69,7 +69,7 @@ impl Slot {
     pub(super) fn relent(&mut self, facts: &Facts) {
         let is_well = self.conditions.active().is_empty()
             && self.link == Link::Online
-            && !self.is_ramping
+            && self.ramp_started.is_none()
             && self.error_code == 0
             && self.health.soft_limits().is_none();
         if is_well {

@@ -44,13 +44,15 @@ pub(super) struct Slot {
     /// What is left of the full limit.
     range: Range,
     full_limit: i16,
+    calm_word: u16,
     raw_per_unit: f32,
     goal: Goal,
     commanded: u32,
     loops: Cascade,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
-    ramp_started: u16,
+    /// While the output rises after a recovery.
+    ramp_started: Option<NonZeroU16>,
     ramp_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
     refused_targets: u16,
@@ -59,12 +61,10 @@ pub(super) struct Slot {
     homing: Homing,
     good_frames: u8,
     generation: u8,
-    is_ramping: bool,
     error_code: u8,
-    /// Below this temperature byte and this command the motor need not be looked at closely; 0 unless all was well when it
-    /// was looked at last, and nothing has begun since.
+    /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
+    /// well when it was looked at last, and nothing has begun since.
     cool_below: u8,
-    calm_word: u16,
     saturated: u16,
     pub(super) conditions: Latch,
     health: &'static HealthConfig,
@@ -98,7 +98,7 @@ impl Slot {
         range: Range::ZERO,
         full_limit: 0,
         ramp_ms: None,
-        ramp_started: 0,
+        ramp_started: None,
         ambiguous_gaps: 0,
         refused_targets: 0,
         forgotten_targets: 0,
@@ -109,7 +109,6 @@ impl Slot {
         good_frames: 0,
         homing: Homing::Relative,
         arming: Arming::Disarmed,
-        is_ramping: false,
         error_code: 0,
         cool_below: 0,
         calm_word: 0,
