@@ -6,7 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest, Recovery, TargetError, Timeouts};
+use drivetrain::motor::{CanDevice, Ingest, Link, Recovery, TargetError, Timeouts};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
@@ -306,4 +306,164 @@ fn frames_are_conserved_through_refusals_and_evictions() {
     let counters = bus.counters();
     let waiting = u32::try_from(sent(&mut bus).len()).unwrap();
     assert_eq!(counters.packed + evicted, taken + counters.superseded + waiting);
+}
+
+/// After it a stamp of 32 bits is the same again.
+const WRAP_US: u64 = 1 << 32;
+
+fn stays_at_rest(bus: &mut Bus, motor: Handle<M3508>, micros: u64) {
+    assert!(bus.arm(us(micros)).is_err(), "armed by feedback of long ago");
+    assert!(bus.arm_only(&[motor.erase()], us(micros)).is_err(), "armed alone");
+    bus.engage(us(micros));
+    assert!(bus.set_raw(motor, 5_000).is_err(), "takes targets");
+    step(bus, micros);
+    assert!(sent(bus).iter().all(|frame| frame.1 == [0; 4]), "driven");
+}
+
+/// Pauses after which the stamps look fresh: as they were, and as far as a stamp may lie before and ahead.
+const PAUSES_US: [u64; 5] = [WRAP_US - 9_999, WRAP_US - 1, WRAP_US, WRAP_US + 1, WRAP_US + 9_999];
+
+#[test]
+fn a_first_update_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
+    for pause in PAUSES_US {
+        let mut bus = Bus::new();
+        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), 1_000);
+        stays_at_rest(&mut bus, motor, 1_000 + pause);
+
+        let (mut bus, motor) = armed(Config::new(1));
+        bus.set_raw(motor, 5_000).unwrap();
+        step(&mut bus, 1_000 + pause);
+        assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "{pause}");
+        stays_at_rest(&mut bus, motor, 10_999 + pause);
+    }
+}
+
+#[test]
+fn a_frame_that_ends_a_pause_before_the_first_update_is_the_first_of_a_motor_that_was_lost() {
+    for pause in PAUSES_US {
+        let (mut bus, motor) = armed(Config::new(1));
+        bus.set_raw(motor, 5_000).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), 1_000 + pause);
+        assert_eq!(bus.link(motor), Some(Link::Recovering), "{pause}");
+        stays_at_rest(&mut bus, motor, 1_000 + pause);
+    }
+}
+
+#[test]
+fn a_motor_that_joins_before_the_first_update_neither_hides_nor_shares_the_pause_of_another() {
+    for pause in PAUSES_US {
+        let mut bus = Bus::new();
+        let [old, young] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), 10_000);
+        // At once after the pause, and all the time.
+        for heard in [1, 100] {
+            let end = 10_000 + pause;
+            (1..=heard).for_each(|n| hear(&mut bus, feedback(0x202, 0, 0), end * n / heard));
+            for good in 1..10 {
+                hear(&mut bus, feedback(0x202, 0, 0), end + good);
+            }
+            bus.engage(us(end + 9));
+            assert!(bus.set_raw(old, 5_000).is_err());
+            bus.set_raw(young, 5_000).unwrap();
+            step(&mut bus, end + 1_000);
+            assert_eq!(sent(&mut bus), [(0x200, [0, 5_000, 0, 0])], "{pause} {heard}");
+
+            bus = Bus::new();
+            _ = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+            hear(&mut bus, feedback(0x201, 0, 0), 10_000);
+        }
+    }
+}
+
+#[test]
+fn a_target_of_long_ago_drives_no_motor_at_the_first_update() {
+    for pause in PAUSES_US {
+        let (mut bus, motor) = armed(Config::new(1));
+        bus.set_raw(motor, 5_000).unwrap();
+        for n in 1..=100 {
+            hear(&mut bus, feedback(0x201, 0, 0), 1_000 + pause * n / 100);
+        }
+        step(&mut bus, 1_000 + pause);
+        assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "{pause}");
+    }
+}
+
+#[test]
+fn an_update_without_a_step_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
+    for pause in PAUSES_US {
+        for dt_s in [f32::NAN, 0.0, -0.001] {
+            let (mut bus, motor) = armed(Config::new(1));
+            step(&mut bus, 1_500);
+            bus.set_raw(motor, 5_000).unwrap();
+            bus.update(Tick::new(us(1_000 + pause), dt_s));
+            stays_at_rest(&mut bus, motor, 1_500 + pause);
+
+            let (mut bus, motor) = armed(Config::new(1));
+            bus.set_raw(motor, 5_000).unwrap();
+            bus.update(Tick::new(us(1_000 + pause), dt_s));
+            stays_at_rest(&mut bus, motor, 1_500 + pause);
+        }
+    }
+}
+
+#[test]
+fn updates_without_a_step_are_one_pause_however_many() {
+    for updated in [true, false] {
+        let (mut bus, motor) = armed(Config::new(1));
+        if updated {
+            step(&mut bus, 1_500);
+        }
+        bus.set_raw(motor, 5_000).unwrap();
+        for held in 1..=100 {
+            bus.update(Tick::new(us(1_000 + held * WRAP_US / 100), 0.0));
+        }
+        stays_at_rest(&mut bus, motor, 1_500 + WRAP_US);
+    }
+}
+
+#[test]
+fn a_stamp_that_wraps_before_the_first_update_is_no_pause() {
+    // From the last frame to the first update the stamps wrap, exactly between them and by some.
+    for (before, after) in [(1, 0), (1, 1), (0, 1), (1_000, 1_000), (9_999, 0), (0, 9_999)] {
+        for frames in 1..20 {
+            let mut bus = Bus::new();
+            let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+            for n in (0..frames).rev() {
+                hear(&mut bus, feedback(0x201, 0, 0), WRAP_US - before - n * 1_000);
+            }
+            bus.arm(us(WRAP_US + after)).unwrap();
+            bus.set_raw(motor, 77).unwrap();
+            step(&mut bus, WRAP_US + after);
+            assert_eq!(sent(&mut bus), [(0x200, [77, 0, 0, 0])], "{before} {after} {frames}");
+            assert_eq!(bus.link(motor), Some(Link::Online));
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_is_late_already_at_the_first_frame_is_no_pause() {
+    for bad_update_first in [true, false] {
+        let mut bus = Bus::new();
+        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        if bad_update_first {
+            bus.update(Tick::new(us(WRAP_US - 500), 0.0));
+        }
+        hear(&mut bus, feedback(0x201, 0, 0), WRAP_US);
+        bus.arm(us(WRAP_US)).unwrap();
+        bus.set_raw(motor, 77).unwrap();
+        step(&mut bus, WRAP_US);
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [77, 0, 0, 0])));
+    }
+}
+
+#[test]
+fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one() {
+    for (pause, link) in [(60_000_000, Link::Online), (60_000_001, Link::Offline)] {
+        let (mut bus, motor) = armed(Config::new(1));
+        step(&mut bus, 1_500);
+        hear(&mut bus, feedback(0x201, 0, 0), 1_500 + pause - 1);
+        step(&mut bus, 1_500 + pause);
+        assert_eq!(bus.link(motor), Some(link), "{pause}");
+    }
 }

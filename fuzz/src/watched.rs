@@ -31,8 +31,6 @@ pub struct Watched {
     /// The time that new targets get.
     now: u64,
     updated: Option<u64>,
-    /// The time of the earliest frame.
-    first_heard: Option<u64>,
     held: u32,
     stopped: bool,
     /// Frames by what became of them.
@@ -64,7 +62,6 @@ impl Watched {
             alone: core::array::from_fn(Alone::new),
             now: 0,
             updated: None,
-            first_heard: None,
             held: 0,
             stopped: false,
             malformed: 0,
@@ -257,21 +254,6 @@ impl Watched {
         }
     }
 
-    /// A first update long after the first frame of any motor: all are lost, also those that were heard just now. A motor
-    /// alone counts from its own first frame.
-    fn start_late(&mut self, now: u64) {
-        let first = self.first_heard.unwrap_or(now);
-        if self.updated.is_some() || now.saturating_sub(first) <= 60_000_000 {
-            return;
-        }
-        for index in 0..COUNT {
-            let Some(motor) = self.motors[index] else { continue };
-            assert_ne!(self.bus.link(motor.handle()), Some(Link::Online), "F30: {index}");
-            self.plug(index);
-            self.plug(index);
-        }
-    }
-
     /// What is known of each motor does not depend on the others.
     fn compare(&self) {
         for (motor, alone) in self.motors.iter().zip(&self.alone) {
@@ -356,8 +338,6 @@ impl CanDevice for Watched {
                 let alone = &mut self.alone[owner];
                 assert_eq!(alone.bus.ingest(frame, now), Ingest::Taken, "I8");
                 alone.heard = Some(now.as_micros());
-                let heard = now.as_micros();
-                self.first_heard = Some(self.first_heard.map_or(heard, |first| first.min(heard)));
             }
             (Verdict::Malformed, _) => self.malformed += 1,
             (Verdict::Unattached, _) => self.unattached += 1,
@@ -372,7 +352,6 @@ impl CanDevice for Watched {
         let holds = stands || TimeStep::new(tick.dt_s(), 0.02).is_hold();
         self.bus.update(tick);
         self.each_alone(|alone| alone.update(tick));
-        self.start_late(now);
         self.updated = Some(now);
         self.now = now;
         self.held = if holds { self.held + 1 } else { 0 };

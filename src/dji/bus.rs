@@ -21,8 +21,9 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
 
-/// Stamps of 32 bits cannot tell how long ago a frame was heard when there was no update for longer than this.
-pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
+pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
+pub(super) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -61,7 +62,7 @@ pub struct Bus<B = ()> {
     pub(super) now: u32,
     pub(super) timeouts: Timeouts,
     pub(super) budget: Budget,
-    /// The time of the last update.
+    /// The time of the last update; before the first one, that of the last frame of a motor.
     pub(super) updated: Instant,
     /// Until then no age exceeds its limit and no frame is due, unless something [disturbs](Self::disturb) that.
     pub(super) quiet_until: Instant,
@@ -83,7 +84,7 @@ pub struct Bus<B = ()> {
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3776);
+const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3720);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -183,7 +184,8 @@ impl<B> Bus<B> {
         self
     }
 
-    /// Takes a received frame that arrived at `now`. Constant time.
+    /// Takes a received frame that arrived at `now`. Constant time, once the updates run; before the first one each frame
+    /// also looks how old all feedback is.
     ///
     /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
     /// [`Timeouts::late`] counts as late: not at once, but within twice that time.
@@ -222,9 +224,11 @@ impl<B> Bus<B> {
         }
         self.check_one_slot();
         let step = self.step;
-        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
-            let raw = slot.update(&step);
+        let mut rest = self.slots.get_mut(..usize::from(self.used)).unwrap_or_default();
+        while let [slot, others @ ..] = rest {
+            let raw = slot.update(&step, &self.step);
             self.outbox.put(slot.place, raw);
+            rest = others;
         }
         self.outbox.finish_update();
     }

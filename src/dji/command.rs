@@ -68,11 +68,12 @@ pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     saturate((halves >> 1) + (halves & !(halves >> 31) & 1), Range::within(limit))
 }
 
+/// From 2^23 to 2^24 floats are the whole numbers: a sum with this is rounded, and its last bits count from here.
+const WHOLE: f32 = 1.5 * 8_388_608.0;
+
 /// As [`to_raw`], for what a loop gives in every update: half a count goes to the even neighbour.
 #[inline]
 pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
-    // From 2^23 to 2^24 floats are the whole numbers: this sum is rounded, and its last bits count from here.
-    const WHOLE: f32 = 1.5 * 8_388_608.0;
     let sum = value * raw_per_unit + WHOLE;
     let raw = sum.to_bits().wrapping_sub(WHOLE.to_bits()).cast_signed();
     if !range.contains(raw) {
@@ -81,6 +82,16 @@ pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> 
     #[expect(clippy::cast_possible_truncation, reason = "within the range")]
     let raw = raw as i16;
     raw
+}
+
+/// As [`loop_to_raw`], for an output that is within the motor's limit and so within 16 bits.
+#[inline]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "within 16 bits, and the last bits count from zero"
+)]
+pub(super) const fn free_to_raw(value: f32, raw_per_unit: f32) -> i16 {
+    (value * raw_per_unit + WHOLE).to_bits() as i16
 }
 
 /// Out of the line of [`loop_to_raw`]: also for what is no number, or too large for its sum.
@@ -118,28 +129,49 @@ fn ones(frames: u8) -> u32 {
 }
 
 /// Where a motor's word stands: one of four slots in one of five frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Place(u8);
+// The compiler knows how large one can be, so that it is an index without a question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+#[rustfmt::skip]
+pub(super) enum Place {
+    X200At0, X200At1, X200At2, X200At3,
+    X1FFAt0, X1FFAt1, X1FFAt2, X1FFAt3,
+    X2FFAt0, X2FFAt1, X2FFAt2, X2FFAt3,
+    X1FEAt0, X1FEAt1, X1FEAt2, X1FEAt3,
+    X2FEAt0, X2FEAt1, X2FEAt2, X2FEAt3,
+    /// In no frame: what is put there is never sent.
+    Nowhere,
+}
 
 impl Place {
+    #[rustfmt::skip]
     pub(super) const fn new(frame: CommandFrame, slot: u8) -> Self {
-        Self((frame as u8) << 2 | (slot & 3))
+        let [a, b, c, d] = match frame {
+            CommandFrame::X200 => [Self::X200At0, Self::X200At1, Self::X200At2, Self::X200At3],
+            CommandFrame::X1FF => [Self::X1FFAt0, Self::X1FFAt1, Self::X1FFAt2, Self::X1FFAt3],
+            CommandFrame::X2FF => [Self::X2FFAt0, Self::X2FFAt1, Self::X2FFAt2, Self::X2FFAt3],
+            CommandFrame::X1FE => [Self::X1FEAt0, Self::X1FEAt1, Self::X1FEAt2, Self::X1FEAt3],
+            CommandFrame::X2FE => [Self::X2FEAt0, Self::X2FEAt1, Self::X2FEAt2, Self::X2FEAt3],
+        };
+        match slot & 3 {
+            0 => a,
+            1 => b,
+            2 => c,
+            _ => d,
+        }
     }
 
-    /// Stands in no frame: what is put there is never sent.
-    pub(super) const NOWHERE: Self = Self(31);
-
     pub(super) const fn same_as(self, other: Self) -> bool {
-        self.0 == other.0
+        self as u8 == other as u8
     }
 
     pub(super) const fn slot(self) -> u8 {
-        self.0 & 3
+        self as u8 & 3
     }
 
     pub(super) const fn frame(self) -> CommandFrame {
         let [x200, x1ff, x2ff, x1fe, x2fe] = CommandFrame::ALL;
-        match self.0 >> 2 {
+        match self as u8 >> 2 {
             0 => x200,
             1 => x1ff,
             2 => x2ff,
@@ -151,7 +183,7 @@ impl Place {
 
 /// The command words, each with its low byte first, aligned to be read as 32-bit words.
 ///
-/// The rows above the five frames are nobody's: they let five bits of a [`Place`] be an index.
+/// The rows above the five frames are nobody's: there is [`Place::Nowhere`], and three bits are an index.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(4))]
 struct Words([[[u8; 2]; 4]; 8]);
@@ -172,8 +204,10 @@ pub(super) struct Outbox {
     /// Had a word that was not zero in the last update, or has to be sent with the next one all the same.
     active: u8,
     dirty: u8,
-    /// The frames after the one that was sent last.
+    /// The frames that come before the others, because their turn is next; 0 when all were taken.
     ahead: u8,
+    /// A frame was refused or evicted since the last update.
+    came_back: bool,
     keep_alive_us: u32,
     kept_alive: u32,
     pub(super) packed: u32,
@@ -189,6 +223,7 @@ impl Outbox {
             active: 0,
             dirty: 0,
             ahead: 0,
+            came_back: false,
             keep_alive_us: 10_000,
             kept_alive: 0,
             packed: 0,
@@ -225,7 +260,7 @@ impl Outbox {
 
     #[inline]
     pub(super) fn put(&mut self, place: Place, raw: i16) {
-        if let Some(word) = self.words.0.as_flattened_mut().get_mut(usize::from(place.0 & 31)) {
+        if let Some(word) = self.words.0.as_flattened_mut().get_mut(place as usize) {
             *word = raw.to_le_bytes();
         }
     }
@@ -233,7 +268,7 @@ impl Outbox {
     /// Returns the word that a motor was given last.
     #[inline]
     pub(super) fn get(&self, place: Place) -> i16 {
-        let word = self.words.0.as_flattened().get(usize::from(place.0 & 31));
+        let word = self.words.0.as_flattened().get(place as usize);
         word.map_or(0, |word| i16::from_le_bytes(*word))
     }
 
@@ -279,30 +314,57 @@ impl Outbox {
     #[inline]
     fn mark(&mut self, frames: u8) {
         self.packed = self.packed.wrapping_add(ones(frames));
-        if frames & self.dirty != 0 {
-            self.superseded = self.superseded.wrapping_add(ones(frames & self.dirty));
+        if self.dirty | self.ahead != 0 {
+            self.keep_turns(frames);
         }
         self.dirty |= frames;
     }
 
-    /// Takes the next waiting frame; each search starts after the frame that was sent last.
+    /// Frames still wait, or one came back: there are turns to be kept until all were taken, so that none starves.
+    #[cold]
+    #[inline(never)]
+    fn keep_turns(&mut self, frames: u8) {
+        self.superseded = self.superseded.wrapping_add(ones(frames & self.dirty));
+        let came_back = core::mem::take(&mut self.came_back);
+        if self.dirty == 0 && !came_back {
+            self.ahead = 0;
+        } else if self.ahead == 0 {
+            self.ahead = self.dirty | self.dirty.wrapping_neg();
+        }
+    }
+
+    /// Takes the next waiting frame: in the order of their index as long as each update finds that all were taken, and
+    /// otherwise in turns.
     #[inline]
     pub(super) fn next(&mut self) -> Option<CanFrame> {
         let waiting = self.dirty;
         if waiting == 0 {
             return None;
         }
-        let ahead = waiting & self.ahead;
-        let index = if ahead == 0 { waiting } else { ahead }.trailing_zeros() & 7;
-        let bit = 1_u8 << index;
-        self.dirty = waiting & !bit;
-        self.ahead = (bit << 1).wrapping_neg();
+        let index = if self.ahead == 0 {
+            self.dirty = waiting & (waiting - 1);
+            waiting.trailing_zeros() & 7
+        } else {
+            self.next_in_turn()
+        };
         let (id, words) =
             (*CommandFrame::IDS.get(index as usize)?, self.words.0.get(index as usize)?);
         let [[a, b], [c, d], [e, f], [g, h]] = *words;
         let [a, b, c, d] = swapped([a, b, c, d]);
         let [e, f, g, h] = swapped([e, f, g, h]);
         CanFrame::standard(id, [a, b, c, d, e, f, g, h])
+    }
+
+    /// Takes the next waiting frame after the one before off the list, and returns its index.
+    #[cold]
+    #[inline(never)]
+    fn next_in_turn(&mut self) -> u32 {
+        let ahead = self.dirty & self.ahead;
+        let index = if ahead == 0 { self.dirty } else { ahead }.trailing_zeros() & 7;
+        let bit = 1_u8 << index;
+        self.dirty &= !bit;
+        self.ahead = (bit << 1).wrapping_neg();
+        index
     }
 
     /// Takes back a frame that was refused or evicted. It waits for the next update, which replaces its words, so that
@@ -313,6 +375,7 @@ impl Outbox {
                 self.active |= frame.bit();
                 self.superseded = self.superseded.wrapping_add(1);
                 self.ahead = frame.bit().wrapping_neg();
+                self.came_back = true;
                 true
             }
             _ => false,
@@ -371,6 +434,28 @@ mod tests {
         assert_eq!(ids(&mut outbox), [0x1FF, 0x2FE, 0x200]);
         assert!(!outbox.requeue(0x1FE), "not ours");
         assert!(!outbox.requeue(0x8000_0200), "extended");
+    }
+
+    #[test]
+    fn where_only_some_frames_are_taken_in_each_update_all_have_their_turn() {
+        let frames = [CommandFrame::X200, CommandFrame::X1FF, CommandFrame::X2FE];
+        for (taken, refused) in [(1, 0), (2, 0), (1, 1), (2, 1)] {
+            let mut outbox = outbox(&frames);
+            let mut sent = Vec::new();
+            for round in 1..=30 {
+                frames.iter().for_each(|frame| outbox.put(Place::new(*frame, 0), round));
+                outbox.finish_update();
+                sent.extend((0..taken).filter_map(|_| outbox.next()).map(|frame| frame.header()));
+                for _ in 0..refused {
+                    let frame = outbox.next().unwrap();
+                    assert!(outbox.requeue(frame.header()));
+                }
+            }
+            for frame in frames {
+                let of = sent.iter().filter(|id| **id == u32::from(frame.id())).count();
+                assert_eq!(of, 10 * taken, "{frame:?} of {taken} and {refused}");
+            }
+        }
     }
 
     #[test]

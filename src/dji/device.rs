@@ -64,7 +64,8 @@ impl<B> CanDevice for Bus<B> {
 
     fn engage(&mut self, now: Instant) {
         if !self.stopped {
-            self.begin(now);
+            self.now = now.stamp();
+            self.disturb();
             for motor in 0..self.used {
                 self.engage_slot(motor, now);
             }
@@ -142,7 +143,8 @@ impl<B> Bus<B> {
         if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
             return Err(ArmError::Faulty(faulty));
         }
-        self.begin(now);
+        self.now = now.stamp();
+        self.disturb();
         for motor in motors {
             if self.slot(*motor).is_some() {
                 self.engage_slot(motor.key().place(), now);
@@ -151,21 +153,16 @@ impl<B> Bus<B> {
         Ok(())
     }
 
-    /// Tells whether a motor has no fresh feedback, also after a pause that its stamp does not tell.
+    /// Tells whether a motor has no fresh feedback, as far as its stamp tells.
     fn misses(&self, slot: &Slot, now: Instant) -> bool {
         now > self.updated + LONGEST_PAUSE || slot.is_missing(now.stamp(), &self.timeouts)
     }
 
-    /// Targets may come from now on, with this time until the next update.
-    fn begin(&mut self, now: Instant) {
-        self.now = now.stamp();
-        if !self.running {
-            self.updated = self.updated.min(now);
-        }
-        self.disturb();
-    }
-
     fn engage_slot(&mut self, motor: u8, now: Instant) {
+        let slot = self.slots.get(usize::from(motor));
+        if slot.is_none_or(|slot| self.misses(slot, now)) {
+            return;
+        }
         let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
         let before = slot.conditions;
         slot.engage(now.stamp(), &self.timeouts);

@@ -107,6 +107,12 @@ impl Feedback {
         temperature
     }
 
+    /// Returns bytes 7 and 6: as large as the temperature, or larger than any when there is an error.
+    #[inline]
+    pub(super) const fn error_and_temperature(self) -> u32 {
+        self.condition.swap_bytes() >> 16
+    }
+
     /// Returns byte 7: the error code; see [`ErrorCode`].
     #[must_use]
     pub const fn error(self) -> u8 {

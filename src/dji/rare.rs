@@ -31,12 +31,13 @@ impl<B> Bus<B> {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };
-        if !self.running && (self.updated == Instant::START || now < self.updated) {
-            // Until the first update, the pause is counted from the earliest frame.
-            self.updated = now;
+        if !self.running {
+            let before = core::mem::replace(&mut self.updated, now);
+            self.forget_bygones(before);
         }
+        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let before = slot.conditions;
-        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts);
+        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts, self.running);
         self.journal.note(motor, &before, &slot.conditions, now);
         self.disturb();
         Ingest::Taken
@@ -50,7 +51,9 @@ impl<B> Bus<B> {
         if self.running && self.updated <= before {
             return false;
         }
-        self.end_pause(before);
+        if !self.running || self.updated > before + LONGEST_PAUSE {
+            self.forget_bygones(before);
+        }
         self.running = true;
         self.held_steps = 0;
         let keep_alive_us = self.outbox.keep_alive(self.now);
@@ -86,15 +89,17 @@ impl<B> Bus<B> {
         }
     }
 
-    /// Takes every motor for lost, after a pause too long for stamps of 32 bits.
-    fn end_pause(&mut self, before: Instant) {
-        if self.updated <= before + LONGEST_PAUSE {
-            return;
-        }
+    /// Gives up what is too old for a stamp of 32 bits to tell how old it is, and everything after a pause, of which no
+    /// stamp tells how long it was. Whatever makes time pass without looking at ages has to ask for this.
+    #[cold]
+    #[inline(never)]
+    fn forget_bygones(&mut self, before: Instant) {
+        let now = self.updated;
+        let is_pause = now > before + LONGEST_PAUSE;
         for (motor, slot) in (0..).zip(&mut self.slots) {
             let before = slot.conditions;
-            slot.lose();
-            self.journal.note(motor, &before, &slot.conditions, self.updated);
+            slot.forget_bygones(now.stamp(), is_pause);
+            self.journal.note(motor, &before, &slot.conditions, now);
         }
     }
 
@@ -102,15 +107,12 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
-        self.end_pause(before);
+        self.forget_bygones(before);
+        self.running = true;
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
-        // Nobody looks at ages here: many of these in a row are one pause.
-        if core::mem::replace(&mut self.running, true) {
-            self.updated = self.updated.min(before);
-        }
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }

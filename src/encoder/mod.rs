@@ -26,7 +26,6 @@ pub use gap::Gap;
 pub use gear::{GearError, GearRatio};
 pub use position::{Homing, Position};
 pub use shaft::Shaft;
-pub(crate) use shaft::Turns;
 
 /// Counts in one rotor turn of a 13-bit encoder.
 pub const COUNTS_PER_TURN: u16 = 8192;

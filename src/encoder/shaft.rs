@@ -186,20 +186,34 @@ impl Shaft {
         }
     }
 
-    /// Returns the way to a located position in radians: exact near zero, saturated at 63 turns.
+    /// Returns the lower half of the turns of a located position; for one that is further away than 2^30 turns, of one
+    /// that is 2^30 turns away in that direction.
+    #[must_use]
+    pub(crate) const fn near(&self, turns: Turns) -> u32 {
+        const FAR: i64 = 1 << 30;
+        let here = self.turns.get();
+        let way = turns.get().saturating_sub(here);
+        if way > FAR {
+            self.turns.add(FAR).low()
+        } else if way < -FAR {
+            self.turns.add(-FAR).low()
+        } else {
+            turns.low()
+        }
+    }
+
+    /// Returns the way to a located position that was [near](Self::near), in radians: exact near zero, saturated at 63
+    /// turns.
     #[must_use]
     #[inline]
-    pub(crate) const fn way_to(&self, turns: Turns, phase: i32) -> f32 {
-        let whole = turns.get().wrapping_sub(self.turns.get());
-        #[expect(clippy::cast_possible_truncation, reason = "compared right after")]
-        let near = whole as i32;
-        let whole = if near as i64 == whole && near.wrapping_add(63).cast_unsigned() <= 126 {
-            near
-        } else {
-            far(whole)
-        };
-        let fine =
-            whole.wrapping_mul(self.fine_per_turn()).wrapping_add(phase.wrapping_sub(self.phase));
+    pub(crate) const fn way_to(&self, turns: u32, phase: i32) -> f32 {
+        let whole = turns.wrapping_sub(self.turns.low).cast_signed();
+        let mut fine = phase.wrapping_sub(self.phase);
+        if whole != 0 {
+            let within = whole.wrapping_add(63).cast_unsigned() <= 126;
+            let whole = if within { whole } else { far(whole) };
+            fine = fine.wrapping_add(whole.wrapping_mul(self.fine_per_turn()));
+        }
         fine as f32 * self.radians_per_fine
     }
 
@@ -223,7 +237,7 @@ impl Shaft {
 /// Returns 63 turns in the direction of `way`; seldom, and so out of the line of [`Shaft::way_to`].
 #[cold]
 #[inline(never)]
-const fn far(way: i64) -> i32 {
+const fn far(way: i32) -> i32 {
     if way < 0 { -63 } else { 63 }
 }
 
@@ -373,9 +387,14 @@ mod tests {
         for turns in [0, 1_000_000, 1_000_000_000_000] {
             shaft.set_position(Position::from_turns(turns));
             let (turns, phase) = shaft.locate(Position::new(turns, Angle::from_degrees(-1.0)));
-            assert!((shaft.way_to(turns, phase).to_degrees() + 1.0).abs() < 1e-4);
-            assert!((shaft.way_to(turns.add(-500), phase) + 63.0 * TAU).abs() < 7.0);
-            assert!((shaft.way_to(Turns::new(i64::MAX), phase).abs() - 63.0 * TAU).abs() < 7.0);
+            let way_to = |turns| shaft.way_to(shaft.near(turns), phase);
+            assert!((way_to(turns).to_degrees() + 1.0).abs() < 1e-4);
+            for far in [-64, -500, -(1 << 30), -(1 << 31), -(1 << 32), -(1 << 32) + 1] {
+                assert!((way_to(turns.add(far)) + 63.0 * TAU).abs() < 7.0, "{far}");
+                assert!((way_to(turns.add(-far)) - 63.0 * TAU).abs() < 7.0, "{far}");
+            }
+            assert!((way_to(Turns::new(i64::MAX)) - 63.0 * TAU).abs() < 7.0);
+            assert!((way_to(Turns::new(i64::MIN)) + 63.0 * TAU).abs() < 7.0);
         }
     }
 

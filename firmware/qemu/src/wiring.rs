@@ -37,7 +37,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Makes an armed bus whose motors stand at `turns`, heard for the first time at `now`.
+    /// Makes an armed bus whose motors stand at `turns`, heard for the first time at `now`; its loop runs.
     pub fn new(targets: Targets, turns: i64, now: Instant) -> Self {
         let speed = PidConfig::new(0.8, 4.0, 0.001);
         let position = PidConfig::new(10.0, 0.5, 0.01);
@@ -54,6 +54,9 @@ impl Drive {
             drive.bus.set_present_position(motor, Position::from_turns(turns)).unwrap();
         }
         drive.bus.arm(drive.now).unwrap();
+        drive.bus.update(Tick::new(drive.now, 0.001));
+        drive.advance();
+        drive.hear();
         drive
     }
 

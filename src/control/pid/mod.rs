@@ -4,6 +4,7 @@ mod config;
 mod cut;
 mod gate;
 mod incremental;
+mod plain;
 mod positional;
 mod settings;
 mod work;

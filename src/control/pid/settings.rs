@@ -10,7 +10,7 @@ pub(super) const CIRCLE: u16 = 1 << 5;
 pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
 pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 7;
 /// The options that the plain path does not know.
-const NOT_PLAIN: u16 = 0xFF;
+pub(super) const NOT_PLAIN: u16 = 0xFF;
 pub(super) const WIND_UP: u16 = 1 << 8;
 /// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
 pub(super) const REST_DERIVATIVE: u16 = 1 << 9;

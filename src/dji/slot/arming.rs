@@ -2,6 +2,7 @@ use super::{Slot, is_near};
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
 use crate::motor::{Condition, Link, Monitor, Timeouts};
+use core::num::NonZeroU16;
 
 /// Whether the motor takes targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +33,7 @@ impl Slot {
         self.conditions.set(Condition::Runaway, false);
         self.monitor = Monitor::NEW;
         self.arming = Arming::Armed;
-        self.is_ramping = false;
+        self.ramp_started = None;
         self.keep_inside(0);
         self.commanded = now;
     }
@@ -66,24 +67,24 @@ impl Slot {
         if self.arming == Arming::Latched && self.ramp_ms.is_some() {
             self.arming = Arming::Armed;
             self.range = Range::ZERO;
-            self.is_ramping = true;
-            self.ramp_started = coarse(self.heard);
+            self.settle();
+            self.attend();
+            // The last unit does not count: it tells that there is a ramp.
+            self.ramp_started = NonZeroU16::new(coarse(self.heard) | 1);
         }
     }
 
     /// Returns the share of the output that a ramp leaves.
     pub(super) fn ramp(&mut self, now: u32) -> f32 {
-        if !self.is_ramping {
-            return 1.0;
-        }
+        let Some(started) = self.ramp_started else { return 1.0 };
         // An interrupt may have stamped the frame just after the tick read its clock.
         const AHEAD: u16 = 64_500;
-        let elapsed = coarse(now).wrapping_sub(self.ramp_started);
+        let elapsed = coarse(now).wrapping_sub(started.get());
         let elapsed_ms = if elapsed < AHEAD { f32::from(elapsed) * 1.024 } else { 0.0 };
         match self.ramp_ms.map(|time| f32::from(time.get())) {
             Some(time_ms) if elapsed_ms < time_ms => elapsed_ms / time_ms,
             _ => {
-                self.is_ramping = false;
+                self.ramp_started = None;
                 1.0
             }
         }

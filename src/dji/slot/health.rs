@@ -14,7 +14,7 @@ use crate::units::Angle;
 const CLEAR_RAD: f32 = 0.01;
 
 /// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
-const CALM_CURRENT: u16 = 2_000;
+const CALM_CURRENT: i32 = 2_000;
 
 /// The temperature byte that stands for -40 °C.
 const FIRST_BELOW_ZERO: u8 = 216;
@@ -42,38 +42,48 @@ impl Slot {
     /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
     #[inline]
     pub(in crate::dji) fn is_well(&mut self, word: i16) -> bool {
-        let (feedback, driven) = (self.feedback, word.unsigned_abs());
+        let (feedback, driven) = (self.feedback, i32::from(word));
         let Some(facts) = self.facts else { return true };
-        let is_calm = driven < self.calm_word
-            && (feedback.current().unsigned_abs() < CALM_CURRENT || driven > self.calm_word / 4)
-            && feedback.rpm().unsigned_abs() <= facts.rotor_no_load_rpm();
-        is_calm
-            && self.conditions.active().is_empty()
-            && self.link == Link::Online
-            && !self.is_ramping
-            && feedback.error() | self.error_code == 0
-            && feedback.temperature() < self.cool_below
+        let (calm, fastest) = (i32::from(self.calm_word), i32::from(facts.rotor_no_load_rpm()));
+        feedback.error_and_temperature() < u32::from(self.cool_below)
+            && is_within(driven, calm)
+            && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
+            && is_within(feedback.rpm().into(), fastest)
             && self.monitor.glance(feedback.angle(), coarse(word))
     }
 
-    /// Returns below which command and which temperature a motor need not be looked at closely.
-    pub(super) const fn calm(facts: &Facts, health: &HealthConfig, full_limit: i16) -> (u16, u8) {
-        if health.soft_limits().is_some() {
-            return (0, 0);
-        }
+    /// Returns below which command a motor need not be looked at closely.
+    pub(super) const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
         // A stall, and half of the command for a runaway.
         let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
-        let word = to_raw(effort, full_limit as f32, full_limit).unsigned_abs();
-        let (warning, _) = temperatures(facts, health);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 216")]
-        let cool_below = if !facts.has_temperature || warning > FIRST_BELOW_ZERO as i16 {
-            FIRST_BELOW_ZERO
-        } else if warning < 0 {
-            0
-        } else {
-            warning as u8
-        };
-        (word, cool_below)
+        to_raw(effort, full_limit as f32, full_limit).unsigned_abs()
+    }
+
+    /// Something began: the motor is looked at closely until all is [well](Self::relent) again.
+    pub(super) const fn attend(&mut self) {
+        self.cool_below = 0;
+    }
+
+    /// From now on a glance is enough, if all is well.
+    #[inline(never)]
+    pub(super) fn relent(&mut self, facts: &Facts) {
+        let is_well = self.conditions.active().is_empty()
+            && self.link == Link::Online
+            && self.ramp_started.is_none()
+            && self.error_code == 0
+            && self.health.soft_limits().is_none();
+        if is_well {
+            let (warning, _) = temperatures(facts, self.health);
+            let known = u8::try_from(warning.max(0)).unwrap_or(FIRST_BELOW_ZERO);
+            self.cool_below =
+                if facts.has_temperature { known.min(FIRST_BELOW_ZERO) } else { FIRST_BELOW_ZERO };
+        }
+    }
+
+    /// A condition began that a look at the motor has to end, or is to see.
+    pub(super) const fn begin(&mut self, condition: Condition) {
+        self.conditions.set(condition, true);
+        self.attend();
     }
 
     /// Looks at everything that need not be looked at in every tick.
@@ -92,8 +102,11 @@ impl Slot {
         } else {
             self.monitor = Monitor::NEW;
         }
-        if !self.conditions.active().is_empty() {
+        if !self.conditions.active().is_empty() || self.error_code != 0 {
+            self.attend();
             self.react(before);
+        } else if self.cool_below == 0 {
+            self.relent(facts);
         }
     }
 
@@ -148,6 +161,7 @@ impl Slot {
         if negative_only {
             self.range = self.range.without_positive();
         }
+        self.settle();
     }
 
     /// Returns whether the shaft may turn up only, and whether down only.
@@ -215,7 +229,7 @@ impl Slot {
     pub(in crate::dji) fn hear_rival(&mut self) {
         if !self.health.ignores(Condition::SecondMaster) {
             let before = self.conditions.active();
-            self.conditions.set(Condition::SecondMaster, true);
+            self.begin(Condition::SecondMaster);
             self.react(before);
         }
     }
@@ -250,6 +264,11 @@ impl Slot {
 /// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).
 const fn mixed(one: u16, other: u16) -> u16 {
     one.wrapping_mul(0x9E37) ^ other.wrapping_mul(0x79B9)
+}
+
+/// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.
+const fn is_within(value: i32, limit: i32) -> bool {
+    (value + limit).cast_unsigned() < 2 * limit.cast_unsigned()
 }
 
 /// A command in units of 256.

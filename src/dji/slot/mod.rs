@@ -23,7 +23,7 @@ use arming::Arming;
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
 pub(super) use health::Look;
-use target::{Action, Goal};
+use target::{Action, Duty, Goal};
 pub(super) use update::Ages;
 
 #[derive(Debug, Clone, Copy)]
@@ -37,20 +37,22 @@ pub(super) struct Slot {
     shaft: Shaft,
     rad_per_s_per_rpm: f32,
     /// What an update does: what is asked for, or nothing while the feedback is late.
-    action: Action,
+    duty: Duty,
     asked: Action,
     pub(super) place: Place,
     link: Link,
     /// What is left of the full limit.
     range: Range,
     full_limit: i16,
+    calm_word: u16,
     raw_per_unit: f32,
     goal: Goal,
     commanded: u32,
     loops: Cascade,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
-    ramp_started: u16,
+    /// While the output rises after a recovery.
+    ramp_started: Option<NonZeroU16>,
     ramp_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
     refused_targets: u16,
@@ -59,11 +61,10 @@ pub(super) struct Slot {
     homing: Homing,
     good_frames: u8,
     generation: u8,
-    is_ramping: bool,
     error_code: u8,
-    /// Below this temperature byte and this command the motor need not be looked at closely.
+    /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
+    /// well when it was looked at last, and nothing has begun since.
     cool_below: u8,
-    calm_word: u16,
     saturated: u16,
     pub(super) conditions: Latch,
     health: &'static HealthConfig,
@@ -83,7 +84,7 @@ const NO_LOOPS: Cascade = match Cascade::new(NO_LOOP, NO_LOOP) {
 impl Slot {
     pub(super) const FREE: Self = Self {
         facts: None,
-        action: Action::Rest,
+        duty: Duty::Rest,
         asked: Action::Rest,
         goal: Goal::NONE,
         shaft: Shaft::new(GearRatio::DIRECT, false),
@@ -97,18 +98,17 @@ impl Slot {
         range: Range::ZERO,
         full_limit: 0,
         ramp_ms: None,
-        ramp_started: 0,
+        ramp_started: None,
         ambiguous_gaps: 0,
         refused_targets: 0,
         forgotten_targets: 0,
         loops: NO_LOOPS,
         generation: 0,
-        place: Place::NOWHERE,
+        place: Place::Nowhere,
         link: Link::Unheard,
         good_frames: 0,
         homing: Homing::Relative,
         arming: Arming::Disarmed,
-        is_ramping: false,
         error_code: 0,
         cool_below: 0,
         calm_word: 0,
@@ -163,7 +163,6 @@ impl Slot {
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));
         }
-        let (calm_word, cool_below) = Self::calm(facts, config.health, limit_raw);
         let direct = config.gear.rotor() == config.gear.output();
         Ok(Self {
             facts: Some(facts),
@@ -178,8 +177,7 @@ impl Slot {
             generation,
             place,
             health: config.health,
-            calm_word,
-            cool_below,
+            calm_word: Self::calm_word(config.health, limit_raw),
             homing: if direct { Homing::Absolute } else { Homing::Relative },
             ..Self::FREE
         })

@@ -1,5 +1,6 @@
 use super::target::Action;
 use super::{Slot, age, is_near};
+use crate::dji::bus::LONGEST_PAUSE_US;
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
 use crate::motor::{Condition, Link, Timeouts};
@@ -26,6 +27,7 @@ impl Slot {
         feedback: Feedback,
         now: u32,
         timeouts: &Timeouts,
+        running: bool,
     ) {
         if self.link != Link::Unheard {
             self.traffic.gap(age(now, self.heard));
@@ -37,7 +39,12 @@ impl Slot {
                 self.set_online(facts);
             }
             Link::Online | Link::Late => {
-                self.follow(facts, feedback, age(now, self.heard));
+                let in_time = now.wrapping_sub(self.heard) < trusted_gap_us(facts);
+                if in_time && !running {
+                    self.move_shortest(feedback);
+                } else {
+                    self.follow(facts, feedback, age(now, self.heard));
+                }
                 self.set_online(facts);
             }
             Link::Offline => {
@@ -56,6 +63,10 @@ impl Slot {
         }
         self.feedback = feedback;
         self.heard = now;
+        if !running {
+            // Nobody looks at ages yet, so every frame has to: it comes this way.
+            self.trusted_gap_us = 0;
+        }
     }
 
     /// Follows the angle of a motor that was heard `gap_us` ago.
@@ -91,7 +102,7 @@ impl Slot {
         self.traffic.compare(counts, predicted as i32, tolerance as i32);
         if self.traffic.is_double() && !self.health.ignores(Condition::DuplicateId) {
             let before = self.conditions.active();
-            self.conditions.set(Condition::DuplicateId, true);
+            self.begin(Condition::DuplicateId);
             self.react(before);
         }
     }
@@ -103,7 +114,7 @@ impl Slot {
 
     fn doubt_position(&mut self) {
         self.ambiguous_gaps = self.ambiguous_gaps.saturating_add(1);
-        self.conditions.set(Condition::PositionUncertain, true);
+        self.begin(Condition::PositionUncertain);
         if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
@@ -118,34 +129,38 @@ impl Slot {
 
     fn set_online(&mut self, facts: &Facts) {
         self.link = Link::Online;
-        self.action = self.asked;
         self.trusted_gap_us = if self.traffic.is_crowded() { 0 } else { trusted_gap_us(facts) };
         self.conditions.set(Condition::Late, false);
         self.conditions.set(Condition::Offline, false);
+        self.relent(facts);
+        self.settle();
     }
 
     /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
     pub(super) fn set_late(&mut self) {
         self.link = Link::Late;
-        self.conditions.set(Condition::Late, true);
-        self.action = Action::Rest;
+        self.begin(Condition::Late);
         self.trusted_gap_us = 0;
         self.loops.interrupt();
+        self.settle();
     }
 
-    /// Nobody knows any more when the motor was heard.
-    #[inline(never)]
-    pub(in crate::dji) fn lose(&mut self) {
-        if self.link != Link::Unheard {
+    /// Gives up what nobody knows any more how old it is: after a pause everything, otherwise what is so old that nobody
+    /// will know.
+    pub(in crate::dji) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
+        let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
+        if self.link != Link::Unheard && is_bygone(self.heard) {
             self.set_offline();
+        } else if self.asked != Action::Rest && is_bygone(self.commanded) {
+            self.forget_target();
         }
     }
 
     /// The motor is lost: relaxed, and latched until it is armed again or ramps back.
     pub(super) fn set_offline(&mut self) {
         self.link = Link::Offline;
-        self.conditions.set(Condition::Late, true);
-        self.conditions.set(Condition::Offline, true);
+        self.begin(Condition::Late);
+        self.begin(Condition::Offline);
         self.trusted_gap_us = 0;
         self.latch();
         self.relax();

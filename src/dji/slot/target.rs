@@ -3,10 +3,11 @@ use super::{Slot, is_loop};
 use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
 use crate::dji::command::to_raw;
-use crate::encoder::{Position, Turns};
+use crate::dji::range::Range;
+use crate::encoder::Position;
 use crate::motor::{Link, TargetError};
 
-/// What a motor does in an update.
+/// What a motor is asked to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Action {
@@ -27,11 +28,26 @@ impl Action {
     }
 }
 
+/// What an update does: the action, where that is as simple as it nearly always is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Duty {
+    Rest,
+    Raw,
+    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
+    Velocity,
+    /// Both loops, as above.
+    Position,
+    /// Whatever else is asked for, within what is left of the output.
+    Other,
+}
+
 /// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Goal {
-    turns: Turns,
-    /// Raw command, bits of the rad/s, or phase of the shaft.
+    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
+    turns: u32,
+    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
     value: i32,
 }
 
@@ -39,7 +55,7 @@ impl Goal {
     pub(super) const NONE: Self = Self::of(0);
 
     const fn of(value: i32) -> Self {
-        Self { turns: Turns::new(0), value }
+        Self { turns: 0, value }
     }
 
     pub(super) const fn raw(&self) -> i32 {
@@ -54,14 +70,13 @@ impl Goal {
         self.value
     }
 
-    pub(super) const fn turns(&self) -> Turns {
+    pub(super) const fn turns(&self) -> u32 {
         self.turns
     }
 
     /// A way in rad, and the rate in rad/s that goes with it.
     pub(super) const fn measured(way: f32, rad_per_s: f32) -> Self {
-        let rate = Turns::new(rad_per_s.to_bits() as i64);
-        Self { turns: rate, value: way.to_bits().cast_signed() }
+        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
     }
 
     pub(super) const fn way(&self) -> f32 {
@@ -69,7 +84,7 @@ impl Goal {
     }
 
     pub(super) const fn rate(&self) -> f32 {
-        f32::from_bits(self.turns.low())
+        f32::from_bits(self.turns)
     }
 }
 
@@ -137,21 +152,26 @@ impl Slot {
         needs(self.loops.position())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         self.enter_position_loop();
-        self.start(Action::Position, Goal { turns, value: phase }, now);
+        let goal = Goal { turns: self.shaft.near(turns), value: phase };
+        self.start(Action::Position, goal, now);
         Ok(())
     }
 
     /// Changes the gains of the speed loop without a jump of its output.
     pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
-        replace(self.loops.speed_mut(), config, limit)
+        let replaced = replace(self.loops.speed_mut(), config, limit);
+        self.settle();
+        replaced
     }
 
     /// Changes the gains of the position loop without a jump of its output.
     pub(in crate::dji) fn set_position_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
         let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = super::no_load_velocity(facts, self.rad_per_s_per_rpm);
-        replace(self.loops.position_mut(), config, limit)
+        let replaced = replace(self.loops.position_mut(), config, limit);
+        self.settle();
+        replaced
     }
 
     /// A value that cannot be followed takes the target before it away: zero output, integrators untouched. An older
@@ -179,10 +199,25 @@ impl Slot {
         self.commanded = now;
     }
 
-    const fn ask(&mut self, action: Action, goal: Goal) {
-        self.asked = action;
-        self.action = action;
+    fn ask(&mut self, action: Action, goal: Goal) {
         self.goal = goal;
+        if self.asked != action {
+            self.asked = action;
+            self.settle();
+        }
+    }
+
+    /// Finds out what an update has to do. To be called wherever the link, the range, a loop or what is asked for changes.
+    pub(super) fn settle(&mut self) {
+        let is_free = self.range == Range::within(self.full_limit) && self.loops.speed().is_plain();
+        self.duty = match self.asked {
+            _ if self.link != Link::Online => Duty::Rest,
+            Action::Rest => Duty::Rest,
+            Action::Raw => Duty::Raw,
+            Action::Velocity if is_free => Duty::Velocity,
+            Action::Position if is_free && self.loops.position().is_plain() => Duty::Position,
+            _ => Duty::Other,
+        };
     }
 
     /// The speed loop takes over from a direct command where that was: no jump of the output.

@@ -1,7 +1,7 @@
-use super::target::Action;
+use super::target::{Action, Duty};
 use super::{Slot, age, is_near};
 use crate::control::TimeStep;
-use crate::dji::command::{loop_to_raw, saturate};
+use crate::dji::command::{free_to_raw, loop_to_raw, saturate};
 use crate::motor::{Condition, Link, Timeouts};
 
 /// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
@@ -29,26 +29,59 @@ impl Ages {
 }
 
 impl Slot {
-    /// Runs the loops of this motor and returns its raw command.
+    /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
+    /// stays in registers, because nobody else gets to see it.
     #[inline]
-    pub(in crate::dji) fn update(&mut self, step: &TimeStep) -> i16 {
-        let mut velocity = self.velocity().as_rad_per_s();
-        let goal = if self.action == Action::Velocity {
-            self.goal.rad_per_s()
-        } else {
-            let way = match self.action {
-                Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
-                Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
-                Action::Measured => {
-                    velocity = self.goal.rate();
-                    self.goal.way()
+    pub(in crate::dji) fn update(&mut self, plain: &TimeStep, step: &TimeStep) -> i16 {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
+                match self.loops.position_mut().try_step_error(way, velocity, plain) {
+                    Some(goal) => goal,
+                    None => return self.update_carefully(step),
                 }
-                Action::Raw => return saturate(self.goal.raw(), self.range),
-                Action::Rest | Action::Velocity => return 0,
-            };
-            self.loops.step_position(way, velocity, step)
+            }
+            Duty::Raw => return saturate(self.goal.raw(), self.range),
+            // Out of line too: a zero for these would be loaded in every update of every motor.
+            Duty::Rest | Duty::Other => return self.update_carefully(step),
         };
+        match self.loops.speed_mut().try_step(goal, velocity, plain) {
+            Some(output) => free_to_raw(output, self.raw_per_unit),
+            None => self.follow_velocity(goal, velocity, step),
+        }
+    }
+
+    // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
+    #[cold]
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
         loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
+    }
+
+    /// Runs the loops whatever they are and however far the output is limited; or rests.
+    #[cold]
+    #[inline(never)]
+    fn update_carefully(&mut self, step: &TimeStep) -> i16 {
+        if self.duty == Duty::Rest {
+            return 0;
+        }
+        let mut velocity = self.velocity().as_rad_per_s();
+        let way = match self.asked {
+            Action::Velocity => {
+                return self.follow_velocity(self.goal.rad_per_s(), velocity, step);
+            }
+            Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
+            Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+            Action::Measured => {
+                velocity = self.goal.rate();
+                self.goal.way()
+            }
+            Action::Rest | Action::Raw => return 0,
+        };
+        let goal = self.loops.step_position(way, velocity, step);
+        self.follow_velocity(goal, velocity, step)
     }
 
     /// Adds the ages of this motor's feedback and target, when it is heard.
@@ -95,7 +128,7 @@ impl Slot {
     /// The application has not set a target for too long.
     pub(super) fn forget_target(&mut self) {
         self.relax();
-        self.conditions.set(Condition::CommandLost, true);
+        self.begin(Condition::CommandLost);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 }
