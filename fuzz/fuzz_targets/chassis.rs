@@ -46,9 +46,9 @@ fuzz_target!(|data: &[u8]| {
         4 => {
             let places = [vec2(&mut input), vec2(&mut input), vec2(&mut input), vec2(&mut input)];
             let Ok(layout) = Swerve::<4>::new(radius, places) else { return };
-            let mut steering = SwerveSteering::new(
-                SteeringConfig::new().with_hysteresis(Angle::from_radians(input.float())),
-            );
+            let config = SteeringConfig::new().with_hysteresis(Angle::from_radians(input.float()));
+            let layout = layout.with_steering(config);
+            let mut steering = SwerveSteering::new();
             drive(layout, input, |input| {
                 let wanted = core::array::from_fn(|_| {
                     ModuleState::new(speed(input), Angle::from_radians(input.float()))
@@ -56,7 +56,7 @@ fuzz_target!(|data: &[u8]| {
                 let measured = core::array::from_fn(|_| {
                     (input.byte() % 4 != 0).then(|| Angle::from_radians(input.float()))
                 });
-                let [module, ..]: [ModuleState; 4] = steering.steer(wanted, measured);
+                let [module, ..] = layout.steer(&mut steering, wanted, measured);
                 module
             });
         }
