@@ -470,6 +470,60 @@ mod tests {
     }
 
     #[test]
+    fn a_place_tells_its_frame_and_its_slot() {
+        for frame in CommandFrame::ALL {
+            for slot in 0..4 {
+                let place = Place::new(frame, slot);
+                assert_eq!((place.frame(), place.slot()), (frame, slot));
+            }
+        }
+    }
+
+    #[test]
+    fn frames_in_use_are_counted_and_told() {
+        let mut outbox = outbox(&[CommandFrame::X200, CommandFrame::X2FF]);
+        assert_eq!(outbox.frames_in_use(), 2);
+        assert_eq!(
+            CommandFrame::ALL.map(|frame| outbox.frames_in_use_with(frame)),
+            [2, 3, 2, 3, 3]
+        );
+        outbox.close(CommandFrame::X200);
+        let in_use = CommandFrame::ALL.map(|frame| outbox.is_in_use(frame));
+        assert_eq!(in_use, [false, false, true, false, false]);
+    }
+
+    #[test]
+    fn a_cleared_frame_is_sent_with_zeros_also_when_it_was_silent() {
+        let mut outbox = outbox(&[CommandFrame::X200, CommandFrame::X1FF]);
+        let moving = Place::new(CommandFrame::X200, 3);
+        outbox.put(moving, -7);
+        assert_eq!(outbox.get(moving), -7);
+        for _ in 0..3 {
+            outbox.finish_update();
+            ids(&mut outbox);
+        }
+        outbox.clear();
+        assert_eq!(outbox.get(moving), 0);
+        assert_eq!(ids(&mut outbox), [0x200, 0x1FF]);
+    }
+
+    #[test]
+    fn a_keep_alive_tells_when_it_is_due_again() {
+        let mut outbox = outbox(&[CommandFrame::X200]);
+        outbox.set_keep_alive(5_000);
+        let due = [5_000, 5_001, 9_999, 10_000, 12_000].map(|now| outbox.keep_alive(now));
+        assert_eq!(due, [5_000, 4_999, 1, 5_000, 3_000]);
+    }
+
+    #[test]
+    fn ties_of_a_loop_go_to_the_even_neighbour() {
+        for (value, raw) in [(0.5, 0), (1.5, 2), (2.5, 2), (-0.5, 0), (-1.5, -2), (-2.5, -2)] {
+            assert_eq!(loop_to_raw(value, 1.0, Range::within(100)), raw, "{value}");
+            assert_eq!(free_to_raw(value, 1.0), raw, "{value}");
+        }
+    }
+
+    #[test]
     fn ties_of_rounding_go_away_from_zero_and_nan_is_zero() {
         for (value, raw) in [(0.5, 1), (-0.5, -1), (0.49, 0), (-0.0, 0), (f32::NAN, 0), (1e-40, 0)]
         {

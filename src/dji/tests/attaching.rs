@@ -121,3 +121,23 @@ fn a_bus_is_built_in_a_static_and_a_handle_is_one_byte() {
     assert_eq!(BUS.motors().count(), 0);
     assert!(size_of::<Handle<M3508>>() == 1);
 }
+
+#[test]
+fn a_frame_goes_on_as_long_as_one_of_its_motors_is_attached() {
+    let mut bus: Bus = Bus::new().with_keep_alive(Duration::from_millis(1));
+    let [one, two, five] = bus.attach_all([1, 2, 5].map(Config::<M3508>::new)).unwrap();
+    let round = |bus: &mut Bus, ms| {
+        step(bus, ms);
+        let mut ids: Vec<_> = sent(bus).into_iter().map(|(id, _)| id).collect();
+        ids.sort_unstable();
+        ids
+    };
+    assert_eq!(round(&mut bus, 1), [0x1FF, 0x200]);
+    bus.detach(one);
+    bus.detach(five);
+    assert_eq!(round(&mut bus, 2), [0x1FF, 0x200], "one last frame of zeros");
+    assert_eq!(round(&mut bus, 3), [0x200]);
+    bus.detach(two);
+    assert_eq!(round(&mut bus, 4), [0x200]);
+    assert_eq!(round(&mut bus, 5), [0_u32; 0]);
+}

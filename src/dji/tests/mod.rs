@@ -1,6 +1,7 @@
 //! Rules of the bus, driven through its public face.
 
 mod attaching;
+mod budget;
 mod commanding;
 mod measured;
 mod receiving;

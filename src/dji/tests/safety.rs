@@ -371,3 +371,56 @@ fn a_pause_of_a_whole_turn_of_the_stamps_revives_nobody() {
     bus.update(Tick::new(at_ms(2) + turn, 0.001));
     assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
 }
+
+#[test]
+fn a_time_that_stands_or_goes_back_is_noticed_however_quiet_all_is() {
+    for stray in [20, 19, 5] {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        for ms in 2..=20 {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+            bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(5.0)).unwrap();
+            step(&mut bus, ms);
+        }
+        assert_eq!(bus.counters().bad_steps, 0);
+        step(&mut bus, stray);
+        assert_eq!(bus.counters().bad_steps, 1, "{stray} ms after 20 ms");
+    }
+}
+
+#[test]
+fn a_frame_of_zeros_is_repeated_as_often_as_configured_and_at_least_each_ten_seconds() {
+    for (period_ms, due_ms) in [(3, 3), (9_999, 9_999), (10_000, 10_000), (60_000, 10_000)] {
+        let mut bus: Bus = Bus::new().with_keep_alive(Duration::from_millis(period_ms));
+        bus.attach(Config::<M3508>::new(1)).unwrap();
+        let mut times = (100_000..=121_000).filter(|ms| {
+            step(&mut bus, *ms);
+            !sent(&mut bus).is_empty()
+        });
+        let (first, second) = (times.next().unwrap(), times.next().unwrap());
+        assert_eq!(second - first, due_ms, "{period_ms} ms asked for");
+    }
+}
+
+#[test]
+fn each_command_frame_in_use_tells_of_a_second_master_and_no_other_does() {
+    let all = [0x1FE, 0x1FF, 0x200, 0x2FE, 0x2FF];
+    for used in all {
+        let heard = all.map(|id| {
+            let mut bus: Bus = Bus::new();
+            match used {
+                0x200 => bus.attach(Config::<M3508>::new(1)).map(Handle::erase),
+                0x1FF => bus.attach(Config::<M3508>::new(5)).map(Handle::erase),
+                0x2FF => bus.attach(Config::<Gm6020Voltage>::new(5)).map(Handle::erase),
+                0x1FE => bus.attach(Config::<Gm6020Current>::new(1)).map(Handle::erase),
+                _ => bus.attach(Config::<Gm6020Current>::new(5)).map(Handle::erase),
+            }
+            .unwrap();
+            let frame = CanFrame::standard(id, [0; 8]).unwrap();
+            assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Unrelated);
+            bus.second_master().map(|claim| claim.id())
+        });
+        let expected = all
+            .map(|id| (id == used).then(|| embedded_can::Id::from(StandardId::new(used).unwrap())));
+        assert_eq!(heard, expected, "0x{used:X} in use");
+    }
+}
