@@ -1,0 +1,58 @@
+//! The bus as any device: through the trait that the runner and combined devices know it by.
+
+use super::*;
+use crate::motor::{Condition, MotorName};
+
+fn frames_of<D: CanDevice>(device: &mut D, ms: u64) -> Vec<CanFrame> {
+    device.update(Tick::new(at_ms(ms), 0.001));
+    core::iter::from_fn(|| device.next_frame(0)).collect()
+}
+
+fn with_error(id: u16, code: u8) -> CanFrame {
+    CanFrame::standard(id, [0, 0, 0, 0, 0, 0, 25, code]).unwrap()
+}
+
+fn id_of(mut names: impl Iterator<Item = MotorName>) -> Option<u8> {
+    names.next().map(|name| name.id())
+}
+
+#[test]
+fn a_device_sends_what_its_updates_give_and_takes_back_its_own_only() {
+    fn check<D: CanDevice>(device: &mut D) {
+        let frames = frames_of(device, 2);
+        assert_eq!(frames.len(), 1);
+        assert_eq!(device.superseded(), 0);
+        assert!(device.requeue(&frames[0]));
+        assert!(!device.requeue(&CanFrame::standard(0x1FF, [0; 8]).unwrap()));
+        assert_eq!(device.superseded(), 1, "the newest words go");
+        assert_eq!(frames_of(device, 3).len(), 1);
+        assert_eq!(device.superseded(), 1);
+    }
+    let (mut bus, _) = armed([Config::<M3508>::new(1)]);
+    check(&mut bus);
+}
+
+#[test]
+fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
+    fn check<D: CanDevice>(device: &mut D) {
+        assert_eq!(id_of(device.faulty()), None);
+        assert_eq!((device.second_master(), device.next_edge()), (None, None));
+        assert_eq!(device.ingest(&with_error(0x202, 3), at_ms(1)), Ingest::Taken);
+        for ms in 2..20 {
+            frames_of(device, ms);
+        }
+        assert_eq!(id_of(device.faulty()), Some(2));
+        let edge = device.next_edge().unwrap();
+        assert_eq!((edge.motor.id(), edge.condition, edge.began), (2, Condition::Fault, true));
+        let command = CanFrame::standard(0x200, [1; 8]).unwrap();
+        assert_eq!(device.ingest(&command, at_ms(20)), Ingest::Unrelated);
+        assert!(device.second_master().is_some());
+        assert!(matches!(
+            device.arm(at_ms(20)),
+            Err(ArmError::Missing(_) | ArmError::SecondMaster(_))
+        ));
+    }
+    let mut bus: Bus = Bus::new();
+    bus.attach(Config::<M3508>::new(2)).unwrap();
+    check(&mut bus);
+}
