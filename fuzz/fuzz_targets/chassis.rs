@@ -76,6 +76,7 @@ fn drive<K: Kinematics>(
     let mut limit = f32::MAX;
     // Seconds since the command was renewed.
     let mut age_s = f64::MAX;
+    let mut renewed = false;
     let mut ramps = false;
     while !input.is_empty() {
         match input.byte() {
@@ -85,17 +86,17 @@ fn drive<K: Kinematics>(
                     check_refusal(chassis, twist);
                 }
                 chassis.set_body(twist);
-                age_s = 0.0;
+                renewed = true;
             }
             32..=63 => {
                 let twist = Twist::new(input.float(), input.float(), input.float());
                 chassis.set_world(twist, Heading::new(Angle::from_radians(input.float())));
-                age_s = 0.0;
+                renewed = true;
             }
             64..=71 => chassis.set_heading(Heading::new(Angle::from_radians(input.float()))),
             72..=79 => {
                 chassis.stop();
-                age_s = 0.0;
+                renewed = true;
             }
             80..=87 => chassis.restart(),
             88..=91 => chassis.set_pose(Pose2::ORIGIN),
@@ -116,11 +117,13 @@ fn drive<K: Kinematics>(
                 });
                 let dt_s = input.step_s();
                 let tick = Tick::new(Instant::from_micros(now), dt_s);
-                // Open: the step of the tick that finds it old counts from the next tick on.
-                let old = age_s > 0.101;
-                if dt_s.is_finite() && dt_s > 0.0 {
+                if renewed {
+                    age_s = 0.0;
+                } else if dt_s.is_finite() && dt_s > 0.0 {
                     age_s += f64::from(dt_s);
                 }
+                renewed = false;
+                let old = age_s > 0.101;
                 let mut same = chassis;
                 let targets = chassis.update(wheels, tick);
                 let again = same.update(wheels, tick);

@@ -17,10 +17,11 @@ use crate::units::Angle;
 /// 4. the modules of a [`Swerve`](super::Swerve) take the shorter way, and at rest keep their angles:
 ///    see [`Swerve::steer`](super::Swerve::steer).
 ///
-/// A command that is NaN or infinite stops the chassis and is counted. A command that is not renewed for 0.1 s counts
-/// as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one over 0.1 s counts as
-/// 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without usable time the clock
-/// is dead: the command counts as stale, and since no ramp can be timed, the wheels are told to stand at once.
+/// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command that is not
+/// renewed for 0.1 s counts as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one
+/// over 0.1 s counts as 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without
+/// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels are told to
+/// stand at once.
 ///
 /// # Examples
 /// ```
@@ -43,6 +44,7 @@ pub struct Chassis<K: Kinematics> {
     limits: ChassisLimits,
     command: Command,
     command_age_s: f32,
+    is_renewed: bool,
     clock: DeadClock,
     gyro: Option<Heading>,
     reference: Twist<World>,
@@ -73,6 +75,19 @@ pub enum MotionSource {
 }
 
 /// What went on in a chassis, besides the motion.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{Chassis, MotionSource, OmniThree, OmniThreeWheels};
+/// use drivetrain::time::{Instant, Tick};
+///
+/// let mut chassis = Chassis::new(OmniThree::new(0.05, 0.2)?);
+/// let _ = chassis.update(OmniThreeWheels::splat(None), Tick::new(Instant::from_micros(1_000), 0.001));
+/// let status = chassis.status();
+/// assert_eq!((status.source, status.lost_wheels), (MotionSource::Unknown, 3));
+/// assert_eq!(status.blind_s, 0.001);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChassisStatus {
@@ -110,6 +125,7 @@ impl<K: Kinematics> Chassis<K> {
             limits: ChassisLimits::new(),
             command: Command::Body(Twist::ZERO),
             command_age_s: f32::MAX,
+            is_renewed: false,
             clock: DeadClock::new(),
             gyro: None,
             reference: Twist::ZERO,
@@ -141,14 +157,14 @@ impl<K: Kinematics> Chassis<K> {
 
     /// Commands a motion in the frame of the body.
     pub fn set_body(&mut self, twist: Twist<Body>) {
-        self.set_command(Command::Body(twist), twist.is_finite());
+        self.set_command(Command::Body(twist), can_be_meant(twist));
     }
 
     /// Commands a motion in the frame of the world, and gives the gyroscope's heading for this tick.
     ///
     /// With a heading that is NaN or infinite the command is as bad as a NaN itself: it stops the chassis.
     pub fn set_world(&mut self, twist: Twist<World>, heading: Heading) {
-        self.set_command(Command::World(twist), twist.is_finite() && heading.is_finite());
+        self.set_command(Command::World(twist), can_be_meant(twist) && heading.is_finite());
         self.gyro = Some(heading).filter(|heading| heading.is_finite());
     }
 
@@ -182,6 +198,10 @@ impl<K: Kinematics> Chassis<K> {
     /// without a jump.
     pub fn restart(&mut self) {
         self.command = Command::Body(Twist::ZERO);
+        self.take_over();
+    }
+
+    fn take_over(&mut self) {
         self.steering = K::UNSTEERED;
         self.reference = self.measured.to_world(self.odometry.heading());
     }
@@ -193,7 +213,7 @@ impl<K: Kinematics> Chassis<K> {
             self.command = Command::Body(Twist::ZERO);
             self.status.rejected = self.status.rejected.saturating_add(1);
         }
-        self.command_age_s = 0.0;
+        self.is_renewed = true;
     }
 
     /// Takes the measured speed of each wheel, `None` where there is no fresh feedback, and returns the speed it shall have.
@@ -262,7 +282,7 @@ impl<K: Kinematics> Chassis<K> {
         let (before, had_gyro) = (self.odometry.heading(), self.odometry.has_gyro());
         let counted = self.odometry.advance(self.measured, self.gyro.take(), dt_s);
         if motion.is_none() || !counted {
-            self.status.blind_s += dt_s;
+            self.status.blind_s = (self.status.blind_s + dt_s).min(f32::MAX);
         }
         if self.odometry.has_gyro() && !had_gyro {
             // The heading jumps from the wheels' to the gyroscope's; the robot does not.
@@ -273,9 +293,11 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn target(&mut self, dt_s: f32) -> Twist<Body> {
+        // The step came before a new command, and after an old one.
+        self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + dt_s };
+        self.is_renewed = false;
         self.status.command_stale =
             self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();
-        self.command_age_s += dt_s;
         match self.command {
             _ if self.status.command_stale => Twist::ZERO,
             Command::Lock => Twist::ZERO,
@@ -302,8 +324,9 @@ impl<K: Kinematics> Chassis<K> {
         self.odometry.pose()
     }
 
-    /// Puts the chassis at a pose; the motion goes on. A pose that is NaN or infinite changes nothing, and is counted in
-    /// [`ChassisStatus::rejected`].
+    /// Puts the chassis at a pose; the motion goes on. The next heading of a gyroscope takes the place of the pose's angle.
+    ///
+    /// A pose that is NaN or infinite changes nothing, and is counted in [`ChassisStatus::rejected`].
     pub fn set_pose(&mut self, pose: Pose2<World>) {
         if !(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.angle.is_finite()) {
             self.status.rejected = self.status.rejected.saturating_add(1);
@@ -330,7 +353,8 @@ impl<K: Kinematics> Chassis<K> {
     ///
     /// The handles of plain wheels are those of any [`VelocityDrive`](crate::motor::VelocityDrive), those of modules
     /// are [`ModuleMotors`](super::ModuleMotors). What a motor refuses is in [`status`](Self::status); the others are
-    /// driven all the same. When all wheels refuse, nothing is steered: the angles to hold are then forgotten.
+    /// driven all the same. When all wheels refuse, nothing is driven: the angles to hold are forgotten, and when a motor takes
+    /// its target again, the command is approached from the measured motion.
     pub fn drive<H: Copy, D: WheelDrive<H, K::Speed> + ?Sized>(
         &mut self,
         owner: &mut D,
@@ -350,10 +374,15 @@ impl<K: Kinematics> Chassis<K> {
                 }
             });
         if !taken {
-            self.steering = K::UNSTEERED;
+            self.take_over();
         }
         targets
     }
+}
+
+/// The change from one motion to another is measured by its length, whose square must not overflow.
+fn can_be_meant<F>(twist: Twist<F>) -> bool {
+    twist.linear().dot(twist.linear()).is_finite() && twist.wz_rad_s.is_finite()
 }
 
 #[cfg(test)]
@@ -490,6 +519,61 @@ mod tests {
         assert_eq!(chassis.reference(), Twist::ZERO);
     }
 
+    // The step that finds the command old used to count from the next tick on.
+    #[test]
+    fn the_first_tick_after_a_long_stall_finds_the_command_old() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.update(NONE, TICK);
+        let stalled = Tick::new(Instant::START, 0.5);
+        let mut renewed = chassis;
+        chassis.update(NONE, stalled);
+        assert!(chassis.status().command_stale && chassis.reference() == Twist::ZERO);
+        renewed.set_body(Twist::new(1.0, 0.0, 0.0)); // after the stall
+        renewed.update(NONE, stalled);
+        assert!(!renewed.status().command_stale && renewed.reference().vx_m_s > 0.9);
+    }
+
+    // The length of the change overflowed: the chassis went on as before, whatever it was told.
+    #[test]
+    fn a_command_whose_square_overflows_stops_and_is_counted() {
+        for speed in [-2e19, 1e25, f32::MAX] {
+            let mut chassis = limited(ChassisLimits::new().with_acceleration(10.0, 10.0));
+            for _ in 0..100 {
+                chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+            }
+            for _ in 0..100 {
+                chassis.set_body(Twist::new(speed, 0.0, 0.0));
+                chassis.update(NONE, TICK);
+            }
+            assert!(chassis.reference().vx_m_s.abs() < 1e-4, "{:?}", chassis.reference());
+            assert_eq!(chassis.status().rejected, 100);
+        }
+    }
+
+    #[test]
+    fn seconds_without_position_never_overflow() {
+        let mut chassis = Chassis::new(mecanum());
+        for _ in 0..3 {
+            chassis.update(NONE, Tick::new(Instant::START, f32::MAX));
+        }
+        assert!(chassis.status().blind_s.is_finite());
+    }
+
+    #[test]
+    fn a_turning_chassis_with_a_slow_loop_does_not_skew() {
+        let (mut chassis, dt_s, mut truth) = (Chassis::new(mecanum()), 0.02, Odometry::default());
+        for _ in 0..100 {
+            chassis.set_world(Twist::new(1.0, 0.0, 10.0), truth.heading());
+            let wheels = chassis.update(NONE, Tick::new(Instant::START, dt_s));
+            truth.advance(mecanum().forward(wheels), None, dt_s);
+        }
+        // Without taking the bend off: half the turn of a step to the left, 0.2 m in 2 m.
+        assert!((truth.pose().x_m - 2.0).abs() < 1e-3, "{:?}", truth.pose());
+        assert!(truth.pose().y_m.abs() < 1e-3, "{:?}", truth.pose());
+    }
+
     #[test]
     fn a_command_of_nan_stops_and_is_counted() {
         let mut chassis = Chassis::new(mecanum());
@@ -618,6 +702,20 @@ mod tests {
         chassis.update(NONE, TICK);
         assert_eq!(chassis.status().rejected, 2);
         assert_eq!(chassis.reference(), Twist::new(1.0, 0.0, 0.0)); // a body command needs no heading
+    }
+
+    #[test]
+    fn putting_the_chassis_at_another_pose_does_not_turn_its_motion() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        for _ in 0..500 {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            chassis.update(NONE, TICK);
+        }
+        let before = chassis.reference();
+        chassis.set_pose(Pose2::new(3.0, -1.0, Angle::from_degrees(120.0)));
+        let error = chassis.reference() - before;
+        assert!(error.linear().norm() < 1e-6, "{error:?}");
+        assert!((chassis.pose().angle.as_degrees() - 120.0).abs() < 1e-3);
     }
 
     #[test]
@@ -867,6 +965,21 @@ mod tests {
         modules.steerings.angles = turned;
         modules.drive();
         modules.assert_degrees(by_hand);
+    }
+
+    // The stick is held forward while nothing is armed: the chassis used to leap at full speed when it armed.
+    #[test]
+    fn a_chassis_that_was_refused_starts_from_the_measured_motion() {
+        let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
+        let wheels = MecanumWheels::from_array([0, 1, 2, 3]);
+        for _ in 0..2000 {
+            chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+            chassis.drive(&mut Refusing, wheels, TICK);
+        }
+        let mut bench = Bench { speeds: [AngularVelocity::ZERO; 4], broken: 9 };
+        chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+        chassis.drive(&mut bench, wheels, TICK);
+        assert!((chassis.reference().vx_m_s - 0.001).abs() < 1e-6, "{:?}", chassis.reference());
     }
 
     /// Motors that are heard and not armed.

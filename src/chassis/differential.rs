@@ -4,6 +4,17 @@ use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 
 /// The dimensions of a chassis with a driven left and a driven right side: all in m, above zero.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{Differential, DifferentialGeometry}, geometry::Twist};
+///
+/// // Sides 0.5 m apart: half of it.
+/// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
+/// let turning = Differential::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
+/// assert!((turning.right.as_rad_per_s() - 0.25 * 2.0 / 0.1).abs() < 1e-5);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

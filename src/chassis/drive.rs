@@ -6,6 +6,35 @@ use crate::units::{Angle, AngularVelocity};
 ///
 /// `H` names the motors of one wheel, `S` is what the wheel does. Whoever is a [`VelocityDrive`] drives plain wheels,
 /// and whoever is an [`AngleDrive`] too drives the modules of a [`Swerve`](super::Swerve).
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{Chassis, Differential, DifferentialGeometry, DifferentialWheels};
+/// use drivetrain::motor::{TargetError, VelocityDrive};
+/// use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
+///
+/// /// Two motors that do at once what they are told.
+/// struct Motors([AngularVelocity; 2]);
+///
+/// impl VelocityDrive<usize> for Motors {
+///     fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
+///         self.0.get(motor).copied()
+///     }
+///     fn set_velocity(&mut self, motor: usize, target: AngularVelocity) -> Result<(), TargetError> {
+///         *self.0.get_mut(motor).ok_or(TargetError::Detached)? = target;
+///         Ok(())
+///     }
+/// }
+///
+/// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
+/// let mut chassis = Chassis::new(Differential::new(geometry)?);
+/// let mut motors = Motors([AngularVelocity::ZERO; 2]);
+/// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+/// let tick = Tick::new(Instant::from_micros(1_000), 0.001);
+/// chassis.drive(&mut motors, DifferentialWheels { left: 0, right: 1 }, tick);
+/// assert!((motors.0[1].as_rad_per_s() - 10.0).abs() < 1e-5);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 pub trait WheelDrive<H: Copy, S> {
     /// Returns what the wheel does; `None` when it is not heard.
     fn measured(&self, wheel: H) -> Option<S>;

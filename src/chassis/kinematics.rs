@@ -6,6 +6,22 @@ use core::fmt::Debug;
 ///
 /// Every layout has `inverse` and `forward` as its own functions; the trait is what
 /// [`Chassis`](super::Chassis) needs to work with all of them.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{GeometryError, Kinematics, OmniFour, OmniThree};
+/// use drivetrain::geometry::{Body, Twist};
+///
+/// /// How far the motion that is read back is from the one that was asked for, in m/s.
+/// fn error_m_s<K: Kinematics>(layout: K, motion: Twist<Body>) -> f32 {
+///     (layout.forward(layout.inverse(motion)) - motion).linear().norm()
+/// }
+///
+/// let motion = Twist::new(1.0, -0.5, 2.0);
+/// assert!(error_m_s(OmniThree::new(0.05, 0.2)?, motion) < 1e-5);
+/// assert!(error_m_s(OmniFour::new(0.05, 0.2)?, motion) < 1e-5);
+/// # Ok::<(), GeometryError>(())
+/// ```
 pub trait Kinematics {
     /// One `T` for each wheel, under the wheel's name.
     type Wheels<T: Copy>: Copy;
@@ -93,6 +109,17 @@ pub trait Kinematics {
 }
 
 /// What a wheel does, as far as limiting and comparing needs to know it.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{ModuleState, WheelSpeed};
+/// use drivetrain::units::{Angle, AngularVelocity};
+///
+/// let module = ModuleState::new(AngularVelocity::from_rad_per_s(8.0), Angle::from_degrees(30.0));
+/// assert_eq!(module.scaled(0.5).velocity().as_rad_per_s(), 4.0);
+/// assert!((module.stopped().angle.as_degrees() - 30.0).abs() < 1e-4); // it stands at its angle
+/// assert!((module.distance(module.scaled(-1.0)) - 16.0).abs() < 1e-4);
+/// ```
 pub trait WheelSpeed: Copy {
     /// Returns the rolling velocity of the wheel, positive forward.
     fn velocity(self) -> AngularVelocity;

@@ -7,6 +7,17 @@ use core::f32::consts::SQRT_2;
 use core::marker::PhantomData;
 
 /// The dimensions of a mecanum chassis: all in m, above zero.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{Mecanum, MecanumGeometry}, geometry::Twist};
+///
+/// // Axles 0.4 m apart, wheels 0.3 m apart: half of each.
+/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.15 };
+/// let turning = Mecanum::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
+/// assert!((turning.front_right.as_rad_per_s() - (0.2 + 0.15) * 2.0 / 0.1).abs() < 1e-5);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

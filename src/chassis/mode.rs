@@ -61,11 +61,17 @@ pub enum GimbalEdge {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{chassis::{ModeConfig, Spin}, control::PidConfig};
+/// use drivetrain::{chassis::{Mode, ModeConfig, Modes, Spin}, control::PidConfig, geometry::Twist, units::Angle};
 ///
 /// let config = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0))
 ///     .with_rotor(6.0, 2.0, 3.0)
-///     .with_spin(Spin::Alternate);
+///     .with_spin(Spin::Clockwise)
+///     .with_transition(0.0);
+/// let mut modes = Modes::new(config)?;
+/// modes.set_mode(Mode::Rotor);
+/// let body = modes.update(Twist::ZERO, Some(Angle::ZERO), 0.001).ok_or("driving")?;
+/// assert_eq!(body.wz_rad_s, -6.0); // the swing begins at its base
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -353,7 +359,9 @@ impl Modes {
     fn spin(&mut self, dt_s: f32) -> f32 {
         let config = &self.config;
         let speed = config.rotor_rad_s + config.swing_rad_s * sin_cos(self.swing_rad).0;
-        self.swing_rad = wrap_tau(self.swing_rad + config.swing_frequency_rad_s * dt_s);
+        let phase = wrap_tau(self.swing_rad + config.swing_frequency_rad_s * dt_s);
+        // After a step that overflows the swing begins again: NaN would stay.
+        self.swing_rad = if phase.is_finite() { phase } else { 0.0 };
         if self.clockwise { -speed } else { speed }
     }
 
@@ -473,6 +481,23 @@ mod tests {
     }
 
     #[test]
+    fn the_follow_loop_begins_anew_when_its_mode_is_entered_again() {
+        let follow = PidConfig::new(5.0, 10.0, 0.0).with_output_limit(50.0);
+        let mut modes = modes(ModeConfig::new(follow).with_transition(0.0), Mode::FollowGimbal);
+        let mut step = |mode, degrees: f32| {
+            modes.set_mode(mode);
+            modes.update(Twist::ZERO, yaw(degrees), DT).unwrap().wz_rad_s
+        };
+        let first = step(Mode::FollowGimbal, 10.0);
+        for _ in 0..1000 {
+            step(Mode::FollowGimbal, 10.0);
+        }
+        assert!(step(Mode::FollowGimbal, 10.0) > 2.0 * first);
+        assert!(step(Mode::Independent, 10.0).abs() < 1e-6);
+        assert!((step(Mode::FollowGimbal, 10.0) - first).abs() < 1e-6);
+    }
+
+    #[test]
     fn relax_gives_nothing_and_leaving_it_starts_from_rest() {
         let mut modes = modes(config(), Mode::Rotor);
         settled(&mut modes, 0.0);
@@ -546,6 +571,15 @@ mod tests {
         }
         let command = Twist::new(f32::MIN, f32::MAX, -1.0);
         assert_eq!(modes.update(command, yaw(45.0), 1.0), Some(Twist::ZERO));
+    }
+
+    // Its phase was NaN from then on, and the chassis stood still until the mode was left.
+    #[test]
+    fn a_step_beyond_all_numbers_does_not_end_the_rotor() {
+        let mut rotor = modes(config(), Mode::Rotor);
+        settled(&mut rotor, 20.0);
+        let _ = rotor.update(AHEAD, yaw(20.0), f32::MAX);
+        assert!(settled(&mut rotor, 20.0).wz_rad_s >= 4.0, "{:?}", rotor.output);
     }
 
     #[test]

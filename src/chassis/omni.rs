@@ -5,6 +5,19 @@ use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::units::{Angle, AngularVelocity};
 
 /// One omni wheel: where it touches the floor, and which way it rolls.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{Omni, OmniWheel}, geometry::{Twist, Vec2}, units::Angle};
+///
+/// let wheel = |x, y, degrees| OmniWheel { position_m: Vec2::new(x, y), direction: Angle::from_degrees(degrees) };
+/// let layout = Omni::new(0.05, [wheel(0.0, 0.2, 0.0), wheel(0.0, -0.2, 0.0), wheel(-0.2, 0.0, 90.0)])?;
+/// let [left, right, rear] = layout.inverse(Twist::new(1.0, 0.0, 1.0)); // ahead and to the left
+/// assert!((left.as_rad_per_s() - (1.0 - 0.2) / 0.05).abs() < 1e-4);
+/// assert!((right.as_rad_per_s() - (1.0 + 0.2) / 0.05).abs() < 1e-4);
+/// assert!((rear.as_rad_per_s() + 0.2 / 0.05).abs() < 1e-4);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

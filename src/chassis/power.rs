@@ -1,6 +1,16 @@
 use crate::math::sqrt;
 
 /// What one wheel is asked for: torque at its shaft, and the speed it turns at.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{PowerModel, WheelLoad};
+///
+/// let mechanical = PowerModel::new(0.0, 1.0, 0.0, 0.0)?;
+/// let braking = WheelLoad { torque: -2.0, speed_rad_s: 30.0 };
+/// assert_eq!(mechanical.power_w(braking), -60.0); // fed back
+/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -81,6 +91,17 @@ pub(super) fn not_negative(value: f32, name: &'static str) -> Result<f32, PowerE
 }
 
 /// How the torques are to be cut.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{PowerModel, WheelLoad};
+///
+/// let model = PowerModel::new(5.0, 1.0, 2.0, 0.0)?;
+/// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
+/// let cut = model.cut([stalled; 4], 10.0); // the electronics alone take 20 W
+/// assert_eq!((cut.scale, cut.power_w, cut.within), (0.0, 20.0, false));
+/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerCut {
@@ -148,8 +169,8 @@ impl PowerModel {
         let scale =
             if total(1.0) <= limit_w { 1.0 } else { largest_root(square, linear, fixed - limit_w) };
         let power_w = total(scale);
-        // The root is exact to rounding.
-        let rounding = 1e-5 * (fixed + linear.abs() + square);
+        // The root is exact to rounding of what is added up there.
+        let rounding = 1e-5 * (fixed + scale * (linear.abs() + scale * square));
         PowerCut { scale, power_w, within: power_w <= limit_w + rounding }
     }
 }
@@ -157,6 +178,9 @@ impl PowerModel {
 /// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given that it is above zero at 1; without any, the
 /// `s` of the least value. `square` is zero or more.
 fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
+    // The squares of large loads overflow; above zero at 1, one of the three is not zero.
+    let most = square.max(linear.abs()).max(rest.abs());
+    let (square, linear, rest) = (square / most, linear / most, rest / most);
     let discriminant = linear * linear - 4.0 * square * rest;
     let scale = if rest > 0.0 && (linear >= 0.0 || discriminant < 0.0) {
         // Never low enough: the bottom of the parabola, which lies at or below zero when nothing is fed back.
@@ -239,6 +263,21 @@ mod tests {
         let model = PowerModel::new(10.0, 1.0, 16.0, 0.0).unwrap();
         let cut = model.cut([load(1.0, -12.0)], 8.0);
         assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within, "{cut:?}");
+    }
+
+    // They were let through whole: the discriminant overflowed.
+    #[test]
+    fn loads_whose_squares_overflow_are_cut_to_the_root_all_the_same() {
+        let model = PowerModel::new(1000.0, 1.0, 1.0, 0.0).unwrap();
+        let cut = model.cut([load(1e10, -3e9)], 80.0); // 1000 - 3e19 s + 1e20 s^2
+        assert!((cut.scale - 0.3).abs() < 1e-6, "{cut:?}");
+    }
+
+    // It was called within: the slack for rounding was that of the loads before the cut.
+    #[test]
+    fn losses_above_the_limit_are_not_called_within_because_the_loads_are_large() {
+        let cut = model().cut([load(1e6, 1e3)], 80.0);
+        assert!(cut.scale == 0.0 && cut.power_w > 1000.0 && !cut.within, "{cut:?}");
     }
 
     #[test]

@@ -1,3 +1,4 @@
+use super::clock::DeadClock;
 use super::power::{PowerError, not_negative};
 use crate::control::{ConfigError, Pid, PidConfig};
 
@@ -23,6 +24,7 @@ use crate::control::{ConfigError, Pid, PidConfig};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PowerBuffer {
     pid: Pid,
+    clock: DeadClock,
     reserve_j: f32,
     blind_share: f32,
 }
@@ -57,6 +59,7 @@ impl PowerBuffer {
     pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, BufferError> {
         Ok(Self {
             pid: Pid::new(pid).map_err(BufferError::Pid)?,
+            clock: DeadClock::new(),
             reserve_j: not_negative(reserve_j, "reserve_j").map_err(BufferError::Value)?,
             blind_share: 0.9,
         })
@@ -74,10 +77,13 @@ impl PowerBuffer {
     /// Returns the power in W to allow now, zero or more, from the limit in W and the charge in J.
     ///
     /// A charge that is NaN or infinite counts as none; the loop then starts anew. A limit that is negative, NaN
-    /// or infinite counts as zero.
+    /// or infinite counts as zero. A `dt_s` that is zero, negative, NaN or infinite leaves what is allowed above the limit as it
+    /// was; from the 100th such call in a row on the clock is dead, and a charge counts as none.
     pub fn allowance_w(&mut self, limit_w: f32, energy_j: Option<f32>, dt_s: f32) -> f32 {
         let limit_w = not_negative(limit_w, "limit_w").unwrap_or(0.0);
-        let Some(energy_j) = energy_j.filter(|energy| energy.is_finite()) else {
+        let dt_s = self.clock.see(dt_s);
+        let charge = energy_j.filter(|energy| energy.is_finite() && !self.clock.is_dead());
+        let Some(energy_j) = charge else {
             self.pid.reset();
             return limit_w * self.blind_share;
         };
@@ -173,6 +179,22 @@ mod tests {
         }
         assert!((buffer().allowance_w(80.0, Some(f32::NAN), 0.001) - 72.0).abs() < 1e-4);
         assert_eq!(buffer().allowance_w(10.0, Some(0.0), 0.001), 0.0);
+    }
+
+    // The loop holds its output without time: an empty buffer was allowed what a full one had been.
+    #[test]
+    fn a_clock_that_died_allows_no_more_than_without_a_reading() {
+        for dt_s in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            let mut buffer = buffer();
+            for _ in 0..10 {
+                assert!(buffer.allowance_w(80.0, Some(60.0), 0.001) > 200.0);
+            }
+            for _ in 0..99 {
+                buffer.allowance_w(80.0, Some(0.0), dt_s);
+            }
+            assert!((buffer.allowance_w(80.0, Some(0.0), dt_s) - 72.0).abs() < 1e-4, "{dt_s}");
+            assert!((buffer.allowance_w(80.0, Some(0.0), 0.001) - 35.0).abs() < 1e-4, "{dt_s}");
+        }
     }
 
     #[test]

@@ -52,7 +52,8 @@ impl PowerFit {
         }
     }
 
-    /// Learns from the loads of all wheels and the power in W measured with them; what is not finite is counted and left out.
+    /// Learns from the loads of all wheels and the power in W measured with them; what is not finite, or makes the fit so,
+    /// is counted and left out.
     pub fn learn(&mut self, wheels: impl IntoIterator<Item = WheelLoad>, measured_w: f32) {
         let (mut features, mut rest_w) = ([0.0_f32; 3], measured_w);
         for WheelLoad { torque, speed_rad_s } in wheels {
@@ -71,8 +72,14 @@ impl PowerFit {
             return;
         }
         let error = rest_w - dot(features, self.losses);
-        self.losses = add(self.losses, gain.map(|part| part * error / (1.0 + spread)));
-        self.shrink(gain, spread);
+        let losses = add(self.losses, gain.map(|part| part * error / (1.0 + spread)));
+        // NaN would stay for ever, and read as a motor without losses.
+        if losses.iter().all(|loss| loss.is_finite()) {
+            self.losses = losses;
+            self.shrink(gain, spread);
+        } else {
+            self.rejected = self.rejected.saturating_add(1);
+        }
     }
 
     /// Takes what was learned off the uncertainty, and forgets in the direction of what was learned only (Kulhavy 1987):
@@ -176,5 +183,17 @@ mod tests {
         fit.learn([WheelLoad { torque: 1.0, speed_rad_s: 1.0 }], f32::INFINITY);
         fit.learn([WheelLoad { torque: 1e30, speed_rad_s: 0.0 }], 1.0);
         assert_eq!((fit.model(), fit.rejected()), (before, 3));
+    }
+    // One such reading made a model of NaN, which reads as no losses: the power limit let everything through for ever.
+    #[test]
+    fn readings_beyond_all_numbers_leave_no_model_that_is_none() {
+        let mut fit = start();
+        for (torque, speed_rad_s, measured_w) in
+            [(1.0, 1.0, 3e38), (1.0, 2.0, -3e38), (2.0, 1.0, -3e38), (1e8, 1.0, 3e38)]
+        {
+            fit.learn([WheelLoad { torque, speed_rad_s }; 4], measured_w);
+            assert!(fit.losses.iter().all(|loss| loss.is_finite()), "{fit:?}");
+        }
+        assert!(fit.rejected() > 0);
     }
 }

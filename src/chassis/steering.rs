@@ -6,10 +6,16 @@ use core::f32::consts::{FRAC_PI_2, PI};
 
 /// How the modules of a swerve chassis are steered.
 ///
+/// # Examples
 /// ```
-/// use drivetrain::{chassis::SteeringConfig, units::Angle};
+/// use drivetrain::{chassis::{SteeringConfig, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
 ///
-/// let config = SteeringConfig::new().with_hysteresis(Angle::from_degrees(10.0));
+/// let config = SteeringConfig::new().with_hysteresis(Angle::from_degrees(20.0));
+/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?.with_steering(config);
+/// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
+/// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
+/// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -54,13 +60,15 @@ impl SteeringConfig {
     /// Sets how far beyond 90 degrees a module must be off before its drive reverses. The sign does not matter; NaN counts as 0.
     #[must_use]
     pub const fn with_hysteresis(self, hysteresis: Angle) -> Self {
-        Self { hysteresis: hysteresis.abs(), ..self }
+        let hysteresis = Angle::from_radians(size(hysteresis.as_radians()));
+        Self { hysteresis, ..self }
     }
 
     /// Sets the wheel speed below which a module stands still and keeps its angle. The sign does not matter; NaN counts as 0.
     #[must_use]
     pub const fn with_hold_below(self, speed: AngularVelocity) -> Self {
-        Self { hold_below: speed.abs(), ..self }
+        let hold_below = AngularVelocity::from_rad_per_s(size(speed.as_rad_per_s()));
+        Self { hold_below, ..self }
     }
 
     /// Lets a module drive at full speed while it still points elsewhere.
@@ -68,6 +76,11 @@ impl SteeringConfig {
     pub const fn without_cosine_compensation(self) -> Self {
         Self { cosine_compensation: false, ..self }
     }
+}
+
+/// Without a sign; with NaN no comparison would hold, and a module at zero command would turn to 0.
+const fn size(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.abs() }
 }
 
 impl Default for SteeringConfig {
@@ -80,6 +93,19 @@ impl Default for SteeringConfig {
 ///
 /// [`Chassis`](super::Chassis) keeps it. Without one, keep it beside the layout for [`Swerve::steer`] and
 /// [`Swerve::lock`], and take a new one when the motors were relaxed.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{ModuleState, Swerve, SwerveSteering}, geometry::Vec2, units::Angle};
+///
+/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
+/// let mut steering = SwerveSteering::new();
+/// let measured = [70.0, -20.0].map(|degrees| Some(Angle::from_degrees(degrees)));
+/// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
+/// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
+/// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwerveSteering<const N: usize>([Module; N]);
 
@@ -144,7 +170,8 @@ impl<const N: usize> Swerve<N> {
         })
     }
 
-    /// Returns the states that lock the chassis in an X: all at rest, each module pointing at the origin of the body.
+    /// Returns the states that lock the chassis in an X: all at rest, each module pointing at the origin of the body, or away
+    /// from it, whichever is nearer. The hysteresis keeps a module that lies across from being turned to and fro.
     ///
     /// A module at the origin has no such direction, and holds its angle.
     pub fn lock(
@@ -152,9 +179,10 @@ impl<const N: usize> Swerve<N> {
         steering: &mut SwerveSteering<N>,
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
+        let config = self.steering_config();
         let mut inputs = self.positions_m().iter().zip(measured);
         steering.0.each_mut().map(|module| match inputs.next() {
-            Some((&position, measured)) => module.lock(position, measured),
+            Some((&position, measured)) => module.lock(config, position, measured),
             None => ModuleState::default(),
         })
     }
@@ -175,15 +203,7 @@ impl Module {
         if !moves || speed <= config.hold_below.as_rad_per_s() {
             return self.hold(here);
         }
-        let ahead = wrap_pi(wanted.angle.as_radians() - here);
-        let behind = wrap_pi(ahead + PI);
-        let (kept, other) = if self.reversed { (behind, ahead) } else { (ahead, behind) };
-        let error = if kept.abs() > FRAC_PI_2 + config.hysteresis.as_radians() {
-            self.reversed = !self.reversed;
-            other
-        } else {
-            kept
-        };
+        let error = self.shorter(config, here, wanted.angle);
         let target = self.keep(here + error);
         let along = if config.cosine_compensation { sin_cos(error).1 } else { 1.0 };
         let along = if along > 0.0 { along } else { 0.0 };
@@ -191,8 +211,24 @@ impl Module {
         ModuleState::new(turned.velocity, target)
     }
 
+    /// The turn from `here` to a direction or against it, whichever is nearer; in the hysteresis, the one taken last.
+    fn shorter(&mut self, config: SteeringConfig, here: f32, direction: Angle) -> f32 {
+        let ahead = wrap_pi(direction.as_radians() - here);
+        let behind = wrap_pi(ahead + PI);
+        let (kept, other) = if self.reversed { (behind, ahead) } else { (ahead, behind) };
+        if kept.abs() > FRAC_PI_2 + config.hysteresis.as_radians() {
+            self.reversed = !self.reversed;
+            other
+        } else {
+            kept
+        }
+    }
+
     fn hold(&mut self, here: f32) -> ModuleState {
-        let target = if self.has_target { self.target_rad } else { here };
+        let kept = if self.has_target { self.target_rad } else { here };
+        let way = kept - here;
+        // An encoder that starts over has lost its turns; they are not made up for.
+        let target = if way.abs() > PI { here + wrap_pi(way) } else { kept };
         standing(self.keep(target))
     }
 
@@ -204,7 +240,12 @@ impl Module {
         }
     }
 
-    fn lock(&mut self, position: Vec2, measured: Option<Angle>) -> ModuleState {
+    fn lock(
+        &mut self,
+        config: SteeringConfig,
+        position: Vec2,
+        measured: Option<Angle>,
+    ) -> ModuleState {
         let away = Angle::from_radians(atan2(position.y, position.x));
         let Some(here) = known(measured) else {
             return self.blind(away);
@@ -212,10 +253,8 @@ impl Module {
         if position == Vec2::ZERO {
             return self.hold(here);
         }
-        let outward = wrap_pi(away.as_radians() - here);
-        let inward = wrap_pi(outward + PI);
-        let nearer = if outward.abs() <= inward.abs() { outward } else { inward };
-        standing(self.keep(here + nearer))
+        let turn = self.shorter(config, here, away);
+        standing(self.keep(here + turn))
     }
 
     const fn keep(&mut self, target_rad: f32) -> Angle {
@@ -369,6 +408,45 @@ mod tests {
         // Told to stand, the modules stay crossed.
         let [still, _] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
         assert_eq!(still, left);
+    }
+
+    #[test]
+    fn a_module_across_the_lock_is_not_turned_to_and_fro_by_the_noise_of_its_encoder() {
+        let One { swerve, mut steering } = One::new(SteeringConfig::new());
+        let mut lock = |noise: f32| {
+            let measured = [135.0 + noise; 2].map(|degrees| Some(Angle::from_degrees(degrees)));
+            swerve.lock(&mut steering, measured)[0].angle.as_degrees()
+        };
+        let first = lock(0.05);
+        for step in 0..10 {
+            let again = lock(if step % 2 == 0 { -0.05 } else { 0.05 });
+            assert!((again - first).abs() < 0.1, "{first}, then {again}");
+        }
+    }
+
+    #[test]
+    fn a_held_angle_is_not_unwound_when_the_encoder_has_lost_its_turns() {
+        let mut one = fresh();
+        let (angle, _) = steered(&mut one, 60.0, 3610.0);
+        assert!((angle - 3660.0).abs() < 0.01);
+        for _ in 0..3 {
+            let (angle, velocity) = one.steer(ModuleState::default(), Some(50.0));
+            assert!((angle - 60.0).abs() < 0.01 && velocity.abs() < 1e-9, "{angle}");
+        }
+    }
+
+    #[test]
+    fn a_configuration_of_nan_counts_as_zero() {
+        let nan = f32::NAN;
+        let config = SteeringConfig::new()
+            .with_hold_below(AngularVelocity::from_rad_per_s(nan))
+            .with_hysteresis(Angle::from_radians(nan))
+            .without_cosine_compensation();
+        let mut one = One::new(config);
+        let (angle, velocity) = steered(&mut one, 91.0, 0.0);
+        assert!((angle + 89.0).abs() < 1e-3 && velocity < 0.0, "{angle} {velocity}");
+        let (angle, velocity) = one.steer(ModuleState::default(), Some(-89.0));
+        assert!((angle + 89.0).abs() < 1e-3 && velocity.abs() < 1e-9, "{angle} {velocity}");
     }
 
     #[test]

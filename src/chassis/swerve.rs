@@ -7,6 +7,16 @@ use crate::math::atan2;
 use crate::units::{Angle, AngularVelocity};
 
 /// What a steered wheel does: how fast it rolls, and where it points.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{chassis::{ModuleState, Swerve}, geometry::Vec2, units::{Angle, AngularVelocity}};
+///
+/// let to_the_left = ModuleState::new(AngularVelocity::from_rad_per_s(10.0), Angle::from_degrees(90.0));
+/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
+/// assert!((swerve.forward([to_the_left; 2]).vy_m_s - 1.0).abs() < 1e-5);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

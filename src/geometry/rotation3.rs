@@ -28,6 +28,15 @@ pub struct Rotation3 {
 /// A turn in space as three angles: yaw about z, then pitch about the new y, then roll about the new x (Rz Ry Rx).
 ///
 /// Positive roll lowers the right side, positive pitch lowers the nose, positive yaw turns left.
+///
+/// # Examples
+/// ```
+/// use drivetrain::{geometry::{RollPitchYaw, Rotation3, Vec3}, units::Angle};
+///
+/// let nose_down = RollPitchYaw { pitch: Angle::from_degrees(30.0), ..Default::default() };
+/// let ahead = Rotation3::from(nose_down).apply(Vec3::new(1.0, 0.0, 0.0));
+/// assert!((ahead.z + 0.5).abs() < 1e-6); // -sin(30 degrees)
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
