@@ -21,7 +21,8 @@ pub struct StepMeasures {
 ///
 /// # Edge behaviour
 /// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. A long `dt_s`
-/// counts in full: no time is lost, but what the value did in it is not seen. Samples after the end are left out.
+/// counts in full, the first one too: no time is lost, but what the value did in it is not seen. Samples after the end are left
+/// out. A value so far off that a measure is beyond `f32` counts as `f32::MAX`.
 ///
 /// # Examples
 /// A first-order lag of 0.1 s rises in `0.1 ln 9` = 0.22 s and settles to 2 % in `0.1 ln 50` = 0.39 s.
