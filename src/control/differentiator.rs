@@ -58,7 +58,7 @@ impl LinearDifferentiator {
     /// Steps by a time that was validated before.
     pub(super) fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
         let r = self.r;
-        self.follower.step(input, step, |error, rate| -finite(r * finite(r * error + 2.0 * rate)))
+        self.follower.step(input, step, |error, rate| -r * finite(r * error + 2.0 * rate))
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.

@@ -54,10 +54,10 @@ impl Sum {
         self.value
     }
 
-    /// Returns how far it is above `other`, exactly when it is near.
+    /// Returns how far it is above `other`, exactly when it is near; it may overflow.
     #[inline]
     pub(super) const fn above(self, other: f32) -> f32 {
-        finite(self.value - other + self.rest)
+        self.value - other + self.rest
     }
 }
 
