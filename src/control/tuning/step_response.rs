@@ -13,7 +13,7 @@ pub struct StepMeasures {
     pub overshoot: f32,
     /// Seconds after which the value stayed within the tolerance; `None` when it was outside at the end.
     pub settling_time_s: Option<f32>,
-    /// Target minus value, averaged over the last tenth of the time, in units of the value.
+    /// Target minus value, averaged over the samples of the last tenth of the time, in units of the value; zero before that.
     pub steady_error: f32,
 }
 
