@@ -37,6 +37,8 @@ pub enum ConfigFault {
     Conflict,
     /// It is where the change starts, so that there is none.
     NoChange,
+    /// It is outside of the range that the documentation gives, where `f32` is not exact enough.
+    OutOfRange,
 }
 
 impl ConfigError {
@@ -68,6 +70,7 @@ impl fmt::Display for ConfigError {
             ConfigFault::NotFinite => ": must be finite",
             ConfigFault::Conflict => ": does not go together with another parameter",
             ConfigFault::NoChange => ": must differ from the start",
+            ConfigFault::OutOfRange => ": outside of the range in which f32 is exact enough",
         })
     }
 }

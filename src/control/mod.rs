@@ -14,6 +14,7 @@
 //! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
 //! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
 //! | single wrong samples | [`Median`] of 3 | |
+//! | a disturbance of a known period | [`MovingAverage`] of that many samples | |
 //! | the rate of a noisy signal | [`LinearDifferentiator`], [`OptimalDifferentiator`] | |
 //! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!

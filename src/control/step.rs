@@ -92,6 +92,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_longest_step_that_is_none_holds_all_and_one_that_is_nan_freezes_none() {
+        for dt_max_s in [0.0, -0.1, f32::NEG_INFINITY] {
+            let step = TimeStep::new(0.001, dt_max_s);
+            assert!(step.is_hold() && !step.is_frozen(), "{dt_max_s}");
+        }
+        for dt_max_s in [f32::NAN, f32::INFINITY] {
+            let step = TimeStep::new(1e30, dt_max_s);
+            assert!(!step.is_hold() && !step.is_frozen() && step.dt_s() == 1e30, "{dt_max_s}");
+        }
+    }
+
+    #[test]
     fn every_dt_is_of_one_kind() {
         for dt_s in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40] {
             let step = TimeStep::new(dt_s, 0.1);

@@ -51,11 +51,19 @@ impl PositionActuatorConfig {
 
 /// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
+/// ```text
+/// wanted = PID(setpoint, low-pass(angle)), every n-th step
+/// output = low-pass(PID(wanted, low-pass(speed)))
+/// ```
+/// With the angle in a unit `A`, the speed in a unit `M` and the output in a unit `U`, the gains of the angle loop are in `M/A`, those
+/// of the speed loop in `U/M`, with the seconds of [`PidConfig`]; cut-offs are in Hz.
+///
 /// # Edge behaviour
-/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward, and by error the D of the angle loop too. A `dt_s` that is zero, negative, NaN or
-/// infinite, and a setpoint, angle or speed that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected)
-/// grows; after a bad input, the next values pass their filters as first ones, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D of both loops, and
-/// counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
+/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward, and by error the D of the
+/// angle loop too, however long ago the actuator was made. A `dt_s` that is zero, negative, NaN or infinite, and a setpoint, angle
+/// or speed that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next
+/// values pass their filters as first ones, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`]
+/// freezes the integral and D of both loops, and counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
 /// time that has passed for it; if one of the steps since was above the maximum, that freezes it too. Without `ki` an
 /// integral stays zero. Huge gains end at the output limits.
 ///

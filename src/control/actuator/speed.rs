@@ -51,13 +51,19 @@ impl SpeedActuatorConfig {
     }
 }
 
-/// A speed loop with its filters: speed, low-pass, [`Pid`], low-pass, output.
+/// A speed loop with its filters.
+///
+/// ```text
+/// output = low-pass(PID(setpoint, low-pass(speed)))
+/// ```
+/// With the speed in a unit `M` and the output in a unit `U` the gains are those of [`PidConfig`]; cut-offs are in Hz.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward.
-/// A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or infinite: the last output is returned
-/// and [`rejected`](Self::rejected) grows; after a bad input, the next speed passes its filter as a first one, and D rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and
-/// counts as that maximum for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold
+/// That of the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward, however
+/// long ago the actuator was made. A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or
+/// infinite: the last output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next speed passes its
+/// filter as a first one, and D rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and counts
+/// as that maximum for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold
 /// behind the filter too.
 ///
 /// # Examples
@@ -180,7 +186,7 @@ impl SpeedActuator {
     }
 
     /// Resets, and lets the first call return `output` as [`Pid::reset_to`] does.
-    pub fn reset_to(&mut self, output: f32) {
+    pub const fn reset_to(&mut self, output: f32) {
         self.pid.reset_to(output);
         self.filters.reset_to(self.pid.output());
     }

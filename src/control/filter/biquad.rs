@@ -12,12 +12,13 @@ use crate::math;
 /// Computed in the transposed direct form II. Source: Bristow-Johnson, "Cookbook formulae for audio equalizer biquad
 /// filter coefficients".
 ///
-/// Rounding grows as the cut-off falls: at a thousandth of the sample rate it reaches 0.2 % of the signal. Below that use
-/// a [`LowPass`](super::LowPass), or filter every tenth sample.
+/// Rounding grows as the cut-off falls: at a thousandth of the sample rate it reaches 0.2 % of the signal, and soon after it
+/// would grow without bound. Below that use a [`LowPass`](super::LowPass), or filter every tenth sample.
 ///
 /// # Edge behaviour
-/// The first sample is the first output, at rest. A sample that is NaN or infinite, or so large that the sum overflows: the
-/// last output is returned, the state stays and [`rejected`](Self::rejected) grows.
+/// The first sample is the first output, at rest. It knows no time: after a gap in the samples, [`reset`](Self::reset) it. A
+/// sample that is NaN or infinite: the last output is returned, the state stays and [`rejected`](Self::rejected) grows. The
+/// same when a sum overflows; then the next sample is a first one.
 ///
 /// # Examples
 /// ```
@@ -55,7 +56,8 @@ impl Biquad {
     /// Lets through what is below `cutoff_hz`. A `q` of [`BUTTERWORTH`](Self::BUTTERWORTH) is flat; a larger one peaks.
     ///
     /// # Errors
-    /// Names `cutoff`, `q` or `sample_hz` when NaN, infinite, zero or negative; `cutoff` when not below half of `sample_hz`.
+    /// Names `cutoff`, `q` or `sample_hz` when NaN, infinite, zero or negative; `cutoff` when not from 0.001 to 0.499 of `sample_hz`,
+    /// `q` when not from 0.01 to 100.
     pub const fn low_pass(cutoff_hz: f32, q: f32, sample_hz: f32) -> Result<Self, ConfigError> {
         check!(check_all("cutoff", cutoff_hz, q, sample_hz));
         let (sine, cosine) = math::sin_cos(core::f32::consts::TAU * (cutoff_hz / sample_hz));
@@ -69,7 +71,8 @@ impl Biquad {
     /// Takes out a narrow band about `center_hz`, `center_hz / q` wide at -3 dB.
     ///
     /// # Errors
-    /// Names `center`, `q` or `sample_hz` when NaN, infinite, zero or negative; `center` when not below half of `sample_hz`.
+    /// Names `center`, `q` or `sample_hz` when NaN, infinite, zero or negative; `center` when not from 0.001 to 0.499 of `sample_hz`,
+    /// `q` when not from 0.01 to 100.
     pub const fn notch(center_hz: f32, q: f32, sample_hz: f32) -> Result<Self, ConfigError> {
         check!(check_all("center", center_hz, q, sample_hz));
         let (sine, cosine) = math::sin_cos(core::f32::consts::TAU * (center_hz / sample_hz));
@@ -151,10 +154,17 @@ const fn check_all(
     check!(positive(name, frequency_hz));
     check!(positive("q", q));
     check!(positive("sample_hz", sample_hz));
-    if frequency_hz >= 0.5 * sample_hz {
-        return Err(ConfigError::new(name, ConfigFault::Unstable));
+    // Nearer to the ends, and at other qualities, the poles round onto the unit circle or past it.
+    let part = frequency_hz / sample_hz;
+    if part > 0.499 {
+        Err(ConfigError::new(name, ConfigFault::Unstable))
+    } else if part < 0.001 {
+        Err(ConfigError::new(name, ConfigFault::OutOfRange))
+    } else if q < 0.01 || q > 100.0 {
+        Err(ConfigError::new("q", ConfigFault::OutOfRange))
+    } else {
+        Ok(())
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -223,7 +233,32 @@ mod tests {
             assert_eq!(Biquad::notch(10.0, bad, 1000.0).unwrap_err().parameter(), "q");
             assert_eq!(Biquad::notch(10.0, 1.0, bad).unwrap_err().parameter(), "sample_hz");
         }
-        assert_eq!(Biquad::notch(500.0, 1.0, 1000.0).unwrap_err().fault(), ConfigFault::Unstable);
+        let out_of_range = ConfigError::new("cutoff", ConfigFault::OutOfRange);
+        assert_eq!(Biquad::low_pass(0.03, 0.7, 1000.0), Err(out_of_range)); // once grew to 1e38
+        for q in [0.009, 101.0, 1e-44, f32::MAX] {
+            let error = ConfigError::new("q", ConfigFault::OutOfRange);
+            assert_eq!(Biquad::notch(50.0, q, 1000.0), Err(error));
+        }
+        for near_half in [499.1, 499.99, 500.0, 1e30] {
+            let error = ConfigError::new("center", ConfigFault::Unstable);
+            assert_eq!(Biquad::notch(near_half, 1.0, 1000.0), Err(error));
+        }
+    }
+
+    /// Law: whatever is taken, its poles lie within the unit circle, by a hundred roundings at least.
+    #[test]
+    fn every_filter_that_is_taken_is_stable() {
+        let parts = (0..=498_u16).map(|thousandth| f32::from(thousandth + 1) * 1e-3);
+        for part in parts.chain([0.001_1, 0.001_5, 0.498_9]) {
+            for q in [0.01, 0.1, 0.5, 0.707, 2.0, 10.0, 100.0] {
+                for made in [Biquad::low_pass(part, q, 1.0), Biquad::notch(part, q, 1.0)] {
+                    let Biquad { a1, a2, .. } = made.unwrap();
+                    let (a1, a2) = (f64::from(a1), f64::from(a2));
+                    let left = (1.0 - a2).min(1.0 + a2 - a1.abs()); // the triangle of Jury
+                    assert!(left > 100.0 * f64::from(f32::EPSILON / 2.0), "{part} {q}: {left}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -13,7 +13,9 @@ use crate::control::step::TimeStep;
 /// # Edge behaviour
 /// The first sample is the first output. `dt_s` zero, negative, NaN or infinite, or an input that is NaN or infinite: the
 /// last output is returned and [`rejected`](Self::rejected) grows. There is no maximum: after a long `dt_s` the old value
-/// rightly counts for little.
+/// rightly counts for little. Every cut-off works: near `f32::MAX` the input passes, near zero the first sample stays. A
+/// change smaller than half the spacing of `f32` at the value is lost, so it stands still within `6e-8 (1 + T / dt)` of the
+/// value: 1e-5 of it for 1 Hz at 1 kHz, 1e-2 for 1 mHz.
 ///
 /// # Examples
 /// ```
@@ -160,6 +162,29 @@ mod tests {
                 let slack = 1e-6 * (highest - lowest);
                 prop_assert!((lowest - slack..=highest + slack).contains(&filter.update(input, dt_s)));
             }
+        }
+    }
+
+    #[test]
+    fn the_slowest_cut_off_keeps_the_first_sample_and_the_fastest_lets_all_pass() {
+        for cutoff_hz in [f32::MIN_POSITIVE, 1e-45] {
+            let mut slow = LowPass::new(cutoff_hz).unwrap();
+            assert_eq!((slow.update(3.0, 0.001), slow.update(9.0, 0.1)), (3.0, 3.0));
+        }
+        let mut fast = LowPass::new(f32::MAX).unwrap();
+        assert_eq!((fast.update(3.0, 0.001), fast.update(9.0, 1e-6)), (3.0, 9.0));
+    }
+
+    #[test]
+    fn it_stands_still_no_further_off_than_the_documentation_says() {
+        for (cutoff_hz, part) in [(1.0, 1e-5), (1e-3, 1e-2)] {
+            let mut filter = LowPass::new(cutoff_hz).unwrap();
+            filter.reset_to(100.0 * (1.0 - 2.0 * part));
+            for _ in 0..1_000_000 {
+                filter.update(100.0, 0.001);
+            }
+            let left = 1.0 - filter.value() / 100.0;
+            assert!(left > 0.0 && left <= part, "{cutoff_hz} Hz: {left}");
         }
     }
 

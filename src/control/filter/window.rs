@@ -2,10 +2,14 @@ use crate::control::number::finite;
 
 /// The mean of the last `N` samples.
 ///
+/// ```text
+/// value = (x + x1 + ... + x(N-1)) / N
+/// ```
 /// Every call adds `N` numbers, so there is no running sum that could drift. Takes out a disturbance whose period is `N` samples.
 ///
 /// # Edge behaviour
-/// Before `N` samples it is the mean of those there are. A sample that is NaN or infinite changes nothing and is counted.
+/// Before `N` samples it is the mean of those there are. It knows no time: after a gap in the samples, [`reset`](Self::reset) it. A
+/// sample that is NaN or infinite changes nothing and is counted. Of samples whose sum is beyond `f32` the mean is right all the same.
 ///
 /// # Examples
 /// ```
@@ -33,7 +37,8 @@ pub struct MovingAverage<const N: usize> {
 /// For an even number of samples it is the lower one of the two in the middle. A call makes `N` times `N` comparisons.
 ///
 /// # Edge behaviour
-/// As for [`MovingAverage`].
+/// Before `N` samples it is the median of those there are. It knows no time: after a gap in the samples, [`reset`](Self::reset)
+/// it. A sample that is NaN or infinite changes nothing and is counted.
 ///
 /// # Examples
 /// ```

@@ -99,10 +99,11 @@ impl IncrementalPidConfig {
 /// [`Pid`](super::Pid) with conditional integration does: the two give the same, to rounding, with limits and without.
 ///
 /// # Edge behaviour
-/// * The first call gives P only, or after [`reset_to`](Self::reset_to) the given output.
+/// * The first call gives P only, or after [`reset_to`](Self::reset_to) the given output, however long ago the controller was made.
 /// * `dt_s` zero, negative, NaN or infinite, and NaN or infinity in an input: the last output is returned, and
 ///   [`rejected`](Self::rejected) grows. After a bad input, D rests in the next good step, as that of [`Pid`](super::Pid) does.
-/// * `dt_s` above the maximum of the [`TimeStep`]: only the change of P is added.
+/// * `dt_s` above the maximum of the [`TimeStep`]: only the change of P is added. With tracking, the target moves on by
+///   [`with_max_step`](IncrementalPidConfig::with_max_step).
 /// * `ki` zero: the output is that of P and D, within the limits. What rounding takes from the sum is not given back.
 /// * Overflow of `f32`: the sum stays at ±`f32::MAX` and the output at its limit, never NaN. What was cut off the sum is lost.
 /// * A change smaller than half the spacing of `f32` at the sum (6e-8 of it) is lost: it stands still where `ki dt e` is less.
@@ -408,6 +409,34 @@ mod tests {
             last = output;
         }
         assert!((last - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn with_tracking_a_long_pause_moves_the_target_on_by_the_longest_step() {
+        let config = IncrementalPidConfig::new(1.0, 5.0, 0.5).with_max_step(0.01);
+        let mut pid = pid(config.with_tracking(50.0));
+        let mut follow = LinearDifferentiator::new(50.0, 0.01).unwrap();
+        follow.reset_to(10.0);
+        for _ in 0..5 {
+            follow.update(11.0, DT_S);
+            pid.update(11.0, 10.0, DT_S);
+        }
+        let (before, target) = (pid.output(), follow.value());
+        let change = follow.update(11.0, 0.01) - target;
+        assert!((pid.update(11.0, 10.0, 1000.0) - before - change).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+        // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
+        for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
+            let mut pid = pid(IncrementalPidConfig::new(0.0, 1.0, 0.0));
+            pid.reset_to(10.0);
+            for _ in 0..1_000 {
+                pid.update(error, 0.0, DT_S);
+            }
+            assert_eq!(pid.output() > 10.0, moves, "{error}");
+        }
     }
 
     #[test]

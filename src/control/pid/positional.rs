@@ -755,6 +755,19 @@ mod tests {
     }
 
     #[test]
+    fn a_slew_limit_of_less_than_half_a_spacing_a_step_stands_still() {
+        // At 100, the spacing is 7.6e-6: half of it a step of 1 ms is 3.8e-3 a second.
+        for (per_s, moves) in [(3.7e-3, false), (4e-3, true)] {
+            let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_slew_limit(per_s));
+            pid.reset_to(100.0);
+            for _ in 0..1_000 {
+                pid.update(200.0, 0.0, DT_S);
+            }
+            assert_eq!(pid.output() > 100.0, moves, "{per_s}");
+        }
+    }
+
+    #[test]
     fn derivative_filter_reaches_63_percent_after_its_time_constant() {
         let cutoff_hz = 1.0 / (core::f32::consts::TAU * 0.1); // 0.1 s
         let mut pid = pid(PidConfig::new(0.0, 0.0, 1.0).with_derivative_filter(cutoff_hz));
@@ -1003,12 +1016,11 @@ mod tests {
 
         #[test]
         fn whole_periods_change_nothing(
-            config in any_config(),
+            config in any_config(), period in prop::sample::select(&[360.0_f32, 8192.0, 7.5, 1.0]),
             samples in prop::collection::vec((0_u16..5760, 0_u16..5760, -50_i8..50, -50_i8..50), 1..30),
         ) {
-            // Feed-forward is for the setpoint next to the measurement: it sees turns of that. Sixteenths of a degree are
-            // exact in f32.
-            let config = config.with_period(360.0);
+            // Feed-forward is for the setpoint next to the measurement: it sees turns of that. Sixteenths are exact in f32.
+            let config = config.with_period(period);
             let turning = config.options() & FEED_FORWARD == 0;
             let (mut here, mut turned) = (pid(config), pid(config));
             for (setpoint, measurement, turns, others) in samples {
@@ -1016,8 +1028,8 @@ mod tests {
                 let (setpoint, measurement) = (f32::from(setpoint) / 16.0, f32::from(measurement) / 16.0);
                 let expected = here.update(setpoint, measurement, DT_S);
                 let shifted = turned.update(
-                    setpoint + 360.0 * f32::from(turns),
-                    measurement + 360.0 * f32::from(others),
+                    setpoint + period * f32::from(turns),
+                    measurement + period * f32::from(others),
                     DT_S,
                 );
                 prop_assert_eq!(shifted, expected);

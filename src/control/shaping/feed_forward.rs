@@ -7,8 +7,8 @@ use crate::control::number::finite;
 /// a unit `U` (A, V) and the velocity in `M`/s they are in `U`, `U s/M` and `U s²/M`.
 ///
 /// # Edge behaviour
-/// At rest, the sign is that of the acceleration: the effort to set off. NaN or infinity in an argument gives zero, and a
-/// sum that overflows ±`f32::MAX`.
+/// It has no state and knows no time. At rest, the sign is that of the acceleration: the effort to set off. NaN or infinity in
+/// an argument gives zero, and a sum that overflows ±`f32::MAX`, however large the gains.
 ///
 /// # Examples
 /// ```

@@ -73,7 +73,7 @@ pub struct ProfileState {
 /// then asked for any moment; the second half mirrors the first, so the end is exact.
 ///
 /// # Edge behaviour
-/// Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
+/// It has no state: any moment may be asked for first, and after any pause. Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
 /// at exactly the end. A move of no length lasts 0 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
 /// shorter than `f32` can tell (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps its limit.
 ///

@@ -4,11 +4,17 @@ use crate::control::step::TimeStep;
 
 /// Bounds the rate at which a value rises and falls.
 ///
+/// ```text
+/// value += target - value, but no more than up dt, and no less than -down dt
+/// ```
+/// The rates are in units of the value a second.
+///
 /// # Edge behaviour
 /// Starts from zero, or from what was given to [`reset_to`](Self::reset_to). `dt_s` zero, negative, NaN or infinite, or a target
 /// that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s (see
-/// [`with_max_step`](Self::with_max_step)) counts as that: a pause is no permission to jump. Steps smaller than the spacing of
-/// `f32` at the value add up: it arrives, however slow the rate.
+/// [`with_max_step`](Self::with_max_step)), in the first call too, counts as that: a pause is no permission to jump. Steps smaller than the spacing of
+/// `f32` at the value add up: it arrives, however slow the rate. However large the rate, the value stays between where it was
+/// and the target.
 ///
 /// # Examples
 /// ```

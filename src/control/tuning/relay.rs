@@ -1,6 +1,6 @@
 use super::Oscillation;
 use crate::control::error::{ConfigError, check, finite, not_negative, positive};
-use crate::control::number::{self, Elapsed};
+use crate::control::number::{self, Sum};
 use crate::control::step::TimeStep;
 use crate::math;
 use core::f32::consts::PI;
@@ -107,8 +107,8 @@ impl RelayTunerConfig {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayTuner {
     config: RelayTunerConfig,
-    passed: Elapsed,
-    period: Elapsed,
+    passed: Sum,
+    period: Sum,
     lowest: f32,
     highest: f32,
     sum_of_periods_s: f32,
@@ -177,8 +177,8 @@ impl RelayTuner {
         check!(config.validate());
         Ok(Self {
             config,
-            passed: Elapsed::ZERO,
-            period: Elapsed::ZERO,
+            passed: Sum::ZERO,
+            period: Sum::ZERO,
             lowest: f32::MAX,
             highest: f32::MIN,
             sum_of_periods_s: 0.0,
@@ -203,7 +203,7 @@ impl RelayTuner {
             return self.output();
         }
         self.passed.add(step.dt_s());
-        if self.passed.seconds() >= self.config.time_limit_s {
+        if self.passed.value() >= self.config.time_limit_s {
             self.state = State::OutOfTime;
             return self.output();
         }
@@ -235,7 +235,7 @@ impl RelayTuner {
     }
 
     const fn next_period(&mut self) {
-        (self.period, self.lowest, self.highest) = (Elapsed::ZERO, f32::MAX, f32::MIN);
+        (self.period, self.lowest, self.highest) = (Sum::ZERO, f32::MAX, f32::MIN);
         (self.samples, self.shorter_half) = (0, u8::MAX);
     }
 
@@ -250,7 +250,7 @@ impl RelayTuner {
         let swing = 0.5 * self.highest - 0.5 * self.lowest;
         if (swing - self.last_swing).abs() <= STEADY * swing {
             self.coarse |= self.shorter_half < Self::LEAST_SAMPLES;
-            self.sum_of_periods_s += self.period.seconds();
+            self.sum_of_periods_s += self.period.value();
             self.sum_of_swings += swing;
             self.periods += 1;
         } else {
@@ -494,7 +494,7 @@ mod tests {
     fn a_time_limit_of_hours_ends_at_short_steps_too() {
         let config = RelayTunerConfig::new(1.0, 0.1).with_time_limit(20_000.0);
         let mut tuner = RelayTuner::new(config).unwrap();
-        tuner.passed = Elapsed::after(19_999.0);
+        tuner.passed = Sum::from(19_999.0);
         let mut steps = 0_u32;
         while !tuner.is_complete() && steps < 3_000 {
             tuner.update(1.0, 0.0, 0.000_5);

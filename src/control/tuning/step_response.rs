@@ -1,5 +1,5 @@
 use crate::control::error::{self, ConfigError, ConfigFault, check, positive};
-use crate::control::number::{Elapsed, finite};
+use crate::control::number::{Sum, finite};
 use crate::control::step::TimeStep;
 
 /// How well a loop follows a step of its setpoint.
@@ -13,7 +13,7 @@ pub struct StepMeasures {
     pub overshoot: f32,
     /// Seconds after which the value stayed within the tolerance; `None` when it was outside at the end.
     pub settling_time_s: Option<f32>,
-    /// Target minus value, averaged over the last tenth of the time, in units of the value.
+    /// Target minus value, averaged over the samples of the last tenth of the time, in units of the value; zero before that.
     pub steady_error: f32,
 }
 
@@ -21,7 +21,8 @@ pub struct StepMeasures {
 ///
 /// # Edge behaviour
 /// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. A long `dt_s`
-/// counts in full: no time is lost, but what the value did in it is not seen. Samples after the end are left out.
+/// counts in full, the first one too: no time is lost, but what the value did in it is not seen. Samples after the end are left
+/// out. A value so far off that a measure is beyond `f32` counts as `f32::MAX`.
 ///
 /// # Examples
 /// A first-order lag of 0.1 s rises in `0.1 ln 9` = 0.22 s and settles to 2 % in `0.1 ln 50` = 0.39 s.
@@ -47,7 +48,7 @@ pub struct StepResponse {
     target: f32,
     duration_s: f32,
     tolerance: f32,
-    passed: Elapsed,
+    passed: Sum,
     tenth_at_s: Option<f32>,
     nine_tenths_at_s: Option<f32>,
     outside_until_s: f32,
@@ -81,7 +82,7 @@ impl StepResponse {
             target,
             duration_s,
             tolerance,
-            passed: Elapsed::ZERO,
+            passed: Sum::ZERO,
             tenth_at_s: None,
             nine_tenths_at_s: None,
             outside_until_s: 0.0,
@@ -102,7 +103,7 @@ impl StepResponse {
             return;
         }
         self.passed.add(dt_s);
-        let passed_s = self.passed.seconds();
+        let passed_s = self.passed.value();
         let part = finite((value - self.start) / (self.target - self.start));
         if part >= 0.1 && self.tenth_at_s.is_none() {
             self.tenth_at_s = Some(passed_s);
@@ -128,7 +129,7 @@ impl StepResponse {
     /// Tells whether the time is over.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
-        self.passed.seconds() >= self.duration_s
+        self.passed.value() >= self.duration_s
     }
 
     /// Returns the measures of what was recorded so far.
@@ -197,7 +198,7 @@ mod tests {
     #[test]
     fn the_last_of_many_hours_ends_at_short_steps_too() {
         let mut response = StepResponse::new(0.0, 1.0, 20_000.0, 0.02).unwrap();
-        response.passed = Elapsed::after(19_999.0);
+        response.passed = Sum::from(19_999.0);
         let mut samples = 0_u32;
         while !response.is_complete() && samples < 3_000 {
             response.record(1.0, 0.000_5);
