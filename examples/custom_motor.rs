@@ -1,18 +1,20 @@
 //! A motor of your own beside DJI motors, on one bus and one runner: the `MyMotor` of many a team's base class.
 //!
 //! Its motor has a gear of 27, an id of its own and frames of its own; everything else, from arming to the command
-//! deadline, it has from the crate. `cargo run --example custom_motor`
+//! deadline and the look-out for stalls, it has from the crate. `cargo run --example custom_motor`
 
 use drivetrain::control::{Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Malformed, MotorName, Own, OwnMotor};
+use drivetrain::motor::{Malformed, MotorName, Own, OwnMotor, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
 const GEAR: f32 = 27.0;
+const NO_LOAD_RAD_PER_S: f32 = 50.0;
+const LIMIT_A: f32 = 8.0;
 /// A per rad/s and A per rad of the output shaft.
-const SPEED: PidConfig = PidConfig::new(0.4, 4.0, 0.0).with_output_limit(8.0);
+const SPEED: PidConfig = PidConfig::new(0.4, 4.0, 0.0).with_output_limit(LIMIT_A);
 
 /// Command 0x120 + id: amperes as `f32`. Feedback 0x140 + id: rotor rpm as `i16`, temperature. Little-endian.
 #[derive(Debug)]
@@ -20,16 +22,13 @@ pub(crate) struct MyMotor {
     id: u8,
     rotor_rpm: i16,
     temperature_c: u8,
+    effort: f32,
     speed: Pid,
 }
 
 impl MyMotor {
     pub(crate) fn new(id: u8) -> Result<Self, drivetrain::control::ConfigError> {
-        Ok(Self { id, rotor_rpm: 0, temperature_c: 0, speed: Pid::new(SPEED)? })
-    }
-
-    pub(crate) fn temperature_c(&self) -> u8 {
-        self.temperature_c
+        Ok(Self { id, rotor_rpm: 0, temperature_c: 0, effort: 0.0, speed: Pid::new(SPEED)? })
     }
 }
 
@@ -61,12 +60,23 @@ impl OwnMotor for MyMotor {
     fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
         let measured = self.velocity().as_rad_per_s();
         let amperes = self.speed.step(target.as_rad_per_s(), measured, step);
+        self.effort = amperes / LIMIT_A;
         let [a, b, c, d] = amperes.to_le_bytes();
         [a, b, c, d, 0, 0, 0, 0]
     }
 
     fn reset(&mut self) {
+        self.effort = 0.0;
         self.speed.reset();
+    }
+
+    fn vitals(&self) -> Vitals {
+        Vitals {
+            temperature_c: Some(self.temperature_c.into()),
+            effort: self.effort,
+            speed: self.velocity().as_rad_per_s() / NO_LOAD_RAD_PER_S,
+            ..Vitals::default()
+        }
     }
 }
 
@@ -82,7 +92,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 mod simulation {
     use super::*;
-    use drivetrain::motor::{ArmError, CanDevice, Claim, Role, VelocityDrive};
+    use drivetrain::motor::{ArmError, CanDevice, Claim, Condition, Role, VelocityDrive};
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::sim::{Line, Model, MotorConfig, World};
     use drivetrain::time::{Duration, Instant};
@@ -128,9 +138,13 @@ mod simulation {
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), robot);
 
         let (rpm, mine_rpm) = (200.0, -150.0);
-        for ms in 0..1_000 {
+        let mut edges = Vec::new();
+        for ms in 0..2_000 {
             world.advance_with(Duration::from_millis(1), |record| esc.hear(&record.frame));
             esc.step(0.001);
+            if (600..1_400).contains(&ms) {
+                esc.rad_per_s = 0.0; // blocked
+            }
             if let Some(frame) = esc.feedback() {
                 let _full = world.inject(Line::Can1, frame);
             }
@@ -141,6 +155,10 @@ mod simulation {
             _ = bus.set_velocity(wheel, AngularVelocity::from_rpm(rpm)); // refused until armed
             _ = mine.set_velocity((), AngularVelocity::from_rpm(mine_rpm));
             runner.tick(tick);
+            while let Some(edge) = runner.device_mut().next_edge() {
+                println!("{edge}");
+                edges.push((edge.condition, edge.began));
+            }
             if ms % 200 == 199 {
                 let (bus, mine) = runner.device();
                 let dji = bus.velocity(wheel).map_or(f32::NAN, AngularVelocity::as_rpm);
@@ -151,13 +169,14 @@ mod simulation {
         let (bus, mine) = runner.device();
         let dji = bus.velocity(wheel).ok_or("M3508 was lost")?.as_rpm();
         let own = mine.velocity(()).ok_or("MyMotor was lost")?.as_rpm();
-        if (dji - rpm).abs() > 4.0
-            || (own - mine_rpm).abs() > 3.0
-            || mine.motor().temperature_c() != 31
-        {
+        if (dji - rpm).abs() > 4.0 || (own - mine_rpm).abs() > 3.0 {
             return Err(format!("{dji} and {own} rpm are not {rpm} and {mine_rpm}").into());
         }
-        Ok(())
+        println!("{}", mine.health());
+        if edges != [(Condition::Stalled, true), (Condition::Stalled, false)] {
+            return Err(format!("one stall was expected, not {edges:?}").into());
+        }
+        if mine.health().temperature_c != Some(31) { Err("no 31 °C".into()) } else { Ok(()) }
     }
 
     /// A Damiao motor in its speed mode, command 0x200 + id: a classic trap beside DJI motors.

@@ -6,7 +6,9 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest, Link, Recovery, TargetError, Timeouts};
+use drivetrain::motor::{
+    CanDevice, Condition, Edge, Ingest, Link, Recovery, TargetError, Timeouts,
+};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
@@ -44,6 +46,18 @@ fn armed(config: Config<M3508>) -> (Bus, Handle<M3508>) {
     hear(&mut bus, feedback(0x200 + u16::from(config.id()), 0, 0), 1_000);
     bus.arm(us(1_000)).unwrap();
     (bus, motor)
+}
+
+/// Feeds one frame a millisecond with the error code that `code` gives, and returns the edges of each update.
+fn edges_of_errors(bus: &mut Bus, to_ms: u64, code: impl Fn(u64) -> u8) -> Vec<(u64, Edge)> {
+    let mut edges = Vec::new();
+    for ms in 2..to_ms {
+        let error = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, code(ms)]).unwrap();
+        hear(bus, error, ms * 1_000);
+        step(bus, ms * 1_000);
+        edges.extend(std::iter::from_fn(|| bus.next_edge()).map(|edge| (ms, edge)));
+    }
+    edges
 }
 
 struct Recorder(Vec<CanFrame>);
@@ -466,4 +480,48 @@ fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one
         step(&mut bus, 1_500 + pause);
         assert_eq!(bus.link(motor), Some(link), "{pause}");
     }
+}
+
+#[test]
+fn an_error_of_5_ms_is_an_edge_whenever_it_comes() {
+    for begin in 100..112 {
+        let (mut bus, motor) = armed(Config::new(1));
+        let lasts = begin..begin + 5;
+        let edges = edges_of_errors(&mut bus, 200, |ms| if lasts.contains(&ms) { 3 } else { 0 });
+        let told: Vec<_> = edges.iter().map(|(_, edge)| (edge.condition, edge.began)).collect();
+        assert_eq!(told, [(Condition::Fault, true), (Condition::Fault, false)], "from {begin} ms");
+        assert_eq!(edges[0].0, begin, "told at once");
+        assert!(begin * 1_000 - edges[0].1.at.as_micros() < 1_024, "{}", edges[0].1);
+        assert!((begin + 5..=begin + 29).contains(&edges[1].0), "over after two looks: {edges:?}");
+        assert!(!bus.is_motor_armed(motor), "a fault relaxes");
+    }
+}
+
+#[test]
+fn an_error_that_comes_with_every_other_frame_is_one_edge() {
+    for codes in [[3, 0], [8, 0], [0, 8]] {
+        let (mut bus, _) = armed(Config::new(1));
+        let code = |ms: u64| if ms < 900 { codes[usize::from(ms % 2 == 0)] } else { 0 };
+        let edges = edges_of_errors(&mut bus, 1_000, code);
+        assert_eq!(edges.len(), 2, "{edges:?}");
+    }
+}
+
+#[test]
+fn codes_that_take_turns_do_not_flood() {
+    let (mut bus, _) = armed(Config::new(1));
+    let edges = edges_of_errors(&mut bus, 1_200, |ms| if ms % 2 == 0 { 3 } else { 8 });
+    assert!(edges.len() <= 4 * 1_200 / 12, "{} edges in 1200 ms", edges.len());
+    let fault = |edge: &&(u64, Edge)| edge.1.condition == Condition::Fault && edge.1.began;
+    assert!(edges.iter().any(|edge| fault(&edge)));
+}
+
+#[test]
+fn a_motor_that_reports_a_fault_before_the_first_update_is_not_armed() {
+    let mut bus = Bus::new();
+    bus.attach(Config::<M3508>::new(1)).unwrap();
+    let fault = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, 3]).unwrap();
+    hear(&mut bus, fault, 1_000);
+    assert!(bus.arm(us(1_000)).is_err());
+    assert!(!bus.is_armed());
 }

@@ -255,3 +255,14 @@ fn the_check_itself_finds_what_it_should() {
         .is_empty()
     );
 }
+
+#[test]
+fn the_decisions_are_numbered_in_their_order() {
+    let design = Path::new(env!("CARGO_MANIFEST_DIR")).join("DESIGN.md");
+    let design = fs::read_to_string(design).unwrap();
+    let section = design.split("\n## ").find(|section| section.starts_with("Decisions")).unwrap();
+    let number = |line: &str| line.split_once(". **").and_then(|(number, _)| number.parse().ok());
+    let numbers: Vec<usize> = section.lines().filter_map(number).collect();
+    assert!(numbers.len() > 20);
+    assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>());
+}

@@ -69,7 +69,7 @@ impl Story<'_> {
     }
 }
 
-/// Ticks times motors, and true doubts about the position.
+/// Ticks of the bus with its four motors armed, and true doubts about the position.
 #[derive(Debug, Default, Clone, Copy)]
 struct Outcome {
     ticks: u64,
@@ -111,7 +111,7 @@ fn drive(seed: u64, seconds: u64) -> Outcome {
         let Some(tick) = runner.due() else { continue };
         if runner.is_armed() {
             story.go_on(runner.device_mut());
-            outcome.ticks += 4;
+            outcome.ticks += 1;
         } else {
             _ = runner.arm(tick);
         }
@@ -119,9 +119,10 @@ fn drive(seed: u64, seconds: u64) -> Outcome {
         while let Some(edge) = runner.device_mut().next_edge() {
             let motor = story.motors[usize::from(edge.motor.id()) - 1];
             let health = runner.device().health(motor).unwrap();
-            // Three lost frames in a row at speed may leave a doubt, and then it has to be told.
+            // Three lost frames in a row at speed may leave a doubt, and then it has to be told. They are a gap of 4 ms,
+            // less what the poll stamped the frame before them too late: half a millisecond, and what others delay it.
             let doubt = edge.condition == Condition::PositionUncertain
-                && (!edge.began || health.longest_gap >= Duration::from_micros(3_900));
+                && (!edge.began || health.longest_gap >= Duration::from_micros(3_400));
             assert!(doubt, "seed {seed}: {edge}; {health}");
             let here = runner.device().state(motor).unwrap().position;
             runner.device_mut().set_present_position(motor, here).unwrap();
@@ -136,19 +137,19 @@ fn drive(seed: u64, seconds: u64) -> Outcome {
 }
 
 #[test]
-fn a_hundred_thousand_healthy_ticks_have_no_edge() {
-    let ticks: u64 = (1..=5).map(|seed| drive(seed, 6).ticks).sum();
-    assert!(ticks > 100_000, "{ticks}");
+fn thirty_thousand_healthy_ticks_have_no_edge() {
+    let ticks: u64 = (1..=6).map(|seed| drive(seed, 6).ticks).sum();
+    assert!(ticks > 30_000, "{ticks}");
 }
 
 #[test]
-#[ignore = "some minutes: cargo test --release --test health_soak -- --ignored --nocapture"]
+#[ignore = "two minutes: cargo test --release --test health_soak -- --ignored --nocapture"]
 fn ten_million_healthy_ticks_have_no_edge() {
-    let outcomes: Vec<Outcome> = (1..=20).map(|seed| drive(seed, 130)).collect();
+    let outcomes: Vec<Outcome> = (1..=20).map(|seed| drive(seed, 520)).collect();
     let ticks: u64 = outcomes.iter().map(|outcome| outcome.ticks).sum();
     let doubts: u32 = outcomes.iter().map(|outcome| outcome.doubts).sum();
     println!(
-        "{ticks} motor-ticks at 5 % loss and 2 % duplicates: no edge but for {doubts} gaps of 3 lost frames and more"
+        "{ticks} ticks of 4 motors at 5 % loss and 2 % duplicates: no edge but for {doubts} gaps of 3 lost frames and more"
     );
     assert!(ticks > 10_000_000, "{ticks}");
 }

@@ -194,8 +194,8 @@ impl<B> Bus<B> {
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
         if let Some(slot) = self.slots.get_mut(index) {
-            if Feedback::of_frame(frame).is_some_and(|feedback| slot.receive(feedback, now.stamp()))
-            {
+            let feedback = Feedback::without_error(frame);
+            if feedback.is_some_and(|feedback| slot.receive(feedback, now.stamp())) {
                 return Ingest::Taken;
             }
         } else if frame.header().wrapping_sub(LOWEST_COMMAND_ID) > COMMAND_IDS {

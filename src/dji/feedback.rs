@@ -19,7 +19,7 @@ use crate::motor::Severity;
 pub struct Feedback {
     /// Angle in the upper half, speed in the lower.
     motion: u32,
-    /// Current in the upper half, then temperature and error.
+    /// Error in the upper byte, then temperature, then current in the order of the wire.
     condition: u32,
 }
 
@@ -51,7 +51,7 @@ impl Feedback {
         let [a, b, c, d, e, f, g, h] = *data;
         let feedback = Self {
             motion: u32::from_be_bytes([a, b, c, d]),
-            condition: u32::from_be_bytes([e, f, g, h]),
+            condition: u32::from_le_bytes([e, f, g, h]),
         };
         if feedback.motion < (8192 << 16) {
             Ok(feedback)
@@ -60,23 +60,24 @@ impl Feedback {
         }
     }
 
-    /// Takes a frame of 8 bytes whose angle is possible, with one comparison for both; `None` does not say why.
+    /// Takes a frame of 8 bytes whose angle is possible and whose error code is zero, with one comparison for all;
+    /// `None` does not say why.
     #[inline]
-    pub(super) const fn of_frame(frame: &CanFrame) -> Option<Self> {
-        let [a, b, c, d, e, f, g, h] = *frame.bytes();
-        let motion = u32::from_be_bytes([a, b, c, d]);
-        let wrong = (frame.length() as u32 ^ 8) | (motion >> 29);
-        if wrong != 0 {
+    pub(super) const fn without_error(frame: &CanFrame) -> Option<Self> {
+        let words = u64::from_le_bytes(*frame.bytes());
+        let (motion, condition) = ((words as u32).swap_bytes(), (words >> 32) as u32);
+        let unusual = frame.missing() as u32 | (condition >> 24) | (motion >> 29);
+        if unusual != 0 {
             return None;
         }
-        Some(Self { motion, condition: u32::from_be_bytes([e, f, g, h]) })
+        Some(Self { motion, condition })
     }
 
     /// Returns the eight bytes of the feedback frame.
     #[must_use]
     pub const fn encode(self) -> [u8; 8] {
         let ([a, b, c, d], [e, f, g, h]) =
-            (self.motion.to_be_bytes(), self.condition.to_be_bytes());
+            (self.motion.to_be_bytes(), self.condition.to_le_bytes());
         [a, b, c, d, e, f, g, h]
     }
 
@@ -96,27 +97,27 @@ impl Feedback {
     /// Returns the torque current in the raw scale of the model.
     #[must_use]
     pub const fn current(self) -> i16 {
-        let [high, low, ..] = self.condition.to_be_bytes();
+        let [high, low, ..] = self.condition.to_le_bytes();
         i16::from_be_bytes([high, low])
     }
 
     /// Returns byte 6: the temperature in °C, on models that have one.
     #[must_use]
     pub const fn temperature(self) -> u8 {
-        let [_, _, temperature, _] = self.condition.to_be_bytes();
+        let [_, _, temperature, _] = self.condition.to_le_bytes();
         temperature
     }
 
     /// Returns bytes 7 and 6: as large as the temperature, or larger than any when there is an error.
     #[inline]
     pub(super) const fn error_and_temperature(self) -> u32 {
-        self.condition.swap_bytes() >> 16
+        self.condition >> 16
     }
 
     /// Returns byte 7: the error code; see [`ErrorCode`].
     #[must_use]
     pub const fn error(self) -> u8 {
-        let [.., error] = self.condition.to_be_bytes();
+        let [.., error] = self.condition.to_le_bytes();
         error
     }
 }

@@ -8,7 +8,7 @@ use crate::motor::{Ingest, Malformed};
 use crate::time::{Duration, Instant};
 
 impl<B> Bus<B> {
-    /// Takes any frame: also the first one of a motor, one after a gap, and what is no feedback at all.
+    /// Takes any frame: also the first one of a motor, one after a gap, one with an error, and what is no feedback at all.
     #[cold]
     #[inline(never)]
     pub(super) fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -37,9 +37,15 @@ impl<B> Bus<B> {
         }
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let before = slot.conditions;
-        slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts, self.running);
+        let in_time = slot.receive(feedback, now.stamp());
+        if !in_time {
+            slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts, self.running);
+        }
+        slot.hear_error(facts, feedback.error());
         self.journal.note(motor, &before, &slot.conditions, now);
-        self.disturb();
+        if !in_time {
+            self.disturb();
+        }
         Ingest::Taken
     }
 

@@ -27,18 +27,18 @@ const ID_MASK: u32 = 0x1FFF_FFFF;
 
 /// A classic CAN data or remote frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CanFrame {
     header: u32,
     data: [u8; 8],
-    length: u8,
+    /// How many of the 8 bytes are not there: none of a full frame, which so is told together with other bits.
+    missing: u8,
 }
 
 impl CanFrame {
     /// Builds a standard data frame of 8 bytes; `None` for an id above `0x7FF`.
     #[must_use]
     pub const fn standard(id: u16, data: [u8; 8]) -> Option<Self> {
-        if id <= 0x7FF { Some(Self { header: id as u32, data, length: 8 }) } else { None }
+        if id <= 0x7FF { Some(Self { header: id as u32, data, missing: 0 }) } else { None }
     }
 
     /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
@@ -78,7 +78,12 @@ impl CanFrame {
     /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
     #[must_use]
     pub const fn length(&self) -> u8 {
-        self.length
+        8 - self.missing
+    }
+
+    /// Returns how many of the 8 data bytes are not there.
+    pub(crate) const fn missing(&self) -> u8 {
+        self.missing
     }
 
     /// [`Frame::is_remote_frame`], for `const` code.
@@ -92,7 +97,8 @@ impl CanFrame {
     }
 
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
-        let mut frame = Self { header, data: [0; 8], length: u8::try_from(data.len()).ok()? };
+        let missing = u8::try_from(8_usize.checked_sub(data.len())?).ok()?;
+        let mut frame = Self { header, data: [0; 8], missing };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
         Some(frame)
     }
@@ -111,8 +117,8 @@ impl Frame for CanFrame {
     }
 
     fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
-        let length = u8::try_from(dlc).ok().filter(|length| *length <= 8)?;
-        Some(Self { header: header_of(id.into()) | REMOTE, data: [0; 8], length })
+        let missing = u8::try_from(8_usize.checked_sub(dlc)?).ok()?;
+        Some(Self { header: header_of(id.into()) | REMOTE, data: [0; 8], missing })
     }
 
     fn is_extended(&self) -> bool {
@@ -133,7 +139,7 @@ impl Frame for CanFrame {
     }
 
     fn dlc(&self) -> usize {
-        usize::from(self.length)
+        usize::from(self.length())
     }
 
     fn data(&self) -> &[u8] {
@@ -146,13 +152,20 @@ impl Frame for CanFrame {
 impl core::fmt::Debug for CanFrame {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self.id() {
-            Id::Standard(id) => write!(f, "{:03X} [{}]", id.as_raw(), self.length)?,
-            Id::Extended(id) => write!(f, "{:08X} [{}]", id.as_raw(), self.length)?,
+            Id::Standard(id) => write!(f, "{:03X} [{}]", id.as_raw(), self.length())?,
+            Id::Extended(id) => write!(f, "{:08X} [{}]", id.as_raw(), self.length())?,
         }
         if self.is_remote_frame() {
             return f.write_str(" remote request");
         }
         self.data().iter().try_for_each(|byte| write!(f, " {byte:02X}"))
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for CanFrame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u32:03X} [{=u8}] {=[u8]:02X}", self.header, self.length(), self.data());
     }
 }
 

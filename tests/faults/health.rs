@@ -272,7 +272,8 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
             let refused = bus.arm(at_ms(40)).map_err(|error| error.to_string());
             assert!(refused.is_err_and(|why| why.starts_with("not fit to be driven: M")));
         }
-        assert_eq!((hear(&mut bus, 0, 20), edges(&mut bus)), (100, vec![(expected, false)]));
+        // An error is over when a whole round of looks heard none.
+        assert_eq!((hear(&mut bus, 0, 30), edges(&mut bus)), (100, vec![(expected, false)]));
     }
     // From one fault to another: an edge of its own, and no end between.
     let (mut bus, _) = armed([Config::new(1)]);

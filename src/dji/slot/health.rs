@@ -110,13 +110,34 @@ impl Slot {
         }
     }
 
+    /// Takes the error code of a frame. One that weighs more than that before counts at once: by the motor's turn it may be
+    /// over. A lesser one waits for that turn, so that codes which come and go are no flood.
+    pub(in crate::dji) fn hear_error(&mut self, facts: &Facts, code: u8) {
+        if code == 0 {
+            return;
+        }
+        self.monitor.hear_error();
+        if facts.errors.severity(code) > facts.errors.severity(self.error_code) {
+            let before = self.conditions.active();
+            self.take_error(facts, code);
+            self.attend();
+            self.react(before);
+        }
+    }
+
+    fn take_error(&mut self, facts: &Facts, code: u8) {
+        if code != self.error_code {
+            self.error_code = code;
+            self.conditions.report(facts.errors.severity(code), true, self.health);
+        }
+    }
+
     fn examine(&mut self, facts: &Facts, look: &Look) -> f32 {
         let feedback = self.feedback;
-        let code = feedback.error();
-        if code | self.error_code != 0 {
-            let changed = code != self.error_code;
-            self.error_code = code;
-            self.conditions.report(facts.errors.severity(code), changed, self.health);
+        let came = self.monitor.take_error();
+        // What came and went since the look before is not over yet: it may come and go.
+        if !came || feedback.error() != 0 {
+            self.take_error(facts, feedback.error());
         }
         let at_limit = look.word != 0 && self.range.is_end(look.word);
         self.saturated = self.saturated.saturating_add(u16::from(at_limit));
@@ -247,7 +268,7 @@ impl Slot {
             feedback_hz: self.traffic.rate_hz(),
             longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
             temperature_c: (heard && facts.has_temperature).then_some(celsius),
-            error_code: self.feedback.error(),
+            error_code: self.error_code,
             saturated: self.saturated,
             refused_targets: self.refused_targets,
             forgotten_targets: self.forgotten_targets,

@@ -69,11 +69,16 @@ pub(crate) struct Monitor {
     stall: Timer,
     runaway: Runaway,
     frozen: Frozen,
+    error_heard: bool,
 }
 
 impl Monitor {
-    pub(crate) const NEW: Self =
-        Self { stall: Timer::ZERO, runaway: Runaway::NONE, frozen: Frozen::NONE };
+    pub(crate) const NEW: Self = Self {
+        stall: Timer::ZERO,
+        runaway: Runaway::NONE,
+        frozen: Frozen::NONE,
+        error_heard: false,
+    };
 
     /// As [`look`](Self::look), for a motor that is moderately driven and cool; `false` when its angle did not move, and
     /// has to be looked at.
@@ -86,6 +91,16 @@ impl Monitor {
             self.frozen.follow(angle, word);
         }
         moved
+    }
+
+    /// An error code came.
+    pub(crate) const fn hear_error(&mut self) {
+        self.error_heard = true;
+    }
+
+    /// Tells whether an error code came since this was asked last.
+    pub(crate) const fn take_error(&mut self) -> bool {
+        core::mem::replace(&mut self.error_heard, false)
     }
 
     /// Looks at the motor and returns the share of the output that it is left with.
