@@ -467,3 +467,26 @@ fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one
         assert_eq!(bus.link(motor), Some(link), "{pause}");
     }
 }
+
+/// The clock of whoever arms is set back, by as much as a stamp cannot tell. The fuzzer found it.
+#[test]
+fn a_motor_is_not_armed_at_a_time_of_long_ago() {
+    for back in PAUSES_US {
+        let now = 20 * WRAP_US;
+        let mut bus = Bus::new();
+        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        step(&mut bus, now);
+        hear(&mut bus, feedback(0x201, 0, 0), now);
+        assert!(bus.arm(us(now - back)).is_err());
+        assert!(bus.arm_only(&[motor.erase()], us(now - back)).is_err());
+        bus.engage(us(now - back));
+        assert!(bus.set_raw(motor, 5_000).is_err());
+        bus.arm(us(now)).unwrap();
+        // What is armed goes on, and its targets count from the bus's own time.
+        bus.engage(us(now - WRAP_US - 50_000));
+        bus.set_raw(motor, 5_000).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), now + 60_000);
+        step(&mut bus, now + 60_000);
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [5_000, 0, 0, 0])));
+    }
+}

@@ -188,7 +188,8 @@ impl<B> Bus<B> {
     /// also looks how old all feedback is.
     ///
     /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
-    /// [`Timeouts::late`] counts as late: not at once, but within twice that time.
+    /// [`Timeouts::late`] counts as late: not at once, but within twice that time. Its low 32 bits are kept: one that is
+    /// wrong by a multiple of 71 min 35 s is not noticed.
     // A call of its own costs as much as a tenth of what it does.
     #[inline(always)]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
