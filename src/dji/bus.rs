@@ -216,7 +216,8 @@ impl<B> Bus<B> {
     /// Runs every loop once and encodes the commands.
     ///
     /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that does not move on, change nothing and leave the
-    /// last commands for one update; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and derivatives rest for the step.
+    /// last commands for one update, but for motors that were relaxed; a second one in a row, or one that comes late, sends
+    /// zeros. Above 20 ms integrals and derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let before = core::mem::replace(&mut self.updated, tick.now());
         self.now = tick.now().stamp();
