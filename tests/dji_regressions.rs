@@ -525,3 +525,61 @@ fn a_motor_that_reports_a_fault_before_the_first_update_is_not_armed() {
     assert!(bus.arm(us(1_000)).is_err());
     assert!(!bus.is_armed());
 }
+
+/// The clock of whoever arms is set back, by as much as a stamp cannot tell. The fuzzer found it.
+#[test]
+fn a_motor_is_not_armed_at_a_time_of_long_ago() {
+    for back in PAUSES_US {
+        let now = 20 * WRAP_US;
+        let mut bus = Bus::new();
+        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        step(&mut bus, now);
+        hear(&mut bus, feedback(0x201, 0, 0), now);
+        assert!(bus.arm(us(now - back)).is_err());
+        assert!(bus.arm_only(&[motor.erase()], us(now - back)).is_err());
+        bus.engage(us(now - back));
+        assert!(bus.set_raw(motor, 5_000).is_err());
+        bus.arm(us(now)).unwrap();
+        // What is armed goes on, and its targets count from the bus's own time.
+        bus.engage(us(now - WRAP_US - 50_000));
+        bus.set_raw(motor, 5_000).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), now + 60_000);
+        step(&mut bus, now + 60_000);
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [5_000, 0, 0, 0])));
+    }
+}
+
+/// The fuzzer found a motor that was offline, because the clock went back, driven once more.
+#[test]
+fn an_update_without_a_step_holds_no_command_of_a_motor_that_was_relaxed() {
+    type Work = fn(&mut Bus, Handle<M3508>) -> u64;
+    let relaxing: [Work; 3] = [
+        |bus, motor| {
+            bus.relax(motor);
+            12_000
+        },
+        |bus, motor| {
+            bus.set_current(motor, Current::from_amperes(f32::NAN)).unwrap_err();
+            12_000
+        },
+        // Hours back: as far as the stamps tell, it was heard long ago.
+        |_, _| 11_000 + WRAP_US / 4,
+    ];
+    for relax in relaxing {
+        let mut bus = Bus::new();
+        let [motor, other] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+        let now = 11_000 + 20 * WRAP_US;
+        for id in [0x201, 0x202] {
+            hear(&mut bus, feedback(id, 0, 0), now);
+        }
+        bus.arm(us(now)).unwrap();
+        bus.set_raw(motor, 5_000).unwrap();
+        bus.set_raw(other, 6_000).unwrap();
+        step(&mut bus, now + 1_000);
+        assert_eq!(sent(&mut bus), [(0x200, [5_000, 6_000, 0, 0])]);
+        let at = relax(&mut bus, motor);
+        bus.update(Tick::new(us(at), 0.0));
+        let held = if at == 12_000 { 6_000 } else { 0 };
+        assert_eq!(sent(&mut bus), [(0x200, [0, held, 0, 0])]);
+    }
+}

@@ -113,7 +113,7 @@ fn drive<K: Kinematics>(
             lost => {
                 now = input.time(now);
                 let wheels = K::map(layout_wheels(&chassis), |_: K::Speed| {
-                    (lost < 240 || input.byte() % 2 == 0).then(|| measured(&mut input))
+                    (lost < 240 || input.coin()).then(|| measured(&mut input))
                 });
                 let dt_s = input.step_s();
                 let tick = Tick::new(Instant::from_micros(now), dt_s);
@@ -171,12 +171,12 @@ fn layout_wheels<K: Kinematics>(chassis: &Chassis<K>) -> K::Wheels<K::Speed> {
 
 fn modes(mut input: Input) {
     let mut config = ModeConfig::new(PidConfig::new(input.positive(), input.positive(), 0.0));
-    if input.byte() % 2 == 0 {
+    if input.coin() {
         config = config.with_rotor(input.positive(), input.positive(), input.positive());
         config = config.with_transition(input.positive());
     }
     let timeout_s = input.positive();
-    let instead = if input.byte() % 2 == 0 { Mode::Relax } else { Mode::Independent };
+    let instead = if input.coin() { Mode::Relax } else { Mode::Independent };
     config = config.with_spin(Spin::Alternate).with_gimbal_timeout(
         timeout_s,
         if instead == Mode::Relax { WithoutGimbal::Relax } else { WithoutGimbal::Independent },

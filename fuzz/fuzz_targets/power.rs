@@ -15,7 +15,9 @@ fuzz_target!(|data: &[u8]| {
     let Ok(model) = model else { return };
     let mut fit = PowerFit::new(model, input.float());
     let pid = PidConfig::new(2.0, 0.5, 0.0).with_output_limit(120.0);
-    let Ok(mut buffer) = PowerBuffer::new(input.positive(), pid) else { return };
+    let Ok(fresh) = PowerBuffer::new(input.positive(), pid) else { return };
+    // I9 and I10: a copy that starts anew wherever the loop does.
+    let (mut buffer, mut clean) = (fresh, fresh);
     while !input.is_empty() {
         let loads: [WheelLoad; 4] = core::array::from_fn(|_| WheelLoad {
             torque: input.float(),
@@ -23,13 +25,25 @@ fuzz_target!(|data: &[u8]| {
         });
         let limit_w = input.float();
         cut(&model, loads, limit_w);
+        let before = fit;
         fit.learn(loads, input.float());
+        if fit.rejected() != before.rejected() {
+            assert_eq!(fit.model(), before.model(), "I5");
+        }
         cut(&fit.model(), loads, limit_w);
         let energy_j = (input.byte() % 4 != 0).then(|| input.float());
-        let allowance_w = buffer.allowance_w(limit_w, energy_j, input.step_s());
+        let known_j = energy_j.filter(|energy| energy.is_finite());
+        let dt_s = input.step_s();
+        let allowance_w = buffer.allowance_w(limit_w, energy_j, dt_s);
+        let again_w = clean.allowance_w(limit_w, known_j, dt_s);
+        assert_eq!(allowance_w.to_bits(), again_w.to_bits(), "I5, I9 or I10: {buffer:?}");
         assert!(allowance_w >= 0.0 && allowance_w.is_finite(), "{allowance_w}");
-        let most = if limit_w > 0.0 { limit_w.min(f32::MAX) } else { 0.0 };
-        assert!(allowance_w <= most + 120.0, "{allowance_w} of {limit_w}");
+        let most = if limit_w > 0.0 && limit_w.is_finite() { limit_w } else { 0.0 };
+        assert!(allowance_w <= most + 120.0, "I2: {allowance_w} of {limit_w}");
+        if known_j.is_none() {
+            assert!(allowance_w <= most, "I4: {allowance_w} of {limit_w} without a reading");
+            clean = fresh;
+        }
     }
 });
 

@@ -1,24 +1,43 @@
-//! Any bytes from a receiver, at any times: values in range, or neutral.
+//! Any bytes from a receiver, at any times and in any split: values in range, or neutral.
 #![no_main]
 
 use drivetrain::time::{Duration, Instant};
-use drivetrain::wire::dbus::{Dbus, Remote, Switch};
+use drivetrain::wire::dbus::{Dbus, FRAME_LENGTH, Remote, Switch};
 use libfuzzer_sys::fuzz_target;
 
+/// From the documentation: a frame counts for so long.
+const DEADLINE: Duration = Duration::from_millis(100);
+
 fuzz_target!(|data: &[u8]| {
-    let mut dbus = Dbus::new();
+    let (mut dbus, mut split) = (Dbus::new(), Dbus::new());
     let mut now = Instant::START;
+    let (mut bytes_came, mut heard) = (0, None);
     for piece in data.chunks(20) {
         let Some((pause, mut bytes)) = piece.split_first() else { return };
         now = now + Duration::from_micros(u64::from(*pause) * 100);
+        bytes_came += bytes.len();
+        for byte in bytes {
+            let mut one = core::slice::from_ref(byte);
+            while split.read(&mut one, now).is_some() {}
+        }
         while let Some(remote) = dbus.read(&mut bytes, now) {
+            heard = Some(now);
             let values =
                 [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
-            assert!(values.iter().all(|value| value.abs() <= 1.0));
+            assert!(values.iter().all(|value| value.abs() <= 1.0), "I2: {remote:?}");
             assert!(remote.left_switch != Switch::Absent && remote.right_switch != Switch::Absent);
         }
         assert!(bytes.is_empty());
-        assert!(dbus.is_live(now) || dbus.remote(now) == Remote::default());
-        let _ = dbus.edge(now);
+        let old = heard.is_none_or(|heard| now - heard > DEADLINE);
+        assert!(!old || !dbus.is_live(now), "I4: live at {now:?}, heard {heard:?}");
+        assert!(dbus.is_live(now) || dbus.remote(now) == Remote::default(), "I4");
+        assert_eq!(dbus.counts(), split.counts(), "I5 or I10: it depends on the split");
+        assert_eq!(dbus.remote(now), split.remote(now), "I5 or I10: it depends on the split");
+        assert_eq!(dbus.edge(now), split.edge(now), "I10");
+        // I6: every byte was in a frame, was skipped, or waits for the end of its frame.
+        let counts = dbus.counts();
+        let in_frames = FRAME_LENGTH * (counts.frames + counts.implausible) as usize;
+        let waiting = bytes_came.checked_sub(in_frames + counts.skipped_bytes as usize);
+        assert!(waiting.is_some_and(|waiting| waiting < FRAME_LENGTH), "I6: {counts:?}");
     }
 });

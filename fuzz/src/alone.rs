@@ -2,12 +2,15 @@
 
 use crate::motors::{COUNT, FACTS, Motor, Target};
 use drivetrain::dji::Bus;
-use drivetrain::motor::{Condition, Edge, Link, Timeouts};
+use drivetrain::motor::{Condition, Conditions, Edge, Link, Timeouts};
 use drivetrain::time::Tick;
 
 /// Feedback is late above this age, and targets are old above the other: the values of the documentation.
 pub const LATE_US: u64 = 10_000;
 pub const COMMAND_US: u64 = 100_000;
+
+/// After so long without an update, everything that was heard is too old.
+pub const PAUSE_US: u64 = 60_000_000;
 
 /// A motor alone, and what is known of it.
 pub struct Alone {
@@ -99,7 +102,11 @@ impl Alone {
     }
 
     pub fn has(&self, condition: Condition) -> bool {
-        self.motor.is_some_and(|motor| self.bus.conditions(motor.handle()).contains(condition))
+        self.conditions().contains(condition)
+    }
+
+    pub fn conditions(&self) -> Conditions {
+        self.motor.map_or(Conditions::NONE, |motor| self.bus.conditions(motor.handle()))
     }
 
     /// The edges that were not read yet, in an order that does not depend on how many there were.
@@ -129,6 +136,18 @@ pub fn lies_ahead(now: u64, stamp: Option<u64>, limit: u64) -> bool {
         let ahead = ahead & 0xFFFF_FFFF;
         ahead > limit && ahead < (1 << 32) - limit
     })
+}
+
+/// The time that a stamp of 32 bits stands for: the one nearest to the clock.
+pub fn as_stamped(now: u64, clock: u64) -> u64 {
+    let off = now.wrapping_sub(clock) as u32;
+    clock.saturating_add_signed(off.cast_signed().into())
+}
+
+/// The age that stamps of 32 bits tell; none when it lies ahead.
+pub fn stamped_age(now: u64, stamp: u64) -> u64 {
+    let age = (now.wrapping_sub(stamp) as u32).cast_signed();
+    age.try_into().unwrap_or_default()
 }
 
 pub fn words(frame: &drivetrain::frame::CanFrame) -> [i16; 4] {

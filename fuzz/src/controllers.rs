@@ -31,9 +31,10 @@ impl<C: Copy + Debug> Observed<C> {
         self.differs = false;
     }
 
-    /// Lets the copy be another one from now on, which has to do the same.
-    pub fn start_from(&mut self, clean: C) {
-        self.clean = clean;
+    /// Resets, and lets the copy be a new one from now on, which has to do the same: nothing of before is left (I9).
+    pub fn reset(&mut self, fresh: C, work: impl FnMut(&mut C) -> f32) {
+        self.change(work);
+        self.clean = fresh;
         self.differs = false;
     }
 

@@ -22,6 +22,11 @@ impl Input<'_> {
         core::array::from_fn(|_| self.byte())
     }
 
+    /// One time in two.
+    pub fn coin(&mut self) -> bool {
+        self.byte().is_multiple_of(2)
+    }
+
     /// Any bits, or, more often than chance would have it, a value of ordinary size.
     pub fn float(&mut self) -> f32 {
         match self.byte() {

@@ -2,7 +2,8 @@
 
 use std::fmt::Debug;
 
-use drivetrain::wire::{Counts, Deframer, Protocol, Reject};
+use drivetrain::time::{Duration, Instant};
+use drivetrain::wire::{Counts, Deframer, Link, Protocol, Reject};
 use std::cell::Cell;
 
 /// Long enough for every frame of every protocol.
@@ -55,14 +56,28 @@ fn read<P: Protocol>(protocol: P, bytes: &[u8], piece: usize) -> (Vec<P::Frame>,
 }
 
 /// The first byte says how the others are split: the frames found and the counts must not depend on it.
-pub fn any_split_gives_the_same<P: Protocol + Copy>(protocol: P, data: &[u8])
-where
-    P::Frame: Debug,
-{
+pub fn any_split_gives_the_same<P: Protocol<Frame: Copy + Debug> + Copy>(protocol: P, data: &[u8]) {
     let Some((piece, bytes)) = data.split_first() else { return };
     let (whole, whole_counts) = read(protocol, bytes, usize::MAX);
     let (split, split_counts) = read(protocol, bytes, usize::from(*piece % 64) + 1);
     assert_eq!(whole_counts, split_counts);
     // Compared as text: a frame may hold NaN.
     assert_eq!(format!("{whole:?}"), format!("{split:?}"));
+    assert_eq!(watch(protocol, bytes, usize::from(*piece % 64) + 1), whole_counts);
+}
+
+/// Reads through a link, each piece up to 255 ms after the one before: what it shows came in time (I4).
+fn watch<P: Protocol<Frame: Copy>>(protocol: P, bytes: &[u8], piece: usize) -> Counts {
+    const DEADLINE: Duration = Duration::from_millis(100);
+    let mut link = Link::<P, BUFFER>::new(protocol, DEADLINE);
+    let (mut now, mut heard) = (Instant::START, None);
+    for mut piece in bytes.chunks(piece) {
+        now = now + Duration::from_millis(piece.first().copied().unwrap_or_default().into());
+        while link.read(&mut piece, now).is_some() {
+            heard = Some(now);
+        }
+        let old = heard.is_none_or(|heard| now - heard > DEADLINE);
+        assert!(!old || link.latest(now).is_none(), "I4: at {now:?}, heard {heard:?}");
+    }
+    link.counts()
 }

@@ -10,8 +10,15 @@
 //! Feedback stamped in the future is the one thing that the whole bus may notice later than a motor alone: `Bus::ingest`
 //! promises twice the time after which it is late. Until then, or until the time has caught up, either answer is right,
 //! for that motor only; then both start anew from a motor that is attached again.
+//!
+//! Before the first update the frames are the clock of all: a motor alone misses what the others' tell. Who was lost by that
+//! is asserted of the whole bus, and starts anew too. Stamps have 32 bits: a frame that comes with a time off by more than
+//! half of that is held for what its stamp says.
 
-use crate::alone::{Alone, COMMAND_US, LATE_US, is_old, lies_ahead, sorted, words};
+use crate::alone::{
+    Alone, COMMAND_US, LATE_US, PAUSE_US, as_stamped, is_old, lies_ahead, sorted, stamped_age,
+    words,
+};
 use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
 use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
@@ -31,6 +38,8 @@ pub struct Watched {
     /// The time that new targets get.
     now: u64,
     updated: Option<u64>,
+    /// The time of the last update; before the first one, that of the last good frame.
+    clock: u64,
     held: u32,
     stopped: bool,
     /// Frames by what became of them.
@@ -62,6 +71,7 @@ impl Watched {
             alone: core::array::from_fn(Alone::new),
             now: 0,
             updated: None,
+            clock: 0,
             held: 0,
             stopped: false,
             malformed: 0,
@@ -254,6 +264,31 @@ impl Watched {
         }
     }
 
+    /// Before the first update, time passes for all with each good frame: whoever it makes known to be lost, and is not lost
+    /// alone, starts anew. So do the others when it sets the clock back: alone they would not arm then.
+    fn pass(&mut self, now: u64, owner: Option<usize>) {
+        let before = core::mem::replace(&mut self.clock, now);
+        let (is_pause, is_reset) = (now > before + PAUSE_US, before > now + PAUSE_US);
+        for index in 0..COUNT {
+            let Some(motor) = self.motors[index] else { continue };
+            let (motor, alone) = (motor.handle(), &self.alone[index]);
+            let (link, conditions) = (self.bus.link(motor), self.bus.conditions(motor));
+            let is_own = owner == Some(index);
+            if link != alone.link() || conditions != alone.conditions() {
+                let is_bygone = |at: u64| is_pause || stamped_age(now, at) > PAUSE_US;
+                let expected = if is_own { Link::Recovering } else { Link::Offline };
+                let lost = alone.heard.is_some_and(is_bygone) && link == Some(expected);
+                let forgotten = alone.commanded.is_some_and(is_bygone)
+                    && conditions.contains(Condition::CommandLost);
+                assert!(lost || forgotten, "I8: {index} is {link:?} at {now}: {alone:?}");
+            } else if !is_reset || is_own {
+                continue;
+            }
+            self.plug(index);
+            self.plug(index);
+        }
+    }
+
     /// What is known of each motor does not depend on the others.
     fn compare(&self) {
         for (motor, alone) in self.motors.iter().zip(&self.alone) {
@@ -337,7 +372,10 @@ impl CanDevice for Watched {
             (Verdict::Taken, Some(owner)) => {
                 let alone = &mut self.alone[owner];
                 assert_eq!(alone.bus.ingest(frame, now), Ingest::Taken, "I8");
-                alone.heard = Some(now.as_micros());
+                if self.updated.is_none() {
+                    self.pass(now.as_micros(), Some(owner));
+                }
+                self.alone[owner].heard = Some(as_stamped(now.as_micros(), self.clock));
             }
             (Verdict::Malformed, _) => self.malformed += 1,
             (Verdict::Unattached, _) => self.unattached += 1,
@@ -352,7 +390,10 @@ impl CanDevice for Watched {
         let holds = stands || TimeStep::new(tick.dt_s(), 0.02).is_hold();
         self.bus.update(tick);
         self.each_alone(|alone| alone.update(tick));
-        self.updated = Some(now);
+        if self.updated.is_none() {
+            self.pass(now, None);
+        }
+        (self.updated, self.clock) = (Some(now), now);
         self.now = now;
         self.held = if holds { self.held + 1 } else { 0 };
         if holds {

@@ -188,7 +188,8 @@ impl<B> Bus<B> {
     /// also looks how old all feedback is.
     ///
     /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
-    /// [`Timeouts::late`] counts as late: not at once, but within twice that time.
+    /// [`Timeouts::late`] counts as late: not at once, but within twice that time. Its low 32 bits are kept: one that is
+    /// wrong by a multiple of 71 min 35 s is not noticed.
     // A call of its own costs as much as a tenth of what it does.
     #[inline(always)]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -215,7 +216,8 @@ impl<B> Bus<B> {
     /// Runs every loop once and encodes the commands.
     ///
     /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that does not move on, change nothing and leave the
-    /// last commands for one update; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and derivatives rest for the step.
+    /// last commands for one update, but for motors that were relaxed; a second one in a row, or one that comes late, sends
+    /// zeros. Above 20 ms integrals and derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let before = core::mem::replace(&mut self.updated, tick.now());
         self.now = tick.now().stamp();

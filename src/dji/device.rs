@@ -63,7 +63,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.stopped {
+        if !self.stopped && !self.is_far(now) {
             self.now = now.stamp();
             self.disturb();
             for motor in 0..self.used {
@@ -155,7 +155,12 @@ impl<B> Bus<B> {
 
     /// Tells whether a motor has no fresh feedback, as far as its stamp tells.
     fn misses(&self, slot: &Slot, now: Instant) -> bool {
-        now > self.updated + LONGEST_PAUSE || slot.is_missing(now.stamp(), &self.timeouts)
+        self.is_far(now) || slot.is_missing(now.stamp(), &self.timeouts)
+    }
+
+    /// Tells whether a time lies so far after or before the last one that no stamp tells how far.
+    fn is_far(&self, now: Instant) -> bool {
+        now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE
     }
 
     fn engage_slot(&mut self, motor: u8, now: Instant) {

@@ -109,7 +109,8 @@ impl<B> Bus<B> {
         }
     }
 
-    /// Ends an update whose time is not usable: the last commands stay once, then zeros.
+    /// Ends an update whose time is not usable: the last commands stay once, then zeros. What asks for nothing gets zero at
+    /// once.
     #[cold]
     #[inline(never)]
     pub(super) fn hold(&mut self, before: Instant) {
@@ -121,6 +122,9 @@ impl<B> Bus<B> {
         let late = self.updated.since(before) > self.timeouts.late();
         if self.held_steps >= 2 || late {
             self.outbox.clear();
+        }
+        for slot in self.slots.iter().filter(|slot| slot.is_at_rest()) {
+            self.outbox.put(slot.place, 0);
         }
         self.outbox.keep_alive(self.now);
         self.outbox.finish_update();

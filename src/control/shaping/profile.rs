@@ -227,10 +227,16 @@ impl Profile {
     }
 }
 
+/// Returns the square root of a ratio, also where the ratio itself is beyond `f32`.
+fn root_of_ratio(dividend: f32, divisor: f32) -> f32 {
+    let ratio = dividend / divisor;
+    if ratio.is_normal() { math::sqrt(ratio) } else { math::sqrt(dividend) / math::sqrt(divisor) }
+}
+
 /// Returns the times of jerk (none) and of full acceleration.
 fn trapezoid(distance: f32, velocity: f32, acceleration: f32) -> (f32, f32) {
     let to_full_speed_s = velocity / acceleration;
-    let to_half_way_s = math::sqrt(distance / acceleration);
+    let to_half_way_s = root_of_ratio(distance, acceleration);
     (0.0, if to_full_speed_s < to_half_way_s { to_full_speed_s } else { to_half_way_s })
 }
 
@@ -238,7 +244,7 @@ fn trapezoid(distance: f32, velocity: f32, acceleration: f32) -> (f32, f32) {
 fn jerk_limited(distance: f32, velocity: f32, acceleration: f32, jerk: f32) -> (f32, f32) {
     let to_full_acceleration_s = acceleration / jerk;
     // Up to the peak speed in two parts of jerk, reaching full acceleration or not.
-    let to_full_speed_s = math::sqrt(velocity / jerk);
+    let to_full_speed_s = root_of_ratio(velocity, jerk);
     let (jerk_s, full_s) = if to_full_speed_s < to_full_acceleration_s {
         (to_full_speed_s, 0.0)
     } else {
@@ -314,6 +320,20 @@ mod tests {
                 (slow.duration_s() - 1000.0).abs() < 1e-3
                     && (slow.at(500.0).position - 5e-4).abs() < 1e-9
             );
+        }
+    }
+
+    /// The fuzzer found a speed of minus infinity: a ratio overflowed, and the time at full acceleration was below zero.
+    #[test]
+    fn a_jerk_near_zero_leaves_the_speed_limit_as_it_is() {
+        for (acceleration, jerk) in [(6e-9, 1e-45), (1.0, 1e-39), (f32::MAX, 1e-39), (1e30, 1e-8)] {
+            let limits = MotionLimits::new(2.7, acceleration).with_jerk(jerk);
+            let profile = Profile::plan(3e38, -1.0, &limits).unwrap();
+            for share in 0..=100_u8 {
+                let at = profile.at(profile.duration_s() * (f32::from(share) / 100.0));
+                assert!(at.velocity.abs() <= 2.700_01, "{at:?} of {profile:?}");
+                assert!(at.position.abs() <= 3e38 && at.acceleration.abs() <= acceleration);
+            }
         }
     }
 

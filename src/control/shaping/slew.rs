@@ -1,5 +1,5 @@
 use crate::control::error::{ConfigError, check, positive};
-use crate::control::number::{finite, limited};
+use crate::control::number::limited;
 use crate::control::step::TimeStep;
 
 /// Bounds the rate at which a value rises and falls.
@@ -66,10 +66,12 @@ impl SlewLimiter {
             let highest = self.rest + self.up_per_s * step.dt_s;
             let left = target - self.value;
             let change = limited(left, lowest, highest);
-            let value = finite(self.value + change);
+            // Rounding must take it neither past the target nor, with a rest of the way before, back.
+            let (nearest, farthest) =
+                if left > 0.0 { (self.value, target) } else { (target, self.value) };
+            let value = limited(self.value + change, nearest, farthest);
             let within_reach = left >= lowest && left <= highest;
-            // The rounding of the sum must not take it past the target.
-            if within_reach || (target - value) * left <= 0.0 {
+            if within_reach || value == target {
                 (self.value, self.rest) = (target, 0.0);
             } else {
                 (self.value, self.rest) = (value, change - (value - self.value));
@@ -122,6 +124,21 @@ mod tests {
             assert!((limiter.value() - expected).abs() < 1e-4, "{}", limiter.value());
         }
         assert_eq!(limiter.value(), 1000.0);
+    }
+
+    /// The fuzzer found both: a rest of the sum that was greater than the next step, and a product that underflowed.
+    #[test]
+    fn rounding_neither_takes_it_back_nor_lets_it_jump() {
+        for (start, fall) in [(0.3, 1.9), (0.4, 0.9), (0.6, 2.7)] {
+            let mut limiter = SlewLimiter::new(1e-30, fall).unwrap().with_max_step(1.0).unwrap();
+            limiter.reset_to(start);
+            let fallen = limiter.update(-10.0, 1.0);
+            assert!((fallen - (start - fall)).abs() < 1e-6);
+            assert!(limiter.update(10.0, 1.0) >= fallen, "falls on from {fallen}");
+        }
+
+        let mut limiter = SlewLimiter::new(1e-30, 1e-30).unwrap();
+        assert_eq!(limiter.update(1e-25, 0.1), 1e-31);
     }
 
     #[test]

@@ -207,6 +207,11 @@ impl Slot {
         }
     }
 
+    /// Tells whether the motor has nothing to do: not asked, or not heard.
+    pub(in crate::dji) fn is_at_rest(&self) -> bool {
+        self.duty == Duty::Rest
+    }
+
     /// Finds out what an update has to do. To be called wherever the link, the range, a loop or what is asked for changes.
     pub(super) fn settle(&mut self) {
         let is_free = self.range == Range::within(self.full_limit) && self.loops.speed().is_plain();
