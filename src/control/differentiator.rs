@@ -52,11 +52,16 @@ impl LinearDifferentiator {
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        self.step(input, &TimeStep::new(dt_s, self.follower.max_step_s))
+        self.follow(input, &TimeStep::new(dt_s, self.follower.max_step_s))
     }
 
-    /// Steps by a time that was validated before.
+    /// Steps by a time that was validated before, with a longest step that may be another one.
     pub(super) fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
+        let dt_s = limited(step.dt_s, 0.0, self.follower.max_step_s);
+        self.follow(input, &TimeStep { dt_s, ..*step })
+    }
+
+    fn follow(&mut self, input: f32, step: &TimeStep) -> f32 {
         let r = self.r;
         self.follower.step(input, step, |error, rate| -r * finite(r * error + 2.0 * rate))
     }
@@ -184,15 +189,14 @@ impl Follower {
         Self { max_step_s, value: Sum::ZERO, rate: Sum::ZERO, rejected: 0 }
     }
 
-    /// Steps by the acceleration that `pull` makes of the error and the rate.
+    /// Steps by the acceleration that `pull` makes of the error and the rate; the step is no longer than the longest one.
     #[inline]
     fn step(&mut self, input: f32, step: &TimeStep, pull: impl FnOnce(f32, f32) -> f32) -> f32 {
         if step.admits(input.is_finite(), &mut self.rejected) {
-            let dt_s = limited(step.dt_s, 0.0, self.max_step_s);
             let rate = self.rate.value();
             let acceleration = pull(self.value.above(input), rate);
-            self.value.add(dt_s * rate);
-            self.rate.add(dt_s * acceleration);
+            self.value.add(step.dt_s * rate);
+            self.rate.add(step.dt_s * acceleration);
         }
         self.value.value()
     }
