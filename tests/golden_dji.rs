@@ -226,8 +226,8 @@ fn feedback_frames_become_the_golden_values() {
         assert!(close(state.velocity.as_rpm(), &expect[rpm]), "{id}");
         assert!(close(state.current.as_amperes(), &expect["current_a"]), "{id}");
         assert_eq!(
-            state.temperature_c.map(u64::from),
-            expect.get("temperature_c").and_then(Value::as_u64)
+            state.temperature_c.map(i64::from),
+            expect.get("temperature_c").and_then(Value::as_i64)
         );
         if let Some(torque) = expect.get("output_torque_nm_at_0.3_nm_per_a") {
             assert!(close(state.torque_nm, torque));

@@ -24,7 +24,7 @@ pub struct State {
     /// Torque at the output shaft in Nm, from the current and the torque constant.
     pub torque_nm: f32,
     /// Motor temperature in °C; `None` on C610, which has none.
-    pub temperature_c: Option<u8>,
+    pub temperature_c: Option<i16>,
     /// What the ESC complains of.
     pub error: Option<ErrorCode>,
     /// Rotor counts in the direction of the shaft since the first frame (which counts its angle) or since zero was

@@ -307,6 +307,6 @@ const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
 }
 
 /// The byte is signed in some drivers and unsigned in others: -40 to -1 is meant rather than 216 to 255.
-fn celsius(byte: u8) -> i16 {
+pub(super) fn celsius(byte: u8) -> i16 {
     if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
 }

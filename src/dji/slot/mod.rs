@@ -23,6 +23,7 @@ use arming::Arming;
 use core::f32::consts::TAU;
 use core::num::NonZeroU16;
 pub(super) use health::Look;
+use health::celsius;
 use target::{Action, Duty, Goal};
 pub(super) use update::Ages;
 
@@ -241,7 +242,7 @@ impl Slot {
             velocity: self.velocity(),
             current: Current::from_amperes(amperes),
             torque_nm: amperes * self.nm_per_a,
-            temperature_c: facts.has_temperature.then_some(self.feedback.temperature()),
+            temperature_c: facts.has_temperature.then_some(celsius(self.feedback.temperature())),
             error: facts.errors.read(self.feedback.error()),
             rotor_counts: self.shaft.rotor_counts(),
             ambiguous_gaps: self.ambiguous_gaps,

@@ -58,6 +58,18 @@ fn state_is_at_the_output_shaft_in_physical_units() {
 }
 
 #[test]
+fn below_zero_it_is_cold_and_not_250_degrees() {
+    let mut bus = Bus::new();
+    let wheel = bus.attach(Config::<M3508>::new(4)).unwrap();
+    for (byte, celsius) in [(250, -6), (216, -40), (215, 215), (0, 0)] {
+        let frame = CanFrame::standard(0x204, [0, 0, 0, 0, 0, 0, byte, 0]).unwrap();
+        assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
+        assert_eq!(bus.state(wheel).unwrap().temperature_c, Some(celsius));
+        assert_eq!(bus.health(wheel).unwrap().temperature_c, Some(celsius));
+    }
+}
+
+#[test]
 fn c610_has_no_temperature_and_its_own_error_list() {
     let mut bus = Bus::new();
     let feeder = bus.attach(Config::<M2006>::new(5)).unwrap();
