@@ -56,3 +56,27 @@ fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
     bus.attach(Config::<M3508>::new(2)).unwrap();
     check(&mut bus);
 }
+
+#[test]
+fn each_command_frame_in_use_tells_of_a_second_master_and_no_other_does() {
+    let all = [0x1FE, 0x1FF, 0x200, 0x2FE, 0x2FF];
+    for used in all {
+        let heard = all.map(|id| {
+            let mut bus: Bus = Bus::new();
+            match used {
+                0x200 => bus.attach(Config::<M3508>::new(1)).map(Handle::erase),
+                0x1FF => bus.attach(Config::<M3508>::new(5)).map(Handle::erase),
+                0x2FF => bus.attach(Config::<Gm6020Voltage>::new(5)).map(Handle::erase),
+                0x1FE => bus.attach(Config::<Gm6020Current>::new(1)).map(Handle::erase),
+                _ => bus.attach(Config::<Gm6020Current>::new(5)).map(Handle::erase),
+            }
+            .unwrap();
+            let frame = CanFrame::standard(id, [0; 8]).unwrap();
+            assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Unrelated);
+            bus.second_master().map(|claim| claim.id())
+        });
+        let expected = all
+            .map(|id| (id == used).then(|| embedded_can::Id::from(StandardId::new(used).unwrap())));
+        assert_eq!(heard, expected, "0x{used:X} in use");
+    }
+}

@@ -7,6 +7,7 @@ mod device;
 mod measured;
 mod receiving;
 mod safety;
+mod timing;
 
 use super::*;
 use crate::control::PidConfig;
