@@ -501,7 +501,7 @@ fn an_error_of_5_ms_is_an_edge_whenever_it_comes() {
 fn an_error_that_comes_with_every_other_frame_is_one_edge() {
     for codes in [[3, 0], [8, 0], [0, 8]] {
         let (mut bus, _) = armed(Config::new(1));
-        let code = |ms: u64| if ms < 900 { codes[usize::from(ms % 2 == 0)] } else { 0 };
+        let code = |ms: u64| if ms < 900 { codes[usize::from(ms.is_multiple_of(2))] } else { 0 };
         let edges = edges_of_errors(&mut bus, 1_000, code);
         assert_eq!(edges.len(), 2, "{edges:?}");
     }
@@ -510,7 +510,7 @@ fn an_error_that_comes_with_every_other_frame_is_one_edge() {
 #[test]
 fn codes_that_take_turns_do_not_flood() {
     let (mut bus, _) = armed(Config::new(1));
-    let edges = edges_of_errors(&mut bus, 1_200, |ms| if ms % 2 == 0 { 3 } else { 8 });
+    let edges = edges_of_errors(&mut bus, 1_200, |ms| if ms.is_multiple_of(2) { 3 } else { 8 });
     assert!(edges.len() <= 4 * 1_200 / 12, "{} edges in 1200 ms", edges.len());
     let fault = |edge: &&(u64, Edge)| edge.1.condition == Condition::Fault && edge.1.began;
     assert!(edges.iter().any(|edge| fault(&edge)));

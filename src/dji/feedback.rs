@@ -64,7 +64,9 @@ impl Feedback {
     /// `None` does not say why.
     #[inline]
     pub(super) const fn without_error(frame: &CanFrame) -> Option<Self> {
+        // As one number, so that each half is loaded as it is: a byte that was asked for alone is loaded alone.
         let words = u64::from_le_bytes(*frame.bytes());
+        #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
         let (motion, condition) = ((words as u32).swap_bytes(), (words >> 32) as u32);
         let unusual = frame.missing() as u32 | (condition >> 24) | (motion >> 29);
         if unusual != 0 {
