@@ -184,8 +184,8 @@ impl<B> Bus<B> {
         self
     }
 
-    /// Takes a received frame that arrived at `now`. Constant time, once the updates run; before the first one each frame
-    /// also looks how old all feedback is.
+    /// Takes a received frame that arrived at `now`. Constant time for one without an error code, once the updates run;
+    /// before the first one each frame also looks how old all feedback is.
     ///
     /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
     /// [`Timeouts::late`] counts as late: not at once, but within twice that time. Its low 32 bits are kept: one that is

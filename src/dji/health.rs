@@ -88,7 +88,7 @@ impl<B> Bus<B> {
     /// let health = bus.health(wheel).ok_or("detached")?;
     /// assert_eq!(
     ///     health.to_string(),
-    ///     "M3508 #2: online, disarmed, healthy; 0 Hz, gap 0 us, 131 C, error 8; saturated 0, refused 0, forgotten 0, ambiguous 0",
+    ///     "M3508 #2: online, disarmed, ESC warning; 0 Hz, gap 0 us, 131 C, error 8; saturated 0, refused 0, forgotten 0, ambiguous 0",
     /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

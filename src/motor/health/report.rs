@@ -46,7 +46,7 @@ pub struct Health {
     pub longest_gap: Duration,
     /// Temperature in °C; `None` for a motor that reports none.
     pub temperature_c: Option<i16>,
-    /// The error code of the ESC as it came; 0 for none.
+    /// The error code of the ESC as it came, for as long as its condition holds; 0 for none.
     pub error_code: u8,
     /// How often the output was found at its limit, saturating: one look every few updates.
     pub saturated: u16,
