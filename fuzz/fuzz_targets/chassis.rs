@@ -116,7 +116,7 @@ fn drive<K: Kinematics>(
                 });
                 let dt_s = input.step_s();
                 let tick = Tick::new(Instant::from_micros(now), dt_s);
-                // Open: the step of the tick that finds it old counts from the next tick on.
+                // A command is new in the first tick after it was set, however long that took.
                 let old = age_s > 0.101;
                 if dt_s.is_finite() && dt_s > 0.0 {
                     age_s += f64::from(dt_s);

@@ -65,7 +65,8 @@ impl SlewLimiter {
                 if left > 0.0 { (self.value, target) } else { (target, self.value) };
             let value = limited(self.value + change, nearest, farthest);
             let within_reach = left >= lowest && left <= highest;
-            if within_reach || value == target {
+            let arrives = if left > 0.0 { value >= target } else { value <= target };
+            if within_reach || arrives {
                 (self.value, self.rest) = (target, 0.0);
             } else {
                 (self.value, self.rest) = (value, change - (value - self.value));
