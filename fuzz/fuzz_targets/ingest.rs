@@ -32,6 +32,17 @@ fuzz_target!(|data: &[u8]| {
             176..=179 => bus.relax(input.byte().into()),
             180..=183 => bus.zero(input.byte().into()),
             184..=187 => bus.plug(input.byte().into()),
+            // All is well for some milliseconds.
+            188..=199 => {
+                let (motor, target) = (input.byte(), input.target());
+                for _ in 0..input.byte() % 16 {
+                    now += 1_000;
+                    hear_all(&mut bus, now, 0);
+                    bus.set(motor.into(), target);
+                    bus.update(Tick::new(Instant::from_micros(now), 0.001));
+                    send(&mut bus, 0);
+                }
+            }
             _ => {
                 now = input.time(now);
                 let step = Tick::new(Instant::from_micros(now), input.step_s());

@@ -31,6 +31,8 @@ struct Scripted {
     full: u32,
     failed: u32,
     evicted: u32,
+    /// Of these, command frames of the bus.
+    evicted_own: u32,
     delivered: u32,
     receive_errors: u32,
 }
@@ -54,6 +56,7 @@ impl embedded_can::nb::Can for Scripted {
             answer @ 100..=149 => {
                 self.accepted += 1;
                 self.evicted += 1;
+                self.evicted_own += 1;
                 let index = usize::from(answer) % (self.waiting.len() + 1);
                 let waited =
                     if index < self.waiting.len() { self.waiting.remove(index) } else { *frame };
@@ -164,6 +167,7 @@ fuzz_target!(|data: &[u8]| {
         }
     }
     let (s, superseded) = (runner.statistics(), runner.device().superseded());
+    let left = runner.device().left_for_good();
     let can = &runner.port_mut().0;
     assert_eq!(s.received, can.delivered + direct, "I6");
     assert_eq!(s.received, s.taken + s.unrelated + s.malformed, "I6");
@@ -172,5 +176,6 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!((s.sent, s.refused, s.send_errors.total()), (can.accepted, can.full, can.failed));
     assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total(), "I6");
     assert_eq!(s.evicted + s.evicted_unrelated, can.evicted, "I6");
+    assert_eq!(left, can.accepted - can.evicted_own, "I6: what came back is offered again");
     assert_eq!(s.superseded, superseded);
 });

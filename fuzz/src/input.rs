@@ -79,7 +79,9 @@ impl Input<'_> {
             0..=191 => {
                 let [high, rest @ ..] = data;
                 let [a, b, c, d, e, f, g] = rest;
-                CanFrame::standard(0x201 + u16::from(id % 11), [high & 0x1F, a, b, c, d, e, f, g])
+                // Now and then the first angle that is none.
+                let [high, a] = if form < 8 { [0x20, 0] } else { [high & 0x1F, a] };
+                CanFrame::standard(0x201 + u16::from(id % 11), [high, a, b, c, d, e, f, g])
             }
             _ => {
                 let number = match id {

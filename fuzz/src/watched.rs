@@ -87,6 +87,11 @@ impl Watched {
         self.bus.counters()
     }
 
+    /// How many frames were taken and not given back.
+    pub fn left_for_good(&self) -> u32 {
+        self.taken_out - self.given_back
+    }
+
     pub fn set(&mut self, index: usize, target: Target) {
         let index = self.settled(index);
         let alone = &mut self.alone[index];

@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""Plants one defect at a time in a copy of the crate, and expects the fuzz target to find it.
+
+    fuzz/controls.py [--seconds N] [WORD]...     60 s at most for each; WORD: only rows in whose target or defect it occurs
+"""
+
+import argparse
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+# target, what is wrong, file, text that stands there exactly once, what is planted instead
+DEFECTS = [
+    ("ingest", "feedback is never late", "src/dji/slot/update.rs",
+     "Link::Online if is_near(now, self.heard, timeouts.late_us()) => {}", "Link::Online => {}"),
+    ("ingest", "targets never grow old", "src/dji/slot/update.rs",
+     "!is_near(now, self.commanded, timeouts.command_us())", "!is_near(now, now, timeouts.command_us())"),
+    ("ingest", "an angle of 8192 is taken", "src/dji/feedback.rs",
+     "| (motion >> 29)", "| (motion.saturating_sub(1 << 16) >> 29)"),
+    ("ingest", "a bad length is not counted", "src/dji/rare.rs",
+     "self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);", ""),
+    ("ingest", "a motor that leaves stays in its frame", "src/dji/attach.rs",
+     "self.outbox.put(place, 0);\n        let shared", "let shared"),
+    ("ingest", "relaxing keeps the integral", "src/dji/slot/target.rs",
+     "self.ask(Action::Rest, Goal::NONE);\n        self.loops.reset();", "self.ask(Action::Rest, Goal::NONE);"),
+    ("ingest", "a refused frame keeps its motor fresh", "src/dji/rare.rs",
+     "let Ok(feedback) = Feedback::decode(frame.bytes()) else {",
+     "let Ok(feedback) = Feedback::decode(frame.bytes()) else {\n            slot.receive(Feedback::NONE, now.stamp());"),
+    ("ingest", "the limit is one count too high", "src/dji/slot/mod.rs",
+     "let limit_raw = to_raw(limit, raw_per_unit, config.command_raw);",
+     "let limit_raw = to_raw(limit, raw_per_unit, config.command_raw) + 1;"),
+    ("runner", "an evicted frame is not given back", "src/runner/send.rs",
+     "if self.device.requeue(&other) {", "if other.header() < 0x300 {"),
+    ("runner", "a full driver is not counted", "src/runner/send.rs",
+     "increment(&mut self.statistics.refused);", ""),
+    ("runner", "errors do not count against the budget", "src/runner/receive.rs",
+     "for _ in 0..budget {\n            match", "while frames < budget {\n            match"),
+    ("runner", "the emergency stop is not looked at", "src/runner/mod.rs",
+     "self.device.emergency_stop();\n        }\n        self.device.update(tick);",
+     "}\n        self.device.update(tick);"),
+    ("runner", "arms at a time of long ago", "src/dji/device.rs",
+     "now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE", "now > self.updated + LONGEST_PAUSE"),
+    ("runner", "holds the command of a motor at rest", "src/dji/rare.rs",
+     "filter(|slot| slot.is_at_rest())", "filter(|_| false)"),
+    ("controllers", "NaN passes", "src/control/step.rs",
+     "let admitted = finite && !self.is_hold();", "let admitted = (finite || true) && !self.is_hold();"),
+    ("controllers", "a reset keeps the sum", "src/control/pid/incremental.rs",
+     "self.rate = 0.0;\n        self.sum = 0.0;\n        self.output = 0.0;\n        self.track_output",
+     "self.rate = 0.0;\n        self.track_output"),
+    ("controllers", "the slew limiter rounds back", "src/control/shaping/slew.rs",
+     "let value = limited(self.value + change, nearest, farthest);",
+     "let value = if nearest > farthest { target } else { self.value + change };"),
+    ("chassis", "commands never grow old", "src/chassis/base.rs",
+     "self.clock.is_dead() || self.command_age_s > self.limits.command_timeout_s();", "self.clock.is_dead();"),
+    ("chassis", "wheels have no limit", "src/chassis/base.rs",
+     "let wheels = K::map(wheels, |wheel| slowed(wheel, scale));\n        if self.is_locking",
+     "if self.is_locking"),
+    ("chassis", "a command of NaN is not counted", "src/chassis/base.rs",
+     "self.status.rejected = self.status.rejected.saturating_add(1);\n        }\n        self.command_age_s",
+     "}\n        self.command_age_s"),
+    ("power", "without a reading all is allowed", "src/chassis/power_buffer.rs",
+     "return limit_w * self.blind_share;", "return limit_w * (self.blind_share + 1.0);"),
+    ("power", "the loop goes on over a gap", "src/chassis/power_buffer.rs", "self.pid.reset();\n", ""),
+    ("snake", "targets never grow old", "src/motor/guard.rs",
+     "if now.since(commanded) > self.timeouts.command() {", "if now < commanded {"),
+    ("snake", "told to relax, it remembers what was written", "src/snake/slot.rs",
+     "self.stopped = now;\n        self.pending = ALL;", "self.stopped = now;"),
+    ("snake", "waits for no answer", "src/snake/slot.rs",
+     "self.awaiting = Some((register, now));\n", ""),
+    ("candump", "an id of two digits", "src/wire/candump/mod.rs", '"{:03X}"', '"{:02X}"'),
+    ("wire_dbus", "the signal is never lost", "src/wire/deadline.rs",
+     "self.live && now.since(self.met) <= self.limit", "self.live"),
+    ("wire_dbus", "a truncated frame is not counted", "src/wire/dbus/mod.rs",
+     "count(&mut self.counts.skipped_bytes, u32::try_from(self.length).unwrap_or(u32::MAX));", ""),
+    ("wire_hipnuc", "a link is never lost", "src/wire/link.rs", "self.latest.filter(|_| self.deadline.is_live(now))", "self.latest"),
+    ("wire_feetech", "noise is not counted", "src/wire/deframer.rs",
+     "self.give_up(noise);", "self.discard(noise);"),
+    ("wire_host_link", "after a bad checksum all that came is thrown away", "src/wire/deframer.rs",
+     "Reject::Unframed | Reject::Length | Reject::Checksum | Reject::Content => {\n                self.give_up(1);",
+     "_ => {\n                self.give_up(self.length);"),
+    ("wire_vofa", "infinity is written as it is", "src/wire/vofa.rs",
+     "if *value == f32::INFINITY { f32::MAX } else { *value }", "*value"),
+]
+
+
+def plant(tree, file, there, instead):
+    path = tree / file
+    text = path.read_text()
+    if text.count(there) != 1:
+        sys.exit(f"{file}: {text.count(there)} times, not once: {there!r}")
+    path.write_text(text.replace(there, instead))
+    return lambda: path.write_text(text)
+
+
+def build(tree, target):
+    command = ["cargo", "+nightly", "fuzz", "build", "--sanitizer", "none", target]
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(done.stderr)
+
+
+def fuzz(tree, binary, target, seconds):
+    corpus = tree / "inputs"
+    shutil.rmtree(corpus, ignore_errors=True)
+    packed = ROOT / "fuzz" / "corpus" / f"{target}.hex"
+    subprocess.run([sys.executable, ROOT / ".ci" / "corpus.py", "unpack", packed, corpus], check=True)
+    started = time.monotonic()
+    done = subprocess.run(
+        [binary, f"-max_total_time={seconds}", "-timeout=10", "-max_len=512", f"-artifact_prefix={tree}/", corpus],
+        capture_output=True, text=True, errors="replace")
+    said = re.search(r"panicked at [^\n]*\n([^\n]*)", done.stderr)
+    hung = "no end" if "ERROR: libFuzzer: timeout" in done.stderr else "?"
+    return done.returncode != 0, time.monotonic() - started, said.group(1)[:70] if said else hung
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--seconds", type=int, default=60)
+    arguments.add_argument("words", nargs="*")
+    arguments = arguments.parse_args()
+    missed = 0
+    print("| target | defect | found after | by |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as tree:
+        tree = pathlib.Path(tree)
+        files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+        for name in files.stdout.split("\0")[:-1]:
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, tree / name)
+        target_dir = pathlib.Path(os.environ.setdefault("CARGO_TARGET_DIR", str(ROOT / "target" / "controls")))
+        version = subprocess.run(["rustc", "-vV"], capture_output=True, text=True, check=True).stdout
+        host = re.search("host: (.*)", version).group(1)
+        for _, _, *defect in DEFECTS:
+            plant(tree, *defect)()
+        for target, what, *defect in DEFECTS:
+            if arguments.words and not any(word in f"{target} {what}" for word in arguments.words):
+                continue
+            restore = plant(tree, *defect)
+            build(tree, target)
+            found, seconds, said = fuzz(tree, target_dir / host / "release" / target, target, arguments.seconds)
+            restore()
+            missed += not found
+            print(f"| `{target}` | {what} | " + (f"{seconds:.1f} s | `{said}` |" if found else "not found | |"), flush=True)
+    sys.exit(f"{missed} not found" if missed else 0)
+
+
+main()
