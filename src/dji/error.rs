@@ -228,6 +228,18 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_written_in_full() {
+        for number in [0, 9, 10, 109, 1_000_000_000, u32::MAX] {
+            let message = Message::new().number(number);
+            assert_eq!(message.to_string(), number.to_string());
+            assert_eq!(std::format!("{message:?}"), std::format!("{:?}", number.to_string()));
+        }
+        for (number, text) in [(0x0A9, "0x0A9"), (0x2FF, "0x2FF"), (0, "0x000")] {
+            assert_eq!(Message::new().hex(number).to_string(), text);
+        }
+    }
+
+    #[test]
     fn the_other_errors_name_motor_and_parameter() {
         let id = AttachError::Id { motor: MotorName::new("M2006", 109), highest: 8 };
         assert_eq!(id.to_string(), "M2006 #109: the id is not within 1..=8");

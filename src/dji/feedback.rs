@@ -225,6 +225,7 @@ impl ErrorTable {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     #[test]
     fn an_angle_above_8191_refuses_the_whole_frame() {
@@ -234,6 +235,41 @@ mod tests {
         );
         assert_eq!(Feedback::decode(&[0xFF; 8]), Err(FeedbackError { angle: 0xFFFF }));
         assert!(Feedback::decode(&[0x1F, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]).is_ok());
+    }
+
+    /// A whole frame with a possible angle and no error: each of the three alone refuses it.
+    #[test]
+    fn without_error_is_decode_of_all_that_is_usual() {
+        use embedded_can::{Frame, StandardId};
+        let id = StandardId::new(0x201).unwrap();
+        let usual = [0x1F, 0xFF, 0x80, 0x01, 0x7F, 0xFE, 250, 0];
+        let frame = CanFrame::new(id, &usual).unwrap();
+        let feedback = Feedback::without_error(&frame).unwrap();
+        assert_eq!(Ok(feedback), Feedback::decode(&usual));
+        assert_eq!((feedback.angle(), feedback.rpm(), feedback.current()), (8191, -32767, 0x7FFE));
+        assert_eq!((feedback.temperature(), feedback.error_and_temperature()), (250, 250));
+
+        assert_eq!(Feedback::without_error(&CanFrame::new(id, &usual[..7]).unwrap()), None);
+        for (byte, value) in [(0, 0x20), (0, 0x80), (7, 1), (7, 0x80)] {
+            let mut data = usual;
+            data[byte] = value;
+            assert_eq!(Feedback::without_error(&CanFrame::new(id, &data).unwrap()), None);
+        }
+        let faulty = Feedback::decode(&[0, 0, 0, 0, 0, 0, 9, 3]).unwrap();
+        assert_eq!(faulty.error_and_temperature(), 0x309);
+    }
+
+    #[test]
+    fn texts_say_what_came() {
+        use std::format;
+        let feedback = Feedback::decode(&[0, 1, 0, 2, 0, 3, 4, 5]).unwrap();
+        assert_eq!(
+            format!("{feedback:?}"),
+            "Feedback { angle: 1, rpm: 2, current: 3, temperature: 4, error: 5 }"
+        );
+        assert_eq!(FeedbackError { angle: 9000 }.to_string(), "rotor angle 9000 is above 8191");
+        assert_eq!(ErrorCode::Stalled.to_string(), "stalled");
+        assert_eq!(ErrorCode::Unlisted(6).to_string(), "unlisted code 6");
     }
 
     #[test]

@@ -141,3 +141,36 @@ fn a_frame_goes_on_as_long_as_one_of_its_motors_is_attached() {
     assert_eq!(round(&mut bus, 4), [0x200]);
     assert_eq!(round(&mut bus, 5), [0_u32; 0]);
 }
+
+#[test]
+fn handles_are_equal_when_they_are_of_one_motor_and_say_which() {
+    let mut bus: Bus = Bus::new();
+    let [one, two] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    let same = one;
+    assert!(one == same && one != two);
+    assert!(one.erase() == one.into() && one.erase() != two.erase());
+    assert_eq!(std::format!("{two:?}"), "Handle(M3508 in slot 1)");
+    assert_eq!(std::format!("{:?}", two.erase()), "AnyHandle(slot 1)");
+}
+
+/// A key holds the place and how often it was taken.
+#[test]
+fn a_place_that_was_taken_before_is_armed_and_measured_as_a_new_one() {
+    let mut bus: Bus = Bus::new();
+    let other = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let mut wheel = bus.attach(Config::<M3508>::new(2)).unwrap();
+    for _ in 0..3 {
+        bus.detach(wheel);
+        wheel = bus.attach(Config::<M3508>::new(2)).unwrap();
+    }
+    assert_eq!(bus.fresh_velocity(wheel.erase()), None);
+    for id in [0x201, 0x202] {
+        assert_eq!(bus.ingest(&feedback(id, 0, 1_920), at_ms(1)), Ingest::Taken);
+    }
+    bus.arm_only(&[wheel.erase()], at_ms(1)).unwrap();
+    assert!(bus.is_motor_armed(wheel) && !bus.is_motor_armed(other));
+    let rpm = bus.fresh_velocity(wheel.erase()).unwrap().as_rpm();
+    assert!((rpm - 1_920.0 * 187.0 / 3591.0).abs() < 0.01, "{rpm}");
+    bus.update(Tick::new(at_ms(500), 0.001));
+    assert_eq!(bus.fresh_velocity(wheel.erase()), None, "lost");
+}
