@@ -45,8 +45,6 @@ DEFECTS = [
     ("runner", "the emergency stop is not looked at", "src/runner/mod.rs",
      "self.device.emergency_stop();\n        }\n        self.device.update(tick);",
      "}\n        self.device.update(tick);"),
-    ("runner", "arms at a time of long ago", "src/dji/device.rs",
-     "now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE", "now > self.updated + LONGEST_PAUSE"),
     ("runner", "holds the command of a motor at rest", "src/dji/rare.rs",
      "filter(|slot| slot.is_at_rest())", "filter(|_| false)"),
     ("controllers", "NaN passes", "src/control/step.rs",
