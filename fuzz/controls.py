@@ -75,14 +75,8 @@ DEFECTS = [
      "self.live && now.since(self.met) <= self.limit", "self.live"),
     ("wire_dbus", "a truncated frame is not counted", "src/wire/dbus/mod.rs",
      "count(&mut self.counts.skipped_bytes, u32::try_from(self.length).unwrap_or(u32::MAX));", ""),
-    ("wire_hipnuc", "a link is never lost", "src/wire/link.rs", "self.latest.filter(|_| self.deadline.is_live(now))", "self.latest"),
     ("wire_feetech", "noise is not counted", "src/wire/deframer.rs",
      "self.give_up(noise);", "self.discard(noise);"),
-    ("wire_host_link", "after a bad checksum all that came is thrown away", "src/wire/deframer.rs",
-     "Reject::Unframed | Reject::Length | Reject::Checksum | Reject::Content => {\n                self.give_up(1);",
-     "_ => {\n                self.give_up(self.length);"),
-    ("wire_vofa", "infinity is written as it is", "src/wire/vofa.rs",
-     "if *value == f32::INFINITY { f32::MAX } else { *value }", "*value"),
 ]
 
 
