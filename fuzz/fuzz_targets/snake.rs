@@ -111,8 +111,11 @@ impl Story {
     }
 
     fn ingest(&mut self, frame: &CanFrame) {
+        let rivals = self.joints.counters().foreign_commands;
         let outcome = self.joints.ingest(frame, Instant::from_micros(self.now));
-        self.refused.push(outcome != Ingest::Taken);
+        // Another controller's command is no reply, but noticed: it relaxes its joint.
+        let rival = self.joints.counters().foreign_commands != rivals;
+        self.refused.push(outcome != Ingest::Taken && !rival);
         match outcome {
             Ingest::Taken => {
                 self.taken += 1;

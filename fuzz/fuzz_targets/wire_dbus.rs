@@ -40,4 +40,6 @@ fuzz_target!(|data: &[u8]| {
         let waiting = bytes_came.checked_sub(in_frames + counts.skipped_bytes as usize);
         assert!(waiting.is_some_and(|waiting| waiting < FRAME_LENGTH), "I6: {counts:?}");
     }
+    now = now + DEADLINE + Duration::from_micros(1);
+    assert!(!dbus.is_live(now) && dbus.remote(now) == Remote::default(), "I4: live for ever");
 });
