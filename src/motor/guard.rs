@@ -108,8 +108,14 @@ impl Guard {
     /// Tells whether a new target may be taken, and notes its time when it is.
     ///
     /// # Errors
-    /// Says why not. A target that is not finite takes the present one away, and is counted.
+    /// Says why not. A target that is not finite is counted. It takes the present one away, as does any that comes without
+    /// fresh feedback: an older target must not act in the place of a newer one when the feedback is back.
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        if !is_finite {
+            self.refused_targets = self.refused_targets.saturating_add(1);
+            self.commanded = None;
+            return Err(TargetError::NotFinite);
+        }
         if !self.armed {
             return Err(TargetError::Disarmed);
         }
@@ -117,12 +123,8 @@ impl Guard {
             return Err(TargetError::Relaxed);
         }
         if !matches!(self.link, Link::Online) {
-            return Err(TargetError::NoFeedback);
-        }
-        if !is_finite {
-            self.refused_targets = self.refused_targets.saturating_add(1);
             self.commanded = None;
-            return Err(TargetError::NotFinite);
+            return Err(TargetError::NoFeedback);
         }
         self.commanded = Some(self.now);
         self.note(Condition::CommandLost, false, self.now);

@@ -24,11 +24,12 @@ enum Mistake {
     ArmsUnheard,
     KeepsItsTarget,
     KeepsNan,
+    KeepsRefused,
     TrustsTheStep,
 }
 
-/// An own motor with a mistake of its maker in front of it.
-struct Careless(Own<MyMotor>, Mistake, Option<CanFrame>, f32);
+/// An own motor with a mistake of its maker in front of it; what it was told last, and whether that was refused.
+struct Careless(Own<MyMotor>, Mistake, Option<CanFrame>, f32, bool);
 
 impl CanDevice for Careless {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -51,6 +52,12 @@ impl CanDevice for Careless {
                     _ = self.0.ingest(&long, tick.now());
                 } else if self.0.is_armed() && self.3 != 0.0 {
                     _ = drive_own(&mut self.0, self.3);
+                }
+                self.0.update(tick);
+            }
+            Mistake::KeepsRefused => {
+                if self.4 && drive_own(&mut self.0, self.3).is_ok() {
+                    self.4 = false;
                 }
                 self.0.update(tick);
             }
@@ -116,16 +123,19 @@ impl CanDevice for Careless {
 
 fn careless(mistake: Mistake) -> Result<usize, Violation> {
     check_contract(|| Mixed {
-        device: Careless(Own::new(MyMotor::new(3).unwrap()), mistake, None, 0.0),
+        device: Careless(Own::new(MyMotor::new(3).unwrap()), mistake, None, 0.0, false),
         ids: vec![0x143],
         drive: |device: &mut Careless, share| {
             let share = match device.1 {
                 Mistake::KeepsNan if share.is_nan() => 1.0,
                 _ => share,
             };
-            drive_own(&mut device.0, share)?;
-            device.3 = share;
-            Ok(())
+            let taken = drive_own(&mut device.0, share);
+            match taken {
+                Ok(()) => device.3 = share,
+                Err(error) => device.4 = error == TargetError::NoFeedback,
+            }
+            taken
         },
     })
 }
@@ -177,6 +187,7 @@ fn the_check_finds_what_a_careless_device_gets_wrong() {
         (Mistake::OffersAtOnce, Rule::RequeuedComesAgain),
         (Mistake::ArmsUnheard, Rule::MissingAreNamed),
         (Mistake::KeepsItsTarget, Rule::StartsFromZero),
+        (Mistake::KeepsRefused, Rule::RefusedTargetsAreZero),
         (Mistake::KeepsNan, Rule::NanIsZero),
         (Mistake::TrustsTheStep, Rule::BadStepsAreZero),
     ] {

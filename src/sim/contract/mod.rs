@@ -102,6 +102,8 @@ pub enum Rule {
     OthersGoOn,
     /// Without new targets the output is zero within a tick of the deadline (I4).
     OldTargetsAreZero,
+    /// A target that is refused without fresh feedback takes the older one away: it does not act when the feedback is back.
+    RefusedTargetsAreZero,
     /// A target that is NaN is an error and gives zero.
     NanIsZero,
     /// A target that is not offered is an error, and changes nothing (I5).
@@ -178,7 +180,7 @@ impl core::error::Error for Violation {}
 ///     let wheel = bus.attach(Config::new(1)).expect("a free id");
 ///     OneWheel(bus, wheel)
 /// };
-/// assert_eq!(check_contract(make), Ok(26)); // rules
+/// assert_eq!(check_contract(make), Ok(27)); // rules
 /// ```
 ///
 /// # Errors

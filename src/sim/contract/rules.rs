@@ -16,6 +16,9 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     late(Run::driving(make())?)?;
     others(make)?;
     old_target(Run::driving(make())?)?;
+    for share in [0.0, f32::NAN] {
+        refused(Run::driving(make())?, share)?;
+    }
     nan(Run::driving(make())?)?;
     unsupported(Run::driving(make())?, Run::driving(make())?)?;
     bad_steps(make)?;
@@ -168,6 +171,25 @@ fn old_target<S: Subject>(mut run: Run<S>) -> Outcome {
     }
     let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
     run.expect(again, Rule::OldTargetsAreZero)
+}
+
+/// A stop that comes while the feedback is late.
+fn refused<S: Subject>(mut run: Run<S>, share: f32) -> Outcome {
+    if run.subject.motors() == 0 {
+        return Ok(());
+    }
+    let driven = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
+    run.expect(driven, Rule::ArmedDrives)?;
+    for _ in 0..=run.subject.late_ms() {
+        run.step_silent()?;
+    }
+    let is_refused = run.subject.drive(share).is_err();
+    run.expect(is_refused, Rule::RefusedTargetsAreZero)?;
+    for _ in 0..20 {
+        let output = run.step()?;
+        run.expect(output.driving == 0, Rule::RefusedTargetsAreZero)?;
+    }
+    Ok(())
 }
 
 fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
