@@ -7,7 +7,8 @@ use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Condition, Edge, Ingest, Link, Recovery, TargetError, Timeouts,
+    CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Reaction, Recovery, TargetError,
+    Timeouts,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
@@ -582,4 +583,22 @@ fn an_update_without_a_step_holds_no_command_of_a_motor_that_was_relaxed() {
         let held = if at == 12_000 { 6_000 } else { 0 };
         assert_eq!(sent(&mut bus), [(0x200, [0, held, 0, 0])]);
     }
+}
+
+/// A program may arm in each tick: a jam relaxes the motor again after each window all the same.
+#[test]
+fn a_jam_that_relaxes_does_so_again_where_the_motor_is_armed_again_at_once() {
+    static FEEDER: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
+    let (mut bus, motor) = armed(Config::new(1).with_health(&FEEDER));
+    let mut jams = 0;
+    for ms in 10..4_000 {
+        hear(&mut bus, feedback(0x201, 100, 0), ms * 1_000);
+        bus.arm(us(ms * 1_000)).unwrap();
+        bus.set_raw(motor, 12_000).unwrap();
+        step(&mut bus, ms * 1_000);
+        let edges = core::iter::from_fn(|| bus.next_edge());
+        jams += edges.filter(|edge| edge.condition == Condition::Stalled && edge.began).count();
+    }
+    assert!(jams >= 4, "{jams} jams in 4 s");
 }

@@ -84,7 +84,9 @@ impl Watch {
 
     /// The motor is about to be driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
-        guard.note(Condition::Runaway, false, now);
+        for noticed_anew in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
+            guard.note(noticed_anew, false, now);
+        }
         self.monitor = Monitor::NEW;
     }
 

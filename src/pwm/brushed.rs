@@ -210,19 +210,28 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             _ if output > 0.0 => Way::Forward,
             _ => Way::Backward,
         };
-        if way != self.way || way == Way::Coast {
+        if way == Way::Coast {
+            return self.coast();
+        }
+        if way != self.way {
             // Never a pulse in the wrong direction while the pins change.
             self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm)?;
+            // A pin that fails may have changed or not: the next call sets both again.
+            self.way = Way::Coast;
             self.direction.set(way).map_err(BrushedError::Direction)?;
             self.way = way;
         }
-        match way {
-            Way::Coast => Ok(()),
-            _ => self
-                .channel
-                .set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
-                .map_err(BrushedError::Pwm),
-        }
+        self.channel
+            .set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
+            .map_err(BrushedError::Pwm)
+    }
+
+    /// Stops by both ways that there are, whether one of them fails or not.
+    fn coast(&mut self) -> Result<(), BrushedError<P::Error, D::Error>> {
+        let off = self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm);
+        let set = self.direction.set(Way::Coast).map_err(BrushedError::Direction);
+        self.way = Way::Coast;
+        off.and(set)
     }
 
     fn command(&mut self, tick: Tick) -> f32 {

@@ -30,7 +30,9 @@ impl Slot {
             return;
         }
         self.relax();
-        self.conditions.set(Condition::Runaway, false);
+        for noticed_anew in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
+            self.conditions.set(noticed_anew, false);
+        }
         self.monitor = Monitor::NEW;
         self.arming = Arming::Armed;
         self.ramp_started = None;

@@ -71,6 +71,7 @@ impl Slot {
             && self.link == Link::Online
             && self.ramp_started.is_none()
             && self.error_code == 0
+            && self.range == Range::within(self.full_limit)
             && self.health.soft_limits().is_none();
         if is_well {
             let (warning, _) = temperatures(facts, self.health);

@@ -163,6 +163,66 @@ fn a_pin_that_fails_is_named_and_tried_again() {
     assert_eq!(motor.update(tick(3)), Err(BrushedError::Pwm(Broken)));
 }
 
+/// What a pin was set to last.
+fn level(log: &Log, pin: &str) -> u16 {
+    log.events.borrow().iter().rev().find(|(name, _)| *name == pin).unwrap().1
+}
+
+#[test]
+fn a_stop_opens_the_bridge_where_the_pulse_cannot_be_taken_away() {
+    let log = Log::default();
+    let mut motor = motor(&log, BrushedConfig::new(1));
+    motor.arm(at_ms(1)).unwrap();
+    motor.set_duty(0.5).unwrap();
+    motor.update(tick(1)).unwrap();
+    assert_eq!((level(&log, "in1"), level(&log, "in2")), (1, 0));
+    log.broken.set("pwm");
+    motor.disarm();
+    assert_eq!(motor.update(tick(2)), Err(BrushedError::Pwm(Broken)));
+    assert_eq!((level(&log, "in1"), level(&log, "in2")), (0, 0));
+}
+
+#[test]
+fn pins_of_which_one_failed_are_set_again_whatever_comes_next() {
+    for next in [0.5, -0.5] {
+        let log = Log::default();
+        let mut motor = motor(&log, BrushedConfig::new(1));
+        motor.arm(at_ms(1)).unwrap();
+        motor.set_duty(0.5).unwrap();
+        motor.update(tick(1)).unwrap();
+        log.broken.set("in2");
+        motor.set_duty(-0.5).unwrap();
+        assert_eq!(motor.update(tick(2)), Err(BrushedError::Direction(Broken)));
+        assert_eq!(level(&log, "pwm"), 0);
+        log.broken.set("");
+        motor.set_duty(next).unwrap();
+        motor.update(tick(3)).unwrap();
+        let pins = if next > 0.0 { (1, 0) } else { (0, 1) };
+        assert_eq!(
+            (level(&log, "in1"), level(&log, "in2"), level(&log, "pwm")),
+            (pins.0, pins.1, 10_000)
+        );
+    }
+}
+
+/// A program may arm in each tick: a blocked motor is relaxed again after each window all the same.
+#[test]
+fn a_blocked_motor_that_is_armed_again_at_once_is_relaxed_again_and_again() {
+    let log = Log::default();
+    let mut motor = motor(&log, WHEEL);
+    let mut stalls = 0;
+    for ms in 1..4_000 {
+        motor.ingest_counts(0, at_ms(ms));
+        motor.arm(at_ms(ms)).unwrap();
+        motor.set_velocity((), AngularVelocity::from_rad_per_s(15.0)).unwrap();
+        motor.update(tick(ms)).unwrap();
+        while let Some(edge) = motor.next_edge() {
+            stalls += u32::from(edge.condition == Condition::Stalled && edge.began);
+        }
+    }
+    assert!(stalls >= 4, "{stalls} stalls in 4 s");
+}
+
 #[test]
 fn parameters_that_make_no_sense_are_named() {
     let config = BrushedConfig::new(1);
