@@ -61,7 +61,8 @@ impl Config {
     /// Sets for how long a joint may stand although it is told to move, by more than a 64th of a turn, and what follows: a
     /// stall after 1 s at first, which is reported. Relaxed, it is disabled and waits to be armed.
     ///
-    /// A joint that is too slow to be seen to move in that time, by a 64th of a turn, is not looked at.
+    /// A joint that is too slow to be seen to move in that time, by a 64th of a turn, is not looked at. A window of zero is
+    /// refused when it is attached.
     ///
     /// # Examples
     /// ```

@@ -98,10 +98,12 @@ impl Slot {
     ) -> Result<Self, AttachError> {
         let joint = name(config.id());
         let speed = config.speed.as_rad_per_s();
-        let refused = if speed.is_finite() && speed >= 0.0 && to_pulses(speed) <= FASTEST {
-            config.settings().refused()
-        } else {
+        let refused = if !(speed.is_finite() && speed >= 0.0 && to_pulses(speed) <= FASTEST) {
             Some("speed")
+        } else if config.stall.window == Duration::ZERO {
+            Some("stall window")
+        } else {
+            config.settings().refused()
         };
         if let Some(parameter) = refused {
             return Err(AttachError::Parameter { joint, parameter });

@@ -112,8 +112,8 @@ impl Monitor {
     ) -> f32 {
         let mut share = 1.0;
         if let Some((celsius, (warning, limit))) = sample.temperature {
-            let warning = if config.ignores(Condition::Warm) { limit } else { warning };
-            let limit = if config.ignores(Condition::Hot) { i16::MAX } else { limit };
+            let warning = (!config.ignores(Condition::Warm)).then_some(warning);
+            let limit = (!config.ignores(Condition::Hot)).then_some(limit);
             share = thermal::check(latch, celsius, warning, limit);
         }
         if !config.ignores(Condition::Stalled) {

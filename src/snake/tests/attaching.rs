@@ -1,6 +1,7 @@
 //! Ids, parameters and handles.
 
 use super::*;
+use crate::motor::Reaction;
 
 #[test]
 fn ids_and_parameters_that_make_no_sense_are_named() {
@@ -15,6 +16,8 @@ fn ids_and_parameters_that_make_no_sense_are_named() {
             "snake joint #1: speed is not usable"
         );
     }
+    let no_window = Config::new(1).with_stall(Duration::ZERO, Reaction::Report);
+    assert_eq!(refused(no_window), "snake joint #1: stall window is not usable");
     let settings = Settings::new().with_current(0);
     assert_eq!(
         refused(Config::new(1).with_settings(settings)),
