@@ -5,9 +5,8 @@ export PATH=/usr/sbin:/usr/bin:/sbin:/bin
 bb=/bin/busybox
 $bb mount -t proc proc /proc
 $bb mount -t sysfs sysfs /sys
-$bb mount -t tmpfs tmpfs /tmp
-$bb mkdir /tmp/results
-$bb mount -t hostfs none /tmp/results -o "$RESULTS"
+# Not below /tmp: the checkout may stand there.
+$bb mount -t hostfs none /mnt -o "$RESULTS"
 modules=$($bb ls -d /usr/lib/uml/modules/*/kernel | $bb tail -n 1)
 {
     for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev net/sched/sch_netem; do
@@ -16,8 +15,8 @@ modules=$($bb ls -d /usr/lib/uml/modules/*/kernel | $bb tail -n 1)
     # With an echo of its own: otherwise frames reach the other sockets past the queue, and none is ever lost.
     $bb insmod "$modules/drivers/net/can/vcan.ko" echo=1 || echo "no module vcan"
     ip link add dev vcan0 type vcan && ip link set vcan0 up \
-        && VCAN_RESULTS=/tmp/results "$TEST" --ignored --nocapture --test-threads 1
-    echo $? >/tmp/results/exit
-} >/tmp/results/output 2>&1
+        && VCAN_RESULTS=/mnt "$TEST" --ignored --nocapture --test-threads 1
+    echo $? >/mnt/exit
+} >/mnt/output 2>&1
 $bb sync
 $bb halt -f
