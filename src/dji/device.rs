@@ -164,10 +164,6 @@ impl<B> Bus<B> {
     }
 
     fn engage_slot(&mut self, motor: u8, now: Instant) {
-        let slot = self.slots.get(usize::from(motor));
-        if slot.is_none_or(|slot| self.misses(slot, now)) {
-            return;
-        }
         let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
         let before = slot.conditions;
         slot.engage(now.stamp(), &self.timeouts);

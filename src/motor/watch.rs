@@ -84,8 +84,8 @@ impl Watch {
 
     /// The motor is about to be driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
-        for noticed_anew in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
-            guard.note(noticed_anew, false, now);
+        for condition in Monitor::NOTICED_ANEW {
+            guard.note(condition, false, now);
         }
         self.monitor = Monitor::NEW;
     }

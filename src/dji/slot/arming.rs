@@ -1,7 +1,7 @@
 use super::{Slot, is_near};
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
-use crate::motor::{Condition, Link, Monitor, Timeouts};
+use crate::motor::{Link, Monitor, Timeouts};
 use core::num::NonZeroU16;
 
 /// Whether the motor takes targets.
@@ -30,8 +30,8 @@ impl Slot {
             return;
         }
         self.relax();
-        for noticed_anew in [Condition::Runaway, Condition::Stalled, Condition::Overspeed] {
-            self.conditions.set(noticed_anew, false);
+        for condition in Monitor::NOTICED_ANEW {
+            self.conditions.set(condition, false);
         }
         self.monitor = Monitor::NEW;
         self.arming = Arming::Armed;

@@ -93,6 +93,10 @@ impl Monitor {
         moved
     }
 
+    /// What ends where a motor is armed, so that it begins again, and relaxes again, if it still holds.
+    pub(crate) const NOTICED_ANEW: [Condition; 3] =
+        [Condition::Runaway, Condition::Stalled, Condition::Overspeed];
+
     /// An error code came.
     pub(crate) const fn hear_error(&mut self) {
         self.error_heard = true;
