@@ -74,7 +74,7 @@ pub struct ProfileState {
 ///
 /// # Edge behaviour
 /// It has no state: any moment may be asked for first, and after any pause. Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
-/// at exactly the end. A move of no length lasts 0 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
+/// at exactly the end. A move of no length lasts 0 s, and so does one that would be over within 1e-38 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
 /// shorter than `f32` can tell (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps its limit.
 ///
 /// # Examples
@@ -130,8 +130,9 @@ impl Profile {
         };
         let duration_s = 2.0 * rise_time_s + cruise_s;
         finite("distance", duration_s)?;
-        let peak_velocity = distance / (rise_time_s + cruise_s);
-        if !(peak_velocity.is_finite() && peak_velocity > 0.0) {
+        let moving_s = rise_time_s + cruise_s;
+        let peak_velocity = distance / moving_s;
+        if !(moving_s.is_normal() && peak_velocity.is_finite() && peak_velocity > 0.0) {
             return Ok(Self::at_rest(end, end)); // too short for f32 to tell its parts
         }
         // A rise shorter than f32 can tell is a jump of the speed.
@@ -320,6 +321,18 @@ mod tests {
                 (slow.duration_s() - 1000.0).abs() < 1e-3
                     && (slow.at(500.0).position - 5e-4).abs() < 1e-9
             );
+        }
+    }
+
+    /// The fuzzer found a speed above its limit: the time of the move had three digits left.
+    #[test]
+    fn a_move_that_is_shorter_than_f32_can_tell_is_over_at_once() {
+        for (end, velocity) in [(5.6e-44, 0.0316), (1e-45, 1e-6), (-1e-39, 1.0)] {
+            let limits = MotionLimits::new(velocity, f32::MAX);
+            let profile = Profile::plan(0.0, end, &limits).unwrap();
+            assert_eq!(profile.duration_s(), 0.0, "{profile:?}");
+            let rest = ProfileState { position: end, ..ProfileState::default() };
+            assert_eq!(profile.at(f32::MIN_POSITIVE), rest);
         }
     }
 
