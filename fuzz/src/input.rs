@@ -61,11 +61,13 @@ impl Input<'_> {
         }
     }
 
-    /// Forward as a rule, by up to half an hour, and sometimes back.
+    /// Forward as a rule, by up to half an hour or by exactly 2^32 us, and sometimes back.
     pub fn time(&mut self, now: u64) -> u64 {
         match self.byte() {
             jump @ 0..=191 => now + u64::from(jump) * 100,
-            jump @ 192..=239 => now + (u64::from(self.byte()) << (jump - 192).min(31)),
+            jump @ 192..=235 => now + (u64::from(self.byte()) << (jump - 192).min(31)),
+            // Once around for who keeps 32 bits of it.
+            236..=239 => now + (1 << 32),
             // Not to 0, where a bus that has no frame and no update yet stands.
             jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)).max(1),
         }
