@@ -252,7 +252,7 @@ impl Slot {
 
     /// Returns the frame that is next to be written.
     pub(super) fn next_write(&mut self, now: Instant) -> Command {
-        if !self.driven {
+        if !(self.driven && self.guard.is_armed()) {
             self.stopped = now;
             return Command::DISABLE;
         }

@@ -83,6 +83,24 @@ fn a_position_further_off_than_a_joint_can_go_disarms_it() {
     bench.joints.arm(at_ms(bench.ms)).unwrap();
 }
 
+/// The fuzzer found that the write which was due went out all the same.
+#[test]
+fn a_joint_that_is_disarmed_in_the_middle_of_a_tick_is_sent_nothing_that_moves() {
+    let mut bench = Bench::armed(&[1]);
+    bench.drive(100);
+    bench.joints.set_pulses(bench.handles[0], 2_000).unwrap();
+    bench.ms += 1;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    let jump = reply(1, Register::ActualPosition, -60_000);
+    assert_eq!(bench.joints.ingest(&jump, at_ms(bench.ms)), Ingest::Taken);
+    let sent: Vec<_> = core::iter::from_fn(|| bench.joints.next_frame())
+        .map(|frame| Command::decode(frame.data()).unwrap())
+        .collect();
+    assert_eq!((sent[0], bench.state(0).is_driven), (Command::DISABLE, true));
+    assert_eq!(writes(&bench.run(5)), [Command::DISABLE]);
+    assert!(!bench.state(0).is_driven);
+}
+
 #[test]
 fn an_emergency_stop_in_the_middle_of_a_tick_disables_all_with_the_next_frames() {
     let mut bench = Bench::armed(&ALL);
