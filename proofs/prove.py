@@ -8,7 +8,8 @@ to its end. Names after the image choose what is proved.
 """
 
 import logging
-import pathlib
+import multiprocessing
+import os
 import sys
 import time
 
@@ -29,8 +30,12 @@ FP = claripy.FSORT_FLOAT
 NEAREST = claripy.fp.RM.RM_NearestTiesEven
 
 
+class Failed(Exception):
+    """What a proof has to say when it is none."""
+
+
 def fail(message):
-    sys.exit(f"proofs: {message}")
+    raise Failed(message)
 
 
 def constant(value):
@@ -261,17 +266,22 @@ def is_of_family(identifier):
     return claripy.And(claripy.UGE(identifier, FAMILY[0]), claripy.ULE(identifier, FAMILY[-1]))
 
 
-def route(image, function):
-    """A bus that has heard nothing yet."""
+def route_foreign(image, function):
+    """What no motor has sent: all other ids, both formats, remote frames, wrong lengths; on a bus that has heard nothing."""
     state, length = image.blank(), claripy.BVS("length", 8)
     identifier, extended, remote = claripy.BVS("id", 32), claripy.BVS("extended", 8), claripy.BVS("remote", 8)
-    own = claripy.Or(is_of_family(identifier), *(identifier == command for command in COMMANDS))
+    whole = claripy.And(is_of_family(identifier), length == 8)
+    own = claripy.Or(whole, *(identifier == command for command in COMMANDS))
     others = claripy.Not(claripy.And(extended == 0, remote == 0, own))
     yield route_case(image, function, state, identifier, extended, remote, length, [others])
+
+
+def route(image, function):
+    """A bus that has heard nothing yet, and data of any length."""
+    none, length = claripy.BVV(0, 8), claripy.BVS("length", 8)
     # One id of the family after the other: each is another place in memory.
-    none = claripy.BVV(0, 8)
     for identifier in FAMILY:
-        yield route_case(image, function, state, constant(identifier), none, none, length)
+        yield route_case(image, function, image.blank(), constant(identifier), none, none, length)
 
 
 def route_in_operation(image, function):
@@ -315,81 +325,99 @@ def word_of(model):
     return cases
 
 
-LATE_US, DEADLINE_US, PATIENT_US = 10_000, 100_000, 10_000_000
+LATE_US, DEADLINE_US = 10_000_000, 100_000
 ASKED = 1_000
 
 
-def word_at(late_us):
+def word_at(image, function):
     """The word is what was asked for exactly while the last frame is not late, the target not too old, and time moves
     on; otherwise zero: for three times of 64 bits."""
-
-    def cases(image, function):
-        heard, set_at, updated = times = [claripy.BVS(name, 64) for name in ("heard", "set", "updated")]
-        state = image.blank()
-        for index, at in enumerate(times):
-            state.memory.store(INPUT + 8 * index, at, endness="Iend_LE")
-        day = 86_400_000_000
-        # Time that can be added to without an overflow, and a target that was accepted: its motor was heard by then.
-        assume = [claripy.ULT(at, claripy.BVV(2**62, 64)) for at in times]
-        assume += [claripy.UGE(heard, day), claripy.ULE(set_at - heard + LATE_US, 2 * LATE_US)]
-        fresh = claripy.ULE(updated - heard + late_us, 2 * late_us)
-        moves_on = claripy.UGT(updated, set_at)
-        in_time = claripy.ULE(updated - set_at, DEADLINE_US)
-        expected = claripy.If(claripy.And(fresh, moves_on, in_time), constant(ASKED), constant(0))
-        paths = [
-            (end, end.regs.r0 == expected) for end in image.call(function, constant(INPUT), state=state, assume=assume)
-        ]
-        yield paths, {"heard": heard, "set": set_at, "updated": updated}, assume
-
-    return cases
+    heard, set_at, updated = times = [claripy.BVS(name, 64) for name in ("heard", "set", "updated")]
+    state = image.blank()
+    for index, at in enumerate(times):
+        state.memory.store(INPUT + 8 * index, at, endness="Iend_LE")
+    day = 86_400_000_000
+    # Time that can be added to without an overflow, and a target that was accepted: its motor was heard by then.
+    assume = [claripy.ULT(at, claripy.BVV(2**62, 64)) for at in times]
+    assume += [claripy.UGE(heard, day), claripy.ULE(set_at - heard + LATE_US, 2 * LATE_US)]
+    fresh = claripy.ULE(updated - heard + LATE_US, 2 * LATE_US)
+    moves_on = claripy.UGT(updated, set_at)
+    in_time = claripy.ULE(updated - set_at, DEADLINE_US)
+    expected = claripy.If(claripy.And(fresh, moves_on, in_time), constant(ASKED), constant(0))
+    ends = image.call(function, constant(INPUT), state=state, assume=assume)
+    yield [(end, end.regs.r0 == expected) for end in ends], dict(zip(("heard", "set", "updated"), times)), assume
 
 
 # What is proved, of which function, for which inputs; and the function with an error on which the same has to fail.
 PROOFS = [
     ("decode", decode, "decode", "all 2^64 frames", "decode_faulty"),
     ("unwrap", unwrap, "unwrap", "all 2^32 pairs", "unwrap_faulty"),
-    ("route", route, "route", "all frames, on a bus that has heard nothing", "route_by_number"),
-    ("operation", route_in_operation, "route", "all frames of the family, on a bus in operation", "route_masked"),
+    ("route", route, "route", "all of the family, on a bus that has heard nothing", "route_masked"),
+    ("foreign", route_foreign, "route", "all frames that are no motor's", "route_by_number"),
+    ("operation", route_in_operation, "route", "all of the family, on a bus in operation", "route_masked"),
     ("m2006", word_of((10_000, 10.0)), "word_m2006", "all 2^32 f32", "word_faulty"),
     ("m3508", word_of((16_384, 20.0)), "word_m3508", "all 2^32 f32", "word_faulty"),
     ("gm6020-voltage", word_of((25_000, 24.0)), "word_gm6020_voltage", "all 2^32 f32", "word_faulty"),
     ("gm6020-current", word_of((16_384, 3.0)), "word_gm6020_current", "all 2^32 f32", "word_faulty"),
-    ("late", word_at(LATE_US), "word_at", "any three times of 64 bits", "word_at_faulty"),
-    ("deadline", word_at(PATIENT_US), "word_at_patient", "any three times of 64 bits", "word_at_faulty"),
+    ("timeouts", word_at, "word_at", "any three times of 64 bits", "word_at_faulty"),
 ]
 
 
-# Some minutes, for the paths of every kind of frame: only by name.
+# Two minutes more for what `operation` proves of a bus that runs: only by name.
 LONG = ["route"]
 # Multiplying floats is hard for a solver: these take turns.
 CONVERSIONS = ["m2006", "m3508", "gm6020-voltage", "gm6020-current"]
 
 
-def main():
-    irop.SimIROp._compute_fp_to_int = saturating
-    image = Image(sys.argv[1])
-    chosen = sys.argv[2:]
+def not_now(title):
+    """Why a proof is left out when none was chosen, or None."""
     today = CONVERSIONS[int(time.time()) // 86_400 % len(CONVERSIONS)]
-    for title, cases, function, inputs, faulty in PROOFS:
-        if chosen and title not in chosen:
-            continue
-        if not chosen and title in LONG:
-            print(f"{title:15} not here: `proofs/run {title}` proves it")
-            continue
-        if not chosen and title in CONVERSIONS and title != today:
-            print(f"{title:15} not today: one conversion a day; `proofs/run {title}` proves it")
-            continue
+    if title in LONG:
+        return f"not here: `proofs/run {title}` proves it"
+    if title in CONVERSIONS and title != today:
+        return f"not today: one conversion a day; `proofs/run {title}` proves it"
+    return None
+
+
+def proved(title):
+    """Proves the rule for the function and finds a counterexample for the faulty one, in a process of its own. Returns
+    what there is to say, or the failure."""
+    irop.SimIROp._compute_fp_to_int = saturating
+    _, cases, function, inputs, faulty = next(proof for proof in PROOFS if proof[0] == title)
+    try:
+        image = Image(sys.argv[1])
         start = time.monotonic()
         found, paths = check(cases(image, function))
         if found:
             fail(f"{function} is wrong for {shown(found)}")
         held = time.monotonic()
-        print(f"{title:15} holds for {inputs}: {paths} paths, {held - start:.1f} s", flush=True)
         found, _ = check(cases(image, faulty))
         if not found:
             fail(f"the rule of {title} holds for {faulty} too: it proves nothing")
-        print(f"{'':15} and fails for {faulty}: {shown(found)}, {time.monotonic() - held:.1f} s", flush=True)
-    print(f"proved in {time.process_time():.0f} s of computing")
+        done = time.monotonic()
+    except Failed as failed:
+        return failed
+    return (
+        f"{title:15} holds for {inputs}: {paths} paths, {held - start:.1f} s\n"
+        f"{'':15} and fails for {faulty}: {shown(found)}, {done - held:.1f} s"
+    )
+
+
+def main():
+    titles = [title for title, *_ in PROOFS]
+    chosen = sys.argv[2:] or [title for title in titles if not not_now(title)]
+    if unknown := set(chosen) - set(titles):
+        sys.exit(f"proofs: there is no {', '.join(unknown)}")
+    for title in [title for title in titles if title not in chosen]:
+        print(f"{title:15} {not_now(title) or 'not chosen'}")
+    start = time.monotonic()
+    # The longest are the last ones: they begin first.
+    with multiprocessing.Pool(os.cpu_count(), maxtasksperchild=1) as pool:
+        for said in pool.imap_unordered(proved, reversed([title for title in titles if title in chosen])):
+            if isinstance(said, Failed):
+                sys.exit(f"proofs: {said}")
+            print(said, flush=True)
+    print(f"proved in {time.monotonic() - start:.0f} s")
 
 
 def shown(found):
