@@ -75,19 +75,10 @@ fn pid(mut input: Input) {
             }
             232..=237 => {
                 let fresh = Pid::new(pid.get().config()).expect("it was valid");
-                pid.reset(fresh, |pid| {
-                    pid.reset();
-                    pid.output()
-                });
+                pid.restart(fresh);
                 assert_eq!(pid.get().terms(), fresh.terms(), "I9: {pid:?}");
             }
-            238..=243 => {
-                let output = input.float();
-                pid.change(|pid| {
-                    pid.reset_to(output);
-                    pid.output()
-                });
-            }
+            238..=243 => pid.restart_at(input.float()),
             244..=249 => {
                 let (kp, ki, kd) = (input.positive(), input.positive(), input.positive());
                 pid.forgive();
@@ -162,19 +153,8 @@ fn incremental(mut input: Input) {
                     pid.rests();
                 }
             }
-            240..=245 => {
-                pid.reset(fresh, |pid| {
-                    pid.reset();
-                    pid.output()
-                });
-            }
-            246..=250 => {
-                let output = input.float();
-                pid.change(|pid| {
-                    pid.reset_to(output);
-                    pid.output()
-                });
-            }
+            240..=245 => pid.restart(fresh),
+            246..=250 => pid.restart_at(input.float()),
             _ => {
                 let gains = [input.positive(), input.positive(), input.positive()];
                 if fresh.set_gains(gains[0], gains[1], gains[2]).is_ok() {
@@ -218,19 +198,8 @@ fn speed_actuator(mut input: Input) {
                     actuator.rests();
                 }
             }
-            232..=239 => {
-                actuator.reset(fresh, |actuator| {
-                    actuator.reset();
-                    actuator.output()
-                });
-            }
-            240..=247 => {
-                let output = input.float();
-                actuator.change(|actuator| {
-                    actuator.reset_to(output);
-                    actuator.output()
-                });
-            }
+            232..=239 => actuator.restart(fresh),
+            240..=247 => actuator.restart_at(input.float()),
             _ => {
                 actuator.forgive();
                 actuator.change(|actuator| {
@@ -276,19 +245,8 @@ fn position_actuator(mut input: Input) {
                 let within = slowest <= speed && speed <= fastest || speed == 0.0;
                 assert!(within, "I2: {speed} of {actuator:?}");
             }
-            232..=239 => {
-                actuator.reset(fresh, |actuator| {
-                    actuator.reset();
-                    actuator.output()
-                });
-            }
-            240..=247 => {
-                let output = input.float();
-                actuator.change(|actuator| {
-                    actuator.reset_to(output);
-                    actuator.output()
-                });
-            }
+            232..=239 => actuator.restart(fresh),
+            240..=247 => actuator.restart_at(input.float()),
             _ => {
                 actuator.change(|actuator| {
                     actuator.interrupt();

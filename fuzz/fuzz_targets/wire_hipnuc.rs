@@ -2,7 +2,31 @@
 #![no_main]
 
 use drivetrain::wire::hipnuc::HipNuc;
-use drivetrain_fuzz::any_split_gives_the_same;
+use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| any_split_gives_the_same(HipNuc, data));
+fuzz_target!(|data: &[u8]| any_split_gives_the_same(HipNuc, data, imu));
+
+/// Header, length, checksum, and a payload of a kind that is known or not, with any content.
+fn imu(input: &mut Input) -> Vec<u8> {
+    let (tag, length) = match input.byte() % 4 {
+        0 | 1 => (0x91, 76),
+        2 => (0x92, 48),
+        _ => (input.byte(), input.byte() % 100 + 1),
+    };
+    let mut payload = vec![tag];
+    payload.extend((1..length).map(|_| input.byte()));
+    let head = [0x5A, 0xA5, length, 0];
+    let [low, high] = crc(head.iter().chain(&payload)).to_le_bytes();
+    [&head[..], &[low, high], &payload].concat()
+}
+
+/// CRC-16/XMODEM, bit by bit.
+fn crc<'a>(bytes: impl Iterator<Item = &'a u8>) -> u16 {
+    bytes.fold(0, |crc, byte| {
+        (0..8).fold(crc ^ u16::from(*byte) << 8, |crc, _| {
+            let shifted = crc << 1;
+            if crc & 0x8000 == 0 { shifted } else { shifted ^ 0x1021 }
+        })
+    })
+}

@@ -1,14 +1,41 @@
 //! Any bytes from the computer or from the robot, in any split.
 #![no_main]
 
-use drivetrain::wire::host_link::{ByteOrder, CommandFormat, TelemetryFormat, TelemetryHeader};
-use drivetrain_fuzz::any_split_gives_the_same;
+use core::array::from_fn;
+use drivetrain::wire::host_link::{
+    ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
+    Telemetry, TelemetryFormat, TelemetryHeader,
+};
+use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    any_split_gives_the_same(CommandFormat, data);
+    any_split_gives_the_same(CommandFormat, data, command);
     let document = TelemetryFormat::new().with_header(TelemetryHeader::Document);
     for format in [document, TelemetryFormat::new().with_floats(ByteOrder::Big)] {
-        any_split_gives_the_same(format, data);
+        any_split_gives_the_same(format, data, |input| telemetry(format, input));
     }
 });
+
+fn command(input: &mut Input) -> Vec<u8> {
+    let joints = from_fn(|_| JointTarget {
+        speed_rpm: input.byte(),
+        position_pulses: i32::from_le_bytes(input.bytes()),
+    });
+    let [gm6020_position, c610_position, sts3032_degrees] =
+        from_fn(|_| i16::from_le_bytes(input.bytes()));
+    let reset = Reset::from_raw(input.byte());
+    let command = Command { joints, gm6020_position, c610_position, sts3032_degrees, reset };
+    command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec()
+}
+
+fn telemetry(format: TelemetryFormat, input: &mut Input) -> Vec<u8> {
+    let telemetry = Telemetry {
+        positions_pulses: from_fn(|_| i32::from_le_bytes(input.bytes())),
+        speeds_rpm: from_fn(|_| input.byte().cast_signed()),
+        gm6020_position: i32::from_le_bytes(input.bytes()),
+        c610_position: i32::from_le_bytes(input.bytes()),
+        imu_angles_deg: from_fn(|_| from_fn(|_| input.float())),
+    };
+    format.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).expect("room").to_vec()
+}

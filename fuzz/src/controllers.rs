@@ -1,4 +1,32 @@
 use core::fmt::Debug;
+use drivetrain::control::{IncrementalPid, Pid, PositionActuator, SpeedActuator};
+
+/// What can start anew, from rest or from an output that another has held.
+pub trait Restart {
+    fn reset(&mut self);
+    fn reset_to(&mut self, output: f32);
+    fn output(&self) -> f32;
+}
+
+macro_rules! restart {
+    ($($controller:ty),*) => {$(
+        impl Restart for $controller {
+            fn reset(&mut self) {
+                Self::reset(self);
+            }
+
+            fn reset_to(&mut self, output: f32) {
+                Self::reset_to(self, output);
+            }
+
+            fn output(&self) -> f32 {
+                Self::output(self)
+            }
+        }
+    )*};
+}
+
+restart!(Pid, IncrementalPid, SpeedActuator, PositionActuator);
 
 /// A controller or filter under observation, beside a copy that never sees what was refused.
 #[derive(Debug)]
@@ -73,5 +101,21 @@ impl<C: Copy + Debug> Observed<C> {
         }
         self.output = output;
         taken
+    }
+}
+
+impl<C: Copy + Debug + Restart> Observed<C> {
+    pub fn restart(&mut self, fresh: C) {
+        self.reset(fresh, |controller| {
+            controller.reset();
+            controller.output()
+        });
+    }
+
+    pub fn restart_at(&mut self, output: f32) {
+        self.change(|controller| {
+            controller.reset_to(output);
+            controller.output()
+        });
     }
 }

@@ -1,5 +1,6 @@
 //! Framed byte protocols: what is found must not depend on how the bytes were split.
 
+use crate::Input;
 use std::fmt::Debug;
 
 use drivetrain::time::{Duration, Instant};
@@ -55,15 +56,66 @@ fn read<P: Protocol>(protocol: P, bytes: &[u8], piece: usize) -> (Vec<P::Frame>,
     (frames, counts)
 }
 
-/// The first byte says how the others are split: the frames found and the counts must not depend on it.
-pub fn any_split_gives_the_same<P: Protocol<Frame: Copy + Debug> + Copy>(protocol: P, data: &[u8]) {
-    let Some((piece, bytes)) = data.split_first() else { return };
+/// What comes over a line: noise, frames as their sender writes them, and frames that lost their end or of which one byte was
+/// changed on the way.
+fn stream(mut input: Input, frame: impl Fn(&mut Input) -> Vec<u8>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    while !input.is_empty() {
+        match input.byte() {
+            noise @ 0..=127 => bytes.extend((0..=noise % 16).map(|_| input.byte())),
+            128..=207 => bytes.extend(frame(&mut input)),
+            kind => {
+                let (place, change, mut frame) = (input.byte(), input.byte(), frame(&mut input));
+                let place = usize::from(place) % frame.len();
+                match kind {
+                    208..=231 => frame[place] ^= change,
+                    _ => frame.truncate(place),
+                }
+                bytes.extend(frame);
+            }
+        }
+    }
+    bytes
+}
+
+/// The first byte says how the others are split: the frames found and the counts must not depend on it. `frame` writes what the
+/// protocol takes.
+pub fn any_split_gives_the_same<P: Protocol<Frame: Copy + Debug> + Copy>(
+    protocol: P,
+    data: &[u8],
+    frame: impl Fn(&mut Input) -> Vec<u8>,
+) {
+    let Some((piece, data)) = data.split_first() else { return };
+    let bytes = &stream(Input(data), frame);
     let (whole, whole_counts) = read(protocol, bytes, usize::MAX);
+    assert_eq!(format!("{whole:?}"), format!("{:?}", search(protocol, bytes)), "I6");
     let (split, split_counts) = read(protocol, bytes, usize::from(*piece % 64) + 1);
     assert_eq!(whole_counts, split_counts);
     // Compared as text: a frame may hold NaN.
     assert_eq!(format!("{whole:?}"), format!("{split:?}"));
     assert_eq!(watch(protocol, bytes, usize::from(*piece % 64) + 1), whole_counts);
+}
+
+/// The frames as one finds them who has all bytes before them: a frame that is none costs one byte, not its length.
+fn search<P: Protocol>(protocol: P, bytes: &[u8]) -> Vec<P::Frame> {
+    let (mut frames, mut rest) = (Vec::new(), bytes);
+    while let Some(prefix) = rest.get(..P::PREFIX) {
+        let total = protocol.length(prefix).filter(|total| (P::PREFIX..=BUFFER).contains(total));
+        let used = match total.filter(|_| rest.starts_with(protocol.header())) {
+            None => 1,
+            Some(total) => match rest.get(..total).map(|frame| protocol.parse(frame)) {
+                None => break,
+                Some(Ok(frame)) => {
+                    frames.push(frame);
+                    total
+                }
+                Some(Err(Reject::Foreign)) => total,
+                Some(Err(_)) => 1,
+            },
+        };
+        rest = &rest[used..];
+    }
+    frames
 }
 
 /// Reads through a link, each piece up to 255 ms after the one before: what it shows came in time (I4).
