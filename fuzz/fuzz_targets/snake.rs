@@ -41,6 +41,8 @@ fuzz_target!(|data: &[u8]| {
 #[derive(Debug, Default)]
 struct Known {
     heard: Option<u64>,
+    /// Heard since the last good update, which does not know of it yet.
+    news: bool,
     asked: Option<u64>,
     /// The target that counts, where it can be told exactly.
     target: Option<i32>,
@@ -129,6 +131,7 @@ impl Story {
                 known.due = known.due.filter(|(register, _)| *register != reply.register());
                 if reply.register() == Register::ActualPosition {
                     known.heard = known.heard.max(Some(self.now));
+                    known.news = true;
                 }
             }
             Ingest::Malformed(_) => self.malformed += 1,
@@ -196,6 +199,7 @@ impl Story {
         if !holds {
             self.updated = self.now;
             for known in &mut self.known {
+                known.news = false;
                 let waited = |(_, at): &(_, u64)| {
                     self.now.checked_sub(*at).is_some_and(|waited| waited <= REPLY_US)
                 };
@@ -251,7 +255,7 @@ impl Story {
         assert!(!self.joints.is_stopped() && self.held < 2, "moves while stopped: {frame:?}");
         let fresh =
             |at: Option<u64>, limit: u64| at.is_some_and(|at| self.updated.abs_diff(at) <= limit);
-        let fresh = fresh(known.heard, LATE_US) && fresh(known.asked, COMMAND_US);
+        let fresh = (known.news || fresh(known.heard, LATE_US)) && fresh(known.asked, COMMAND_US);
         assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.updated);
     }
 
