@@ -27,7 +27,9 @@ fuzz_target!(|data: &[u8]| {
             150..=159 => _ = bus.arm(Instant::from_micros(now)),
             160..=163 => bus.disarm(),
             164..=167 => bus.emergency_stop(),
-            168..=172 => bus.clear_emergency_stop(),
+            168..=170 => bus.clear_emergency_stop(),
+            // What was left over, whatever has come since the update.
+            171..=172 => send(&mut bus, input.byte()),
             173..=175 => while bus.next_edge().is_some() {},
             176..=179 => bus.relax(input.byte().into()),
             180..=183 => bus.zero(input.byte().into()),

@@ -109,7 +109,12 @@ impl Story {
                     }
                     frames += 1;
                 }
-                9.. => self.update(flags, payload),
+                9 | 10 => {
+                    self.update(flags, payload);
+                    self.send(flags);
+                }
+                // What was left over, whatever has come since the update.
+                11 => self.send(flags),
                 op => self.call(op, flags, index, payload),
             }
         }
@@ -206,6 +211,9 @@ impl Story {
                 known.due = known.due.filter(waited);
             }
         }
+    }
+
+    fn send(&mut self, flags: u8) {
         for sent in 0.. {
             let Some(frame) = self.joints.next_frame() else { break };
             assert!(sent < 12 + 2 + 3, "I1: bounded");
