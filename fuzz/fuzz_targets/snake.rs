@@ -41,9 +41,9 @@ fuzz_target!(|data: &[u8]| {
 #[derive(Debug, Default)]
 struct Known {
     heard: Option<u64>,
-    /// Heard since the last good update, which does not know of it yet.
-    news: bool,
     asked: Option<u64>,
+    /// Heard, and asked, since the last good update, which does not know of it yet.
+    news: [bool; 2],
     /// The target that counts, where it can be told exactly.
     target: Option<i32>,
     written: Vec<Register>,
@@ -56,7 +56,8 @@ struct Story {
     handles: Vec<Joint>,
     known: [Known; 3],
     now: u64,
-    /// The time of the last good update, or of arming: what new targets get.
+    /// The time of the last good update, and of arming after it: what new targets get.
+    tick: u64,
     updated: u64,
     held: u32,
     taken: u32,
@@ -75,6 +76,7 @@ impl Story {
             handles,
             known: Default::default(),
             now: 0,
+            tick: 0,
             updated: 0,
             held: 0,
             taken: 0,
@@ -136,7 +138,7 @@ impl Story {
                 known.due = known.due.filter(|(register, _)| *register != reply.register());
                 if reply.register() == Register::ActualPosition {
                     known.heard = known.heard.max(Some(self.now));
-                    known.news = true;
+                    known.news[0] = true;
                 }
             }
             Ingest::Malformed(_) => self.malformed += 1,
@@ -154,6 +156,7 @@ impl Story {
                 let position = Position::from_angle(Angle::from_turns(value));
                 if joints.set_position(joint, position).is_ok() {
                     (known.asked, known.target) = (Some(self.updated), None);
+                    known.news[1] = true;
                 }
             }
             5 => {
@@ -162,6 +165,7 @@ impl Story {
                 if joints.set_pulses(joint, pulses).is_ok() {
                     let target = offset.map(|offset| offset.target(pulses));
                     (known.asked, known.target) = (Some(self.updated), target);
+                    known.news[1] = true;
                 }
                 _ = joints.set_speed(joint, AngularVelocity::from_rad_per_s(value));
             }
@@ -202,9 +206,9 @@ impl Story {
         assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
         self.held = if holds { self.held + 1 } else { 0 };
         if !holds {
-            self.updated = self.now;
+            (self.tick, self.updated) = (self.now, self.now);
             for known in &mut self.known {
-                known.news = false;
+                known.news = [false; 2];
                 let waited = |(_, at): &(_, u64)| {
                     self.now.checked_sub(*at).is_some_and(|waited| waited <= REPLY_US)
                 };
@@ -235,7 +239,7 @@ impl Story {
         let known = &mut self.known[index];
         assert!(known.due.is_none(), "sent while an answer is due: {known:?}");
         if let Command::Read(register) = command {
-            known.due = Some((register, self.updated));
+            known.due = Some((register, self.tick));
         }
         if let Command::Write(register, value) = command {
             match register {
@@ -261,10 +265,11 @@ impl Story {
         }
         assert!(self.joints.is_joint_armed(self.handles[index]), "moves while disarmed: {frame:?}");
         assert!(!self.joints.is_stopped() && self.held < 2, "moves while stopped: {frame:?}");
+        let [heard, asked] = known.news;
+        let fresh = |at: Option<u64>, limit| at.is_some_and(|at| self.tick.abs_diff(at) <= limit);
         let fresh =
-            |at: Option<u64>, limit: u64| at.is_some_and(|at| self.updated.abs_diff(at) <= limit);
-        let fresh = (known.news || fresh(known.heard, LATE_US)) && fresh(known.asked, COMMAND_US);
-        assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.updated);
+            (heard || fresh(known.heard, LATE_US)) && (asked || fresh(known.asked, COMMAND_US));
+        assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.tick);
     }
 
     fn take_back(&mut self, frame: &CanFrame) {
