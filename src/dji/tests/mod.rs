@@ -3,6 +3,7 @@
 mod attaching;
 mod budget;
 mod commanding;
+mod conversions;
 mod device;
 mod measured;
 mod receiving;
