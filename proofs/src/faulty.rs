@@ -45,15 +45,24 @@ extern "C" fn route_masked(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
 }
 
 /// Rounds towards zero.
-#[unsafe(no_mangle)]
-extern "C" fn word_faulty(bits: u32, word: &mut i16) -> u32 {
-    let value = f32::from_bits(bits);
-    let raw = (value * (16_384.0 / 20.0)) as i32;
-    let raw = if raw > 16_384 { 16_384 } else { raw };
-    let raw = if raw < -16_384 { -16_384 } else { raw };
-    *word = if value.is_finite() { raw as i16 } else { 0 };
-    u32::from(value.is_finite())
+macro_rules! truncated {
+    ($name:ident, $limit:literal, $full_scale:literal) => {
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(bits: u32, word: &mut i16) -> u32 {
+            let value = f32::from_bits(bits);
+            let raw = (value * ($limit as f32 / $full_scale)) as i32;
+            let raw = if raw > $limit { $limit } else { raw };
+            let raw = if raw < -$limit { -$limit } else { raw };
+            *word = if value.is_finite() { raw as i16 } else { 0 };
+            u32::from(value.is_finite())
+        }
+    };
 }
+
+truncated!(word_m2006_faulty, 10_000, 10.0);
+truncated!(word_m3508_faulty, 16_384, 20.0);
+truncated!(word_gm6020_voltage_faulty, 25_000, 24.0);
+truncated!(word_gm6020_current_faulty, 16_384, 3.0);
 
 /// Compares stamps of 32 bits and nothing else: after 71 minutes the old ones are new again.
 #[unsafe(no_mangle)]
