@@ -255,6 +255,11 @@ mod tests {
             data[byte] = value;
             assert_eq!(Feedback::without_error(&CanFrame::new(id, &data).unwrap()), None);
         }
+        // Two things wrong at once, of the same size.
+        let short_and_far = CanFrame::new(id, &[0x20, 0, 0, 0, 0, 0, 0]).unwrap();
+        let far_with_error = CanFrame::new(id, &[0x20, 0, 0, 0, 0, 0, 0, 1]).unwrap();
+        assert_eq!(Feedback::without_error(&short_and_far), None);
+        assert_eq!(Feedback::without_error(&far_with_error), None);
         let faulty = Feedback::decode(&[0, 0, 0, 0, 0, 0, 9, 3]).unwrap();
         assert_eq!(faulty.error_and_temperature(), 0x309);
     }

@@ -4,6 +4,8 @@ mod attaching;
 mod budget;
 mod commanding;
 mod device;
+mod health;
+mod limiting;
 mod measured;
 mod receiving;
 mod safety;
