@@ -140,7 +140,7 @@ impl Slot {
         if !came || feedback.error() != 0 {
             self.take_error(facts, feedback.error());
         }
-        let at_limit = look.word != 0 && self.range.is_end(look.word);
+        let at_limit = self.range.is_end(look.word);
         self.saturated = self.saturated.saturating_add(u16::from(at_limit));
         let sample = Sample {
             elapsed: look.elapsed,

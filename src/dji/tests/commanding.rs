@@ -200,11 +200,14 @@ fn a_drive_tells_and_takes_velocities_and_angles_by_either_handle() {
         VelocityDrive::set_velocity(bus, motor, target).unwrap();
         step(bus, ms);
         assert_eq!(sent(bus)[0].1[0], 2_500, "2.4 V of 24");
+        VelocityDrive::set_velocity(bus, motor, velocity).unwrap();
+        step(bus, ms + 1);
+        assert_eq!(sent(bus)[0].1[0], 0);
     }
     let config = Config::<Gm6020Voltage>::new(1).position_loop(SPEED, SPEED);
     let (mut bus, [yaw]) = armed([config]);
     check(&mut bus, yaw, 2);
-    check(&mut bus, yaw.erase(), 3);
+    check(&mut bus, yaw.erase(), 4);
     step(&mut bus, 500);
     assert_eq!(VelocityDrive::velocity(&bus, yaw), None, "silent");
     assert_eq!(VelocityDrive::velocity(&bus, yaw.erase()), None, "silent");

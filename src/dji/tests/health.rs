@@ -44,7 +44,11 @@ fn a_second_master_is_forgotten_a_second_after_its_last_frame_and_not_earlier() 
         let last_ms = 100 + offset;
         let mut ended = Vec::new();
         for ms in 2..1_300 {
-            (0x201..=0x203).for_each(|id| hear(&mut bus, id, ms));
+            for id in 0x201..=0x203 {
+                // They turn, and nothing else is to be looked at.
+                let angle = u16::try_from(14 * ms % 8_192).unwrap();
+                assert_eq!(bus.ingest(&feedback(id, angle, 100), at_ms(ms)), Ingest::Taken);
+            }
             if ms == 50 || ms == last_ms {
                 assert_eq!(bus.ingest(&command, at_ms(ms)), Ingest::Unrelated);
             }

@@ -10,6 +10,7 @@ mod measured;
 mod receiving;
 mod safety;
 mod timing;
+mod watching;
 
 use super::*;
 use crate::control::PidConfig;
