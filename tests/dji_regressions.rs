@@ -492,7 +492,7 @@ fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one
 
         let (mut bus, motor) = armed(Config::new(1));
         step(&mut bus, 1_500);
-        hear(&mut bus, feedback(0x201, 0, 0), 1_500 + pause - 1);
+        hear(&mut bus, feedback(0x201, 0, 0), 1_500);
         bus.update(Tick::new(us(1_500 + pause), 0.0));
         assert_eq!(bus.link(motor), Some(link), "{pause}, and no step");
     }

@@ -4,11 +4,13 @@ mod attaching;
 mod budget;
 mod commanding;
 mod device;
+mod duplicates;
 mod health;
 mod limiting;
 mod measured;
 mod receiving;
 mod safety;
+mod soft_limits;
 mod timing;
 mod watching;
 
