@@ -109,7 +109,7 @@ fn a_motor_that_comes_while_all_is_quiet_is_watched_from_its_first_frame() {
         step(&mut bus, ms);
         let link = match ms {
             ..=110 => Link::Online,
-            ..=200 => Link::Late,
+            111..=200 => Link::Late,
             _ => Link::Offline,
         };
         assert_eq!(bus.link(wheel), Some(link), "at {ms} ms");

@@ -11,6 +11,7 @@ mod measured;
 mod receiving;
 mod safety;
 mod soft_limits;
+mod takeover;
 mod timing;
 mod watching;
 

@@ -167,6 +167,38 @@ fn feedback_that_does_not_answer_a_command_is_frozen_and_one_whose_current_answe
     }
 }
 
+/// What costs a close look costs each update: it is kept for what needs one.
+#[test]
+fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
+    // Of full scale a half is calm; and from an eighth on a current of its own is no wonder.
+    let cases: [(i16, i16, bool); 9] = [
+        (0, 0, true),
+        (0, 1_999, true),
+        (0, 2_000, false),
+        (2_047, 3_000, false),
+        (2_048, 3_000, true),
+        (-2_100, -3_000, true),
+        (8_191, 0, true),
+        (-8_191, 0, true),
+        (8_192, 0, false),
+    ];
+    for (raw, current, expected) in cases {
+        let mut bench = Bench::new(Config::<M3508>::new(1));
+        bench.run(40, CALM, 500);
+        bench.hear(Told { current, ..CALM });
+        let motor = bench.motor.erase();
+        let glance = |bench: &mut Bench<M3508>| bench.bus.slot_mut(motor).unwrap().is_well(raw);
+        assert_eq!(glance(&mut bench), expected, "{raw} and {current}");
+        // After something was wrong, and is over, a glance is enough again.
+        bench.run(24, Told { celsius: 130, ..CALM }, 500);
+        bench.hear(Told { current, ..CALM });
+        assert!(!glance(&mut bench), "warm");
+        bench.run(24, CALM, 500);
+        bench.hear(Told { current, ..CALM });
+        assert_eq!(glance(&mut bench), expected, "{raw} and {current}, cool again");
+    }
+}
+
 #[test]
 fn looks_at_the_limit_are_counted_and_others_are_not() {
     let limited = Config::<M3508>::new(1).with_current_limit(Current::from_amperes(5.0));
