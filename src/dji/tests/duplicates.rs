@@ -111,3 +111,14 @@ fn a_gap_is_bridged_with_the_speed_in_a_crowd_too() {
     crowd.hear(6_144, 9_000, 5_000); // 1228.8 counts a millisecond
     assert_eq!(crowd.bus.state(crowd.motor).unwrap().rotor_counts - before, 6_144);
 }
+
+#[test]
+fn frames_are_compared_for_as_long_as_half_a_turn_may_not_have_passed() {
+    for (gap_us, doubts) in [(2_740, 0), (2_741, 1)] {
+        let mut crowd = Crowd::new(&USUAL);
+        let before = crowd.bus.state(crowd.motor).unwrap().ambiguous_gaps;
+        crowd.hear(0, 20_000, gap_us); // later than that, it is not possible
+        let after = crowd.bus.state(crowd.motor).unwrap().ambiguous_gaps;
+        assert_eq!(after - before, doubts, "{gap_us} us");
+    }
+}

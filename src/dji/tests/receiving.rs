@@ -193,3 +193,22 @@ fn a_frame_in_time_is_followed_the_shortest_way() {
         assert_eq!((state.rotor_counts, state.ambiguous_gaps), (0, 0), "{running}");
     }
 }
+
+/// Half a turn at no-load speed takes 3241 us; 500 us are for the frames of others.
+#[test]
+fn a_frame_is_in_time_for_as_long_as_half_a_turn_may_not_have_passed() {
+    for running in [false, true] {
+        for (gap_us, doubts) in [(2_740, 0), (2_741, 1)] {
+            let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+            if running {
+                step(&mut bus, 2);
+            }
+            let at = |us: u64| Instant::from_micros(2_000 + us);
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(0)), Ingest::Taken);
+            // Later than that, a speed is asked, and this one is not possible.
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 20_000), at(gap_us)), Ingest::Taken);
+            let state = bus.state(wheel).unwrap();
+            assert_eq!(state.ambiguous_gaps, doubts, "{gap_us} us, {running}");
+        }
+    }
+}
