@@ -253,6 +253,15 @@ fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
     assert_eq!(sent(&mut bus), [(0x200, [100, 0, 0, 0])]);
     bus.update(Tick::new(us(5_000_000), 0.0));
     assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+
+    // The limit is that of feedback, 10 ms.
+    for (pause, word) in [(10_000, 100), (10_001, 0)] {
+        let (mut bus, motor) = armed(Config::new(1));
+        bus.set_raw(motor, 100).unwrap();
+        step(&mut bus, 2_000);
+        bus.update(Tick::new(us(2_000 + pause), 0.0));
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [word, 0, 0, 0])), "{pause}");
+    }
 }
 
 #[test]
@@ -480,6 +489,34 @@ fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one
         hear(&mut bus, feedback(0x201, 0, 0), 1_500 + pause - 1);
         step(&mut bus, 1_500 + pause);
         assert_eq!(bus.link(motor), Some(link), "{pause}");
+
+        let (mut bus, motor) = armed(Config::new(1));
+        step(&mut bus, 1_500);
+        hear(&mut bus, feedback(0x201, 0, 0), 1_500);
+        bus.update(Tick::new(us(1_500 + pause), 0.0));
+        assert_eq!(bus.link(motor), Some(link), "{pause}, and no step");
+    }
+}
+
+/// A minute before the last update, or after it, is as far as anybody arms.
+#[test]
+fn a_minute_from_the_last_update_a_motor_is_armed_and_a_microsecond_more_is_too_far() {
+    const MINUTE_US: u64 = 60_000_000;
+    let updated = 100_000_000;
+    for (now, is_near) in [
+        (updated + MINUTE_US, true),
+        (updated + MINUTE_US + 1, false),
+        (updated - MINUTE_US, true),
+        (updated - MINUTE_US - 1, false),
+    ] {
+        let mut bus = Bus::new();
+        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        step(&mut bus, updated);
+        hear(&mut bus, feedback(0x201, 0, 0), now);
+        assert_eq!(bus.arm(us(now)).is_ok(), is_near, "{now}");
+        assert_eq!(bus.is_motor_armed(motor), is_near, "{now}");
+        let alone = bus.arm_only(&[motor.erase()], us(now));
+        assert_eq!(alone.is_ok(), is_near, "{now}");
     }
 }
 

@@ -101,6 +101,8 @@ fn refuses_less_than<E: std::fmt::Debug>(
             Err(refused) => {
                 assert!(given < needed);
                 assert_eq!(error(&refused), Some(BufferTooSmall { needed, given }));
+                let text = format!("the frame needs {needed} bytes, the buffer has {given}");
+                assert_eq!(error(&refused).unwrap().to_string(), text);
             }
         }
     }

@@ -167,10 +167,9 @@ impl Message {
     const fn number(self, number: u32) -> Self {
         let mut message = self;
         let mut unit = 1_000_000_000;
-        while unit > 0 {
-            if number >= unit || unit == 1 {
-                // Never zero, which `/` would not believe.
-                let Some(leading) = number.checked_div(unit) else { break };
+        // After the ones the unit is zero, by which nothing can be divided.
+        while let Some(leading) = number.checked_div(unit) {
+            if leading > 0 || unit == 1 {
                 message = message.byte(b'0' + (leading % 10) as u8);
             }
             unit /= 10;

@@ -68,7 +68,7 @@ impl Feedback {
         let words = u64::from_le_bytes(*frame.bytes());
         #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
         let (motion, condition) = ((words as u32).swap_bytes(), (words >> 32) as u32);
-        let unusual = frame.missing() as u32 | (condition >> 24) | (motion >> 29);
+        let unusual = frame.missing() as u32 | (motion >> 29) | (condition >> 24);
         if unusual != 0 {
             return None;
         }
@@ -255,6 +255,11 @@ mod tests {
             data[byte] = value;
             assert_eq!(Feedback::without_error(&CanFrame::new(id, &data).unwrap()), None);
         }
+        // Two things wrong at once, of the same size.
+        let short_and_far = CanFrame::new(id, &[0x20, 0, 0, 0, 0, 0, 0]).unwrap();
+        let far_with_error = CanFrame::new(id, &[0x20, 0, 0, 0, 0, 0, 0, 1]).unwrap();
+        assert_eq!(Feedback::without_error(&short_and_far), None);
+        assert_eq!(Feedback::without_error(&far_with_error), None);
         let faulty = Feedback::decode(&[0, 0, 0, 0, 0, 0, 9, 3]).unwrap();
         assert_eq!(faulty.error_and_temperature(), 0x309);
     }

@@ -61,8 +61,9 @@ impl Facts {
     pub const fn place(&self, id: u8) -> Option<(CommandFrame, u8)> {
         let [low, high] = self.command;
         match id {
-            1..=4 if id <= self.ids => Some((low, id - 1)),
-            5..=8 if id <= self.ids => Some((high, id - 5)),
+            _ if id > self.ids => None,
+            1..=4 => Some((low, id - 1)),
+            5..=8 => Some((high, id - 5)),
             _ => None,
         }
     }
@@ -221,4 +222,36 @@ model! {
 model! {
     /// The GM6020 with current control switched on in RoboMaster Assistant.
     Gm6020Current, GM6020_CURRENT_FACTS, CurrentControlled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_id_has_its_own_slot_and_no_other_id_has_one() {
+        for (facts, first, second) in [
+            (M2006::FACTS, CommandFrame::X200, CommandFrame::X1FF),
+            (M3508::FACTS, CommandFrame::X200, CommandFrame::X1FF),
+            (Gm6020Voltage::FACTS, CommandFrame::X1FF, CommandFrame::X2FF),
+            (Gm6020Current::FACTS, CommandFrame::X1FE, CommandFrame::X2FE),
+        ] {
+            for id in 0..=255 {
+                let place = match id {
+                    1..=4 => Some((first, id - 1)),
+                    8 if facts.ids == 7 => None,
+                    5..=8 => Some((second, id - 5)),
+                    _ => None,
+                };
+                assert_eq!(facts.place(id), place, "{} #{id}", facts.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_rotor_turns_as_fast_as_the_output_and_the_gear_say_rounded() {
+        let rpm = [M2006::FACTS, M3508::FACTS, Gm6020Voltage::FACTS, Gm6020Current::FACTS]
+            .map(Facts::rotor_no_load_rpm);
+        assert_eq!(rpm, [18_000, 9_256, 320, 320]); // 482 * 3591 / 187 = 9255.97
+    }
 }

@@ -57,7 +57,7 @@ impl<B> Bus<B> {
         if self.running && self.updated <= before {
             return false;
         }
-        if !self.running || self.updated > before + LONGEST_PAUSE {
+        if self.updated > before + LONGEST_PAUSE {
             self.forget_bygones(before);
         }
         self.running = true;

@@ -259,3 +259,42 @@ fn replace(pid: &mut Pid, config: PidConfig, limit: f32) -> Result<(), LoopError
     pid.set_config(super::within(Some(config), limit))
         .map_err(|error| LoopError::Parameter(error.parameter()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dji::{Bus, Config, M3508};
+    use crate::frame::CanFrame;
+    use crate::motor::{CanDevice, Timeouts};
+    use crate::time::Instant;
+    use crate::units::AngularVelocity;
+
+    /// The short ways are for plain loops with the full output; all others take the one that knows everything.
+    #[test]
+    fn a_plain_loop_with_the_full_output_takes_the_short_way_and_no_other_does() {
+        let plain = PidConfig::new(1.0, 0.0, 0.0);
+        let slow = plain.with_slew_limit(1.0);
+        for (position, speed, expected) in [
+            (plain, plain, [Duty::Velocity, Duty::Position]),
+            (slow, plain, [Duty::Velocity, Duty::Other]),
+            (plain, slow, [Duty::Other, Duty::Other]),
+        ] {
+            let mut bus: Bus = Bus::new();
+            let motor = bus.attach(Config::<M3508>::new(1).position_loop(position, speed)).unwrap();
+            let now = Instant::from_micros(1_000);
+            _ = bus.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), now);
+            bus.arm(now).unwrap();
+            let duty = |bus: &Bus| bus.slot(motor.erase()).unwrap().duty;
+            bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
+            let velocity = duty(&bus);
+            bus.set_position(motor, Position::ZERO).unwrap();
+            assert_eq!([velocity, duty(&bus)], expected);
+            let slot = bus.slot_mut(motor.erase()).unwrap();
+            slot.range = Range::within(1_000);
+            slot.settle();
+            assert_eq!(slot.duty, Duty::Other, "less than the full output");
+            slot.see_to(500_000, &Timeouts::new());
+            assert!(slot.is_at_rest(), "not heard");
+        }
+    }
+}

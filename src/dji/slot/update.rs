@@ -132,3 +132,23 @@ impl Slot {
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Law: nothing is above its limit for as long as it is told, and something is a microsecond later.
+        #[test]
+        fn it_is_quiet_until_the_oldest_age_is_above_its_limit(heard in 0_u32..20_002, commanded in 0_u32..200_002) {
+            let ages = Ages { heard, commanded, ..Ages::none(0, Timeouts::new()) };
+            // 10 ms and 100 ms, and as far ahead.
+            let is_within = |passed| heard + passed <= 20_000 && commanded + passed <= 200_000;
+            match ages.within_limits_us() {
+                Some(quiet) => prop_assert!(is_within(quiet - 1) && !is_within(quiet)),
+                None => prop_assert!(!is_within(0)),
+            }
+        }
+    }
+}

@@ -158,13 +158,13 @@ fn handles_are_equal_when_they_are_of_one_motor_and_say_which() {
 fn a_place_that_was_taken_before_is_armed_and_measured_as_a_new_one() {
     let mut bus: Bus = Bus::new();
     let other = bus.attach(Config::<M3508>::new(1)).unwrap();
-    let mut wheel = bus.attach(Config::<M3508>::new(2)).unwrap();
+    let mut wheel = bus.attach(Config::<M3508>::new(3)).unwrap();
     for _ in 0..3 {
         bus.detach(wheel);
-        wheel = bus.attach(Config::<M3508>::new(2)).unwrap();
+        wheel = bus.attach(Config::<M3508>::new(3)).unwrap();
     }
     assert_eq!(bus.fresh_velocity(wheel.erase()), None);
-    for id in [0x201, 0x202] {
+    for id in [0x201, 0x203] {
         assert_eq!(bus.ingest(&feedback(id, 0, 1_920), at_ms(1)), Ingest::Taken);
     }
     bus.arm_only(&[wheel.erase()], at_ms(1)).unwrap();
@@ -173,4 +173,16 @@ fn a_place_that_was_taken_before_is_armed_and_measured_as_a_new_one() {
     assert!((rpm - 1_920.0 * 187.0 / 3591.0).abs() < 0.01, "{rpm}");
     bus.update(Tick::new(at_ms(500), 0.001));
     assert_eq!(bus.fresh_velocity(wheel.erase()), None, "lost");
+}
+
+/// The place of one that is refused with others was taken before, and its old handle is still somewhere.
+#[test]
+fn an_array_that_is_refused_revives_no_handle_of_before() {
+    let mut bus: Bus = Bus::new();
+    let old = bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.detach(old);
+    bus.attach(Config::<M3508>::new(2)).unwrap();
+    assert!(bus.attach_all([1, 2].map(Config::<M3508>::new)).is_err());
+    let new = bus.attach(Config::<M3508>::new(1)).unwrap();
+    assert!(old != new && bus.link(old).is_none() && bus.link(new).is_some());
 }

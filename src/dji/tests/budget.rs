@@ -53,6 +53,7 @@ fn a_hardware_filter_opens_the_bits_in_which_ids_differ() {
     assert_eq!(filter(&[2, 3]), (0x202, 0x7FE));
     assert_eq!(filter(&[1, 2]), (0x200, 0x7FC));
     assert_eq!(filter(&[4, 6]), (0x204, 0x7FC));
+    assert_eq!(filter(&[1, 2, 3]), (0x200, 0x7FC), "a bit that two of them differ in stays open");
     assert_eq!(filter(&[1, 2, 3, 4]), (0x200, 0x7F8));
     assert_eq!(filter(&[1, 8]), (0x200, 0x7F0));
 }

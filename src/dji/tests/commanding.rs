@@ -181,3 +181,81 @@ fn the_angle_that_steers_is_known_while_the_motor_is_heard_and_homed() {
     bus.zero(geared).unwrap();
     assert!(AngleDrive::angle(&bus, AnyHandle::from(geared)).is_some());
 }
+
+/// A motor as the generic parts know it: by its own handle, and by one that does not tell the model.
+#[test]
+fn a_drive_tells_and_takes_velocities_and_angles_by_either_handle() {
+    use crate::motor::{AngleDrive, Capability, VelocityDrive};
+    fn check<H: Copy>(bus: &mut Bus, motor: H, ms: u64)
+    where
+        Bus: VelocityDrive<H> + AngleDrive<H>,
+    {
+        assert_eq!(bus.ingest(&feedback(0x205, 1_024, 30), at_ms(ms)), Ingest::Taken);
+        let velocity = VelocityDrive::velocity(bus, motor).unwrap();
+        assert!((velocity.as_rpm() - 30.0).abs() < 1e-3, "{velocity:?}");
+        let angle = AngleDrive::angle(bus, motor).unwrap();
+        assert!((angle.as_degrees() - 45.0).abs() < 1e-3, "{angle:?}");
+        assert!(VelocityDrive::capabilities(bus, motor).has(Capability::AbsoluteAngle));
+        let target = velocity + AngularVelocity::from_rad_per_s(2.4);
+        VelocityDrive::set_velocity(bus, motor, target).unwrap();
+        step(bus, ms);
+        assert_eq!(sent(bus)[0].1[0], 2_500, "2.4 V of 24");
+        VelocityDrive::set_velocity(bus, motor, velocity).unwrap();
+        step(bus, ms + 1);
+        assert_eq!(sent(bus)[0].1[0], 0);
+    }
+    let config = Config::<Gm6020Voltage>::new(1).position_loop(SPEED, SPEED);
+    let (mut bus, [yaw]) = armed([config]);
+    check(&mut bus, yaw, 2);
+    check(&mut bus, yaw.erase(), 4);
+    step(&mut bus, 500);
+    assert_eq!(VelocityDrive::velocity(&bus, yaw), None, "silent");
+    assert_eq!(VelocityDrive::velocity(&bus, yaw.erase()), None, "silent");
+}
+
+/// M3508 without load: 9256 rpm of the rotor, 50.47 rad/s behind 3591 to 187.
+#[test]
+fn a_position_loop_asks_for_no_more_than_the_motor_runs_without_load_nor_than_it_was_told() {
+    let speed = PidConfig::new(0.1, 0.0, 0.0); // A per rad/s
+    let strong = PidConfig::new(1_000.0, 0.0, 0.0);
+    for (range, forward, backward) in [
+        ((f32::MIN, f32::MAX), 50.474, -50.474),
+        ((-60.0, 60.0), 50.474, -50.474),
+        ((-20.0, 30.0), 30.0, -20.0),
+    ] {
+        let position = strong.with_output_range(range.0, range.1);
+        let (mut bus, [joint]) = armed([Config::<M3508>::new(1).position_loop(position, speed)]);
+        for again in [false, true] {
+            for (ms, turns, rad_per_s) in [(2, 9, forward), (3, -9, backward)] {
+                bus.set_position(joint, Position::from_turns(turns)).unwrap();
+                bus.update(Tick::new(at_ms(ms + 2 * u64::from(again)), 0.001));
+                let amperes = f32::from(sent(&mut bus)[0].1[0]) * 20.0 / 16_384.0;
+                assert!((amperes - 0.1 * rad_per_s).abs() < 1e-3, "{amperes} A in {range:?}");
+            }
+            bus.set_position_loop(joint, position).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
+    let loops = |kp| PidConfig::new(kp, 0.0, 0.0);
+    let (mut bus, [joint]) = armed([Config::<M3508>::new(1).position_loop(loops(1.0), SPEED)]);
+    let wrong = bus.set_position_loop(joint, loops(f32::NAN)).unwrap_err();
+    assert_eq!(wrong.to_string(), "kp is not usable");
+    bus.set_position(joint, Position::from_turns(1)).unwrap();
+    step(&mut bus, 2);
+    let before = sent(&mut bus)[0].1[0];
+    bus.set_position_loop(joint, loops(2.0)).unwrap();
+    bus.relax(joint);
+    bus.set_position(joint, Position::from_turns(1)).unwrap();
+    step(&mut bus, 3);
+    let after = sent(&mut bus)[0].1[0];
+    assert!((after - 2 * before).abs() <= 1, "{before}, then {after}");
+    bus.detach(joint);
+    let detached = bus.set_position_loop(joint, loops(1.0)).unwrap_err();
+    assert_eq!(detached.to_string(), "the motor was detached");
+    let wheel = bus.attach(Config::<M3508>::new(2).speed_loop(SPEED)).unwrap();
+    let without = bus.set_position_loop(wheel, loops(1.0)).unwrap_err();
+    assert_eq!(without.to_string(), "the motor was attached without this loop");
+}

@@ -5,10 +5,16 @@ mod budget;
 mod commanding;
 mod conversions;
 mod device;
+mod duplicates;
+mod health;
+mod limiting;
 mod measured;
 mod receiving;
 mod safety;
+mod soft_limits;
+mod takeover;
 mod timing;
+mod watching;
 
 use super::*;
 use crate::control::PidConfig;

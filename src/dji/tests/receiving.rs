@@ -152,3 +152,63 @@ fn two_buses_share_no_state() {
     assert_eq!(sent(&mut right), [(0x200, [0; 4])]); // its first keep-alive
     assert_eq!(right.state(other).unwrap().rotor_counts, 0);
 }
+
+/// Twice the no-load speed, 18512 rpm, is the fastest that is believed.
+#[test]
+fn a_gap_is_bridged_by_speeds_that_are_possible_and_the_shortest_way_where_one_is_not() {
+    for (before, after, counts) in [
+        (9_256, 9_256, 10_111), // 1263.9 counts a millisecond
+        (12_000, 12_000, 13_107),
+        (18_512, 18_512, 20_221),
+        (18_513, 18_512, 20_221 - 2 * 8_192),
+        (18_512, -18_513, 20_221 - 2 * 8_192),
+        (32_000, 300, 20_221 - 2 * 8_192),
+    ] {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+        step(&mut bus, 2);
+        assert_eq!(bus.ingest(&feedback(0x201, 0, before), at_ms(2)), Ingest::Taken);
+        let from = bus.state(wheel).unwrap().rotor_counts;
+        let angle = u16::try_from(i32::rem_euclid(counts, 8_192)).unwrap();
+        assert_eq!(bus.ingest(&feedback(0x201, angle, after), at_ms(10)), Ingest::Taken);
+        let moved = bus.state(wheel).unwrap().rotor_counts - from;
+        assert_eq!(moved, i64::from(counts), "{before} and {after} rpm");
+    }
+}
+
+/// Whatever speed it tells: so it is after the first update, and so it is before.
+#[test]
+fn a_frame_in_time_is_followed_the_shortest_way() {
+    for running in [false, true] {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+        if running {
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(2)), Ingest::Taken);
+            step(&mut bus, 2);
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(2)), Ingest::Taken);
+        }
+        for ms in 3..10 {
+            let frame = feedback(0x201, 0, if ms % 2 == 0 { 20_000 } else { -9_000 });
+            assert_eq!(bus.ingest(&frame, at_ms(ms)), Ingest::Taken);
+        }
+        let state = bus.state(wheel).unwrap();
+        assert_eq!((state.rotor_counts, state.ambiguous_gaps), (0, 0), "{running}");
+    }
+}
+
+/// Half a turn at no-load speed takes 3241 us; 500 us are for the frames of others.
+#[test]
+fn a_frame_is_in_time_for_as_long_as_half_a_turn_may_not_have_passed() {
+    for running in [false, true] {
+        for (gap_us, doubts) in [(2_740, 0), (2_741, 1)] {
+            let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+            if running {
+                step(&mut bus, 2);
+            }
+            let at = |us: u64| Instant::from_micros(2_000 + us);
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(0)), Ingest::Taken);
+            // Later than that, a speed is asked, and this one is not possible.
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 20_000), at(gap_us)), Ingest::Taken);
+            let state = bus.state(wheel).unwrap();
+            assert_eq!(state.ambiguous_gaps, doubts, "{gap_us} us, {running}");
+        }
+    }
+}

@@ -28,3 +28,38 @@ fn a_frame_of_zeros_is_repeated_as_often_as_configured_and_at_least_each_ten_sec
         assert_eq!(second - first, due_ms, "{period_ms} ms asked for");
     }
 }
+
+/// A ramp knows its beginning in 16 bits of 1.024 ms: two moments of the clock are close to its zero.
+#[test]
+fn a_ramp_rises_for_as_long_as_it_is_to_whatever_the_clock_shows() {
+    const TURN_US: u64 = 1 << 26;
+    for (ramp_ms, expected_ms) in
+        [(100, 100), (65_535, 65_535), (66_000, 65_535), (600_000, 65_535)]
+    {
+        for started_us in [TURN_US - 500, TURN_US + 500, TURN_US + 1_500, TURN_US + 2_500] {
+            let ramp = Recovery::Ramp(Duration::from_millis(ramp_ms));
+            let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).with_recovery(ramp)]);
+            // Offline, then heard ten times to the moment.
+            let at = |ms: u64| Instant::from_micros(started_us + 1_000 * ms);
+            bus.update(Tick::new(at(0), 0.001));
+            for _ in 0..10 {
+                assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(0)), Ingest::Taken);
+            }
+            let mut full_after = None;
+            for ms in 1..400 {
+                assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(ms)), Ingest::Taken);
+                bus.set_raw(wheel, 16_384).unwrap();
+                bus.update(Tick::new(at(ms), 0.001));
+                let word = f64::from(sent(&mut bus).last().map_or(0, |frame| frame.1[0]));
+                #[expect(clippy::cast_precision_loss, reason = "at most 65 535")]
+                let share = (ms as f64 / expected_ms as f64).min(1.0) * 16_384.0;
+                assert!(word <= share + 2.0 * 16_384.0 / expected_ms as f64 + 1.0, "{ms}: {word}");
+                if word >= 16_384.0 {
+                    full_after = full_after.or(Some(ms));
+                }
+            }
+            let in_time = full_after.map(|ms| (100..=114).contains(&ms));
+            assert_eq!(in_time, (expected_ms == 100).then_some(true), "{full_after:?}");
+        }
+    }
+}

@@ -42,7 +42,9 @@ pub struct Health {
     pub conditions: Conditions,
     /// Feedback frames a second, over the last whole window of about a second; 0 before there was one.
     pub feedback_hz: u16,
-    /// The longest time between two of them, in that window and in the present one; saturates at a second.
+    /// The longest time between two of them, in that window and in the present one; saturates at a second. DJI motors are
+    /// heard at 1 kHz, and only what is longer than half a turn of the rotor at no-load speed counts there: 0 while no
+    /// frame is missed.
     pub longest_gap: Duration,
     /// Temperature in °C; `None` for a motor that reports none.
     pub temperature_c: Option<i16>,
