@@ -129,6 +129,7 @@ impl Story {
         // Another controller's command is no reply, but noticed: it relaxes its joint.
         let rival = self.joints.counters().foreign_commands != rivals;
         self.refused.push(outcome != Ingest::Taken && !rival);
+        assert_eq!(outcome == Ingest::Taken, self.is_reply(frame), "{frame:?}: {outcome:?}");
         match outcome {
             Ingest::Taken => {
                 self.taken += 1;
@@ -144,6 +145,18 @@ impl Story {
             Ingest::Malformed(_) => self.malformed += 1,
             Ingest::Unrelated => self.unrelated += 1,
         }
+    }
+
+    /// By the protocol: `04`, a register of the table, and its value, from a joint that is attached.
+    fn is_reply(&self, frame: &CanFrame) -> bool {
+        const REGISTERS: [u8; 9] = [6, 7, 8, 9, 10, 11, 12, 15, 16];
+        let attached = self.joints.joints().any(|(_, name)| u32::from(name.id()) == frame.header());
+        let [kind, register, ..] = *frame.data() else { return false };
+        attached
+            && frame.is_data_frame()
+            && frame.is_standard()
+            && (frame.data().len(), kind) == (6, 4)
+            && REGISTERS.contains(&register)
     }
 
     fn call(&mut self, op: u8, flags: u8, index: usize, payload: [u8; 8]) {

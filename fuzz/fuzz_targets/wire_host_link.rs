@@ -6,6 +6,7 @@ use drivetrain::wire::host_link::{
     ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
     Telemetry, TelemetryFormat, TelemetryHeader,
 };
+use drivetrain::wire::{Protocol, Reject};
 use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
 
@@ -26,7 +27,9 @@ fn command(input: &mut Input) -> Vec<u8> {
         from_fn(|_| i16::from_le_bytes(input.bytes()));
     let reset = Reset::from_raw(input.byte());
     let command = Command { joints, gm6020_position, c610_position, sts3032_degrees, reset };
-    command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec()
+    let frame = command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec();
+    assert_eq!(CommandFormat.parse(&frame), Ok(command));
+    frame
 }
 
 fn telemetry(format: TelemetryFormat, input: &mut Input) -> Vec<u8> {
@@ -37,5 +40,15 @@ fn telemetry(format: TelemetryFormat, input: &mut Input) -> Vec<u8> {
         c610_position: i32::from_le_bytes(input.bytes()),
         imu_angles_deg: from_fn(|_| from_fn(|_| input.float())),
     };
-    format.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).expect("room").to_vec()
+    let frame = format.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).expect("room").to_vec();
+    match format.parse(&frame) {
+        // As text: an angle may be NaN.
+        Ok(read) => assert_eq!(format!("{read:?}"), format!("{telemetry:?}")),
+        Err(reject) => {
+            let angles = telemetry.imu_angles_deg.as_flattened();
+            let bad = angles.iter().any(|angle| !angle.is_finite());
+            assert!(bad && reject == Reject::Content, "{reject:?} of {telemetry:?}");
+        }
+    }
+    frame
 }
