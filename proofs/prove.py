@@ -353,12 +353,12 @@ PROOFS = [
     ("unwrap", unwrap, "unwrap", "all 2^32 pairs", "unwrap_faulty"),
     ("route", route, "route", "all of the family, on a bus that has heard nothing", "route_masked"),
     ("foreign", route_foreign, "route", "all frames that are no motor's, but for the five ids that the bus sends itself", "route_by_number"),
-    ("operation", route_in_operation, "route", "all data frames of the family, on a bus that heard each motor", "route_masked"),
     ("m2006", word_of((10_000, 10.0)), "word_m2006", "all 2^32 f32", "word_m2006_faulty"),
     ("m3508", word_of((16_384, 20.0)), "word_m3508", "all 2^32 f32", "word_m3508_faulty"),
     ("gm6020-voltage", word_of((25_000, 24.0)), "word_gm6020_voltage", "all 2^32 f32", "word_gm6020_voltage_faulty"),
     ("gm6020-current", word_of((16_384, 3.0)), "word_gm6020_current", "all 2^32 f32", "word_gm6020_current_faulty"),
     ("timeouts", word_at, "word_at", "any three times below 2^62 us, the target accepted", "word_at_faulty"),
+    ("operation", route_in_operation, "route", "all data frames of the family, on a bus that heard each motor", "route_masked"),
 ]
 
 

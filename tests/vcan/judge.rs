@@ -145,6 +145,11 @@ impl Judge {
             assert_eq!(self.count(name), expected[name], "{name}");
             assert!(expected[name] > 100, "{name}: hardly any");
         }
+        let received = self.candump.iter().filter(|frame| !is_error(frame));
+        let (ids, data): (Vec<_>, Vec<_>) = received.filter_map(|one| one.split_once('#')).unzip();
+        let extended = ids.iter().filter(|id| id.len() == 8).count();
+        let remote = data.iter().filter(|data| data.starts_with('R')).count();
+        assert!(extended.min(remote) > 100, "{extended} extended, {remote} remote: hardly any");
         let copies = doubled_commands(&self.candump);
         let unrelated = expected["others"] + expected["unattached"] + copies;
         assert_eq!(self.count("unrelated"), unrelated);
