@@ -177,7 +177,7 @@ def unwrap(image, function):
 # The motors of the image's bus, by the ids of their feedback, and all ids of the family.
 ATTACHED = [0x201, 0x202, 0x204, 0x206, 0x209, 0x20B]
 FAMILY = range(0x201, 0x20C)
-# What the bus sends itself: received, it is noted as a second master's, and the tests of F05 say what follows.
+# What the bus sends itself: the tests of F05 say what follows when it is received.
 COMMANDS = [0x200, 0x1FF, 0x2FF, 0x1FE, 0x2FE]
 TAKEN, UNRELATED, BAD_LENGTH, BAD_FIELD = 1, 2, 3, 4
 
@@ -231,6 +231,8 @@ def route_case(image, function, state, identifier, extended, remote, length, ass
     there_is = claripy.And(claripy.ULE(length, 8), claripy.ULT(identifier, below))
     standard_data = claripy.And(extended == 0, remote == 0)
     mine = claripy.And(standard_data, claripy.Or(*(identifier == motor for motor in ATTACHED)))
+    # As a second master's it is noted, and no motor has it.
+    own_command = claripy.Or(*(identifier == command for command in COMMANDS))
     stranger = claripy.And(there_is, standard_data, is_of_family(identifier), claripy.Not(mine))
     outcome = constant(TAKEN)
     for holds, value in (
@@ -256,7 +258,7 @@ def route_case(image, function, state, identifier, extended, remote, length, ass
             count == before + claripy.If(holds, constant(1), constant(0))
             for count, before, holds in zip(counts, counts_before, (outcome == BAD_LENGTH, outcome == BAD_FIELD, stranger))
         ]
-        untouched = claripy.Or(outcome == TAKEN, claripy.BoolV(changed <= 1))
+        untouched = claripy.Or(outcome == TAKEN, claripy.And(standard_data, own_command), claripy.BoolV(changed <= 1))
         paths.append((end, claripy.And(end.regs.r0 == outcome, untouched, *kept, *counted)))
     names = {"id": identifier, "extended": extended, "remote": remote, "length": length, "data": data}
     return paths, names, assume
@@ -270,10 +272,15 @@ def route_foreign(image, function):
     """What no motor has sent: all other ids, both formats, remote frames, wrong lengths; on a bus that has heard nothing."""
     state, length = image.blank(), claripy.BVS("length", 8)
     identifier, extended, remote = claripy.BVS("id", 32), claripy.BVS("extended", 8), claripy.BVS("remote", 8)
+    # A part of the case after it, where the solver finds a mix-up of the formats at once.
+    yield route_case(image, function, state, constant(ATTACHED[0]), extended, remote, length, [extended != 0])
     whole = claripy.And(is_of_family(identifier), length == 8)
     own = claripy.Or(whole, *(identifier == command for command in COMMANDS))
     others = claripy.Not(claripy.And(extended == 0, remote == 0, own))
     yield route_case(image, function, state, identifier, extended, remote, length, [others])
+    none = claripy.BVV(0, 8)
+    for identifier in COMMANDS:
+        yield route_case(image, function, state, constant(identifier), none, none, claripy.BVV(8, 8))
 
 
 def route(image, function):
@@ -352,7 +359,7 @@ PROOFS = [
     ("decode", decode, "decode", "all 2^64 frames", "decode_faulty"),
     ("unwrap", unwrap, "unwrap", "all 2^32 pairs", "unwrap_faulty"),
     ("route", route, "route", "all of the family, on a bus that has heard nothing", "route_masked"),
-    ("foreign", route_foreign, "route", "all frames that are no motor's, but for the five ids that the bus sends itself", "route_by_number"),
+    ("foreign", route_foreign, "route", "all frames that are no motor's (the bus's own: of 8 bytes)", "route_by_number"),
     ("m2006", word_of((10_000, 10.0)), "word_m2006", "all 2^32 f32", "word_m2006_faulty"),
     ("m3508", word_of((16_384, 20.0)), "word_m3508", "all 2^32 f32", "word_m3508_faulty"),
     ("gm6020-voltage", word_of((25_000, 24.0)), "word_gm6020_voltage", "all 2^32 f32", "word_gm6020_voltage_faulty"),
