@@ -365,7 +365,7 @@ PROOFS = [
     ("gm6020-voltage", word_of((25_000, 24.0)), "word_gm6020_voltage", "all 2^32 f32", "word_gm6020_voltage_faulty"),
     ("gm6020-current", word_of((16_384, 3.0)), "word_gm6020_current", "all 2^32 f32", "word_gm6020_current_faulty"),
     ("timeouts", word_at, "word_at", "any three times below 2^62 us, the target accepted", "word_at_faulty"),
-    ("operation", route_in_operation, "route", "all data frames of the family, on a bus that heard each motor", "route_masked"),
+    ("operation", route_in_operation, "route", "all data frames of 8 bytes of the family, on a bus that heard each motor", "route_masked"),
 ]
 
 
