@@ -1,9 +1,8 @@
 //! Long runs: random frames and calls with the invariants of `docs/faults.md` asserted, and healthy motors that must not
 //! raise an alarm.
 //!
-//! Ignored in the everyday run; `.ci/run` runs all ticks, and a 25th of the frames and calls, with seeds that change by the day: 25
-//! days are the whole. `DRIVETRAIN_DAY=20778` runs those of a day again. At once:
-//! `DRIVETRAIN_SOAK=full cargo test --release --all-features --test soak -- --ignored --nocapture --test-threads 1`
+//! Ignored in the everyday run; `.ci/run` runs them whole, with the same seeds each time, so that a failure is of the change and not
+//! of the day. Others are drawn by `DRIVETRAIN_SEED=7`.
 
 #![cfg(test)]
 
@@ -11,35 +10,27 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M2006, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, Timeouts,
+    CanDevice, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, TargetError, Timeouts,
 };
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ExtendedId, Frame, StandardId};
 use std::thread;
-use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Runs `work` on two threads with seeds of their own, each with half of `full` or of its `share`.
-fn soak(what: &str, full: u64, share: u64, work: impl Fn(u64, u64) -> Report + Sync) {
-    let everything = std::env::var("DRIVETRAIN_SOAK").is_ok_and(|share| share == "full");
-    let share = if everything { full } else { full / share };
-    // A day can be had again by its number.
-    let today = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs() / 86_400;
-    let day = std::env::var("DRIVETRAIN_DAY").map_or_else(|_| today(), |day| day.parse().unwrap());
+/// Runs `work` on two threads, each with half of `count` and a seed of its own.
+fn soak(what: &str, count: u64, work: impl Fn(u64, u64) -> Report + Sync) {
+    let seed: u64 = std::env::var("DRIVETRAIN_SEED").map_or(1, |seed| seed.parse().unwrap());
+    let seeds = [2 * seed, 2 * seed + 1];
     let start = std::time::Instant::now();
     let reports = thread::scope(|scope| {
-        let threads = [2 * day, 2 * day + 1].map(|seed| {
+        let threads = seeds.map(|seed| {
             let work = &work;
-            scope.spawn(move || work(seed, share / 2))
+            scope.spawn(move || work(seed, count / 2))
         });
         threads.map(|thread| thread.join().unwrap())
     });
     let seconds = start.elapsed().as_secs_f64();
-    println!(
-        "soak: {share} of {full} {what} in {seconds:.1} s, seeds {} and {} of day {day}",
-        2 * day,
-        2 * day + 1
-    );
+    println!("soak: {count} {what} in {seconds:.1} s, seeds {seeds:?}");
     reports.iter().for_each(|report| println!("  {report}"));
 }
 
@@ -72,6 +63,30 @@ struct Motor {
     /// When its last good frame came, and its last accepted target.
     heard: Option<u64>,
     asked: Option<u64>,
+    /// That target is a velocity.
+    is_velocity: bool,
+    /// No loop of it has run, and none took over from a raw command, since it was last at rest.
+    is_empty: bool,
+}
+
+impl Motor {
+    /// Relaxed, disarmed, stopped, lost, or without a target for too long.
+    fn rest(&mut self) {
+        self.asked = None;
+        self.is_empty = true;
+    }
+
+    fn follow(&mut self, is_velocity: bool, now_us: u64) {
+        // A target has the time of the update before it.
+        self.asked = Some(now_us);
+        self.is_velocity = is_velocity;
+        // The loop that comes after a raw command goes on from there.
+        self.is_empty &= is_velocity;
+    }
+
+    fn is_fresh(at: Option<u64>, now_us: u64, limit_us: u64) -> bool {
+        at.is_some_and(|at| now_us - at <= limit_us)
+    }
 }
 
 const LATE_US: u64 = 10_000;
@@ -89,6 +104,9 @@ static BLIND: HealthConfig = HealthConfig::new()
 /// These run; the two others are what they look like, nearly always at fault.
 const RUNNING: [usize; 3] = [0, 2, 4];
 
+/// The motor whose loop does nothing but integrate: its first output after a rest is zero, or its integral outlived the rest.
+const INTEGRATOR: usize = 2;
+
 fn attach(bus: &mut Bus, index: usize) -> AnyHandle {
     let m3508 = |id| Config::<M3508>::new(id).speed_loop(SPEED);
     let voltage = PidConfig::new(1.0, 5.0, 0.0);
@@ -96,7 +114,11 @@ fn attach(bus: &mut Bus, index: usize) -> AnyHandle {
     match index {
         0 => bus.attach(m3508(1).with_health(&BLIND)).unwrap().into(),
         1 => bus.attach(m3508(2).reversed()).unwrap().into(),
-        2 => bus.attach(Config::<M2006>::new(4).with_health(&BLIND)).unwrap().into(),
+        INTEGRATOR => {
+            let integral = PidConfig::new(0.0, 50.0, 0.0);
+            let m2006 = Config::<M2006>::new(4).speed_loop(integral);
+            bus.attach(m2006.with_health(&BLIND)).unwrap().into()
+        }
         3 => bus.attach(Config::<M2006>::new(6)).unwrap().into(),
         _ => bus.attach(gm6020.with_health(&BLIND)).unwrap().into(),
     }
@@ -111,6 +133,8 @@ fn motors(bus: &mut Bus) -> Vec<Motor> {
         handle,
         heard: None,
         asked: None,
+        is_velocity: false,
+        is_empty: true,
     };
     vec![
         of(0x201, 0x200, 0, 16_384, attach(bus, 0)),
@@ -166,6 +190,7 @@ struct Books {
     given_back: u32,
     nonzero: u64,
     compared: u64,
+    from_rest: u64,
 }
 
 struct Soak {
@@ -312,9 +337,11 @@ impl Soak {
             }
         }
         assert!(done.iter().all(|one| *one == done[0]), "I8: {done:?}");
-        if done.first().is_some_and(Result::is_ok) {
-            // A target has the time of the update before it.
-            motor.asked = Some(self.now_us);
+        match done.first() {
+            Some(Ok(())) => motor.follow(bits >> 8 & 31 > 7, self.now_us),
+            Some(Err(TargetError::NotFinite | TargetError::NoFeedback)) => motor.asked = None,
+            None if bits >> 8 & 31 == 16 => motor.rest(),
+            _ => {}
         }
         match bits >> 8 & 31 {
             17 if bits & 0x7000 == 0 => self.both(Bus::disarm),
@@ -329,21 +356,48 @@ impl Soak {
     fn both(&mut self, work: impl Fn(&mut Bus)) {
         work(&mut self.bus);
         work(&mut self.alone.bus);
+        self.look_who_rests();
         self.alone.drain(self.motors[self.alone.index].slot);
     }
 
     fn arm(&mut self, now: Instant, which: &[usize]) {
         let handles: Vec<AnyHandle> =
             which.iter().map(|index| self.motors[*index].handle).collect();
+        self.look_who_rests();
         let armed = self.bus.arm_only(&handles, now).is_ok();
         if armed && which.contains(&self.alone.index) {
             assert_eq!(self.alone.bus.arm(now), Ok(()), "I8: armed among others only");
         }
     }
 
+    /// Who is not armed, or lost, rests.
+    fn look_who_rests(&mut self) {
+        for motor in &mut self.motors {
+            let is_lost = self.bus.link(motor.handle) == Some(Link::Offline);
+            if is_lost || !self.bus.is_motor_armed(motor.handle) {
+                motor.rest();
+            }
+        }
+    }
+
+    /// What an update in which time passed did to the motors.
+    fn look_who_ran(&mut self) {
+        for motor in &mut self.motors {
+            if !Motor::is_fresh(motor.heard, self.now_us, LATE_US) || motor.asked.is_none() {
+                continue;
+            }
+            if Motor::is_fresh(motor.asked, self.now_us, DEADLINE_US) {
+                motor.is_empty = false;
+            } else {
+                motor.rest();
+            }
+        }
+    }
+
     /// Time goes on, mostly by a millisecond, sometimes by much more.
     fn update(&mut self) {
         let bits = self.random.next();
+        let before_us = self.now_us;
         self.now_us += match bits & 0xFF {
             0 => bits >> 8 & 0x3_FFFF,
             1 if bits & 0xFF00 == 0 => bits >> 20 & 0xFFFF_FFFF,
@@ -362,7 +416,8 @@ impl Soak {
         let (one, other) = (self.motors[self.alone.index].handle, self.alone.handle);
         assert_eq!(self.bus.state(one), self.alone.bus.state(other), "I8");
         // The last words stay for one update whose step is unusable.
-        let has_time = dt_s > 0.0 && dt_s.is_finite();
+        let has_time = dt_s > 0.0 && dt_s.is_finite() && self.now_us > before_us;
+        self.look_who_rests();
         // Each bit is a frame that the driver gives back; or it is full, and the others wait.
         let refuses = if bits >> 48 & 7 == 0 { bits >> 52 } else { 0 };
         let mut drained = false;
@@ -382,10 +437,13 @@ impl Soak {
                 break;
             }
         }
+        if has_time {
+            self.look_who_ran();
+        }
         self.check_books(drained);
     }
 
-    /// I2 to I4, I7 and I8 on a frame.
+    /// I2 to I4 and I7 to I9 on a frame.
     fn check_frame(&mut self, frame: &CanFrame, has_time: bool) {
         assert!(frame.is_data_frame() && frame.dlc() == 8);
         assert!([0x200, 0x1FF, 0x2FF].contains(&frame.header()), "{frame:?}");
@@ -403,6 +461,12 @@ impl Soak {
                 assert_eq!(word, self.alone.word, "I7 or I8: not what it sends alone: {frame:?}");
                 self.books.compared += u64::from(word != 0);
             }
+            if owner == Some(INTEGRATOR) && has_time {
+                let motor = &self.motors[INTEGRATOR];
+                let is_first = motor.asked.is_some() && motor.is_velocity && motor.is_empty;
+                assert!(!is_first || word == 0, "I9: an integral outlived its rest: {frame:?}");
+                self.books.from_rest += u64::from(is_first);
+            }
             if word == 0 {
                 continue;
             }
@@ -415,7 +479,7 @@ impl Soak {
             );
             self.books.nonzero += 1;
             if has_time {
-                let fresh = |at: Option<u64>, limit| at.is_some_and(|at| self.now_us - at <= limit);
+                let fresh = |at, limit_us| Motor::is_fresh(at, self.now_us, limit_us);
                 assert!(fresh(motor.heard, LATE_US), "driven without feedback: {frame:?}");
                 assert!(fresh(motor.asked, DEADLINE_US), "driven without a target: {frame:?}");
             }
@@ -450,9 +514,9 @@ impl Soak {
 }
 
 #[test]
-#[ignore = "10^9 frames and calls: in release, a share by .ci/run"]
+#[ignore = "10^9 frames and calls: in release, by .ci/run"]
 fn random_frames_and_calls_keep_the_invariants() {
-    soak("frames and calls", 1_000_000_000, 25, |seed, count| {
+    soak("frames and calls", 1_000_000_000, |seed, count| {
         // I10: the same again gives the same, bit for bit.
         let again = [0, 1].map(|_| {
             let mut soak = Soak::new(seed, 0);
@@ -469,9 +533,10 @@ fn random_frames_and_calls_keep_the_invariants() {
                 let least = if RUNNING.contains(&chosen) { count / 20_000 } else { 0 };
                 assert!(books.nonzero > count / 2_000, "{}: hardly ever ran", books.nonzero);
                 assert!(books.compared >= least, "{}: {chosen} hardly ever ran", books.compared);
+                assert!(books.from_rest > count / 50_000, "{}: hardly ever from rest", books.from_rest);
                 assert!(books.taken * 2 > books.offered, "half of the frames are good");
                 format!(
-                    "{} frames: {} taken, {} of others, {} of a wrong length, {} with a bad field; {} sent, {} given back, {} words not zero, {} of them compared",
+                    "{} frames: {} taken, {} of others, {} of a wrong length, {} with a bad field; {} sent, {} given back, {} words not zero, {} of them compared, {} first ones after a rest",
                     books.offered,
                     books.taken,
                     books.unrelated,
@@ -480,7 +545,8 @@ fn random_frames_and_calls_keep_the_invariants() {
                     books.taken_out,
                     books.given_back,
                     books.nonzero,
-                    books.compared
+                    books.compared,
+                    books.from_rest
                 )
             })
             .collect();
@@ -580,7 +646,7 @@ fn healthy_motors(bus: &mut Bus) -> Vec<Healthy> {
 #[test]
 #[ignore = "10^8 ticks of motors: in release, by .ci/run"]
 fn healthy_motors_that_lose_one_frame_in_twenty_raise_no_alarm() {
-    soak("ticks of healthy motors at 5 % loss", 100_000_000, 1, |seed, count| {
+    soak("ticks of healthy motors at 5 % loss", 100_000_000, |seed, count| {
         let mut bus = Bus::new();
         let mut motors = healthy_motors(&mut bus);
         let mut random = Random(seed);
