@@ -124,7 +124,8 @@ fn drive<K: Kinematics>(
                 }
                 renewed = false;
                 let old = age_s > 0.101;
-                let mut same = chassis;
+                let (mut same, mut stopped) = (chassis, chassis);
+                stopped.stop();
                 let targets = chassis.update(wheels, tick);
                 let again = same.update(wheels, tick);
                 let _: K::Wheels<()> = K::map(K::zip(targets, again), |(target, again)| {
@@ -137,6 +138,15 @@ fn drive<K: Kinematics>(
                     let rests = !old || dt_s <= 0.0 || !dt_s.is_finite() || ramps || speed == 0.0;
                     assert!(rests, "I4: {speed} after {age_s} s");
                 });
+                if old {
+                    // With limits of acceleration it is on its way to rest, at the rate of a stop.
+                    let stopped = stopped.update(wheels, tick);
+                    let _: K::Wheels<()> = K::map(K::zip(targets, stopped), |(target, stopped)| {
+                        let [target, stopped] =
+                            [target, stopped].map(|speed| speed.velocity().as_rad_per_s());
+                        assert_eq!(target.to_bits(), stopped.to_bits(), "I4: not as a stop");
+                    });
+                }
                 assert!(!old || chassis.status().command_stale, "I4: {age_s} s");
                 let (pose, moves) = (chassis.pose(), chassis.measured());
                 assert!(moves.is_finite(), "{moves:?}");
