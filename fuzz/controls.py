@@ -15,6 +15,7 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+NIGHTLY = (ROOT / ".ci/nightly").read_text().strip()
 
 # target, what is wrong, file, text that stands there exactly once, what is planted instead
 DEFECTS = [
@@ -112,7 +113,7 @@ def plant(tree, file, there, instead):
 
 
 def build(tree, target):
-    command = ["cargo", "+nightly", "fuzz", "build", "--sanitizer", "none", target]
+    command = ["cargo", f"+{NIGHTLY}", "fuzz", "build", "--sanitizer", "none", target]
     done = subprocess.run(command, cwd=tree, capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)
