@@ -330,3 +330,42 @@ fn the_longest_gap_is_that_of_frames_that_were_lost() {
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(100_000)), Ingest::Taken);
     assert_eq!(bus.health(late).unwrap().longest_gap.as_micros(), 0);
 }
+
+/// Half a rotor turn at no-load speed less 500 µs; any, when an update found the motor late before it ended.
+#[test]
+fn a_gap_counts_from_half_a_turn_on_or_when_the_motor_was_late() {
+    fn longest<M: Model>(gap_us: u64, is_updated: bool) -> u64 {
+        let mut bench = Bench::new(Config::<M>::new(1));
+        bench.run(2_100, CALM, 0);
+        let now = Instant::from_micros(1_000 * bench.ms - 300 + gap_us);
+        if is_updated {
+            for ms in 1..=gap_us / 1_000 {
+                step(&mut bench.bus, bench.ms + ms);
+            }
+        }
+        _ = bench.bus.ingest(&feedback(M::FACTS.feedback_base + 1, 0, 0), now);
+        bench.bus.health(bench.motor).unwrap().longest_gap.as_micros()
+    }
+    for is_updated in [false, true] {
+        assert_eq!([1_165, 1_166].map(|us| longest::<M2006>(us, is_updated)), [0, 1_152]);
+        assert_eq!([2_740, 2_741].map(|us| longest::<M3508>(us, is_updated)), [0, 2_736]);
+    }
+    assert_eq!([93_249, 93_250].map(|us| longest::<Gm6020Voltage>(us, false)), [0, 93_248]);
+    assert_eq!([9_900, 11_200].map(|us| longest::<Gm6020Voltage>(us, true)), [0, 11_200]);
+}
+
+#[test]
+fn every_gap_counts_before_the_first_update_and_while_too_many_frames_come() {
+    let mut bus: Bus = Bus::new().with_feedback_rate(100);
+    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let gap = |bus: &Bus| bus.health(motor).unwrap().longest_gap.as_micros();
+    let hear = |bus: &mut Bus, ms| _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+    (0..3).for_each(|ms| hear(&mut bus, ms));
+    assert_eq!(gap(&bus), 992, "in steps of 16 µs");
+    // The first whole window tells that 1000 frames a second come and not 100.
+    for ms in 3..4_300 {
+        hear(&mut bus, ms);
+        step(&mut bus, ms);
+    }
+    assert_eq!(gap(&bus), 992);
+}

@@ -42,9 +42,12 @@ pub struct Health {
     pub conditions: Conditions,
     /// Feedback frames a second, over the last whole window of about a second; 0 before there was one.
     pub feedback_hz: u16,
-    /// The longest time between two of them, in that window and in the present one; saturates at a second. DJI motors are
-    /// heard at 1 kHz, and only what is longer than half a turn of the rotor at no-load speed counts there: 0 while no
-    /// frame is missed.
+    /// The longest time between two of them, in that window and in the present one; in steps of 16 µs, at most 1.05 s.
+    ///
+    /// Of a DJI motor only some gaps count: those of at least half a rotor turn at no-load speed less 500 µs, which
+    /// is 1166 µs for an M2006, 2741 µs for an M3508 and 93 250 µs for a GM6020; and those in which, at any time, the
+    /// motor was not online, its bus was not updated yet, or `feedback_hz` was more than half above the rate that the
+    /// bus was told. 0 without such a gap.
     pub longest_gap: Duration,
     /// Temperature in °C; `None` for a motor that reports none.
     pub temperature_c: Option<i16>,
