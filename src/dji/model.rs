@@ -193,35 +193,35 @@ pub trait CurrentControlled: Model {}
 /// A model whose command is a voltage.
 pub trait VoltageControlled: Model {}
 
-macro_rules! model {
-    ($(#[$doc:meta])* $model:ident, $facts:ident, $control:ident) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub struct $model;
+macro_rules! models {
+    ($($(#[$doc:meta])* $model:ident, $facts:ident, $control:ident;)+) => {
+        $(
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+            pub struct $model;
 
-        impl sealed::Sealed for $model {}
-        impl Model for $model {
-            const FACTS: &'static Facts = &$facts;
-        }
-        impl $control for $model {}
+            impl sealed::Sealed for $model {}
+            impl Model for $model {
+                const FACTS: &'static Facts = &$facts;
+            }
+            impl $control for $model {}
+        )+
+
+        /// Those of every model.
+        #[cfg(test)]
+        pub(super) const ALL_FACTS: &[&Facts] = &[$(&$facts),+];
     };
 }
 
-model! {
+models! {
     /// The M2006 with its C610 ESC: current control, no temperature.
-    M2006, M2006_FACTS, CurrentControlled
-}
-model! {
+    M2006, M2006_FACTS, CurrentControlled;
     /// The M3508 with its C620 ESC: current control.
-    M3508, M3508_FACTS, CurrentControlled
-}
-model! {
+    M3508, M3508_FACTS, CurrentControlled;
     /// The GM6020 as it is delivered: voltage control.
-    Gm6020Voltage, GM6020_VOLTAGE_FACTS, VoltageControlled
-}
-model! {
+    Gm6020Voltage, GM6020_VOLTAGE_FACTS, VoltageControlled;
     /// The GM6020 with current control switched on in RoboMaster Assistant.
-    Gm6020Current, GM6020_CURRENT_FACTS, CurrentControlled
+    Gm6020Current, GM6020_CURRENT_FACTS, CurrentControlled;
 }
 
 #[cfg(test)]

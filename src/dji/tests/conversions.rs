@@ -1,56 +1,101 @@
 //! Every `f32` that a loop could give.
 
 use crate::dji::command::{free_to_raw, loop_to_raw};
+use crate::dji::model::ALL_FACTS;
 use crate::dji::range::Range;
+use crate::dji::{Config, Gm6020Voltage};
 
-/// Raw counts a unit, and the limit, of each model and scale.
-const SCALES: [(f32, i16); 5] = [
-    (10_000.0 / 10.0, 10_000),
-    (16_384.0 / 20.0, 16_384),
-    (25_000.0 / 24.0, 25_000),
-    (30_000.0 / 24.0, 30_000),
-    (16_384.0 / 3.0, 16_384),
-];
-
-/// The nearest word of the product in `f32`, half a count to the even neighbour, saturated; NaN gives 0.
-fn expected(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
-    let exact = f64::from(value * raw_per_unit).round_ties_even();
-    #[expect(clippy::cast_possible_truncation, reason = "saturated before; NaN gives 0")]
-    let word = exact.clamp(-f64::from(limit), f64::from(limit)) as i16;
-    word
+/// A scale, and the ranges of a motor that has all of it, or less than a third and one direction.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    raw_per_unit: f32,
+    limit: i16,
+    third: i16,
+    whole: Range,
+    positive: Range,
+    negative: Range,
 }
 
-fn check(bits: u32, raw_per_unit: f32, limit: i16) {
-    let value = f32::from_bits(bits);
-    let word = expected(value, raw_per_unit, limit);
-    let range = Range::within(limit);
-    assert_eq!(loop_to_raw(value, raw_per_unit, range), word, "{value:e} at {raw_per_unit}");
-    if (value * raw_per_unit).abs() <= f32::from(limit) {
-        assert_eq!(free_to_raw(value, raw_per_unit), word, "{value:e} at {raw_per_unit}");
+impl Case {
+    fn new(limit: i16, full_scale: f32) -> Self {
+        let third = limit / 3;
+        let narrow = Range::within(third);
+        Self {
+            raw_per_unit: f32::from(limit) / full_scale,
+            limit,
+            third,
+            whole: Range::within(limit),
+            positive: narrow.without_negative(),
+            negative: narrow.without_positive(),
+        }
+    }
+
+    /// Those of each model, and of the older scale of one.
+    fn all() -> impl Iterator<Item = Self> {
+        let usual = ALL_FACTS.iter().map(|facts| (facts.command_raw, facts.command_full_scale));
+        let legacy = Config::<Gm6020Voltage>::new(1).with_legacy_full_scale().plain;
+        let all = usual.chain([(legacy.command_raw, legacy.command_full_scale)]);
+        all.map(|(limit, full_scale)| Self::new(limit, full_scale))
+    }
+
+    /// Compares the word of the whole range with the exact product, for which `f64` has room. A reversed motor gets the
+    /// negative of that word, and one that is held back the nearest to it: upward for even bits, downward for odd ones.
+    fn check(&self, bits: u32) {
+        let (value, limit) = (f32::from_bits(bits), f64::from(self.limit));
+        let product = f64::from(value) * f64::from(self.raw_per_unit);
+        let word = loop_to_raw(value, self.raw_per_unit, self.whole);
+        let inside = product.clamp(-limit, limit);
+        let is_nearest = (f64::from(word) - inside).abs() < 0.5 || is_near_enough(word, inside);
+        assert!(is_nearest, "{value:e}: {word} for {inside}, {self:?}");
+
+        let (range, ends) = match bits & 1 {
+            0 => (self.positive, (0, self.third)),
+            _ => (self.negative, (-self.third, 0)),
+        };
+        let reversed = loop_to_raw(value, -self.raw_per_unit, range);
+        assert_eq!(reversed, (-word).clamp(ends.0, ends.1), "{value:e}: {self:?}");
+        if product.abs() <= limit {
+            assert_eq!(free_to_raw(value, -self.raw_per_unit), -word, "{value:e}: {self:?}");
+        }
+    }
+}
+
+/// Tells whether a word may stand for a product that is half a count off, or none: half a count goes to the even
+/// neighbour, and NaN to 0. The product is rounded to the 24 bits of an `f32` first, which may take it past a middle.
+#[cold]
+#[expect(clippy::float_cmp, reason = "the difference is exact")]
+fn is_near_enough(word: i16, product: f64) -> bool {
+    let off = (f64::from(word) - product).abs();
+    if product.is_nan() {
+        word == 0
+    } else if off == 0.5 {
+        word % 2 == 0
+    } else {
+        off <= 0.5 + product.abs() / 16_777_216.0
     }
 }
 
 #[test]
 fn values_about_each_step_and_each_end_become_the_nearest_word() {
-    for (raw_per_unit, limit) in SCALES {
-        for halves in -2 * i32::from(limit) - 3..=2 * i32::from(limit) + 3 {
-            let value = f64::from(halves) * 0.5 / f64::from(raw_per_unit);
+    for case in Case::all() {
+        for halves in -2 * i32::from(case.limit) - 3..=2 * i32::from(case.limit) + 3 {
+            let value = f64::from(halves) * 0.5 / f64::from(case.raw_per_unit);
             #[expect(clippy::cast_possible_truncation, reason = "the nearest f32 is meant")]
             let value = value as f32;
             for bits in [value.next_down(), value, value.next_up()].map(f32::to_bits) {
-                check(bits, raw_per_unit, limit);
+                case.check(bits);
             }
         }
     }
 }
 
 /// Two threads, as the machine of the checks has cores.
-fn every_f32((raw_per_unit, limit): (f32, i16)) {
+fn every_f32(case: Case) {
     std::thread::scope(|scope| {
         for sign in [0, 1 << 31] {
             scope.spawn(move || {
                 for bits in 0..1 << 31 {
-                    check(sign | bits, raw_per_unit, limit);
+                    case.check(sign | bits);
                 }
             });
         }
@@ -58,14 +103,15 @@ fn every_f32((raw_per_unit, limit): (f32, i16)) {
 }
 
 #[test]
-#[ignore = "2^32 values for one of five scales a day: by .ci/run"]
+#[ignore = "2^32 values for one scale a day: by .ci/run"]
 fn every_f32_of_a_loop_becomes_the_nearest_word() {
     let all = std::env::var("DRIVETRAIN_EXHAUSTIVE").is_ok_and(|share| share == "full");
     let since_1970 = std::time::UNIX_EPOCH.elapsed().unwrap();
-    let today = since_1970.as_secs() / 86_400 % SCALES.len() as u64;
-    for (turn, scale) in (0..).zip(SCALES) {
+    let today = since_1970.as_secs() / 86_400 % Case::all().count() as u64;
+    for (turn, case) in (0..).zip(Case::all()) {
+        let scale = (case.raw_per_unit, case.limit);
         if all || turn == today {
-            every_f32(scale);
+            every_f32(case);
             std::println!("exhaustive: loop outputs at {scale:?}: 4294967296 values");
         } else {
             std::println!("exhaustive: loop outputs at {scale:?}: not today");
