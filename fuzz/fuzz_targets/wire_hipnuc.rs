@@ -1,6 +1,8 @@
 //! Any bytes from an IMU, in any split.
 #![no_main]
 
+use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::wire::Protocol;
 use drivetrain::wire::hipnuc::HipNuc;
 use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
@@ -18,7 +20,15 @@ fn imu(input: &mut Input) -> Vec<u8> {
     payload.extend((1..length).map(|_| input.byte()));
     let head = [0x5A, 0xA5, length, 0];
     let [low, high] = crc(head.iter().chain(&payload)).to_le_bytes();
-    [&head[..], &[low, high], &payload].concat()
+    let frame = [&head[..], &[low, high], &payload].concat();
+    if let Ok(imu) = HipNuc.parse(&frame) {
+        // What motion is computed from; pressure and magnetic field may be anything.
+        let rates = imu.angular_velocity.map(AngularVelocity::as_rad_per_s);
+        let angles = [imu.roll, imu.pitch, imu.yaw].map(Angle::as_radians);
+        let motion = [imu.acceleration_m_s2, rates, angles];
+        assert!(motion.as_flattened().iter().all(|value| value.is_finite()), "{imu:?}");
+    }
+    frame
 }
 
 /// CRC-16/XMODEM, bit by bit.
