@@ -255,7 +255,9 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
         if !netem.is_empty() {
             output("tc", &["qdisc", "del", "dev", BUS, "root"]);
         }
-        // What still came, then the marker.
+        // What still came, then the marker. With frames of the robot before the commands: where one of the last two was lost,
+        // the other would be followed by its like.
+        robot.step();
         example.step();
         let written = robot.written;
         robot.receive();
