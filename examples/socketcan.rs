@@ -253,22 +253,15 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
         if options.lock_step {
             let clock = ManualClock::new(Instant::from_micros(1_000_000));
             let mut lines = io::stdin().lock().lines();
-            let next = || match lines.next() {
-                Some(_) => {
-                    clock.advance(Duration::from_millis(1));
-                    true
-                }
-                None => false,
-            };
-            return Session::new(&options, &clock)?.run(&options, &stop, next);
+            let pause = || clock.advance(Duration::from_millis(1));
+            let next = || lines.next().is_some();
+            return Session::new(&options, &clock)?.run(&options, &stop, next, pause);
         }
         let start = std::time::Instant::now();
         let clock = move || Instant::START + Duration::from(start.elapsed());
-        let next = || {
-            std::thread::sleep(std::time::Duration::from_micros(200));
-            start.elapsed().as_secs() < options.seconds
-        };
-        Session::new(&options, clock)?.run(&options, &stop, next)
+        let pause = || std::thread::sleep(std::time::Duration::from_micros(200));
+        let next = || start.elapsed().as_secs() < options.seconds;
+        Session::new(&options, clock)?.run(&options, &stop, next, pause)
     }
 
     struct Session<K> {
@@ -294,15 +287,17 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
             })
         }
 
-        /// Runs until `next` or a signal ends it, and ends with zeros.
+        /// Runs until `next` or a signal ends it, and ends with zeros. In each `pause` some time passes.
         fn run(
             mut self,
             options: &Options,
             stop: &AtomicBool,
             mut next: impl FnMut() -> bool,
+            mut pause: impl FnMut(),
         ) -> Result<(), Box<dyn Error>> {
             let mut ticks: u64 = 0;
             while next() && !stop.load(Ordering::Relaxed) {
+                pause();
                 while self.runner.poll(64) == 64 {}
                 let Some(tick) = self.runner.due() else { continue };
                 ticks += 1;
@@ -319,7 +314,7 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
                 }
             }
             if options.arm {
-                self.end();
+                self.end(pause);
             }
             self.show();
             self.report();
@@ -350,16 +345,15 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
             while self.runner.device_mut().next_frame().is_some() {}
         }
 
-        /// Zeros, some of them in case one is lost.
-        fn end(&mut self) {
+        /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost.
+        fn end(&mut self, mut pause: impl FnMut()) {
             self.runner.device_mut().disarm();
-            let start = std::time::Instant::now();
-            let mut sent = 0;
-            while sent < 3 && start.elapsed().as_millis() < 100 {
-                std::thread::sleep(std::time::Duration::from_millis(1));
+            let mut ticks = 0;
+            while ticks < 30 {
+                pause();
                 let Some(tick) = self.runner.due() else { continue };
                 self.runner.tick(tick);
-                sent += 1;
+                ticks += 1;
             }
         }
 
