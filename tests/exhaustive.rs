@@ -1,8 +1,8 @@
 //! Every input, one after the other, against an oracle that is not our code: integers and `f64`.
 //!
-//! Ignored in the everyday run: minutes in release. `.ci/run` runs them; the five sweeps of conversions take turns there,
-//! one a day, so that five days see every value of every scale. All of it:
-//! `DRIVETRAIN_EXHAUSTIVE=full cargo test --release --all-features --test exhaustive -- --ignored --nocapture --test-threads 1`
+//! Ignored in the everyday run: minutes in release, with checks for overflow. `.ci/run` runs them; the five sweeps of
+//! conversions take turns there, one a day, so that five days see every value of every scale. All of it:
+//! `DRIVETRAIN_EXHAUSTIVE=full cargo test --profile soak --all-features --test exhaustive -- --ignored --nocapture --test-threads 1`
 
 #![cfg(test)]
 

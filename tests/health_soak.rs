@@ -143,7 +143,7 @@ fn thirty_thousand_healthy_ticks_have_no_edge() {
 }
 
 #[test]
-#[ignore = "two minutes: cargo test --release --test health_soak -- --ignored --nocapture"]
+#[ignore = "two minutes: cargo test --profile soak --test health_soak -- --ignored --nocapture"]
 fn ten_million_healthy_ticks_have_no_edge() {
     let outcomes: Vec<Outcome> = (1..=20).map(|seed| drive(seed, 520)).collect();
     let ticks: u64 = outcomes.iter().map(|outcome| outcome.ticks).sum();
