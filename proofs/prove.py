@@ -7,6 +7,8 @@ with an error (src/faulty.rs): there the solver has to find some. Fails otherwis
 to its end. Names after the image choose what is proved.
 """
 
+import copy
+import functools
 import logging
 import multiprocessing
 import os
@@ -25,7 +27,7 @@ except ImportError:
 RETURN = 0xDEAD0000
 STACK = 0x2001_0000
 # Inputs and outputs by pointer lie here.
-INPUT, OUTPUT = 0x2002_0000, 0x2002_1000
+INPUT, OUTPUT, BEFORE = 0x2002_0000, 0x2002_1000, 0x2003_0000
 FP = claripy.FSORT_FLOAT
 NEAREST = claripy.fp.RM.RM_NearestTiesEven
 
@@ -71,8 +73,10 @@ class Image:
             fail(f"the image has no {name}")
         return symbol.rebased_addr
 
-    def size(self, name):
-        return self.project.loader.find_symbol(name).size
+    def words(self, name, size=4):
+        """Where the words of a static are."""
+        first = self.address(name)
+        return range(first, first + self.project.loader.find_symbol(name).size, size)
 
     def blank(self):
         """Nothing has run yet; nothing is in the output."""
@@ -174,128 +178,231 @@ def unwrap(image, function):
     yield paths, {"previous": previous, "next": following}, ()
 
 
-# The motors of the image's bus, by the ids of their feedback, and all ids of the family.
-ATTACHED = [0x201, 0x202, 0x204, 0x206, 0x209, 0x20B]
+# The motors of the image's bus, by the ids of their feedback and of their commands, and all ids of the family.
+ATTACHED = {0x201: 0x200, 0x202: 0x200, 0x204: 0x200, 0x206: 0x1FF, 0x209: 0x2FF, 0x20B: 0x2FF}
 FAMILY = range(0x201, 0x20C)
-# What the bus sends itself: the tests of F05 say what follows when it is received.
+# What a bus sends itself: a second master's, when it is received.
 COMMANDS = [0x200, 0x1FF, 0x2FF, 0x1FE, 0x2FE]
 TAKEN, UNRELATED, BAD_LENGTH, BAD_FIELD = 1, 2, 3, 4
+# What `news` says of a motor.
+NOTHING, SECOND_MASTER = 0, 1
 
 
-def put_frame(state, identifier, extended, remote, length, data):
-    for offset, value in ((0, identifier), (4, extended), (5, remote), (6, length), (8, data)):
-        endness = "Iend_LE" if offset == 0 else "Iend_BE"
-        state.memory.store(INPUT + offset, value, endness=endness)
+class Frames:
+    """Every frame: an id, two flags and a length as a CAN controller has them, and the words that the image makes of it."""
 
-
-def bus_in_operation(image):
-    """The state after each motor was heard once, at 1 ms."""
-    state = image.blank()
-    bus = constant(image.address("BUS"))
-    for identifier in ATTACHED:
-        byte = claripy.BVV(0, 8)
-        put_frame(state, constant(identifier), byte, byte, claripy.BVV(8, 8), claripy.BVV(0x11_0000_0000_0000 * 16, 64))
-        (state,) = image.call("route", bus, constant(INPUT), constant(1_000), state=state)
-    return state
-
-
-def last_frames(image, end):
-    """The last frame of every motor, as the public API tells it."""
-    (end,) = image.call("heard", constant(image.address("BUS")), constant(OUTPUT), state=end)
-    return [end.memory.load(OUTPUT + 8 * index, 8) for index in range(len(ATTACHED))]
-
-
-def counters(image, end):
-    (end,) = image.call("counted", constant(image.address("BUS")), constant(OUTPUT), state=end)
-    return [output(end, index) for index in range(3)]
-
-
-def words_changed(image, before, after):
-    """How many words of the bus are not what they were."""
-    first, size = image.address("BUS"), image.size("BUS")
-    same = lambda place, count: claripy.is_true(before.memory.load(place, count) == after.memory.load(place, count))
-    if same(first, size):
-        return 0
-    return sum(not same(place, 4) for place in range(first, first + size, 4))
-
-
-def route_case(image, function, state, identifier, extended, remote, length, assume=()):
-    """Taken exactly when it is a standard data frame of 8 bytes with a motor's id and an angle below 8192; then that
-    motor has it, and no other has changed. What is not taken changes nothing but its counter."""
-    data = claripy.BVS("data", 64)
-    frames_before, counts_before = last_frames(image, state), counters(image, state)
-    start = state.copy()
-    put_frame(start, identifier, extended, remote, length, data)
-
-    below = claripy.If(extended != 0, constant(1 << 29), constant(1 << 11))
-    there_is = claripy.And(claripy.ULE(length, 8), claripy.ULT(identifier, below))
-    standard_data = claripy.And(extended == 0, remote == 0)
-    mine = claripy.And(standard_data, claripy.Or(*(identifier == motor for motor in ATTACHED)))
-    # As a second master's it is noted, and no motor has it.
-    own_command = claripy.Or(*(identifier == command for command in COMMANDS))
-    stranger = claripy.And(there_is, standard_data, is_of_family(identifier), claripy.Not(mine))
-    outcome = constant(TAKEN)
-    for holds, value in (
-        (claripy.UGE(data[63:48], 8192), BAD_FIELD),
-        (length != 8, BAD_LENGTH),
-        (claripy.Not(mine), UNRELATED),
-        (claripy.Not(there_is), 0),
-    ):
-        outcome = claripy.If(holds, constant(value), outcome)
-
-    paths = []
-    bus = constant(image.address("BUS"))
-    for end in image.call(function, bus, constant(INPUT), constant(2_000), state=start, assume=assume):
-        changed = words_changed(image, start, end)
-        counts = counters(image, end) if changed else counts_before
-        # Where at most one word has changed, and that is a counter, the motors are as they were.
-        frames = last_frames(image, end) if changed > 1 else frames_before
-        kept = [
-            frame == claripy.If(claripy.And(outcome == TAKEN, identifier == motor), data, before)
-            for motor, frame, before in zip(ATTACHED, frames, frames_before)
+    def __init__(self, image, function="frame"):
+        self.identifier, self.length = claripy.BVS("id", 32), claripy.BVS("length", 8)
+        self.extended, self.remote = claripy.BVS("extended", 8), claripy.BVS("remote", 8)
+        self.data = claripy.BVS("data", 64)
+        below = claripy.If(self.extended != 0, constant(1 << 29), constant(1 << 11))
+        self.there_is = claripy.And(claripy.ULE(self.length, 8), claripy.ULT(self.identifier, below))
+        # One length after the other, as the image does.
+        self.ends = self.made(image, function, self.length, claripy.UGT(self.length, 8))
+        for length in range(9):
+            self.ends += self.made(image, function, claripy.BVV(length, 8), self.length == length)
+        # The conditions of each path to a frame, and its words. `put` makes them one again: there would be as many paths
+        # through all that follows. That none is missing is what `frames` proves.
+        places = image.words("FRAME")
+        self.ways = [
+            (end.solver.constraints, [end.memory.load(place, 4) for place in places])
+            for end in self.ends
+            if end.solver.eval_one(end.regs.r0)
         ]
-        counted = [
-            count == before + claripy.If(holds, constant(1), constant(0))
-            for count, before, holds in zip(counts, counts_before, (outcome == BAD_LENGTH, outcome == BAD_FIELD, stranger))
+
+    def made(self, image, function, length, assumed):
+        state = image.blank()
+        wire = ((0, self.identifier), (4, self.extended), (5, self.remote), (6, length), (8, self.data))
+        for offset, value in wire:
+            endness = "Iend_LE" if offset == 0 else "Iend_BE"
+            state.memory.store(INPUT + offset, value, endness=endness)
+        place = constant(image.address("FRAME"))
+        return image.call(function, constant(INPUT), place, state=state, assume=[assumed])
+
+    def inputs(self):
+        flags = {"extended": self.extended, "remote": self.remote}
+        return {"id": self.identifier, **flags, "length": self.length, "data": self.data}
+
+    def with_values(self, **values):
+        """Those with these values."""
+        chosen = copy.copy(self)
+        for name, value in values.items():
+            symbol = getattr(self, name)
+            value = claripy.BVV(value, symbol.length)
+            setattr(chosen, name, value)
+            put = lambda terms: [claripy.replace(term, symbol, value) for term in terms]
+            chosen.there_is = claripy.replace(chosen.there_is, symbol, value)
+            ways = [(put(taken), put(words)) for taken, words in chosen.ways]
+            chosen.ways = [way for way in ways if not any(claripy.is_false(term) for term in way[0])]
+        return chosen
+
+    def of(self, identifier, **values):
+        """The standard data frames of one id."""
+        return self.with_values(identifier=identifier, extended=0, remote=0, **values)
+
+    def put(self, image, state):
+        for index, place in enumerate(image.words("FRAME")):
+            (_, first), *others = self.ways
+            word = first[index]
+            for taken, words in others:
+                if words[index] is not word:
+                    word = claripy.If(claripy.And(*taken), words[index], word)
+            state.memory.store(place, word)
+
+
+class Watched:
+    """What a function tells of a bus; and the words of the bus that it reads for that: as long as none of them changes, it
+    tells the same."""
+
+    def __init__(self, image, state, function, *arguments, size):
+        self.image, self.function, self.arguments, self.size = image, function, arguments, size
+        self.reads = set()
+        watched = state.copy()
+        watched.inspect.b("mem_read", when=angr.BP_BEFORE, action=self.note)
+        self.value = self.told(watched)
+
+    def note(self, state):
+        place, size = state.inspect.mem_read_address, state.inspect.mem_read_length
+        first = state.solver.eval_one(place)
+        self.reads |= {word & ~3 for word in range(first, first + size)}
+
+    def told(self, state):
+        (end,) = self.image.call(self.function, *self.arguments, constant(OUTPUT), state=state)
+        return [end.regs.r0, *(output(end, index) for index in range(self.size))]
+
+    def after(self, end, changed):
+        return self.told(end) if self.reads & changed else self.value
+
+
+class Router:
+    """A bus, and what it does with frames that come 1 ms later."""
+
+    def __init__(self, image, state):
+        self.image, self.state, self.bus = image, state, constant(image.address("BUS"))
+        state.memory.store(BEFORE, state.memory.load(image.address("BUS"), 4 * len(image.words("BUS"))))
+        self.before = self.words(state)
+        self.motors = [constant(place) for place in image.words("MOTORS", 1)]
+        self.last = [Watched(image, state, "heard", self.bus, motor, size=2) for motor in self.motors]
+        self.counters = Watched(image, state, "counted", self.bus, size=3)
+
+    def words(self, state):
+        return {place: state.memory.load(place, 4) for place in self.image.words("BUS")}
+
+    def changed(self, end):
+        """The words of the bus that are not what they were. Equal terms are one object."""
+        return {place for place, word in self.words(end).items() if word is not self.before[place]}
+
+    def case(self, function, frames, assume=(), command=None):
+        """Taken exactly when it is a standard data frame of 8 bytes with a motor's id and an angle below 8192; then that
+        motor has it, and no other has changed. What is not taken changes nothing but its counter; but a command that this
+        bus sends itself is a second master's, and noted with the motors that it is for."""
+        start = self.state.copy()
+        frames.put(self.image, start)
+        identifier, data = frames.identifier, frames.data
+        standard_data = claripy.And(frames.extended == 0, frames.remote == 0)
+        mine = claripy.And(standard_data, claripy.Or(*(identifier == motor for motor in ATTACHED)))
+        stranger = claripy.And(standard_data, is_of_family(identifier), claripy.Not(mine))
+        outcome = constant(TAKEN)
+        for holds, value in (
+            (claripy.UGE(data[63:48], 8192), BAD_FIELD),
+            (frames.length != 8, BAD_LENGTH),
+            (claripy.Not(mine), UNRELATED),
+        ):
+            outcome = claripy.If(holds, constant(value), outcome)
+        rejected = (outcome == BAD_LENGTH, outcome == BAD_FIELD, stranger)
+        counted = [claripy.If(holds, constant(1), constant(0)) for holds in rejected]
+        this = [constant(1), data[63:32].reversed, data[31:0].reversed]
+
+        paths, assume = [], [frames.there_is, *assume]
+        place = constant(self.image.address("FRAME"))
+        for end in self.image.call(function, self.bus, place, constant(2_000), state=start, assume=assume):
+            changed = self.changed(end)
+            kept = []
+            for motor, last in zip(ATTACHED, self.last):
+                taken = claripy.And(outcome == TAKEN, identifier == motor)
+                for new, old, word in zip(last.after(end, changed), last.value, this):
+                    kept.append(new == claripy.If(taken, word, old))
+            # It returns nothing but what it writes.
+            for new, old, more in zip(self.counters.after(end, changed)[1:], self.counters.value[1:], counted):
+                kept.append(new == old + more)
+            if command:
+                kept.append(self.noted(end, changed, command))
+            else:
+                kept.append(claripy.Or(outcome == TAKEN, claripy.BoolV(changed <= self.counters.reads)))
+            paths.append((end, claripy.And(end.regs.r0 == outcome, *kept)))
+        return paths, frames.inputs(), assume
+
+    def noted(self, end, changed, command):
+        """Whether the health of the motors is what it was, but that those of this command have a second master; and no more
+        words have changed than it takes to remember that."""
+        rivals = [motor for motor, frame in ATTACHED.items() if frame == command]
+        # For each motor three words of health and two of the journal; and when it was, and where the journal ends.
+        right = [claripy.BoolV(len(changed) <= (5 * len(rivals) + 3 if rivals else 0))]
+        for motor, news in zip(ATTACHED, self.news):
+            (said,) = news.after(end, changed)
+            right.append(said == (SECOND_MASTER if motor in rivals else NOTHING))
+        return claripy.And(*right)
+
+    @functools.cached_property
+    def news(self):
+        return [
+            Watched(self.image, self.state, "news", constant(BEFORE), self.bus, motor, size=0) for motor in self.motors
         ]
-        untouched = claripy.Or(outcome == TAKEN, claripy.And(standard_data, own_command), claripy.BoolV(changed <= 1))
-        paths.append((end, claripy.And(end.regs.r0 == outcome, untouched, *kept, *counted)))
-    names = {"id": identifier, "extended": extended, "remote": remote, "length": length, "data": data}
-    return paths, names, assume
 
 
 def is_of_family(identifier):
     return claripy.And(claripy.UGE(identifier, FAMILY[0]), claripy.ULE(identifier, FAMILY[-1]))
 
 
-def route_foreign(image, function):
-    """What no motor has sent: all other ids, both formats, remote frames, wrong lengths; on a bus that has heard nothing."""
-    state, length = image.blank(), claripy.BVS("length", 8)
-    identifier, extended, remote = claripy.BVS("id", 32), claripy.BVS("extended", 8), claripy.BVS("remote", 8)
-    # A part of the case after it, where the solver finds a mix-up of the formats at once.
-    yield route_case(image, function, state, constant(ATTACHED[0]), extended, remote, length, [extended != 0])
-    whole = claripy.And(is_of_family(identifier), length == 8)
-    own = claripy.Or(whole, *(identifier == command for command in COMMANDS))
-    others = claripy.Not(claripy.And(extended == 0, remote == 0, own))
-    yield route_case(image, function, state, identifier, extended, remote, length, [others])
-    none = claripy.BVV(0, 8)
-    for identifier in COMMANDS:
-        yield route_case(image, function, state, constant(identifier), none, none, claripy.BVV(8, 8))
+def silent(image, frames):
+    """A bus that has heard nothing yet."""
+    return Router(image, image.blank())
 
 
-def route(image, function):
-    """A bus that has heard nothing yet, and data of any length."""
-    none, length = claripy.BVV(0, 8), claripy.BVS("length", 8)
-    # One id of the family after the other: each is another place in memory.
-    for identifier in FAMILY:
-        yield route_case(image, function, image.blank(), constant(identifier), none, none, length)
-
-
-def route_in_operation(image, function):
+def in_operation(image, frames):
     """A bus that heard each of its motors 1 ms ago."""
-    state, none = bus_in_operation(image), claripy.BVV(0, 8)
-    for identifier in FAMILY:
-        yield route_case(image, function, state, constant(identifier), none, none, claripy.BVV(8, 8))
+    state = image.blank()
+    bus, frame = constant(image.address("BUS")), constant(image.address("FRAME"))
+    for identifier in ATTACHED:
+        frames.of(identifier, length=8, data=0x11_0000_0000_0000 * 16).put(image, state)
+        (state,) = image.call("route", bus, frame, constant(1_000), state=state)
+    return Router(image, state)
+
+
+def exists(image, function):
+    """There is a frame exactly when the id fits its format and the length is at most 8."""
+    frames = Frames(image, function)
+    paths = [(end, (end.regs.r0 == 1) == frames.there_is) for end in frames.ends]
+    yield paths, frames.inputs(), ()
+
+
+def foreign(image, function):
+    """All other ids, both formats, remote frames."""
+    frames = Frames(image)
+    known = claripy.Or(is_of_family(frames.identifier), *(frames.identifier == command for command in COMMANDS))
+    others = claripy.Not(claripy.And(frames.extended == 0, frames.remote == 0, known))
+    for bus in (silent, in_operation):
+        yield bus(image, frames).case(function, frames, [others])
+
+
+def commands(image, function):
+    frames = Frames(image)
+    for bus in (silent, in_operation):
+        router = bus(image, frames)
+        for command in COMMANDS:
+            yield router.case(function, frames.of(command), command=command)
+
+
+def family(bus):
+    """One id after the other: each is another place in memory."""
+
+    def cases(image, function):
+        frames = Frames(image)
+        router = bus(image, frames)
+        for identifier in FAMILY:
+            yield router.case(function, frames.of(identifier))
+
+    return cases
 
 
 def word_of(model):
@@ -355,33 +462,33 @@ def word_at(image, function):
 
 
 # What is proved, of which function, for which inputs; and the function with an error on which the same has to fail.
+# Together `frames`, `foreign`, `commands` and `route` are all ids, flags, lengths and data on a bus that has heard nothing,
+# and with `operation` instead of `route`, on one that has heard each motor.
 PROOFS = [
     ("decode", decode, "decode", "all 2^64 frames", "decode_faulty"),
     ("unwrap", unwrap, "unwrap", "all 2^32 pairs", "unwrap_faulty"),
-    ("route", route, "route", "all of the family, on a bus that has heard nothing", "route_masked"),
-    ("foreign", route_foreign, "route", "all frames that are no motor's (the bus's own: of 8 bytes)", "route_by_number"),
+    ("frames", exists, "frame", "all ids, flags, lengths and data", "frame_cut"),
+    ("foreign", foreign, "route", "all frames but data of the family and commands, on both buses", "route_by_number"),
+    ("commands", commands, "route", "all data frames of the bus's own command ids, on both buses", "route_command"),
+    ("route", family(silent), "route", "all data frames of the family, on a bus that has heard nothing", "route_masked"),
     ("m2006", word_of((10_000, 10.0)), "word_m2006", "all 2^32 f32", "word_m2006_faulty"),
     ("m3508", word_of((16_384, 20.0)), "word_m3508", "all 2^32 f32", "word_m3508_faulty"),
     ("gm6020-voltage", word_of((25_000, 24.0)), "word_gm6020_voltage", "all 2^32 f32", "word_gm6020_voltage_faulty"),
     ("gm6020-current", word_of((16_384, 3.0)), "word_gm6020_current", "all 2^32 f32", "word_gm6020_current_faulty"),
     ("timeouts", word_at, "word_at", "any three times below 2^62 us, the target accepted", "word_at_faulty"),
-    ("operation", route_in_operation, "route", "all data frames of 8 bytes of the family, on a bus that heard each motor", "route_masked"),
+    ("operation", family(in_operation), "route", "all data frames of the family, on a bus that heard them", "route_masked"),
 ]
 
 
-# Two minutes more for what `operation` proves of a bus that runs: only by name.
-LONG = ["route"]
-# Multiplying floats is hard for a solver: these take turns.
-CONVERSIONS = ["m2006", "m3508", "gm6020-voltage", "gm6020-current"]
+# These take turns: floats multiplied are hard for a solver, and the whole has two minutes.
+TURNS = ["m2006", "m3508", "gm6020-voltage", "gm6020-current", "route"]
 
 
 def not_now(title):
     """Why a proof is left out when none was chosen, or None."""
-    today = CONVERSIONS[int(time.time()) // 86_400 % len(CONVERSIONS)]
-    if title in LONG:
-        return f"not here: `proofs/run {title}` proves it"
-    if title in CONVERSIONS and title != today:
-        return f"not today: one conversion a day; `proofs/run {title}` proves it"
+    today = TURNS[int(time.time()) // 86_400 % len(TURNS)]
+    if title in TURNS and title != today:
+        return f"not today: today {today} has its turn; `proofs/run {title}` proves it"
     return None
 
 

@@ -1,6 +1,6 @@
 //! The same functions, each with an error that is found in the field. No proof may hold here.
 
-use crate::frames::{Wire, outcome};
+use crate::frames::{Wire, frame, route};
 use drivetrain::dji::Bus;
 use drivetrain::frame::CanFrame;
 
@@ -23,25 +23,47 @@ extern "C" fn unwrap_faulty(previous: u32, next: u32) -> i32 {
     (i32::from(next as u16) - i32::from(previous as u16) + 4096) % 8192 - 4096
 }
 
-/// Takes an extended frame for a standard one of the same number.
+/// Takes more than 8 bytes, as of CAN FD, for 8.
 #[unsafe(no_mangle)]
-extern "C" fn route_by_number(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
+extern "C" fn frame_cut(wire: &Wire, place: &mut CanFrame) -> u32 {
+    frame(&Wire { length: wire.length.min(8), ..*wire }, place)
+}
+
+/// Gives the bus another frame instead of one of 8 bytes, where there is another.
+fn replaced(
+    bus: &mut Bus,
+    frame: &CanFrame,
+    now_us: u32,
+    other: impl Fn(u32, [u8; 8]) -> Option<CanFrame>,
+) -> u32 {
+    let other = if frame.length() == 8 { other(frame.header(), *frame.bytes()) } else { None };
+    route(bus, other.as_ref().unwrap_or(frame), now_us)
+}
+
+/// Takes an extended or remote frame for a standard data frame of the same number.
+#[unsafe(no_mangle)]
+extern "C" fn route_by_number(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
     const NUMBER: u16 = 0x201;
-    if wire.id == u32::from(NUMBER) && wire.remote == 0 && wire.length == 8 {
-        let standard = CanFrame::standard(NUMBER, wire.data);
-        return standard.map_or(0, |standard| outcome(bus, &standard, now_us));
-    }
-    wire.frame().map_or(0, |frame| outcome(bus, &frame, now_us))
+    let by_number = |header, data| {
+        CanFrame::standard(NUMBER, data).filter(|_| header & 0xFFFF == u32::from(NUMBER))
+    };
+    replaced(bus, frame, now_us, by_number)
+}
+
+/// Takes the command frame 0x200 for feedback of the first motor: their ids lie side by side.
+#[unsafe(no_mangle)]
+extern "C" fn route_command(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
+    let next = |header, data| CanFrame::standard(0x201, data).filter(|_| header == 0x200);
+    replaced(bus, frame, now_us, next)
 }
 
 /// Makes an angle of any 16 bits, instead of refusing what is none.
 #[unsafe(no_mangle)]
-extern "C" fn route_masked(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
-    let [high, low, rest @ ..] = wire.data;
-    let [c, d, e, f, g, h] = rest;
-    let data = [high & 0x1F, low, c, d, e, f, g, h];
-    let frame = u16::try_from(wire.id).ok().and_then(|id| CanFrame::standard(id, data));
-    frame.map_or(0, |frame| outcome(bus, &frame, now_us))
+extern "C" fn route_masked(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
+    let masked = |header, [high, low, c, d, e, f, g, h]: [u8; 8]| {
+        CanFrame::standard(header as u16, [high & 0x1F, low, c, d, e, f, g, h])
+    };
+    replaced(bus, frame, now_us, masked)
 }
 
 /// Rounds towards zero.

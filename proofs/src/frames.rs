@@ -1,9 +1,11 @@
 //! The router: what a bus does with a frame, and what can be seen of the bus afterwards.
 
 use crate::Shared;
-use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, M2006, M3508, Model};
+use drivetrain::dji::{
+    AnyHandle, AttachError, Bus, Config, Gm6020Voltage, Handle, M2006, M3508, Model,
+};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Ingest, Malformed};
+use drivetrain::motor::{Condition, Health, Ingest, Malformed};
 use drivetrain::time::Instant;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
@@ -46,34 +48,47 @@ impl Wire {
     }
 }
 
-const fn attached<M: Model>(bus: &mut Bus, id: u8) {
+/// Stands between [`frame`] and [`route`].
+#[unsafe(no_mangle)]
+static FRAME: Shared<[u32; size_of::<CanFrame>() / 4]> = Shared::new([0; _]);
+
+/// Makes a frame: 1, or 0 when there is no such frame.
+#[unsafe(no_mangle)]
+pub extern "C" fn frame(wire: &Wire, place: &mut CanFrame) -> u32 {
+    wire.frame().map_or(0, |frame| {
+        *place = frame;
+        1
+    })
+}
+
+const fn attached<M: Model>(bus: &mut Bus, id: u8) -> AnyHandle {
     match bus.attach(Config::<M>::new(id)) {
-        Ok(_) => {}
+        Ok(motor) => Handle::erase(motor),
         Err(AttachError::Collision(_)) => panic!("two motors on one id"),
         Err(_) => panic!("not attached"),
     }
 }
 
 /// 0x201, 0x202, 0x204, 0x206, 0x209, 0x20B: with gaps between, and both ends.
-#[unsafe(no_mangle)]
-static BUS: Shared<Bus> = Shared::new({
+const ATTACHED: (Bus, [AnyHandle; 6]) = {
     let mut bus = Bus::new();
-    attached::<M3508>(&mut bus, 1);
-    attached::<M3508>(&mut bus, 2);
-    attached::<M2006>(&mut bus, 4);
-    attached::<M2006>(&mut bus, 6);
-    attached::<Gm6020Voltage>(&mut bus, 5);
-    attached::<Gm6020Voltage>(&mut bus, 7);
-    bus
-});
+    let motors = [
+        attached::<M3508>(&mut bus, 1),
+        attached::<M3508>(&mut bus, 2),
+        attached::<M2006>(&mut bus, 4),
+        attached::<M2006>(&mut bus, 6),
+        attached::<Gm6020Voltage>(&mut bus, 5),
+        attached::<Gm6020Voltage>(&mut bus, 7),
+    ];
+    (bus, motors)
+};
 
-/// Gives the bus a frame: 0 there is no such frame, 1 taken, 2 not of this bus, 3 wrong length, 4 a bad field.
 #[unsafe(no_mangle)]
-extern "C" fn route(bus: &mut Bus, wire: &Wire, now_us: u32) -> u32 {
-    wire.frame().map_or(0, |frame| outcome(bus, &frame, now_us))
-}
+static BUS: Shared<Bus> = Shared::new(ATTACHED.0);
 
-pub fn outcome(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
+/// Gives the bus a frame: 1 taken, 2 not of this bus, 3 wrong length, 4 a bad field.
+#[unsafe(no_mangle)]
+pub extern "C" fn route(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
     match bus.ingest(frame, Instant::from_micros(u64::from(now_us))) {
         Ingest::Taken => 1,
         Ingest::Unrelated => 2,
@@ -83,17 +98,32 @@ pub fn outcome(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
     }
 }
 
-/// Writes the last frame of every motor, in the order of the ids, and returns how many were heard.
 #[unsafe(no_mangle)]
-extern "C" fn heard(bus: &Bus, frames: &mut [[u8; 8]; 11]) -> u32 {
-    let mut count = 0;
-    for ((motor, _), place) in bus.motors().zip(frames) {
-        if let Some(state) = bus.state(motor) {
-            *place = state.feedback.encode();
-            count += 1;
-        }
+static MOTORS: [AnyHandle; 6] = ATTACHED.1;
+
+/// Writes the last frame of a motor: 1, or 0 when it was not heard yet.
+#[unsafe(no_mangle)]
+extern "C" fn heard(bus: &Bus, motor: &AnyHandle, last: &mut [u8; 8]) -> u32 {
+    bus.state(*motor).map_or(0, |state| {
+        *last = state.feedback.encode();
+        1
+    })
+}
+
+/// Compares the health of a motor with what it was before: 0 it is the same, 1 it is the same but for a second master, who
+/// is new, 2 there is more.
+#[unsafe(no_mangle)]
+extern "C" fn news(before: &Bus, after: &Bus, motor: &AnyHandle) -> u32 {
+    let (old, new) = (before.health(*motor), after.health(*motor));
+    let noted = old.map(|old| {
+        let conditions = old.conditions.with(Condition::SecondMaster);
+        Health { conditions, ..old }
+    });
+    match new {
+        _ if new == old => 0,
+        _ if new == noted => 1,
+        _ => 2,
     }
-    count
 }
 
 /// Writes how many frames had a wrong length, a bad field, and no motor.

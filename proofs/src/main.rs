@@ -42,6 +42,13 @@ impl<T> Shared<T> {
     const fn new(value: T) -> Self {
         Self(UnsafeCell::new(value))
     }
+
+    /// To be called once.
+    #[expect(clippy::mut_from_ref, reason = "the only one")]
+    fn get(&self) -> &mut T {
+        // SAFETY: each caller has a value of its own, and each call of the image begins with a memory of its own.
+        unsafe { &mut *self.0.get() }
+    }
 }
 
 /// The eight bytes of two big-endian words.

@@ -1,5 +1,6 @@
 //! From a physical command to the word on the wire, for each model.
 
+use crate::Shared;
 use drivetrain::dji::{
     Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
@@ -25,7 +26,7 @@ impl<M: Model> Motor<M> {
 
     /// Sends a value: 1 when it was accepted, and the word.
     fn send(
-        mut self,
+        &mut self,
         bits: u32,
         word: &mut i16,
         set: impl Fn(&mut Bus, Handle<M>, f32) -> Result<(), TargetError>,
@@ -63,8 +64,9 @@ macro_rules! word {
     ($name:ident, $model:ident, $set:expr) => {
         #[unsafe(no_mangle)]
         extern "C" fn $name(bits: u32, word: &mut i16) -> u32 {
-            const MOTOR: Motor<$model> = Motor::new();
-            MOTOR.send(bits, word, $set)
+            // A copy on the stack would be most of what the proof has to follow.
+            static MOTOR: Shared<Motor<$model>> = Shared::new(Motor::new());
+            MOTOR.get().send(bits, word, $set)
         }
     };
 }
