@@ -191,7 +191,7 @@ NOTHING, SECOND_MASTER = 0, 1
 class Frames:
     """Every frame: an id, two flags and a length as a CAN controller has them, and the words that the image makes of it."""
 
-    def __init__(self, image, function="frame"):
+    def __init__(self, image, function):
         self.identifier, self.length = claripy.BVS("id", 32), claripy.BVS("length", 8)
         self.extended, self.remote = claripy.BVS("extended", 8), claripy.BVS("remote", 8)
         self.data = claripy.BVS("data", 64)
@@ -354,14 +354,22 @@ def is_of_family(identifier):
     return claripy.And(claripy.UGE(identifier, FAMILY[0]), claripy.ULE(identifier, FAMILY[-1]))
 
 
-def silent(image, frames):
+# A proof and its control begin with the same.
+@functools.cache
+def every_frame(image):
+    return Frames(image, "frame")
+
+
+@functools.cache
+def silent(image):
     """A bus that has heard nothing yet."""
     return Router(image, image.blank())
 
 
-def in_operation(image, frames):
+@functools.cache
+def in_operation(image):
     """A bus that heard each of its motors 1 ms ago."""
-    state = image.blank()
+    state, frames = image.blank(), every_frame(image)
     bus, frame = constant(image.address("BUS")), constant(image.address("FRAME"))
     for identifier in ATTACHED:
         frames.of(identifier, length=8, data=0x11_0000_0000_0000 * 16).put(image, state)
@@ -378,17 +386,17 @@ def exists(image, function):
 
 def foreign(image, function):
     """All other ids, both formats, remote frames."""
-    frames = Frames(image)
+    frames = every_frame(image)
     known = claripy.Or(is_of_family(frames.identifier), *(frames.identifier == command for command in COMMANDS))
     others = claripy.Not(claripy.And(frames.extended == 0, frames.remote == 0, known))
     for bus in (silent, in_operation):
-        yield bus(image, frames).case(function, frames, [others])
+        yield bus(image).case(function, frames, [others])
 
 
 def commands(image, function):
-    frames = Frames(image)
+    frames = every_frame(image)
     for bus in (silent, in_operation):
-        router = bus(image, frames)
+        router = bus(image)
         for command in COMMANDS:
             yield router.case(function, frames.of(command), command=command)
 
@@ -397,8 +405,7 @@ def family(bus):
     """One id after the other: each is another place in memory."""
 
     def cases(image, function):
-        frames = Frames(image)
-        router = bus(image, frames)
+        frames, router = every_frame(image), bus(image)
         for identifier in FAMILY:
             yield router.case(function, frames.of(identifier))
 
