@@ -1,5 +1,6 @@
 //! When feedback and targets count as too old.
 
+use crate::Shared;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{CanDevice, Timeouts};
@@ -17,8 +18,7 @@ const fn armed_with(timeouts: Timeouts) -> (Bus, Handle<M3508>) {
 }
 
 /// Hears a motor, arms it, sets a target and updates, each at its time in µs: the word that is sent then.
-fn word(setup: (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
-    let (mut bus, motor) = setup;
+fn word((bus, motor): &mut (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
     let [heard, set, updated] = times.map(Instant::from_micros);
     if let Some(rest) = CanFrame::standard(0x201, [0; 8]) {
         _ = bus.ingest(&rest, heard);
@@ -28,7 +28,7 @@ fn word(setup: (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
     }
     bus.update(Tick::new(set, 0.001));
     while bus.next_frame().is_some() {}
-    if bus.set_raw(motor, ASKED).is_err() {
+    if bus.set_raw(*motor, ASKED).is_err() {
         return i32::MAX;
     }
     bus.update(Tick::new(updated, 0.001));
@@ -42,7 +42,7 @@ fn word(setup: (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
 #[unsafe(no_mangle)]
 extern "C" fn word_at(times: &[u64; 3]) -> i32 {
     const LATE: Duration = Duration::from_secs(10);
-    const SETUP: (Bus, Handle<M3508>) =
-        armed_with(Timeouts::new().with_late(LATE).with_offline(LATE));
-    word(SETUP, times)
+    static SETUP: Shared<(Bus, Handle<M3508>)> =
+        Shared::new(armed_with(Timeouts::new().with_late(LATE).with_offline(LATE)));
+    word(SETUP.get(), times)
 }
