@@ -31,6 +31,8 @@ DEFECTS = [
      "self.outbox.put(place, 0);\n        let shared", "let shared"),
     ("ingest", "relaxing keeps the integral", "src/dji/slot/target.rs",
      "self.ask(Action::Rest, Goal::NONE);\n        self.loops.reset();", "self.ask(Action::Rest, Goal::NONE);"),
+    ("ingest", "a relaxed motor's last word is held", "src/dji/targets.rs",
+     "let place = slot.place;\n            self.outbox.put(place, 0);", ""),
     ("ingest", "a refused frame keeps its motor fresh", "src/dji/rare.rs",
      "let Ok(feedback) = Feedback::decode(frame.bytes()) else {",
      "let Ok(feedback) = Feedback::decode(frame.bytes()) else {\n            slot.receive(Feedback::NONE, now.stamp());"),

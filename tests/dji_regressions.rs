@@ -4,7 +4,7 @@
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
-use drivetrain::encoder::GearRatio;
+use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Reaction, Recovery, TargetError,
@@ -619,6 +619,35 @@ fn an_update_without_a_step_holds_no_command_of_a_motor_that_was_relaxed() {
         bus.update(Tick::new(us(at), 0.0));
         let held = if at == 12_000 { 6_000 } else { 0 };
         assert_eq!(sent(&mut bus), [(0x200, [0, held, 0, 0])]);
+    }
+}
+
+/// A hostile reader found the word from before a rest held once more, where a new target came between the rest and an
+/// update without a step.
+#[test]
+fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
+    type Work = fn(&mut Bus, Handle<M3508>);
+    let resting: [Work; 3] = [
+        |bus, motor| bus.relax(motor),
+        |bus, motor| bus.zero(motor).unwrap(),
+        |bus, _| {
+            bus.disarm();
+            bus.arm(us(12_000)).unwrap();
+        },
+    ];
+    for rest in resting {
+        let mut bus = Bus::new();
+        let loops = PidConfig::new(1.0, 0.0, 0.0);
+        let motor = bus.attach(Config::<M3508>::new(1).position_loop(loops, loops)).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), 11_000);
+        bus.arm(us(11_000)).unwrap();
+        bus.set_position(motor, Position::new(1, Angle::ZERO)).unwrap();
+        step(&mut bus, 12_000);
+        assert!(sent(&mut bus)[0].1[0] > 4_000, "it is driven");
+        rest(&mut bus, motor);
+        bus.set_velocity(motor, AngularVelocity::from_rpm(1.0)).unwrap();
+        bus.update(Tick::new(us(13_000), 0.0));
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [0; 4])));
     }
 }
 

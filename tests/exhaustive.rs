@@ -168,26 +168,26 @@ fn set_volts(bus: &mut Bus, motor: Handle<Gm6020Voltage>, value: f32) -> Result<
 }
 
 #[test]
-#[ignore = "2^32 values: in release, by .ci/run"]
+#[ignore = "2^32 values: by .ci/run"]
 fn every_f32_of_an_m2006_is_the_nearest_word() {
     every_value::<M2006, 8>((0, ""), 10_000, 10.0, Config::new, set_amperes);
 }
 
 #[test]
-#[ignore = "2^32 values: in release, by .ci/run"]
+#[ignore = "2^32 values: by .ci/run"]
 fn every_f32_of_an_m3508_is_the_nearest_word() {
     every_value::<M3508, 8>((1, ""), 16_384, 20.0, Config::new, set_amperes);
 }
 
 #[test]
-#[ignore = "2^32 values: in release, by .ci/run"]
+#[ignore = "2^32 values: by .ci/run"]
 fn every_f32_of_a_gm6020_in_voltage_mode_is_the_nearest_word() {
     every_value::<Gm6020Voltage, 6>((2, ""), 25_000, 24.0, Config::new, set_volts);
 }
 
 /// The scale of motors of 2020 and before.
 #[test]
-#[ignore = "2^32 values: in release, by .ci/run"]
+#[ignore = "2^32 values: by .ci/run"]
 fn every_f32_of_a_gm6020_with_the_legacy_scale_is_the_nearest_word() {
     every_value::<Gm6020Voltage, 6>(
         (4, ", legacy scale"),
@@ -199,7 +199,7 @@ fn every_f32_of_a_gm6020_with_the_legacy_scale_is_the_nearest_word() {
 }
 
 #[test]
-#[ignore = "2^32 values: in release, by .ci/run"]
+#[ignore = "2^32 values: by .ci/run"]
 fn every_f32_of_a_gm6020_in_current_mode_is_the_nearest_word() {
     every_value::<Gm6020Current, 6>((3, ""), 16_384, 3.0, Config::new, set_amperes);
 }
@@ -217,7 +217,7 @@ fn spacing(x: f32) -> f64 {
 /// Every `f32`: in range, the same direction as far as `f32` can tell one, odd-symmetric but for the half
 /// turn itself.
 #[test]
-#[ignore = "2^32 angles: in release, by .ci/run"]
+#[ignore = "2^32 angles: by .ci/run"]
 #[expect(clippy::float_cmp, reason = "exact symmetry is the rule under test")]
 fn every_f32_wraps_to_the_same_direction() {
     use core::f32::consts::{PI, TAU};
@@ -266,7 +266,7 @@ fn way(previous: u64, next: u64) -> i64 {
 
 /// Every pair of angles, alone and through a bus.
 #[test]
-#[ignore = "2^26 pairs: in release, by .ci/run"]
+#[ignore = "2^26 pairs: by .ci/run"]
 fn every_pair_of_angles_is_the_shortest_way() {
     both_halves("pairs of angles", 0..8192, |previous_angles| {
         let mut bus = Bus::new();
@@ -323,7 +323,7 @@ fn attach(bus: &mut Bus, model: usize, id: u64) -> Result<(), AttachError> {
 /// Every pair of models with every byte as an id: refused exactly when an id or a slot would have two owners, and then
 /// the bus is as it was.
 #[test]
-#[ignore = "2^20 pairs: in release, by .ci/run"]
+#[ignore = "2^20 pairs: by .ci/run"]
 fn every_pair_of_motors_is_refused_exactly_when_it_collides() {
     both_halves("pairs of motors", 0..4 * 256, |firsts| {
         let mut count = 0;
@@ -365,7 +365,7 @@ fn identifier(raw: u64, extended: bool) -> Id {
 
 /// Every set of motors, every standard id, data and remote, every length, a good angle and a bad one.
 #[test]
-#[ignore = "2^11 sets of motors: in release, by .ci/run"]
+#[ignore = "2^11 sets of motors: by .ci/run"]
 fn every_standard_frame_is_for_exactly_its_motor() {
     both_halves("standard frames", 0..1 << 11, |sets| {
         let mut count = 0;
@@ -415,7 +415,7 @@ fn every_standard_frame_is_for_exactly_its_motor() {
 
 /// Every extended id, data and remote, every length: none is ours, and none leaves a trace.
 #[test]
-#[ignore = "2^29 ids: in release, by .ci/run"]
+#[ignore = "2^29 ids: by .ci/run"]
 fn no_extended_frame_is_ours() {
     both_halves("extended frames", 0..1 << 29, |ids| {
         let mut bus = Bus::new();

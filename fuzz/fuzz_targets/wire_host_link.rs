@@ -2,11 +2,11 @@
 #![no_main]
 
 use core::array::from_fn;
+use drivetrain::wire::Protocol;
 use drivetrain::wire::host_link::{
     ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
     Telemetry, TelemetryFormat, TelemetryHeader,
 };
-use drivetrain::wire::Protocol;
 use drivetrain_fuzz::{Input, any_split_gives_the_same};
 use libfuzzer_sys::fuzz_target;
 

@@ -25,6 +25,8 @@ pub struct Alone {
     pub moved: bool,
     /// The target that counts is a velocity, and the first one since the motor was at rest.
     pub first_velocity: bool,
+    /// The target that counts is a place of the shaft.
+    pub is_way: bool,
     /// Since when its last frame lies so far ahead that it counts as late here, and the whole bus has not noticed.
     pub doubted: Option<u64>,
 }
@@ -51,19 +53,28 @@ impl Alone {
             commanded: None,
             moved: false,
             first_velocity: false,
+            is_way: false,
             doubted: None,
         }
+    }
+
+    /// It asks for nothing from now on: nor do frames that wait.
+    pub fn relax(&mut self) {
+        self.word = 0;
+        self.rest();
     }
 
     pub fn rest(&mut self) {
         self.commanded = None;
         self.moved = false;
         self.first_velocity = false;
+        self.is_way = false;
     }
 
     /// A target was taken at `now`.
     pub fn follow(&mut self, target: Target, now: u64) {
         let velocity = matches!(target, Target::Velocity(_));
+        self.is_way = matches!(target, Target::Angle(_) | Target::Turns(..));
         // The loop that takes over from it goes on from its output.
         self.moved |= !velocity;
         self.first_velocity =

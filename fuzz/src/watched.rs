@@ -115,7 +115,7 @@ impl Watched {
         if let (Some(motor), Some(same)) = (self.motors[index], alone.motor) {
             self.bus.relax(motor.handle());
             alone.bus.relax(same.handle());
-            alone.rest();
+            alone.relax();
         }
     }
 
@@ -125,6 +125,9 @@ impl Watched {
         if let (Some(motor), Some(same)) = (self.motors[index], alone.motor) {
             let outcome = self.bus.zero(motor.handle());
             assert_eq!(outcome, alone.bus.zero(same.handle()), "I8");
+            if outcome.is_ok() && alone.is_way && alone.commanded.is_some() {
+                alone.relax();
+            }
         }
     }
 
@@ -404,6 +407,9 @@ impl CanDevice for Watched {
         if holds {
             let zero = self.held < 2 || self.alone.iter().all(|alone| alone.word == 0);
             assert!(zero, "driven without time: {:?}", self.alone);
+            let alone = &self.alone[INTEGRATOR];
+            let kept = alone.first_velocity && alone.word != 0;
+            assert!(!kept, "I9: a command outlived its rest: {alone:?}");
         } else {
             self.check_motors(now);
             self.look_at_what_lies_ahead(now);

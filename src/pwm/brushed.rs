@@ -257,6 +257,8 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     fn rest(&mut self) {
         self.target = Target::Rest;
+        // The output before it is no longer held.
+        self.held_steps = 1;
         self.speed.iter_mut().for_each(Pid::reset);
     }
 

@@ -92,4 +92,5 @@ fn last(log: &Log) -> u16 {
 }
 
 mod brushed;
+mod holding;
 mod rc;
