@@ -183,6 +183,8 @@ ATTACHED = {0x201: 0x200, 0x202: 0x200, 0x204: 0x200, 0x206: 0x1FF, 0x209: 0x2FF
 FAMILY = range(0x201, 0x20C)
 # What a bus sends itself: a second master's, when it is received.
 COMMANDS = [0x200, 0x1FF, 0x2FF, 0x1FE, 0x2FE]
+# When a bus in operation heard its motors last.
+LAST_US = 2_000
 TAKEN, UNRELATED, BAD_LENGTH, BAD_FIELD = 1, 2, 3, 4
 # What `news` says of a motor.
 NOTHING, SECOND_MASTER = 0, 1
@@ -294,8 +296,8 @@ class Router:
 
     def case(self, function, frames, assume=(), command=None):
         """Taken exactly when it is a standard data frame of 8 bytes with a motor's id and an angle below 8192; then that
-        motor has it, and no other has changed. What is not taken changes nothing but its counter; but a command that this
-        bus sends itself is a second master's, and noted with the motors that it is for."""
+        motor has it, and of no other the last frame or the health has changed. What is not taken changes nothing but its
+        counter; but a command that this bus sends itself is a second master's, and noted with the motors that it is for."""
         start = self.state.copy()
         frames.put(self.image, start)
         identifier, data = frames.identifier, frames.data
@@ -315,13 +317,15 @@ class Router:
 
         paths, assume = [], [frames.there_is, *assume]
         place = constant(self.image.address("FRAME"))
-        for end in self.image.call(function, self.bus, place, constant(2_000), state=start, assume=assume):
+        for end in self.image.call(function, self.bus, place, constant(LAST_US + 1_000), state=start, assume=assume):
             changed = self.changed(end)
             kept = []
-            for motor, last in zip(ATTACHED, self.last):
+            for motor, last, news in zip(ATTACHED, self.last, self.news):
                 taken = claripy.And(outcome == TAKEN, identifier == motor)
                 for new, old, word in zip(last.after(end, changed), last.value, this):
                     kept.append(new == claripy.If(taken, word, old))
+                if not command and not claripy.is_true(identifier == motor):
+                    kept += [said == NOTHING for said in news.after(end, changed)]
             # It returns nothing but what it writes.
             for new, old, more in zip(self.counters.after(end, changed)[1:], self.counters.value[1:], counted):
                 kept.append(new == old + more)
@@ -368,12 +372,14 @@ def silent(image):
 
 @functools.cache
 def in_operation(image):
-    """A bus that heard each of its motors 1 ms ago."""
+    """A bus at 1 kHz: it is updated, and heard each of its motors twice, the last time 1 ms ago."""
     state, frames = image.blank(), every_frame(image)
     bus, frame = constant(image.address("BUS")), constant(image.address("FRAME"))
-    for identifier in ATTACHED:
-        frames.of(identifier, length=8, data=0x11_0000_0000_0000 * 16).put(image, state)
-        (state,) = image.call("route", bus, frame, constant(1_000), state=state)
+    for now_us in (LAST_US - 1_000, LAST_US):
+        for identifier in ATTACHED:
+            frames.of(identifier, length=8, data=0x11_0000_0000_0000 * 16).put(image, state)
+            (state,) = image.call("route", bus, frame, constant(now_us), state=state)
+        (state,) = image.call("update", bus, constant(now_us), state=state)
     return Router(image, state)
 
 
@@ -488,7 +494,7 @@ PROOFS = [
 
 
 # These take turns, because each is a minute and the whole has two.
-TURNS = ["m2006", "m3508", "gm6020-voltage", "gm6020-current", "timeouts", "route"]
+TURNS = ["m2006", "m3508", "gm6020-voltage", "gm6020-current", "timeouts", "commands", "route"]
 
 
 def not_now(title):

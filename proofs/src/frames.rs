@@ -6,7 +6,7 @@ use drivetrain::dji::{
 };
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Condition, Health, Ingest, Malformed};
-use drivetrain::time::Instant;
+use drivetrain::time::{Instant, Tick};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
 /// A frame as a CAN controller has it.
@@ -96,6 +96,12 @@ pub extern "C" fn route(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
         Ingest::Malformed(Malformed::Field) => 4,
         Ingest::Malformed(_) => 5,
     }
+}
+
+/// Updates the bus a millisecond after the time before.
+#[unsafe(no_mangle)]
+extern "C" fn update(bus: &mut Bus, now_us: u32) {
+    bus.update(Tick::new(Instant::from_micros(u64::from(now_us)), 0.001));
 }
 
 #[unsafe(no_mangle)]
