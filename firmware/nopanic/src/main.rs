@@ -29,14 +29,13 @@ unsafe extern "C" {
 #[cfg(feature = "show")]
 #[unsafe(no_mangle)]
 #[inline(never)]
-extern "C" fn a_function_of_drivetrain_can_panic() -> ! {
+unsafe extern "C" fn a_function_of_drivetrain_can_panic() -> ! {
     loop {
         core::hint::spin_loop();
     }
 }
 
 #[panic_handler]
-#[allow(unused_unsafe, reason = "safe where it is defined")]
 fn panic(_: &PanicInfo) -> ! {
     // SAFETY: does not exist.
     unsafe { a_function_of_drivetrain_can_panic() }

@@ -78,8 +78,8 @@ const NO_LOOP: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
 
 const NO_LOOPS: Cascade = match Cascade::new(NO_LOOP, NO_LOOP) {
     Ok(loops) => loops,
-    // Evaluated by the compiler: were zero gains refused, this would not compile.
-    Err(_) => unreachable!(),
+    // Evaluated by the compiler.
+    Err(_) => panic!("zero gains are refused: a bus cannot be made"),
 };
 
 impl Slot {
