@@ -97,7 +97,11 @@ class Image:
             setattr(start.regs, register, value)
         start.solver.add(*assume)
         run = self.project.factory.simulation_manager(start)
-        run.explore(find=lambda end: end.addr & ~1 == RETURN, num_find=100_000)
+        # Its panic is a loop without an end.
+        panicked = self.address("panicked")
+        run.explore(find=lambda end: end.addr & ~1 == RETURN, avoid=panicked, num_find=100_000)
+        if run.avoid:
+            fail(f"{name} panics")
         for stash in ("errored", "unconstrained", "active", "deadended"):
             if getattr(run, stash):
                 fail(f"{name}: a path was not followed to its end ({stash}: {getattr(run, stash)[0]})")
@@ -183,8 +187,8 @@ ATTACHED = {0x201: 0x200, 0x202: 0x200, 0x204: 0x200, 0x206: 0x1FF, 0x209: 0x2FF
 FAMILY = range(0x201, 0x20C)
 # What a bus sends itself: a second master's, when it is received.
 COMMANDS = [0x200, 0x1FF, 0x2FF, 0x1FE, 0x2FE]
-# When a bus in operation heard its motors last.
-LAST_US = 2_000
+# When a bus in operation heard its motors last, and when the frame comes.
+LAST_US, NOW_US = 2_000, 3_000
 TAKEN, UNRELATED, BAD_LENGTH, BAD_FIELD = 1, 2, 3, 4
 # What `news` says of a motor.
 NOTHING, SECOND_MASTER = 0, 1
@@ -285,7 +289,7 @@ class Router:
         self.before = self.words(state)
         self.motors = [constant(place) for place in image.words("MOTORS", 1)]
         self.last = [Watched(image, state, "heard", self.bus, motor, size=2) for motor in self.motors]
-        self.counters = Watched(image, state, "counted", self.bus, size=3)
+        self.counters = Watched(image, state, "counted", self.bus, size=6)
 
     def words(self, state):
         return {place: state.memory.load(place, 4) for place in self.image.words("BUS")}
@@ -312,12 +316,12 @@ class Router:
         ):
             outcome = claripy.If(holds, constant(value), outcome)
         rejected = (outcome == BAD_LENGTH, outcome == BAD_FIELD, stranger)
-        counted = [claripy.If(holds, constant(1), constant(0)) for holds in rejected]
+        counted = [claripy.If(holds, constant(1), constant(0)) for holds in rejected] + 3 * [constant(0)]
         this = [constant(1), data[63:32].reversed, data[31:0].reversed]
 
         paths, assume = [], [frames.there_is, *assume]
         place = constant(self.image.address("FRAME"))
-        for end in self.image.call(function, self.bus, place, constant(LAST_US + 1_000), state=start, assume=assume):
+        for end in self.image.call(function, self.bus, place, constant(NOW_US), state=start, assume=assume):
             changed = self.changed(end)
             kept = []
             for motor, last, news in zip(ATTACHED, self.last, self.news):
@@ -337,14 +341,21 @@ class Router:
         return paths, frames.inputs(), assume
 
     def noted(self, end, changed, command):
-        """Whether the health of the motors is what it was, but that those of this command have a second master; and no more
-        words have changed than it takes to remember that."""
+        """Whether the motors are what they were, but that those of this command have a second master, each with an edge of
+        its own and of now; and no words have changed but those that tell of that, and two: the times of the second master
+        and of the last edge."""
         rivals = [motor for motor, frame in ATTACHED.items() if frame == command]
-        # For each motor three words of health and two of the journal; and when it was, and where the journal ends.
-        right = [claripy.BoolV(len(changed) <= (5 * len(rivals) + 3 if rivals else 0))]
+        edges = Watched(self.image, end, "edges", self.bus, size=3)
+        _, begun, others, latest = edges.value
+        telling = edges.reads
+        right = [begun == len(rivals), others == 0]
+        if rivals:
+            right += [claripy.ULE(latest, NOW_US), claripy.UGT(latest, NOW_US - 1_024)]
         for motor, news in zip(ATTACHED, self.news):
             (said,) = news.after(end, changed)
             right.append(said == (SECOND_MASTER if motor in rivals else NOTHING))
+            telling |= news.reads if motor in rivals else set()
+        right.append(claripy.BoolV(len(changed - telling) <= (2 if rivals else 0)))
         return claripy.And(*right)
 
     @functools.cached_property
@@ -380,6 +391,7 @@ def in_operation(image):
             frames.of(identifier, length=8, data=0x11_0000_0000_0000 * 16).put(image, state)
             (state,) = image.call("route", bus, frame, constant(now_us), state=state)
         (state,) = image.call("update", bus, constant(now_us), state=state)
+    (state,) = image.call("edges", bus, constant(OUTPUT), state=state)
     return Router(image, state)
 
 
@@ -521,8 +533,9 @@ def proved(title):
         if not found:
             fail(f"the rule of {title} holds for {faulty} too: it proves nothing")
         done = time.monotonic()
-    except Failed as failed:
-        return failed
+    # Whatever happened in its process, the proof is named.
+    except Exception as error:
+        return Failed(f"{title}: {error if isinstance(error, Failed) else repr(error)}")
     return (
         f"{title:15} holds for {inputs}: {paths} paths, {held - start:.1f} s\n"
         f"{'':15} and fails for {faulty}: {shown(found)}, {done - held:.1f} s"

@@ -2,7 +2,7 @@
 
 use crate::Shared;
 use drivetrain::dji::{
-    AnyHandle, AttachError, Bus, Config, Gm6020Voltage, Handle, M2006, M3508, Model,
+    AnyHandle, AttachError, Bus, Config, Counters, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Condition, Health, Ingest, Malformed};
@@ -132,9 +132,22 @@ extern "C" fn news(before: &Bus, after: &Bus, motor: &AnyHandle) -> u32 {
     }
 }
 
-/// Writes how many frames had a wrong length, a bad field, and no motor.
+/// Takes all edges and writes how many there were, that a second master began and others, and the latest time in µs.
 #[unsafe(no_mangle)]
-extern "C" fn counted(bus: &Bus, counts: &mut [u32; 3]) {
-    let counters = bus.counters();
-    *counts = [counters.bad_length, counters.bad_field, counters.unattached];
+extern "C" fn edges(bus: &mut Bus, told: &mut [u32; 3]) {
+    let [mut rivals, mut others, mut latest] = [0; 3];
+    while let Some(edge) = bus.next_edge() {
+        let is_rival = edge.began && edge.condition == Condition::SecondMaster;
+        *if is_rival { &mut rivals } else { &mut others } += 1;
+        latest = latest.max(edge.at.as_micros() as u32);
+    }
+    *told = [rivals, others, latest];
+}
+
+/// Writes all counters: first those of frames with a wrong length, a bad field, and no motor.
+#[unsafe(no_mangle)]
+extern "C" fn counted(bus: &Bus, counts: &mut [u32; 6]) {
+    let Counters { bad_length, bad_field, unattached, bad_steps, packed, superseded } =
+        bus.counters();
+    *counts = [bad_length, bad_field, unattached, bad_steps, packed, superseded];
 }
