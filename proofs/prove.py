@@ -257,20 +257,22 @@ class Frames:
 
 
 class Watched:
-    """What a function tells of a bus; and the words of the bus that it reads for that: as long as none of them changes, it
-    tells the same."""
+    """What a function tells of a bus; and the words that it writes and reads for that: as long as none of those that it reads
+    changes, it tells the same."""
 
     def __init__(self, image, state, function, *arguments, size):
         self.image, self.function, self.arguments, self.size = image, function, arguments, size
-        self.reads = set()
+        self.reads, self.writes = set(), set()
         watched = state.copy()
-        watched.inspect.b("mem_read", when=angr.BP_BEFORE, action=self.note)
+        for access, words in (("mem_read", self.reads), ("mem_write", self.writes)):
+            watched.inspect.b(access, when=angr.BP_BEFORE, action=functools.partial(self.note, access, words))
         self.value = self.told(watched)
 
-    def note(self, state):
-        place, size = state.inspect.mem_read_address, state.inspect.mem_read_length
-        first = state.solver.eval_one(place)
-        self.reads |= {word & ~3 for word in range(first, first + size)}
+    @staticmethod
+    def note(access, words, state):
+        first, size = (getattr(state.inspect, f"{access}_{what}") for what in ("address", "length"))
+        first, size = state.solver.eval_one(first), state.solver.eval_one(size)
+        words |= {word & ~3 for word in range(first, first + size)}
 
     def told(self, state):
         (end,) = self.image.call(self.function, *self.arguments, constant(OUTPUT), state=state)
@@ -290,6 +292,7 @@ class Router:
         self.motors = [constant(place) for place in image.words("MOTORS", 1)]
         self.last = [Watched(image, state, "heard", self.bus, motor, size=2) for motor in self.motors]
         self.counters = Watched(image, state, "counted", self.bus, size=6)
+        self.edges = Watched(image, state, "edges", self.bus, size=3)
 
     def words(self, state):
         return {place: state.memory.load(place, 4) for place in self.image.words("BUS")}
@@ -342,12 +345,12 @@ class Router:
 
     def noted(self, end, changed, command):
         """Whether the motors are what they were, but that those of this command have a second master, each with an edge of
-        its own and of now; and no words have changed but those that tell of that, and two: the times of the second master
-        and of the last edge."""
+        its own and of now; and no words have changed but those of that health, those that are read for these edges only or
+        freed with them, and two: the times of the last edge and of the second master."""
         rivals = [motor for motor, frame in ATTACHED.items() if frame == command]
         edges = Watched(self.image, end, "edges", self.bus, size=3)
         _, begun, others, latest = edges.value
-        telling = edges.reads
+        telling = edges.reads - self.edges.reads | edges.writes
         right = [begun == len(rivals), others == 0]
         if rivals:
             right += [claripy.ULE(latest, NOW_US), claripy.UGT(latest, NOW_US - 1_024)]
