@@ -9,7 +9,7 @@ $bb mount -t sysfs sysfs /sys
 $bb mount -t hostfs none /mnt -o "$RESULTS"
 modules=$($bb ls -d /usr/lib/uml/modules/*/kernel | $bb tail -n 1)
 {
-    for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev net/sched/sch_netem; do
+    for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev net/sched/sch_netem net/sched/sch_plug; do
         $bb insmod "$modules/$module.ko" || echo "no module $module"
     done
     # With an echo of its own: otherwise frames reach the other sockets past the queue, and none is ever lost.

@@ -2,7 +2,7 @@
 //! witness of both. [`run`](../run) starts a Linux of its own for it, so that nothing of the host's kernel is needed.
 //!
 //! The two go in lock-step, a millisecond for each line: in there the clock stalls. The interface loses and doubles frames,
-//! and its queue is full for a while (netem); among the robot's frames are foreign, remote, extended, malformed and error
+//! and its queue is full for a while; among the robot's frames are foreign, remote, extended, malformed and error
 //! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
 //! And a chassis has to move as the example is asked to.
 
@@ -31,13 +31,14 @@ const MARKER: u16 = 0x7F0;
 const END: u16 = 0x7F1;
 const RPM: f32 = 60.0;
 
-/// Name, what netem does, milliseconds.
+/// Name, what stands between the sockets and the bus, milliseconds.
 const PHASES: [(&str, &str, u32); 6] = [
     ("clean", "", 1_500),
-    ("5 % lost", "loss 5%", 4_000),
-    ("2 % doubled", "duplicate 2%", 2_000),
-    ("both", "loss 5% duplicate 2%", 3_000),
-    ("queue full", "limit 4 delay 30ms", 60),
+    ("5 % lost", "netem loss 5%", 4_000),
+    ("2 % doubled", "netem duplicate 2%", 2_000),
+    ("both", "netem loss 5% duplicate 2%", 3_000),
+    // Room for four frames, and none leaves before it is pulled out.
+    ("queue full", "plug limit 64", 60),
     ("clean again", "", 1_000),
 ];
 
@@ -57,16 +58,23 @@ fn output(program: &str, arguments: &[&str]) -> String {
     String::from_utf8(done.stdout).unwrap()
 }
 
+/// Changes what stands between the sockets and the bus.
+fn queueing(change: &str, discipline: &str) {
+    let words = ["qdisc", change, "dev", BUS, "root"].into_iter();
+    output("tc", &words.chain(discipline.split_whitespace()).collect::<Vec<_>>());
+}
+
 /// Frames that the kernel dropped, and those that still wait.
 fn queue() -> (u64, u64) {
     let text = output("tc", &["-s", "qdisc", "show", "dev", BUS]);
-    let number = |after: &str, until: char| {
-        let rest = text.split(after).nth(1).and_then(|rest| rest.split(until).next());
-        rest.and_then(|number| number.trim().parse().ok()).unwrap_or(0)
+    let number = |after: &str| {
+        let rest = text.split(after).nth(1)?;
+        rest.split(|end: char| !end.is_ascii_digit()).next()?.parse().ok()
     };
-    let waiting = text.split("backlog ").nth(1).and_then(|rest| rest.split_whitespace().nth(1));
-    let waiting = waiting.and_then(|packets| packets.trim_end_matches('p').parse().ok());
-    (number("dropped ", ','), waiting.unwrap_or(0))
+    let waiting = text.split("backlog ").nth(1).and_then(|bytes| bytes.split_once("b "));
+    let waiting = waiting.and_then(|(_, packets)| packets.split_once('p')?.0.parse().ok());
+    let counts = number("dropped ").zip(waiting);
+    counts.unwrap_or_else(|| panic!("what tc says has another form:\n{text}"))
 }
 
 /// The example, one millisecond after the other.
@@ -241,21 +249,22 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
     });
 
     let mut phases = Vec::new();
-    for (index, (name, netem, ms)) in PHASES.into_iter().enumerate() {
-        if !netem.is_empty() {
-            let mut arguments = vec!["qdisc", "add", "dev", BUS, "root", "netem"];
-            arguments.extend(netem.split(' '));
-            output("tc", &arguments);
+    for (index, (name, discipline, ms)) in PHASES.into_iter().enumerate() {
+        if !discipline.is_empty() {
+            queueing("add", discipline);
         }
         robot.written = Written::default();
         for _ in 0..ms {
             robot.step();
             example.step();
         }
+        if discipline.starts_with("plug") {
+            queueing("change", "plug release_indefinite");
+        }
         wait_until("an empty queue", || queue().1 == 0);
-        let dropped = if netem.is_empty() { 0 } else { queue().0 };
-        if !netem.is_empty() {
-            output("tc", &["qdisc", "del", "dev", BUS, "root"]);
+        let dropped = if discipline.is_empty() { 0 } else { queue().0 };
+        if !discipline.is_empty() {
+            queueing("del", "");
         }
         // What still came, then the marker. With frames of the robot before the commands: where one of the last two was lost,
         // the other would be followed by its like.
