@@ -7,8 +7,8 @@ use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Reaction, Recovery, TargetError,
-    Timeouts,
+    CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction, Recovery,
+    TargetError, Timeouts,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
@@ -623,31 +623,88 @@ fn an_update_without_a_step_holds_no_command_of_a_motor_that_was_relaxed() {
 }
 
 /// A hostile reader found the word from before a rest held once more, where a new target came between the rest and an
-/// update without a step.
+/// update without a step; a second one, that there are more ways to rest than those that were mended.
 #[test]
 fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
+    static CAREFUL: HealthConfig =
+        HealthConfig::new().with_reaction(Condition::Warning, Reaction::Relax);
     type Work = fn(&mut Bus, Handle<M3508>);
-    let resting: [Work; 3] = [
+    let arm_again = |bus: &mut Bus| bus.arm(us(12_500)).unwrap();
+    let resting: [Work; 7] = [
         |bus, motor| bus.relax(motor),
         |bus, motor| bus.zero(motor).unwrap(),
+        |bus, _| bus.disarm(),
         |bus, _| {
-            bus.disarm();
-            bus.arm(us(12_000)).unwrap();
+            bus.emergency_stop();
+            bus.clear_emergency_stop();
+        },
+        |bus, motor| {
+            let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
+            assert_eq!(bus.set_velocity(motor, nowhere), Err(TargetError::NotFinite));
+        },
+        |bus, motor| {
+            let (angle, velocity) = (Angle::ZERO, AngularVelocity::ZERO);
+            let old = Measured { angle, velocity, at: us(1_000_000) };
+            let refused = bus.set_angle_measured(motor, Angle::ZERO, old);
+            assert_eq!(refused, Err(TargetError::StaleMeasurement));
+        },
+        |bus, motor| {
+            let warning = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, 8]).unwrap();
+            hear(bus, warning, 12_500);
+            assert!(!bus.is_motor_armed(motor));
         },
     ];
-    for rest in resting {
+    for (case, rest) in resting.iter().enumerate() {
         let mut bus = Bus::new();
         let loops = PidConfig::new(1.0, 0.0, 0.0);
-        let motor = bus.attach(Config::<M3508>::new(1).position_loop(loops, loops)).unwrap();
+        let config = Config::<M3508>::new(1).position_loop(loops, loops).with_health(&CAREFUL);
+        let motor = bus.attach(config).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), 11_000);
         bus.arm(us(11_000)).unwrap();
         bus.set_position(motor, Position::new(1, Angle::ZERO)).unwrap();
         step(&mut bus, 12_000);
-        assert!(sent(&mut bus)[0].1[0] > 4_000, "it is driven");
+        assert!(sent(&mut bus)[0].1[0] > 4_000, "{case}: it is driven");
         rest(&mut bus, motor);
+        arm_again(&mut bus);
         bus.set_velocity(motor, AngularVelocity::from_rpm(1.0)).unwrap();
         bus.update(Tick::new(us(13_000), 0.0));
-        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [0; 4])));
+        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [0; 4])), "{case}");
+        // From then on it is held as ever.
+        bus.set_velocity(motor, AngularVelocity::from_rpm(1.0)).unwrap();
+        step(&mut bus, 14_000);
+        let driven = sent(&mut bus)[0];
+        assert_ne!(driven.1[0], 0, "{case}");
+        bus.update(Tick::new(us(15_000), 0.0));
+        assert_eq!(sent(&mut bus), [driven], "{case}");
+    }
+}
+
+/// A hostile reader found that what is looked for in the last command, a runaway and a jam, was looked for in a zero where
+/// the program relaxes a motor before each target.
+#[test]
+fn a_motor_that_is_relaxed_before_each_target_is_looked_at_by_what_it_was_sent() {
+    for is_jammed in [false, true] {
+        let (mut bus, motor) = armed(Config::new(1));
+        let (mut rpm, mut counts, mut word) = (0, 0, 0_i16);
+        let mut conditions = Vec::new();
+        for ms in 2..1_000 {
+            if is_jammed {
+                // It trembles: feedback that never changes is another fault.
+                counts = (counts + 3) % 7;
+            } else {
+                rpm += (i32::from(word) * 9_000 / 16_384 - rpm) / 50;
+                counts = (counts + rpm * 8_192 / 60_000).rem_euclid(8_192);
+            }
+            let (angle, rpm) = (u16::try_from(counts).unwrap(), i16::try_from(rpm).unwrap());
+            hear(&mut bus, feedback(0x201, angle, rpm), ms * 1_000);
+            bus.relax(motor);
+            _ = bus.set_raw(motor, 16_384);
+            step(&mut bus, ms * 1_000);
+            word = sent(&mut bus).last().map_or(word, |(_, words)| words[0]);
+            conditions.extend(std::iter::from_fn(|| bus.next_edge()).map(|edge| edge.condition));
+        }
+        let expected: &[Condition] = if is_jammed { &[Condition::Stalled] } else { &[] };
+        assert_eq!((&conditions[..], word), (expected, 16_384));
     }
 }
 

@@ -67,13 +67,21 @@ struct Motor {
     is_velocity: bool,
     /// No loop of it has run, and none took over from a raw command, since it was last at rest.
     is_empty: bool,
+    /// It was at rest since the last update in which time passed.
+    has_rested: bool,
 }
 
 impl Motor {
     /// Relaxed, disarmed, stopped, lost, or without a target for too long.
     fn rest(&mut self) {
-        self.asked = None;
+        self.lose_target();
         self.is_empty = true;
+    }
+
+    /// At rest, with its loops as they are.
+    fn lose_target(&mut self) {
+        self.asked = None;
+        self.has_rested = true;
     }
 
     fn follow(&mut self, is_velocity: bool, now_us: u64) {
@@ -135,6 +143,7 @@ fn motors(bus: &mut Bus) -> Vec<Motor> {
         asked: None,
         is_velocity: false,
         is_empty: true,
+        has_rested: true,
     };
     vec![
         of(0x201, 0x200, 0, 16_384, attach(bus, 0)),
@@ -339,7 +348,7 @@ impl Soak {
         assert!(done.iter().all(|one| *one == done[0]), "I8: {done:?}");
         match done.first() {
             Some(Ok(())) => motor.follow(bits >> 8 & 31 > 7, self.now_us),
-            Some(Err(TargetError::NotFinite | TargetError::NoFeedback)) => motor.asked = None,
+            Some(Err(TargetError::NotFinite | TargetError::NoFeedback)) => motor.lose_target(),
             None if bits >> 8 & 31 == 16 => motor.rest(),
             _ => {}
         }
@@ -383,6 +392,7 @@ impl Soak {
     /// What an update in which time passed did to the motors.
     fn look_who_ran(&mut self) {
         for motor in &mut self.motors {
+            motor.has_rested = false;
             if !Motor::is_fresh(motor.heard, self.now_us, LATE_US) || motor.asked.is_none() {
                 continue;
             }
@@ -479,6 +489,7 @@ impl Soak {
                 "driven unarmed: {frame:?}"
             );
             self.books.nonzero += 1;
+            assert!(has_time || !motor.has_rested, "I9: held from before a rest: {frame:?}");
             if has_time {
                 let fresh = |at, limit_us| Motor::is_fresh(at, self.now_us, limit_us);
                 assert!(fresh(motor.heard, LATE_US), "driven without feedback: {frame:?}");

@@ -27,6 +27,8 @@ pub struct Alone {
     pub first_velocity: bool,
     /// The target that counts is a place of the shaft.
     pub is_way: bool,
+    /// It was at rest since the last update in which time passed.
+    pub has_rested: bool,
     /// Since when its last frame lies so far ahead that it counts as late here, and the whole bus has not noticed.
     pub doubted: Option<u64>,
 }
@@ -54,18 +56,19 @@ impl Alone {
             moved: false,
             first_velocity: false,
             is_way: false,
+            has_rested: true,
             doubted: None,
         }
     }
 
-    /// It asks for nothing from now on: nor do frames that wait.
-    pub fn relax(&mut self) {
-        self.word = 0;
-        self.rest();
+    /// At rest, with its loops as they are.
+    pub fn lose_target(&mut self) {
+        self.commanded = None;
+        self.has_rested = true;
     }
 
     pub fn rest(&mut self) {
-        self.commanded = None;
+        self.lose_target();
         self.moved = false;
         self.first_velocity = false;
         self.is_way = false;

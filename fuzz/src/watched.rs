@@ -104,7 +104,7 @@ impl Watched {
                 alone.follow(target, self.now);
             }
             // A target that cannot be followed takes the one before away: no older one acts in its place.
-            Err(TargetError::NotFinite | TargetError::NoFeedback) => alone.commanded = None,
+            Err(TargetError::NotFinite | TargetError::NoFeedback) => alone.lose_target(),
             Err(_) => {}
         }
     }
@@ -115,7 +115,7 @@ impl Watched {
         if let (Some(motor), Some(same)) = (self.motors[index], alone.motor) {
             self.bus.relax(motor.handle());
             alone.bus.relax(same.handle());
-            alone.relax();
+            alone.rest();
         }
     }
 
@@ -126,7 +126,7 @@ impl Watched {
             let outcome = self.bus.zero(motor.handle());
             assert_eq!(outcome, alone.bus.zero(same.handle()), "I8");
             if outcome.is_ok() && alone.is_way && alone.commanded.is_some() {
-                alone.relax();
+                alone.rest();
             }
         }
     }
@@ -407,11 +407,11 @@ impl CanDevice for Watched {
         if holds {
             let zero = self.held < 2 || self.alone.iter().all(|alone| alone.word == 0);
             assert!(zero, "driven without time: {:?}", self.alone);
-            let alone = &self.alone[INTEGRATOR];
-            let kept = alone.first_velocity && alone.word != 0;
-            assert!(!kept, "I9: a command outlived its rest: {alone:?}");
+            let kept = self.alone.iter().find(|alone| alone.has_rested && alone.word != 0);
+            assert!(kept.is_none(), "I9: a command outlived its rest: {kept:?}");
         } else {
             self.check_motors(now);
+            self.alone.iter_mut().for_each(|alone| alone.has_rested = false);
             self.look_at_what_lies_ahead(now);
         }
         self.compare();

@@ -123,7 +123,7 @@ impl<B> Bus<B> {
         if self.held_steps >= 2 || late {
             self.outbox.clear();
         }
-        for slot in self.slots.iter().filter(|slot| slot.is_at_rest()) {
+        for slot in self.slots.iter().filter(|slot| slot.has_rested()) {
             self.outbox.put(slot.place, 0);
         }
         self.outbox.keep_alive(self.now);

@@ -85,12 +85,10 @@ impl<B> Bus<B> {
         self.set(motor.into(), |slot, now| slot.set_position(position, now))
     }
 
-    /// Asks a motor for nothing: zero output, in frames that wait too, loops reset. It stays armed.
+    /// Asks a motor for nothing: zero output, loops reset. It stays armed.
     pub fn relax(&mut self, motor: impl Into<AnyHandle<B>>) {
         if let Some(slot) = self.slot_mut(motor.into()) {
             slot.relax();
-            let place = slot.place;
-            self.outbox.put(place, 0);
         }
     }
 
@@ -115,12 +113,9 @@ impl<B> Bus<B> {
     ) -> Result<(), TargetError> {
         let motor = motor.into();
         let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
-        let (before, was_at_rest) = (slot.conditions, slot.is_at_rest());
+        let before = slot.conditions;
         let outcome = slot.set_present_position(position);
-        let (after, is_at_rest, place) = (slot.conditions, slot.is_at_rest(), slot.place);
-        if is_at_rest && !was_at_rest {
-            self.outbox.put(place, 0);
-        }
+        let after = slot.conditions;
         self.journal.note(motor.key().place(), &before, &after, self.updated);
         outcome
     }

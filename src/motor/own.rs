@@ -107,7 +107,8 @@ pub struct Own<M> {
     target: AngularVelocity,
     output: [u8; 8],
     resting: bool,
-    held_steps: u8,
+    /// An update without a step may send the output once more.
+    may_hold: bool,
     waits: bool,
     superseded: u32,
     watch: Watch,
@@ -123,7 +124,7 @@ impl<M: OwnMotor> Own<M> {
             target: AngularVelocity::ZERO,
             output: [0; 8],
             resting: true,
-            held_steps: 0,
+            may_hold: false,
             waits: false,
             superseded: 0,
             watch: Watch::new(),
@@ -184,10 +185,9 @@ impl<M: OwnMotor> Own<M> {
             return [0; 8];
         }
         if step.is_hold() {
-            self.held_steps = self.held_steps.saturating_add(1);
-            return if self.held_steps >= 2 { [0; 8] } else { self.output };
+            return if core::mem::take(&mut self.may_hold) { self.output } else { [0; 8] };
         }
-        self.held_steps = 0;
+        self.may_hold = true;
         self.resting = false;
         self.motor.control(self.target, &step)
     }
@@ -318,8 +318,74 @@ impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
     }
 
     fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        // Where there was no target, the output is of one before.
+        self.may_hold &= self.guard.has_target();
         self.guard.admit(target.as_rad_per_s().is_finite())?;
         self.target = target;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor::Malformed;
+    use embedded_can::StandardId;
+
+    /// Sends its target in rad/s.
+    struct Plain;
+
+    impl OwnMotor for Plain {
+        fn name(&self) -> MotorName {
+            MotorName::new("plain", 1)
+        }
+        fn command_id(&self) -> Id {
+            StandardId::MAX.into()
+        }
+        fn feedback_id(&self) -> Id {
+            StandardId::ZERO.into()
+        }
+        fn decode(&mut self, _: &CanFrame) -> Result<(), Malformed> {
+            Ok(())
+        }
+        fn velocity(&self) -> AngularVelocity {
+            AngularVelocity::ZERO
+        }
+        fn control(&mut self, target: AngularVelocity, _: &TimeStep) -> [u8; 8] {
+            let [a, b, c, d] = target.as_rad_per_s().to_le_bytes();
+            [a, b, c, d, 0, 0, 0, 0]
+        }
+        fn reset(&mut self) {}
+    }
+
+    /// What is held for an update without a step is the output of the target in force, not one from before a rest.
+    #[test]
+    fn an_update_without_a_step_holds_no_output_from_before_a_rest() {
+        let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+        let rad_per_s = AngularVelocity::from_rad_per_s;
+        let resting: [fn(&mut Own<Plain>); 2] = [CanDevice::disarm, |motor| {
+            let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
+            assert_eq!(motor.set_velocity((), nowhere), Err(TargetError::NotFinite));
+        }];
+        for rest in resting {
+            let mut motor = Own::new(Plain);
+            let feedback = CanFrame::new(StandardId::ZERO, &[]).unwrap();
+            assert_eq!(motor.ingest(&feedback, at_ms(1)), Ingest::Taken);
+            motor.arm(at_ms(1)).unwrap();
+            motor.set_velocity((), rad_per_s(200.0)).unwrap();
+            let sent = |motor: &mut Own<Plain>, ms: u64, dt_s| {
+                motor.update(Tick::new(at_ms(ms), dt_s));
+                let [a, b, c, d, ..] = *motor.next_frame(0).unwrap().bytes();
+                [a, b, c, d]
+            };
+            assert_eq!(sent(&mut motor, 2, 0.001), 200.0_f32.to_le_bytes());
+            rest(&mut motor);
+            motor.engage(at_ms(2));
+            let driven = 1.0_f32.to_le_bytes();
+            motor.set_velocity((), rad_per_s(1.0)).unwrap();
+            assert_eq!([3, 4].map(|ms| sent(&mut motor, ms, 0.0)), [[0; 4]; 2]);
+            assert_eq!(sent(&mut motor, 5, 0.001), driven);
+            assert_eq!([6, 7].map(|ms| sent(&mut motor, ms, 0.0)), [driven, [0; 4]], "once");
+        }
     }
 }

@@ -80,7 +80,8 @@ pub struct Brushed<P, D> {
     target: Target,
     way: Way,
     output: f32,
-    held_steps: u8,
+    /// An update without a step may set the output once more.
+    may_hold: bool,
     counted: Option<(u32, Instant)>,
     counts: i64,
     rad_per_s: f32,
@@ -107,7 +108,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             target: Target::Rest,
             way: Way::Coast,
             output: 0.0,
-            held_steps: 0,
+            may_hold: false,
             counted: None,
             counts: 0,
             rad_per_s: 0.0,
@@ -186,7 +187,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
     pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
-        self.guard.admit(share.is_finite())?;
+        self.admit(share.is_finite())?;
         self.target = Target::Duty(share);
         Ok(())
     }
@@ -244,10 +245,9 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         }
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         if step.is_hold() {
-            self.held_steps = self.held_steps.saturating_add(1);
-            return if self.held_steps >= 2 { 0.0 } else { self.output };
+            return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
         }
-        self.held_steps = 0;
+        self.may_hold = true;
         match (self.target, &mut self.speed) {
             (Target::Duty(share), _) => share,
             (Target::Velocity(goal), Some(speed)) => speed.step(goal, self.rad_per_s, &step),
@@ -255,10 +255,16 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         }
     }
 
+    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        if !self.guard.has_target() {
+            // What was asked for before, and its output, are over.
+            (self.target, self.may_hold) = (Target::Rest, false);
+        }
+        self.guard.admit(is_finite)
+    }
+
     fn rest(&mut self) {
         self.target = Target::Rest;
-        // The output before it is no longer held.
-        self.held_steps = 1;
         self.speed.iter_mut().for_each(Pid::reset);
     }
 

@@ -33,6 +33,8 @@ impl Action {
 #[repr(u8)]
 pub(super) enum Duty {
     Rest,
+    /// Whatever is asked for, for the first time since a rest.
+    First,
     Raw,
     /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
     Velocity,
@@ -207,9 +209,10 @@ impl Slot {
         }
     }
 
-    /// Tells whether the motor has nothing to do: not asked, or not heard.
-    pub(in crate::dji) fn is_at_rest(&self) -> bool {
-        self.duty == Duty::Rest
+    /// Tells whether the motor was at rest, not asked or not heard, at any time since the last usable update: its command
+    /// of then is not to be sent again.
+    pub(in crate::dji) fn has_rested(&self) -> bool {
+        matches!(self.duty, Duty::Rest | Duty::First)
     }
 
     /// Finds out what an update has to do. To be called wherever the link, the range, a loop or what is asked for changes.
@@ -218,11 +221,18 @@ impl Slot {
         self.duty = match self.asked {
             _ if self.link != Link::Online => Duty::Rest,
             Action::Rest => Duty::Rest,
+            _ if self.has_rested() => Duty::First,
             Action::Raw => Duty::Raw,
             Action::Velocity if is_free => Duty::Velocity,
             Action::Position if is_free && self.loops.position().is_plain() => Duty::Position,
             _ => Duty::Other,
         };
+    }
+
+    /// What is asked for has an output from now on.
+    pub(super) fn end_rest(&mut self) {
+        self.duty = Duty::Other;
+        self.settle();
     }
 
     /// The speed loop takes over from a direct command where that was: no jump of the output.
@@ -266,7 +276,7 @@ mod tests {
     use crate::dji::{Bus, Config, M3508};
     use crate::frame::CanFrame;
     use crate::motor::{CanDevice, Timeouts};
-    use crate::time::Instant;
+    use crate::time::{Instant, Tick};
     use crate::units::AngularVelocity;
 
     /// The short ways are for plain loops with the full output; all others take the one that knows everything.
@@ -286,6 +296,8 @@ mod tests {
             bus.arm(now).unwrap();
             let duty = |bus: &Bus| bus.slot(motor.erase()).unwrap().duty;
             bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
+            assert_eq!(duty(&bus), Duty::First);
+            bus.update(Tick::new(now, 0.001));
             let velocity = duty(&bus);
             bus.set_position(motor, Position::ZERO).unwrap();
             assert_eq!([velocity, duty(&bus)], expected);
@@ -294,7 +306,7 @@ mod tests {
             slot.settle();
             assert_eq!(slot.duty, Duty::Other, "less than the full output");
             slot.see_to(500_000, &Timeouts::new());
-            assert!(slot.is_at_rest(), "not heard");
+            assert_eq!(slot.duty, Duty::Rest, "not heard");
         }
     }
 }

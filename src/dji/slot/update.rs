@@ -45,7 +45,7 @@ impl Slot {
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             // Out of line too: a zero for these would be loaded in every update of every motor.
-            Duty::Rest | Duty::Other => return self.update_carefully(step),
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step),
         };
         match self.loops.speed_mut().try_step(goal, velocity, plain) {
             Some(output) => free_to_raw(output, self.raw_per_unit),
@@ -60,12 +60,14 @@ impl Slot {
         loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
     }
 
-    /// Runs the loops whatever they are and however far the output is limited; or rests.
+    /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
     fn update_carefully(&mut self, step: &TimeStep) -> i16 {
-        if self.duty == Duty::Rest {
-            return 0;
+        match self.duty {
+            Duty::Rest => return 0,
+            Duty::First => self.end_rest(),
+            _ => {}
         }
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {
@@ -78,7 +80,8 @@ impl Slot {
                 velocity = self.goal.rate();
                 self.goal.way()
             }
-            Action::Rest | Action::Raw => return 0,
+            Action::Raw => return saturate(self.goal.raw(), self.range),
+            Action::Rest => return 0,
         };
         let goal = self.loops.step_position(way, velocity, step);
         self.follow_velocity(goal, velocity, step)

@@ -21,7 +21,7 @@ impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
         if self.speed.is_none() {
             return Err(TargetError::NoLoop);
         }
-        self.guard.admit(target.as_rad_per_s().is_finite())?;
+        self.admit(target.as_rad_per_s().is_finite())?;
         let goal = target.as_rad_per_s();
         if let (Target::Duty(share), Some(speed)) = (self.target, &mut self.speed) {
             speed.reset_to(share);

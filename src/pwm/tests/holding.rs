@@ -2,23 +2,56 @@
 
 use super::*;
 
+type Work = fn(&mut Brushed<Pin<'_>, TwoPins<Pin<'_>, Pin<'_>>>);
+
 /// What is held for an update without a step is the output of the target in force, not one from before a rest.
 #[test]
 fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
+    let resting: [Work; 3] = [
+        |motor| motor.disarm(),
+        |motor| {
+            motor.emergency_stop();
+            motor.clear_emergency_stop();
+        },
+        |motor| assert_eq!(motor.set_duty(f32::NAN), Err(TargetError::NotFinite)),
+    ];
+    for rest in resting {
+        let log = Log::default();
+        let pins = TwoPins(pin("in1", &log), pin("in2", &log));
+        let mut motor = Brushed::new(pin("pwm", &log), pins, BrushedConfig::new(1)).unwrap();
+        motor.arm(at_ms(0)).unwrap();
+        motor.set_duty(1.0).unwrap();
+        motor.update(tick(1)).unwrap();
+        assert_eq!(last(&log), 20_000);
+        rest(&mut motor);
+        motor.arm(at_ms(1)).unwrap();
+        motor.set_duty(0.1).unwrap();
+        motor.update(Tick::new(at_ms(2), 0.0)).unwrap();
+        assert_eq!(last(&log), 0);
+        motor.update(tick(3)).unwrap();
+        assert_eq!(last(&log), 2_000);
+        motor.update(Tick::new(at_ms(4), 0.0)).unwrap();
+        assert_eq!(last(&log), 2_000, "once");
+        motor.update(Tick::new(at_ms(5), 0.0)).unwrap();
+        assert_eq!(last(&log), 0);
+    }
+}
+
+/// The speed loop takes over from a direct duty without a jump; but not from one that was taken away.
+#[test]
+fn a_speed_loop_does_not_take_over_a_duty_from_before_a_rest() {
     let log = Log::default();
     let pins = TwoPins(pin("in1", &log), pin("in2", &log));
-    let mut motor = Brushed::new(pin("pwm", &log), pins, BrushedConfig::new(1)).unwrap();
+    let integral = PidConfig::new(0.0, 0.001, 0.0);
+    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
+    let mut motor = Brushed::new(pin("pwm", &log), pins, config).unwrap();
+    motor.ingest_counts(0, at_ms(0));
     motor.arm(at_ms(0)).unwrap();
     motor.set_duty(1.0).unwrap();
     motor.update(tick(1)).unwrap();
     assert_eq!(last(&log), 20_000);
-    motor.disarm();
-    motor.arm(at_ms(1)).unwrap();
-    motor.set_duty(0.1).unwrap();
-    motor.update(Tick::new(at_ms(2), 0.0)).unwrap();
+    assert_eq!(motor.set_duty(f32::NAN), Err(TargetError::NotFinite));
+    motor.set_velocity((), AngularVelocity::from_rad_per_s(1.0)).unwrap();
+    motor.update(tick(2)).unwrap();
     assert_eq!(last(&log), 0);
-    motor.update(tick(3)).unwrap();
-    assert_eq!(last(&log), 2_000);
-    motor.update(Tick::new(at_ms(4), 0.0)).unwrap();
-    assert_eq!(last(&log), 2_000);
 }
