@@ -46,8 +46,8 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
                     sudo ip link set can0 up type can bitrate 1000000
   --motors LIST     model:ids, models m3508, m2006 and gm6020 (default: m3508:1-4)
   --rpm N           speed of every output shaft (default: 0, they hold still)
-  --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front left, front
-                    right, rear left and rear right
+  --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
+                    front left, rear left and rear right
   --seconds S       how long (default: 5); Ctrl-C ends it as well, with zeros
   --arm             send commands; without it nothing is sent
   --log FILE        every frame in the form of candump -L
@@ -205,7 +205,7 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
     /// Attaches all of them. In a chassis the motors on the right side are reversed.
     fn attach(bus: &mut Bus, options: &Options) -> Result<Vec<AnyHandle>, Box<dyn Error>> {
         let attached = options.motors.iter().map(|(model, id)| {
-            let right = options.twist.is_some() && matches!(id, 2 | 4);
+            let right = options.twist.is_some() && matches!(id, 1 | 4);
             let done: Result<AnyHandle, AttachError> = match model.as_str() {
                 "m3508" => {
                     let config = Config::<M3508>::new(*id).speed_loop(M3508_SPEED);
@@ -238,7 +238,8 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
         }
         let speeds = Mecanum::new(GEOMETRY)?.inverse(Twist::new(x, y, w));
         let MecanumWheels { front_left, front_right, rear_left, rear_right } = speeds;
-        Ok(vec![front_left, front_right, rear_left, rear_right])
+        // Ids 1 to 4, as DJI counts them: from the front right, counter-clockwise.
+        Ok(vec![front_right, front_left, rear_left, rear_right])
     }
 
     pub(crate) fn main() -> Result<(), Box<dyn Error>> {

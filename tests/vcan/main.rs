@@ -307,13 +307,14 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
     println!("motors at the end: {reached:.1?} rpm, {RPM} asked for");
 }
 
-/// The body is the simulator's, with the wheels where the example has them: it knows nothing of the kinematics.
+/// The body is the simulator's and knows nothing of the kinematics. Ids 1 to 4 stand as the example's help says: front right,
+/// front left, rear left, rear right.
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_mecanum_chassis_moves_as_it_is_asked_and_is_left_at_zero() {
     let (ahead, left, turn) = (0.6, -0.3, 0.8);
     let world = World::new(2);
-    let places = [(0.20, 0.18), (0.20, -0.18), (-0.20, 0.18), (-0.20, -0.18)];
+    let places = [(0.20, -0.18), (0.20, 0.18), (-0.20, 0.18), (-0.20, -0.18)];
     let wheels: Vec<_> = (1..)
         .zip(places)
         .map(|(id, (x, y))| {
