@@ -119,7 +119,7 @@ fn notes(replay: &Replay, bad: u64, complaints: &mut impl Write) -> io::Result<(
         }
     }
     for (count, what) in [
-        (replay.unrelated, "frames of nobody asked for"),
+        (replay.unrelated, "other frames: commands, motors that were not listed, other devices"),
         (replay.other_interfaces, "frames of other interfaces; choose with --interface"),
         (bad, "lines skipped"),
     ] {
