@@ -6,10 +6,11 @@ use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, CanDevice, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, Fault, JointConfig, JointKey, Line, SimClock, World};
+use drivetrain::sim::{Controller, Fault, JointConfig, JointKey, Line, Sender, SimClock, World};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
+use embedded_can::Frame;
 
 type Shell<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Joints>;
 
@@ -20,23 +21,42 @@ struct Robot<'w> {
     keys: Vec<JointKey>,
     /// Where they are told to be, in degrees.
     wanted: Option<f32>,
+    /// The application arms as soon as it sees itself disarmed.
+    is_eager: bool,
+    /// What was written to the joint with the id 1.
+    writes: Vec<Command>,
 }
 
 impl<'w> Robot<'w> {
-    fn new(world: &'w World, count: u8, mut joints: Joints) -> Self {
-        let keys = (1..=count).map(|id| world.attach_joint(JointConfig::new(id)).unwrap());
-        let keys = keys.collect();
+    fn new(world: &'w World, count: u8, joints: Joints) -> Self {
+        Self::of(world, (1..=count).map(JointConfig::new), joints)
+    }
+
+    fn of(
+        world: &'w World,
+        configs: impl Iterator<Item = JointConfig>,
+        mut joints: Joints,
+    ) -> Self {
+        let keys: Vec<_> = configs.map(|config| world.attach_joint(config).unwrap()).collect();
         let fast = |id| Config::new(id).with_speed(AngularVelocity::from_rpm(30.0));
-        let handles = (1..=count).map(|id| joints.attach(fast(id)).unwrap()).collect();
+        let handles = (1..).take(keys.len()).map(|id| joints.attach(fast(id)).unwrap()).collect();
         let runner = Runner::new(Nb(world.controller()), world.clock(), joints);
-        Self { world, runner, joints: handles, keys, wanted: None }
+        let (wanted, writes) = (None, Vec::new());
+        Self { world, runner, joints: handles, keys, wanted, is_eager: false, writes }
     }
 
     fn run(&mut self, ms: u64) {
         for _ in 0..10 * ms {
-            self.world.advance(Duration::from_micros(100));
+            self.world.advance_with(Duration::from_micros(100), |record| {
+                let ours = record.sender == Sender::Controller && record.frame.header() == 1;
+                let command = Command::decode(record.frame.data()).filter(|_| ours);
+                self.writes.extend(command.filter(|sent| matches!(sent, Command::Write(..))));
+            });
             self.runner.poll(16);
             let Some(tick) = self.runner.due() else { continue };
+            if self.is_eager && !self.runner.is_armed() {
+                _ = self.runner.arm(tick);
+            }
             if let Some(degrees) = self.wanted {
                 let position = Position::from_angle(Angle::from_degrees(degrees));
                 for joint in &self.joints {
@@ -177,6 +197,55 @@ fn a_brown_out_shorter_than_any_time_limit_does_not_set_a_joint_going_again() {
     let state = robot.runner.device().state(robot.joints[6]).unwrap();
     assert!(state.resets + state.position_jumps >= 1, "{state:?}");
     assert!(!robot.is_enabled(6) && !state.is_driven && !robot.runner.is_armed());
+}
+
+/// What disarms joint 1, and how it is counted: resets and jumps.
+type Event = (&'static str, fn(&mut Robot), (u16, u16));
+
+fn brown_out(robot: &mut Robot) {
+    let now = robot.world.now();
+    let window = now..now + Duration::from_millis(5);
+    robot.world.fault(Fault::JointPowerLoss(robot.keys[0]), window).unwrap();
+}
+
+fn register(command: &Command) -> u8 {
+    let (Command::Write(register, _) | Command::Read(register)) = *command;
+    register.as_raw()
+}
+
+fn stop_and_clear(robot: &mut Robot) {
+    robot.runner.device_mut().emergency_stop();
+    robot.runner.device_mut().clear_emergency_stop();
+}
+
+/// It once went on as if nothing had been where it was armed before the next update: not disabled, nor enabled again.
+#[test]
+fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_disarmed_it() {
+    let events: [(i32, Event); 4] = [
+        (0, ("found disabled", brown_out, (1, 0))),
+        (25_000, ("further off than it can go", brown_out, (0, 1))),
+        (0, ("disarmed", |robot| robot.runner.device_mut().disarm(), (0, 0))),
+        (0, ("stopped and cleared", stop_and_clear, (0, 0))),
+    ];
+    for (position, (what, event, counts)) in events {
+        let world = World::new(4);
+        let config = JointConfig::new(1).with_position(position);
+        let mut robot = Robot::of(&world, [config].into_iter(), Joints::new());
+        robot.run(50);
+        robot.arm();
+        (robot.wanted, robot.is_eager) = (Some(5.0), true);
+        robot.run(250);
+        robot.writes.clear();
+        event(&mut robot);
+        robot.run(300);
+        let state = robot.runner.device().state(robot.joints[0]).unwrap();
+        assert_eq!((state.resets, state.position_jumps), counts, "{what}");
+        assert!(state.is_driven && robot.is_enabled(0), "{what}: {state:?}");
+        let mut since = robot.writes.iter().skip_while(|sent| **sent != Command::DISABLE);
+        let registers: Vec<_> = since.by_ref().take(8).map(register).collect();
+        assert_eq!(registers, [0x10, 0x0F, 0x08, 0x0B, 0x0C, 0x09, 0x0A, 0x10], "{what}");
+        assert!(since.all(|sent| register(sent) == 0x0A), "{what}: brought up once");
+    }
 }
 
 #[test]

@@ -188,6 +188,7 @@ impl Joints {
             Ok(reply) => {
                 count(&mut counters.replies);
                 slot.receive(reply, now);
+                self.let_go(index);
                 return Ingest::Taken;
             }
             Err(_) if Command::decode(frame.data()).is_some() => {
@@ -217,7 +218,7 @@ impl Joints {
             count(&mut self.counters.bad_steps);
             self.held_steps = self.held_steps.saturating_add(1);
             if self.held_steps >= 2 {
-                self.let_go();
+                (0..SLOTS).for_each(|index| self.relax_at(index));
             }
             return;
         }
@@ -239,12 +240,19 @@ impl Joints {
         self.plan();
     }
 
-    /// Takes the targets of all joints away.
-    fn let_go(&mut self) {
-        for index in 0..SLOTS {
-            if self.slots.get_mut(index).is_some_and(Slot::let_go) {
-                self.stop(index);
-            }
+    /// Takes the target of a joint away.
+    pub(super) fn relax_at(&mut self, index: usize) {
+        if let Some(slot) = self.slots.get_mut(index) {
+            slot.guard.relax();
+        }
+        self.let_go(index);
+    }
+
+    /// Has a joint that may no longer be driven disabled: now, as it may be armed and led again before the next update,
+    /// which would see nothing then.
+    pub(super) fn let_go(&mut self, index: usize) {
+        if self.slots.get_mut(index).is_some_and(Slot::let_go) {
+            self.stop(index);
         }
     }
 

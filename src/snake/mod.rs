@@ -28,13 +28,14 @@
 //! made safe by a frame, not by silence: *relaxed* and *safe output* are both `01 10 00000000`, disable. It is sent
 //!
 //! * to every joint with the first update, so that a controller that was reset stops what its predecessor left running;
-//! * at once, before all else and to all joints, on emergency stop, disarming, lost feedback, an old target, a target that
-//!   is not finite, a bad time step, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
+//! * at once, before all else and to all joints, on emergency stop, disarming, a fault, lost feedback, an old target, a
+//!   target that is not finite, a bad time step, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
 //! * again each 100 ms as long as a joint is relaxed: a drive may have missed it.
 //!
-//! A relaxed joint is disabled before it is brought up again, however soon that is. It is written in the order mode, current, acceleration, deceleration, speed, target, enable, so
-//! that none is enabled with an old target; then its target is repeated in its turn, so that a lost frame does not last.
-//! The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
+//! A relaxed joint is disabled before it is brought up again, however soon that is, and whatever relaxed it: also one that
+//! is armed before the next update. It is written in the order mode, current, acceleration, deceleration, speed, target,
+//! enable, so that none is enabled with an old target; then its target is repeated in its turn, so that a lost frame does
+//! not last. The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
 //! ([`State::resets`]), and waits to be armed.
 //!
 //! # What is noticed

@@ -216,6 +216,8 @@ impl Slot {
             self.lose_zero(now);
         }
         self.look(now);
+        // What was seen may have relaxed it.
+        let drives = drives && self.guard.is_armed();
         let stops = self.driven && !drives;
         if drives && !self.driven {
             self.pending = ALL;
@@ -238,10 +240,11 @@ impl Slot {
         self.driven
     }
 
-    /// Lets go at once; returns whether the joint has to be told.
+    /// Lets go where the joint was driven and may be no longer; returns whether it has to be told.
     pub(super) const fn let_go(&mut self) -> bool {
-        self.guard.relax();
-        core::mem::replace(&mut self.driven, false)
+        let stops = self.driven && !(self.guard.is_armed() && self.guard.has_target());
+        self.driven = self.driven && !stops;
+        stops
     }
 
     /// Notes that it is told to relax now. A joint that has a target again is brought up from the beginning after that.
@@ -252,7 +255,7 @@ impl Slot {
 
     /// Returns the frame that is next to be written.
     pub(super) fn next_write(&mut self, now: Instant) -> Command {
-        if !(self.driven && self.guard.is_armed()) {
+        if !self.driven {
             self.stopped = now;
             return Command::DISABLE;
         }

@@ -42,7 +42,7 @@ impl Joints {
     pub fn set_speed(&mut self, joint: Joint, speed: AngularVelocity) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
         if !speed.is_finite() {
-            slot.guard.relax();
+            self.relax(joint);
             return Err(TargetError::NotFinite);
         }
         slot.set_speed(speed.as_rad_per_s());
@@ -64,8 +64,8 @@ impl Joints {
 
     /// Asks a joint for nothing: it is disabled, and stays armed.
     pub fn relax(&mut self, joint: Joint) {
-        if self.slot_mut(joint).is_some_and(Slot::let_go) {
-            self.stop(joint.index());
+        if self.slot(joint).is_some() {
+            self.relax_at(joint.index());
         }
     }
 
@@ -126,8 +126,12 @@ impl Joints {
         set: impl FnOnce(&mut Slot),
     ) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
-        slot.guard.admit(is_finite)?;
-        set(slot);
-        Ok(())
+        let outcome = slot.guard.admit(is_finite);
+        if outcome.is_ok() {
+            set(slot);
+        }
+        // A target that is refused takes the present one away.
+        self.let_go(joint.index());
+        outcome
     }
 }

@@ -206,6 +206,23 @@ fn a_blocked_joint_is_stalled_in_either_direction_and_relaxed_where_configured()
 }
 
 #[test]
+fn a_stalled_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew() {
+    let mut bench = jaw(Reaction::Relax);
+    let mut sent = Vec::new();
+    for _ in 0..450 {
+        if !bench.joints.is_armed() {
+            bench.joints.arm(at_ms(bench.ms)).unwrap();
+        }
+        bench.joints.set_pulses(bench.handles[0], 8_000).unwrap();
+        sent.extend(writes(&bench.run(1)));
+    }
+    let stops: Vec<_> = (0..sent.len()).filter(|at| sent[*at] == Command::DISABLE).collect();
+    assert!(matches!(stops[..], [300..=330]), "{stops:?}");
+    assert_eq!(sent[stops[0] + 1], Command::Write(Register::Mode, 1));
+    assert_eq!(sent[stops[0] + 7], Command::Write(Register::Enable, 1));
+}
+
+#[test]
 fn a_joint_that_is_there_or_creeps_or_is_not_looked_at_is_not_stalled() {
     let mut bench = jaw(Reaction::Report);
     assert_eq!(run_to(&mut bench, 1_000, 2_000, true), [], "there");

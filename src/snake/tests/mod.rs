@@ -53,14 +53,27 @@ impl Bench {
         for _ in 0..ms {
             self.ms += 1;
             self.joints.update(Tick::new(at_ms(self.ms), 0.001));
-            while let Some(frame) = self.joints.next_frame() {
-                let id = u8::try_from(frame.header()).unwrap();
-                let command = Command::decode(frame.data()).unwrap();
-                sent.push((id, command));
-                self.answer(id, command);
-            }
+            sent.extend(self.take());
         }
         sent
+    }
+
+    /// All that waits to be sent.
+    fn take(&mut self) -> Vec<(u8, Command)> {
+        let mut sent = Vec::new();
+        while let Some(frame) = self.joints.next_frame() {
+            let id = u8::try_from(frame.header()).unwrap();
+            let command = Command::decode(frame.data()).unwrap();
+            sent.push((id, command));
+            self.answer(id, command);
+        }
+        sent
+    }
+
+    /// Joint 1 says something.
+    fn hear(&mut self, register: Register, value: i32) {
+        let outcome = self.joints.ingest(&reply(1, register, value), at_ms(self.ms));
+        assert_eq!(outcome, Ingest::Taken);
     }
 
     fn answer(&mut self, id: u8, command: Command) {

@@ -83,22 +83,65 @@ fn a_position_further_off_than_a_joint_can_go_disarms_it() {
     bench.joints.arm(at_ms(bench.ms)).unwrap();
 }
 
-/// The fuzzer found that the write which was due went out all the same.
-#[test]
-fn a_joint_that_is_disarmed_in_the_middle_of_a_tick_is_sent_nothing_that_moves() {
+/// What ends a joint's being driven between two updates, and its name.
+type End = (&'static str, fn(&mut Bench));
+
+const ENDS: [End; 7] = [
+    ("a jump", |bench| {
+        bench.raw[0] = -60_000;
+        bench.hear(Register::ActualPosition, -60_000);
+    }),
+    ("a reset", |bench| bench.hear(Register::Enable, 0)),
+    ("a target of NaN", |bench| {
+        let nan = Position::from_angle(Angle::from_radians(f32::NAN));
+        _ = bench.joints.set_position(bench.handles[0], nan);
+    }),
+    ("a speed of NaN", |bench| {
+        let nan = AngularVelocity::from_rpm(f32::NAN);
+        _ = bench.joints.set_speed(bench.handles[0], nan);
+    }),
+    ("relaxed", |bench| bench.joints.relax(bench.handles[0])),
+    ("disarmed", |bench| bench.joints.disarm()),
+    ("stopped", |bench| {
+        bench.joints.emergency_stop();
+        bench.joints.clear_emergency_stop();
+    }),
+];
+
+/// A joint that is driven, in the middle of a tick: its frames wait.
+fn in_the_middle_of_a_tick() -> Bench {
     let mut bench = Bench::armed(&[1]);
     bench.drive(100);
-    bench.joints.set_pulses(bench.handles[0], 2_000).unwrap();
     bench.ms += 1;
     bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
-    let jump = reply(1, Register::ActualPosition, -60_000);
-    assert_eq!(bench.joints.ingest(&jump, at_ms(bench.ms)), Ingest::Taken);
-    let sent: Vec<_> = core::iter::from_fn(|| bench.joints.next_frame())
-        .map(|frame| Command::decode(frame.data()).unwrap())
-        .collect();
-    assert_eq!((sent[0], bench.state(0).is_driven), (Command::DISABLE, true));
-    assert_eq!(writes(&bench.run(5)), [Command::DISABLE]);
-    assert!(!bench.state(0).is_driven);
+    bench
+}
+
+/// The fuzzer found that the write which was due went out all the same.
+#[test]
+fn a_joint_that_may_not_move_any_more_is_disabled_with_the_next_frame_and_then_left_alone() {
+    for (what, end) in ENDS {
+        let mut bench = in_the_middle_of_a_tick();
+        end(&mut bench);
+        assert!(!bench.state(0).is_driven, "{what}");
+        let sent = bench.take();
+        assert_eq!((sent[0], writes(&sent).len()), ((1, Command::DISABLE), 1), "{what}");
+        assert_eq!(writes(&bench.run(5)), [], "{what}");
+    }
+}
+
+#[test]
+fn a_joint_that_is_armed_and_led_again_before_the_next_update_is_disabled_all_the_same() {
+    for (what, end) in ENDS {
+        let mut bench = in_the_middle_of_a_tick();
+        end(&mut bench);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        bench.joints.set_pulses(bench.handles[0], 3_000).unwrap();
+        assert_eq!(writes(&bench.take()), [Command::DISABLE], "{what}");
+        let sent = writes(&bench.drive(7));
+        assert_eq!(sent[0], Command::Write(Register::Mode, 1), "{what}");
+        assert_eq!(sent[6], Command::Write(Register::Enable, 1), "{what}");
+    }
 }
 
 #[test]
