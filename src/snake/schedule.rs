@@ -99,6 +99,8 @@ impl Joints {
             Command::DISABLE => {
                 slot.told_to_relax(self.now);
                 self.returned.0 |= bit;
+                // It comes first the next time too.
+                self.writes &= !bit;
             }
             _ if !attached => return false,
             Command::Write(register, _) => {

@@ -79,6 +79,16 @@ fn a_joint_that_gets_a_new_target_at_once_is_disabled_before_it_is_brought_up() 
     assert!(bench.joints.requeue(&refused));
     let sent = writes(&bench.run(9));
     assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
+    // And when what brings it up waits behind the disable that is given back.
+    bench.joints.relax(bench.handles[0]);
+    bench.joints.set_pulses(bench.handles[0], 7).unwrap();
+    bench.ms += 1;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    let refused = bench.joints.next_frame().unwrap();
+    assert!(bench.joints.requeue(&refused));
+    assert_eq!(writes(&bench.take()), []);
+    let sent = writes(&bench.run(9));
+    assert_eq!(sent[..2], [Command::DISABLE, Command::Write(Register::Mode, 1)]);
 }
 
 #[test]
