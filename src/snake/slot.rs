@@ -20,8 +20,9 @@ const JUMP: i32 = PULSES_PER_TURN / 16;
 /// Every so many readings of the speed make way for one that looks whether the drive is still enabled.
 const CHECKS: u8 = 8;
 
-/// All registers of [`Register::SEQUENCE`].
+/// All registers of [`Register::SEQUENCE`], and the last of them: the enable.
 const ALL: u8 = 0x7F;
+const LAST: u8 = 0x40;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
@@ -147,8 +148,7 @@ impl Slot {
         match reply.register() {
             Register::ActualPosition => self.receive_position(reply.value(), now),
             Register::ActualSpeed => self.raw_speed = reply.value(),
-            // What waits to be written says that the answer is from before.
-            Register::Enable if self.driven && self.pending == 0 && reply.value() == 0 => {
+            Register::Enable if self.is_up() && reply.value() == 0 => {
                 self.resets = self.resets.saturating_add(1);
                 self.distrust(now);
             }
@@ -304,7 +304,10 @@ impl Slot {
         let target = self.offset.target(self.directed(pulses));
         if target != self.target {
             self.target = target;
-            self.unwrite(Register::Position);
+            // The enable does not wait for one target after the other: the turn after it has this one.
+            if self.pending != LAST {
+                self.unwrite(Register::Position);
+            }
         }
     }
 

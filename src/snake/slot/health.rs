@@ -1,6 +1,6 @@
 //! What is wrong with one joint.
 
-use super::Slot;
+use super::{LAST, Slot};
 use crate::motor::{Condition, Edge, Health, Link, Reaction};
 use crate::snake::PULSES_PER_TURN;
 use crate::time::{Duration, Instant};
@@ -68,7 +68,7 @@ impl Slot {
         let (window, reaction) = (self.stall.window, self.stall.reaction);
         let way = self.target.wrapping_sub(raw).unsigned_abs();
         let moved = raw.wrapping_sub(self.stands.at).unsigned_abs() > STANDS;
-        let asked = self.driven && self.pending == 0 && way > THERE;
+        let asked = self.is_up() && way > THERE;
         let looks = reaction != Reaction::Ignore && self.guard.link() == Link::Online;
         if moved || !(asked && looks && self.is_fast_enough()) {
             self.stands = Standing { at: raw, since: now };
@@ -78,6 +78,12 @@ impl Slot {
             self.guard.relax_until_armed();
         }
         self.guard.note(Condition::Stalled, begins, now);
+    }
+
+    /// Tells whether the joint was enabled. Before that it says of itself that it is not; afterwards it may have news all
+    /// the time, from an application that leads it along.
+    pub(super) const fn is_up(&self) -> bool {
+        self.driven && self.pending & LAST == 0
     }
 
     /// Tells whether the joint would move visibly within the window, from rest.

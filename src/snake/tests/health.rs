@@ -223,6 +223,24 @@ fn a_stalled_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew()
 }
 
 #[test]
+fn a_joint_whose_target_changes_in_each_tick_is_enabled_and_seen_to_be_blocked_and_disabled() {
+    let mut bench = jaw(Reaction::Report);
+    let follow = |bench: &mut Bench| {
+        for near in [0, 1].into_iter().cycle().take(400) {
+            _ = bench.joints.set_pulses(bench.handles[0], 8_000 + near);
+            bench.run(1);
+        }
+        edges(&mut bench.joints)
+    };
+    assert_eq!(follow(&mut bench), [(1, Condition::Stalled, true)]);
+    assert_eq!(bench.enabled[0], 1);
+    bench.enabled[0] = 0;
+    let seen = follow(&mut bench);
+    assert!(seen.contains(&(1, Condition::Fault, true)), "{seen:?}");
+    assert_eq!(bench.state(0).resets, 1);
+}
+
+#[test]
 fn a_joint_that_is_there_or_creeps_or_is_not_looked_at_is_not_stalled() {
     let mut bench = jaw(Reaction::Report);
     assert_eq!(run_to(&mut bench, 1_000, 2_000, true), [], "there");

@@ -108,11 +108,12 @@ const ENDS: [End; 7] = [
     }),
 ];
 
-/// A joint that is driven, in the middle of a tick: its frames wait.
+/// A joint that is driven, in the middle of a tick: its frames wait, a new speed among them.
 fn in_the_middle_of_a_tick() -> Bench {
     let mut bench = Bench::armed(&[1]);
     bench.drive(100);
     bench.ms += 1;
+    bench.joints.set_speed(bench.handles[0], AngularVelocity::from_rpm(20.0)).unwrap();
     bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
     bench
 }
