@@ -49,6 +49,19 @@ struct Known {
     written: Vec<Register>,
     /// What it was asked for and has not answered, and when.
     due: Option<(Register, u64)>,
+    /// Written to, and not disabled since.
+    moves: bool,
+    /// It was led and may be no longer: a disable comes first, whatever follows.
+    stop_due: bool,
+    /// That disable was given back, and waits for a good update.
+    stop_returned: bool,
+}
+
+impl Known {
+    /// What led it until now does so no longer.
+    fn end(&mut self) {
+        self.stop_due |= self.moves;
+    }
 }
 
 struct Story {
@@ -100,6 +113,7 @@ impl Story {
                 self.now.saturating_sub(jump)
             };
             let index = usize::from(id) % 3;
+            let armed = self.are_armed();
             match op % 12 {
                 // Mostly replies, sometimes anything.
                 0..=3 => {
@@ -119,8 +133,17 @@ impl Story {
                 11 => self.send(flags),
                 op => self.call(op, flags, index, payload),
             }
+            for (index, (before, after)) in armed.into_iter().zip(self.are_armed()).enumerate() {
+                if before && !after {
+                    self.known[index].end();
+                }
+            }
         }
         self.sent.finish()
+    }
+
+    fn are_armed(&self) -> [bool; 3] {
+        [0, 1, 2].map(|index| self.joints.is_joint_armed(self.handles[index]))
     }
 
     fn ingest(&mut self, frame: &CanFrame) {
@@ -170,6 +193,8 @@ impl Story {
                 if joints.set_position(joint, position).is_ok() {
                     (known.asked, known.target) = (Some(self.updated), None);
                     known.news[1] = true;
+                } else {
+                    known.end();
                 }
             }
             5 => {
@@ -180,7 +205,9 @@ impl Story {
                     (known.asked, known.target) = (Some(self.updated), target);
                     known.news[1] = true;
                 }
-                _ = joints.set_speed(joint, AngularVelocity::from_rad_per_s(value));
+                if joints.set_speed(joint, AngularVelocity::from_rad_per_s(value)).is_err() {
+                    known.end();
+                }
             }
             6 => {
                 let at = Instant::from_micros(self.now);
@@ -193,10 +220,17 @@ impl Story {
                 0 => joints.emergency_stop(),
                 1 => joints.clear_emergency_stop(),
                 2 => joints.disarm(),
-                _ => joints.relax(joint),
+                _ => {
+                    joints.relax(joint);
+                    known.end();
+                }
             },
             _ => match flags & 3 {
-                0 => _ = joints.zero(joint),
+                0 => {
+                    if joints.zero(joint).is_ok() {
+                        known.end();
+                    }
+                }
                 1 => {
                     let settings = Settings::new().with_current(bits.cast_signed());
                     _ = joints.set_settings(joint, settings);
@@ -218,9 +252,17 @@ impl Story {
         let holds = self.joints.counters().bad_steps != bad_steps;
         assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
         self.held = if holds { self.held + 1 } else { 0 };
+        if self.held >= 2 {
+            self.known.iter_mut().for_each(Known::end);
+        }
         if !holds {
             (self.tick, self.updated) = (self.now, self.now);
-            for known in &mut self.known {
+            for (known, handle) in self.known.iter_mut().zip(&self.handles) {
+                known.stop_returned = false;
+                // Its feedback or its target is too old, say.
+                if !self.joints.state(*handle).is_some_and(|state| state.is_driven) {
+                    known.end();
+                }
                 known.news = [false; 2];
                 let waited = |(_, at): &(_, u64)| {
                     self.now.checked_sub(*at).is_some_and(|waited| waited <= REPLY_US)
@@ -240,6 +282,10 @@ impl Story {
                 assert!(self.joints.requeue(&frame));
                 self.take_back(&frame);
             }
+        }
+        for known in &self.known {
+            let waits = known.due.is_some() || known.stop_returned;
+            assert!(!known.stop_due || waits, "I9: not disabled at once: {known:?}");
         }
         self.add_up();
     }
@@ -269,8 +315,11 @@ impl Story {
             }
             if command == Command::DISABLE {
                 known.written.clear();
+                (known.moves, known.stop_due) = (false, false);
             } else {
                 known.written.push(register);
+                known.moves = true;
+                assert!(!known.stop_due, "I9: led again before it was disabled: {frame:?}");
             }
         }
         if command.is_safe() {
@@ -289,7 +338,10 @@ impl Story {
         let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
         let known = &mut self.known[index.expect("checked before")];
         match Command::decode(frame.data()) {
-            Some(Command::DISABLE) => known.written.clear(),
+            Some(Command::DISABLE) => {
+                known.written.clear();
+                (known.moves, known.stop_due, known.stop_returned) = (true, true, true);
+            }
             Some(Command::Write(register, _)) => known.written.retain(|other| *other != register),
             Some(Command::Read(_)) => known.due = None,
             _ => {}
