@@ -214,7 +214,9 @@ fn a_stalled_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew()
             bench.joints.arm(at_ms(bench.ms)).unwrap();
         }
         bench.joints.set_pulses(bench.handles[0], 8_000).unwrap();
-        sent.extend(writes(&bench.run(1)));
+        let tick = writes(&bench.run(1));
+        assert!(bench.joints.is_armed() || tick == [Command::DISABLE], "at once: {tick:?}");
+        sent.extend(tick);
     }
     let stops: Vec<_> = (0..sent.len()).filter(|at| sent[*at] == Command::DISABLE).collect();
     assert!(matches!(stops[..], [300..=330]), "{stops:?}");
