@@ -66,6 +66,16 @@ extern "C" fn route_masked(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 
     replaced(bus, frame, now_us, masked)
 }
 
+/// Answers rightly, and lets another motor hear something as well.
+#[unsafe(no_mangle)]
+extern "C" fn route_aside(bus: &mut Bus, frame: &CanFrame, now_us: u32) -> u32 {
+    let said = route(bus, frame, now_us);
+    if let Some(other) = CanFrame::standard(0x20B, [0x10; 8]) {
+        route(bus, &other, now_us);
+    }
+    said
+}
+
 /// Rounds towards zero.
 macro_rules! truncated {
     ($name:ident, $limit:literal, $full_scale:literal) => {

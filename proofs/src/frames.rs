@@ -132,16 +132,20 @@ extern "C" fn news(before: &Bus, after: &Bus, motor: &AnyHandle) -> u32 {
     }
 }
 
-/// Takes all edges and writes how many there were, that a second master began and others, and the latest time in µs.
+/// Takes all edges and writes how many there were; of which motors a second master began, a bit for each id of an ESC; and the
+/// earliest and the latest time in µs.
 #[unsafe(no_mangle)]
-extern "C" fn edges(bus: &mut Bus, told: &mut [u32; 3]) {
-    let [mut rivals, mut others, mut latest] = [0; 3];
+extern "C" fn edges(bus: &mut Bus, told: &mut [u32; 4]) {
+    let [mut count, mut rivals, mut latest] = [0_u32; 3];
+    let mut earliest = u32::MAX;
     while let Some(edge) = bus.next_edge() {
         let is_rival = edge.began && edge.condition == Condition::SecondMaster;
-        *if is_rival { &mut rivals } else { &mut others } += 1;
-        latest = latest.max(edge.at.as_micros() as u32);
+        count += 1;
+        rivals |= u32::from(is_rival) << edge.motor.id();
+        let at = edge.at.as_micros() as u32;
+        (earliest, latest) = (earliest.min(at), latest.max(at));
     }
-    *told = [rivals, others, latest];
+    *told = [count, rivals, earliest, latest];
 }
 
 /// Writes all counters: first those of frames with a wrong length, a bad field, and no motor.
