@@ -85,7 +85,8 @@ impl<B> Bus<B> {
         self.set(motor.into(), |slot, now| slot.set_position(position, now))
     }
 
-    /// Asks a motor for nothing: zero output, loops reset. It stays armed.
+    /// Asks a motor for nothing: zero output from the next update on, loops reset. It stays armed, and frames that wait go
+    /// out as they are.
     pub fn relax(&mut self, motor: impl Into<AnyHandle<B>>) {
         if let Some(slot) = self.slot_mut(motor.into()) {
             slot.relax();

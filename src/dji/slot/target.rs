@@ -235,9 +235,9 @@ impl Slot {
         self.settle();
     }
 
-    /// The speed loop takes over from a direct command where that was: no jump of the output.
+    /// The speed loop takes over from a direct command that was sent: no jump of the output.
     pub(super) fn enter_speed_loop(&mut self) {
-        if self.asked == Action::Raw {
+        if self.asked == Action::Raw && !self.has_rested() {
             self.loops.speed_mut().reset_to(self.goal.raw() as f32 / self.raw_per_unit);
         } else if self.asked == Action::Measured {
             // Another sensor: its last reading says nothing of the next one.

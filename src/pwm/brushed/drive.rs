@@ -23,8 +23,9 @@ impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
         }
         self.admit(target.as_rad_per_s().is_finite())?;
         let goal = target.as_rad_per_s();
-        if let (Target::Duty(share), Some(speed)) = (self.target, &mut self.speed) {
-            speed.reset_to(share);
+        if let (Target::Duty(_), Some(speed)) = (self.target, &mut self.speed) {
+            // From the output that it has, if that is of this target.
+            speed.reset_to(if self.may_hold { self.output } else { 0.0 });
         }
         self.target = Target::Velocity(goal);
         Ok(())

@@ -55,3 +55,25 @@ fn a_speed_loop_does_not_take_over_a_duty_from_before_a_rest() {
     motor.update(tick(2)).unwrap();
     assert_eq!(last(&log), 0);
 }
+
+/// Nor from one that was never set: armed, a duty, a velocity, and only then an update.
+#[test]
+fn a_speed_loop_does_not_take_over_a_duty_that_never_was() {
+    let log = Log::default();
+    let pins = TwoPins(pin("in1", &log), pin("in2", &log));
+    let integral = PidConfig::new(0.0, 0.001, 0.0);
+    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
+    let mut motor = Brushed::new(pin("pwm", &log), pins, config).unwrap();
+    motor.ingest_counts(0, at_ms(0));
+    motor.arm(at_ms(0)).unwrap();
+    motor.set_duty(1.0).unwrap();
+    motor.set_velocity((), AngularVelocity::ZERO).unwrap();
+    motor.update(tick(1)).unwrap();
+    assert_eq!(last(&log), 0);
+    // One that was, it does.
+    motor.set_duty(0.5).unwrap();
+    motor.update(tick(2)).unwrap();
+    motor.set_velocity((), AngularVelocity::ZERO).unwrap();
+    motor.update(tick(3)).unwrap();
+    assert_eq!(last(&log), 10_000);
+}
