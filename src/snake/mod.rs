@@ -34,7 +34,7 @@
 //!
 //! A relaxed joint is disabled before it is brought up again, however soon that is, and whatever relaxed it: also one that
 //! is armed before the next update. It is written in the order mode, current, acceleration, deceleration, speed, target,
-//! enable, so that none is enabled with an old target; then its target is repeated in its turn, so that a lost frame does
+//! enable, so that none is enabled with a target from before; then its target is repeated in its turn, so that a lost frame does
 //! not last. The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
 //! ([`State::resets`]), and waits to be armed.
 //!

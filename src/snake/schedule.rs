@@ -104,7 +104,7 @@ impl Joints {
             }
             _ if !attached => return false,
             Command::Write(register, _) => {
-                slot.unwrite(register);
+                slot.take_back(register);
                 self.returned.1 |= bit;
             }
             Command::Read(_) => {

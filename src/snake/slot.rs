@@ -1,6 +1,7 @@
 //! One joint: replies in, the next frame for it out.
 
 mod health;
+mod writing;
 
 use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
@@ -39,8 +40,10 @@ pub(super) struct Slot {
     /// As on the wire.
     target: i32,
     speed: i32,
-    /// Registers of [`Register::SEQUENCE`] that wait to be written.
+    /// Registers of [`Register::SEQUENCE`] that wait to be written; and those that come before the others, which are all as long
+    /// as none was written.
     pending: u8,
+    ahead: u8,
     driven: bool,
     stopped: Instant,
     pub(super) awaiting: Option<(Register, Instant)>,
@@ -74,6 +77,7 @@ impl Slot {
         target: 0,
         speed: 0,
         pending: 0,
+        ahead: 0,
         driven: false,
         stopped: Instant::START,
         awaiting: None,
@@ -220,7 +224,7 @@ impl Slot {
         let drives = drives && self.guard.is_armed();
         let stops = self.driven && !drives;
         if drives && !self.driven {
-            self.pending = ALL;
+            (self.pending, self.ahead) = (ALL, ALL);
         }
         self.driven = drives;
         stops
@@ -240,50 +244,12 @@ impl Slot {
         self.driven
     }
 
-    /// Lets go where the joint was driven and may be no longer; returns whether it has to be told.
+    /// Lets go where the joint was driven and may be no longer; returns whether it has to be told: not where nothing was
+    /// written to it since it was told last.
     pub(super) const fn let_go(&mut self) -> bool {
         let stops = self.driven && !(self.guard.is_armed() && self.guard.has_target());
         self.driven = self.driven && !stops;
-        stops
-    }
-
-    /// Notes that it is told to relax now. A joint that has a target again is brought up from the beginning after that.
-    pub(super) const fn told_to_relax(&mut self, now: Instant) {
-        self.stopped = now;
-        self.pending = ALL;
-    }
-
-    /// Returns the frame that is next to be written.
-    pub(super) fn next_write(&mut self, now: Instant) -> Command {
-        if !self.driven {
-            self.stopped = now;
-            return Command::DISABLE;
-        }
-        let next = self.pending.trailing_zeros() as usize;
-        self.pending &= self.pending.wrapping_sub(1);
-        match Register::SEQUENCE.get(next) {
-            Some(register) => Command::Write(*register, self.value(*register)),
-            None => Command::Write(Register::Position, self.target),
-        }
-    }
-
-    const fn value(&self, register: Register) -> i32 {
-        match register {
-            Register::Mode => self.settings.mode(),
-            Register::Current => self.settings.current(),
-            Register::Acceleration => self.settings.acceleration(),
-            Register::Deceleration => self.settings.deceleration(),
-            Register::Speed => self.speed,
-            Register::Enable => 1,
-            Register::Position | Register::ActualPosition | Register::ActualSpeed => self.target,
-        }
-    }
-
-    /// Takes back a write that was not sent.
-    pub(super) fn unwrite(&mut self, register: Register) {
-        if let Some(place) = Register::SEQUENCE.iter().position(|other| *other == register) {
-            self.pending |= 1 << place;
-        }
+        stops && self.ahead != ALL
     }
 
     /// Returns the frame that asks for what is next in turn.
@@ -304,10 +270,7 @@ impl Slot {
         let target = self.offset.target(self.directed(pulses));
         if target != self.target {
             self.target = target;
-            // The enable does not wait for one target after the other: the turn after it has this one.
-            if self.pending != LAST {
-                self.unwrite(Register::Position);
-            }
+            self.renew(Register::Position);
         }
     }
 
@@ -317,7 +280,7 @@ impl Slot {
         let speed = if pulses > FASTEST { FASTEST } else { pulses };
         if speed != self.speed {
             self.speed = speed;
-            self.unwrite(Register::Speed);
+            self.renew(Register::Speed);
         }
     }
 
@@ -326,7 +289,7 @@ impl Slot {
         for register in
             [Register::Mode, Register::Current, Register::Acceleration, Register::Deceleration]
         {
-            self.unwrite(register);
+            self.renew(register);
         }
     }
 

@@ -60,3 +60,81 @@ fn positions_saturate_and_refused_ones_relax() {
             .any(|c| matches!(c, Command::Write(Register::Speed, v) if *v > 278_528))
     );
 }
+
+/// Runs joints of which the first is led by `lead` and the others go back and forth in each tick, from where they are armed;
+/// returns what was written to the first.
+fn led_among_others(
+    count: u8,
+    ticks: i32,
+    lead: impl Fn(&mut Joints, Joint, i32),
+) -> Vec<(Register, i32)> {
+    let ids: Vec<u8> = (1..=count).collect();
+    let mut bench = Bench::armed(&ids);
+    let mut written = Vec::new();
+    for tick in 0..ticks {
+        let (first, others) = bench.handles.split_first().unwrap();
+        lead(&mut bench.joints, *first, tick);
+        for joint in others {
+            bench.joints.set_pulses(*joint, tick % 1_000).unwrap();
+        }
+        let of_first = bench.run(1).into_iter().filter(|(id, _)| *id == 1);
+        written.extend(of_first.filter_map(|(_, command)| match command {
+            Command::Write(register, value) => Some((register, value)),
+            Command::Read(_) => None,
+        }));
+    }
+    written
+}
+
+/// A hostile reader had a joint enabled with the target before, and kept there for ever, where its target changed once, just
+/// as only the enable waited, and others had news all the time.
+#[test]
+fn a_target_that_changes_in_any_tick_of_the_bring_up_is_written_also_where_others_have_news() {
+    for (count, longest) in [(1, 12), (2, 20), (6, 50)] {
+        for change in 0..longest {
+            let written = led_among_others(count, 300, |joints, joint, tick| {
+                let target = if tick < change { 4_000 } else { -4_000 };
+                joints.set_pulses(joint, target).unwrap();
+            });
+            let mut positions =
+                written.iter().filter(|(register, _)| *register == Register::Position);
+            assert_eq!(
+                positions.next_back(),
+                Some(&(Register::Position, -4_000)),
+                "{count}: {change}"
+            );
+            assert!(written.contains(&(Register::Enable, 1)), "{count}: {change}");
+        }
+    }
+}
+
+#[test]
+fn a_speed_that_changes_in_each_tick_holds_up_neither_the_target_nor_the_enable() {
+    let written = led_among_others(1, 60, |joints, joint, tick| {
+        let rpm = 20.0 + (tick % 50) as f32;
+        joints.set_speed(joint, AngularVelocity::from_rpm(rpm)).unwrap();
+        joints.set_pulses(joint, if tick < 40 { 100 } else { 4_000 }).unwrap();
+    });
+    let enabled = written.iter().position(|one| *one == (Register::Enable, 1)).unwrap();
+    assert!(written[..enabled].contains(&(Register::Position, 100)));
+    assert!(written.contains(&(Register::Position, 4_000)), "{written:?}");
+}
+
+/// A program that sends a target that is no number and a good one in each tick: all joints relaxed, in few frames.
+#[test]
+fn what_nothing_was_written_to_since_it_was_disabled_is_not_disabled_again() {
+    let ids: Vec<u8> = (1..=12).collect();
+    let mut bench = Bench::armed(&ids);
+    let mut disables = 0;
+    for _ in 0..1_000 {
+        for joint in bench.handles.clone() {
+            let nowhere = Position::from_angle(Angle::from_radians(f32::NAN));
+            assert_eq!(bench.joints.set_position(joint, nowhere), Err(TargetError::NotFinite));
+            bench.joints.set_pulses(joint, 4_000).unwrap();
+        }
+        let sent = bench.run(1);
+        disables += sent.iter().filter(|(_, command)| *command == Command::DISABLE).count();
+    }
+    // One a tick: of the joint that was written to in the tick before.
+    assert!((900..=1_100).contains(&disables), "{disables} in a second");
+}

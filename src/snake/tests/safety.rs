@@ -157,3 +157,15 @@ fn an_emergency_stop_in_the_middle_of_a_tick_disables_all_with_the_next_frames()
     assert_eq!((stops.count(), sent.len()), (12, 13)); // and one question
     assert_eq!(bench.joints.arm(at_ms(bench.ms)), Err(ArmError::Stopped));
 }
+
+/// The fuzzer found settings, which have the first register written anew, to look as if nothing had been written.
+#[test]
+fn a_joint_that_got_settings_while_it_is_brought_up_is_disabled_all_the_same() {
+    let mut bench = Bench::armed(&[1]);
+    let joint = bench.handles[0];
+    bench.joints.set_pulses(joint, 1_000).unwrap();
+    assert_eq!(writes(&bench.run(1)), [Command::Write(Register::Mode, 1)]);
+    bench.joints.set_settings(joint, Settings::new()).unwrap();
+    bench.joints.relax(joint);
+    assert_eq!(writes(&bench.run(1)), [Command::DISABLE]);
+}
