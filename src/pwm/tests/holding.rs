@@ -2,7 +2,19 @@
 
 use super::*;
 
-type Work = fn(&mut Brushed<Pin<'_>, TwoPins<Pin<'_>, Pin<'_>>>);
+type Motor<'a> = Brushed<Pin<'a>, TwoPins<Pin<'a>, Pin<'a>>>;
+type Work = fn(&mut Motor<'_>);
+
+/// Armed; its speed loop does nothing but integrate.
+fn integrator(log: &Log) -> Motor<'_> {
+    let pins = TwoPins(pin("in1", log), pin("in2", log));
+    let integral = PidConfig::new(0.0, 0.001, 0.0);
+    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
+    let mut motor = Brushed::new(pin("pwm", log), pins, config).unwrap();
+    motor.ingest_counts(0, at_ms(0));
+    motor.arm(at_ms(0)).unwrap();
+    motor
+}
 
 /// What is held for an update without a step is the output of the target in force, not one from before a rest.
 #[test]
@@ -41,12 +53,7 @@ fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
 #[test]
 fn a_speed_loop_does_not_take_over_a_duty_from_before_a_rest() {
     let log = Log::default();
-    let pins = TwoPins(pin("in1", &log), pin("in2", &log));
-    let integral = PidConfig::new(0.0, 0.001, 0.0);
-    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
-    let mut motor = Brushed::new(pin("pwm", &log), pins, config).unwrap();
-    motor.ingest_counts(0, at_ms(0));
-    motor.arm(at_ms(0)).unwrap();
+    let mut motor = integrator(&log);
     motor.set_duty(1.0).unwrap();
     motor.update(tick(1)).unwrap();
     assert_eq!(last(&log), 20_000);
@@ -60,12 +67,7 @@ fn a_speed_loop_does_not_take_over_a_duty_from_before_a_rest() {
 #[test]
 fn a_speed_loop_does_not_take_over_a_duty_that_never_was() {
     let log = Log::default();
-    let pins = TwoPins(pin("in1", &log), pin("in2", &log));
-    let integral = PidConfig::new(0.0, 0.001, 0.0);
-    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
-    let mut motor = Brushed::new(pin("pwm", &log), pins, config).unwrap();
-    motor.ingest_counts(0, at_ms(0));
-    motor.arm(at_ms(0)).unwrap();
+    let mut motor = integrator(&log);
     motor.set_duty(1.0).unwrap();
     motor.set_velocity((), AngularVelocity::ZERO).unwrap();
     motor.update(tick(1)).unwrap();
