@@ -407,7 +407,8 @@ impl CanDevice for Watched {
         if holds {
             let zero = self.held < 2 || self.alone.iter().all(|alone| alone.word == 0);
             assert!(zero, "driven without time: {:?}", self.alone);
-            let kept = self.alone.iter().find(|alone| alone.has_rested && alone.word != 0);
+            let is_new = |alone: &&Alone| alone.has_rested || alone.first_velocity;
+            let kept = self.alone.iter().filter(is_new).find(|alone| alone.word != 0);
             assert!(kept.is_none(), "I9: a command outlived its rest: {kept:?}");
         } else {
             self.check_motors(now);
