@@ -708,24 +708,6 @@ fn a_motor_that_is_relaxed_before_each_target_is_looked_at_by_what_it_was_sent()
     }
 }
 
-/// A hostile reader had full current from a speed loop that took over from a raw command which was replaced before it was
-/// sent (I9).
-#[test]
-fn a_speed_loop_does_not_take_over_from_a_command_that_was_never_sent() {
-    let integral = PidConfig::new(0.0, 0.01, 0.0);
-    let (mut bus, motor) = armed(Config::<M3508>::new(1).speed_loop(integral));
-    bus.set_raw(motor, 16_384).unwrap();
-    bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
-    step(&mut bus, 2_000);
-    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
-    // From one that was, it does.
-    bus.set_raw(motor, 5_000).unwrap();
-    step(&mut bus, 3_000);
-    bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
-    step(&mut bus, 4_000);
-    assert_eq!(sent(&mut bus), [(0x200, [5_000, 0, 0, 0])]);
-}
-
 /// A program may arm in each tick: a jam relaxes the motor again after each window all the same.
 #[test]
 fn a_jam_that_relaxes_does_so_again_where_the_motor_is_armed_again_at_once() {

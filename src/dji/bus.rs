@@ -341,6 +341,12 @@ impl<B> Bus<B> {
     }
 
     pub(super) fn slot_mut(&mut self, motor: AnyHandle<B>) -> Option<&mut Slot> {
-        self.slots.get_mut(motor.key().index()).filter(|slot| slot.matches(motor.key()))
+        find(&mut self.slots, motor.key())
     }
+}
+
+/// Returns the slot of a motor, without borrowing the rest of its bus.
+#[inline]
+pub(super) fn find(slots: &mut [Slot], key: Key) -> Option<&mut Slot> {
+    slots.get_mut(key.index()).filter(|slot| slot.matches(key))
 }

@@ -188,6 +188,10 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
     pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
         self.admit(share.is_finite())?;
+        if !matches!(self.target, Target::Duty(_)) {
+            // The loop has no part in the output from now on.
+            self.speed.iter_mut().for_each(Pid::reset);
+        }
         self.target = Target::Duty(share);
         Ok(())
     }
@@ -238,7 +242,9 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     fn command(&mut self, tick: Tick) -> f32 {
         if !self.guard.drives(tick.now()) {
             // Late counts leave the integral as it is; without a target it starts afresh.
-            if !self.guard.has_target() {
+            if self.guard.has_target() {
+                self.speed.iter_mut().for_each(Pid::forget_take_over);
+            } else {
                 self.rest();
             }
             return 0.0;
@@ -259,6 +265,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         if !self.guard.has_target() {
             // What was asked for before, and its output, are over.
             (self.target, self.may_hold) = (Target::Rest, false);
+            self.speed.iter_mut().for_each(Pid::forget_take_over);
         }
         self.guard.admit(is_finite)
     }

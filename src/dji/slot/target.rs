@@ -2,7 +2,7 @@ use super::arming::Arming;
 use super::{Slot, is_loop};
 use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
-use crate::dji::command::to_raw;
+use crate::dji::command::{Outbox, to_raw};
 use crate::dji::range::Range;
 use crate::encoder::Position;
 use crate::motor::{Link, TargetError};
@@ -119,10 +119,11 @@ impl Slot {
         &mut self,
         rad_per_s: f32,
         now: u32,
+        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
         needs(self.loops.speed())?;
-        self.enter_speed_loop();
+        self.enter_speed_loop(sent);
         self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
     }
@@ -132,6 +133,7 @@ impl Slot {
         &mut self,
         angle: Position,
         now: u32,
+        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
         needs(self.loops.position())?;
@@ -139,7 +141,7 @@ impl Slot {
             return Err(TargetError::NotHomed);
         }
         let (_, phase) = self.shaft.locate(angle);
-        self.enter_position_loop();
+        self.enter_position_loop(sent);
         self.start(Action::Angle, Goal::of(phase), now);
         Ok(())
     }
@@ -149,11 +151,12 @@ impl Slot {
         &mut self,
         position: Position,
         now: u32,
+        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
         needs(self.loops.position())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
-        self.enter_position_loop();
+        self.enter_position_loop(sent);
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);
         Ok(())
@@ -204,6 +207,10 @@ impl Slot {
     fn ask(&mut self, action: Action, goal: Goal) {
         self.goal = goal;
         if self.asked != action {
+            if action == Action::Raw {
+                // The loops have no part in what is sent from now on.
+                self.loops.reset();
+            }
             self.asked = action;
             self.settle();
         }
@@ -229,16 +236,19 @@ impl Slot {
         };
     }
 
-    /// What is asked for has an output from now on.
+    /// What is asked for has an output from now on: its own, and not one from before the rest that a loop was to take
+    /// over.
     pub(super) fn end_rest(&mut self) {
+        self.loops.forget_take_over();
         self.duty = Duty::Other;
         self.settle();
     }
 
-    /// The speed loop takes over from a direct command that was sent: no jump of the output.
-    pub(super) fn enter_speed_loop(&mut self) {
-        if self.asked == Action::Raw && !self.has_rested() {
-            self.loops.speed_mut().reset_to(self.goal.raw() as f32 / self.raw_per_unit);
+    /// The speed loop takes over from a direct command at what was sent last: no jump of the output.
+    pub(super) fn enter_speed_loop(&mut self, sent: &Outbox) {
+        if self.asked == Action::Raw {
+            let last = self.in_units(sent.get(self.place));
+            self.loops.speed_mut().reset_to(last);
         } else if self.asked == Action::Measured {
             // Another sensor: its last reading says nothing of the next one.
             self.loops.interrupt();
@@ -246,11 +256,11 @@ impl Slot {
     }
 
     /// The position loop starts from the present velocity: no jump of its output.
-    fn enter_position_loop(&mut self) {
+    fn enter_position_loop(&mut self, sent: &Outbox) {
         if self.asked.is_way() {
             return;
         }
-        self.enter_speed_loop();
+        self.enter_speed_loop(sent);
         if self.asked != Action::Rest {
             let velocity = self.velocity().as_rad_per_s();
             self.loops.position_mut().reset_to(velocity);

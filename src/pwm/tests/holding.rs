@@ -79,3 +79,39 @@ fn a_speed_loop_does_not_take_over_a_duty_that_never_was() {
     motor.update(tick(3)).unwrap();
     assert_eq!(last(&log), 10_000);
 }
+
+/// Nor from a loop that a direct duty replaced since, or one that was to take over when a rest came.
+#[test]
+fn a_speed_loop_does_not_go_on_from_before_a_duty_or_a_rest() {
+    let velocity: Work = |motor| motor.set_velocity((), AngularVelocity::ZERO).unwrap();
+    let nowhere: Work = |motor| {
+        let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
+        assert_eq!(motor.set_velocity((), nowhere), Err(TargetError::NotFinite));
+    };
+    let full: Work = |motor| motor.set_duty(1.0).unwrap();
+    let none: Work = |motor| motor.set_duty(0.0).unwrap();
+    // Each with a millisecond after it, but for those that are followed at once.
+    let replaced: &[&[Work]] = &[&[full], &[velocity], &[none], &[nowhere, velocity]];
+    let interrupted: &[&[Work]] = &[&[full], &[velocity, nowhere], &[velocity]];
+    let at_once: &[&[Work]] = &[&[full], &[velocity, nowhere, velocity]];
+    for steps in [replaced, interrupted, at_once] {
+        let log = Log::default();
+        let mut motor = integrator(&log);
+        for (ms, works) in (1..).zip(steps) {
+            works.iter().for_each(|work| work(&mut motor));
+            motor.update(tick(ms)).unwrap();
+        }
+        assert_eq!(last(&log), 0);
+    }
+    // Late before the loop took over: the encoder is heard again at 30 ms.
+    let log = Log::default();
+    let mut motor = integrator(&log);
+    full(&mut motor);
+    motor.update(tick(1)).unwrap();
+    velocity(&mut motor);
+    motor.update(tick(20)).unwrap();
+    assert_eq!(last(&log), 0);
+    motor.ingest_counts(0, at_ms(30));
+    motor.update(tick(30)).unwrap();
+    assert_eq!(last(&log), 0);
+}
