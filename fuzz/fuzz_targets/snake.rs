@@ -53,7 +53,7 @@ struct Known {
     moves: bool,
     /// It was led and may be no longer: a disable comes first, whatever follows.
     stop_due: bool,
-    /// That disable was given back, and waits for a good update.
+    /// That disable was given back, and waits for the next update.
     stop_returned: bool,
 }
 
@@ -72,7 +72,13 @@ struct Story {
     /// The time of the last good update, and of arming after it: what new targets get.
     tick: u64,
     updated: u64,
+    /// The time of the last update, good or not.
+    clock: u64,
     held: u32,
+    /// Writes that wait in the driver, which may still give them back.
+    kept: Vec<CanFrame>,
+    handed_out: u32,
+    given_back: u32,
     taken: u32,
     malformed: u32,
     unrelated: u32,
@@ -91,7 +97,11 @@ impl Story {
             now: 0,
             tick: 0,
             updated: 0,
+            clock: 0,
             held: 0,
+            kept: Vec::new(),
+            handed_out: 0,
+            given_back: 0,
             taken: 0,
             malformed: 0,
             unrelated: 0,
@@ -130,7 +140,13 @@ impl Story {
                     self.send(flags);
                 }
                 // What was left over, whatever has come since the update.
-                11 => self.send(flags),
+                11 => {
+                    if flags & 4 != 0 {
+                        let kept = core::mem::take(&mut self.kept);
+                        kept.iter().for_each(|frame| self.give_back(frame));
+                    }
+                    self.send(flags);
+                }
                 op => self.call(op, flags, index, payload),
             }
             for (index, (before, after)) in armed.into_iter().zip(self.are_armed()).enumerate() {
@@ -250,24 +266,30 @@ impl Story {
         let bad_steps = self.joints.counters().bad_steps;
         self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
         let holds = self.joints.counters().bad_steps != bad_steps;
+        let stands = self.now == self.clock && self.clock != 0;
         assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
         self.held = if holds { self.held + 1 } else { 0 };
         if self.held >= 2 {
             self.known.iter_mut().for_each(Known::end);
         }
+        self.clock = if holds { self.clock.max(self.now) } else { self.now };
+        for known in &mut self.known {
+            known.stop_returned = false;
+            let waits = |(_, at): &(_, u64)| {
+                let waited = self.clock.checked_sub(*at);
+                waited.is_some_and(|waited| waited <= REPLY_US)
+                    && !(holds && stands && u64::from(self.held) * 1_000 > REPLY_US)
+            };
+            known.due = known.due.filter(waits);
+        }
         if !holds {
             (self.tick, self.updated) = (self.now, self.now);
             for (known, handle) in self.known.iter_mut().zip(&self.handles) {
-                known.stop_returned = false;
                 // Its feedback or its target is too old, say.
                 if !self.joints.state(*handle).is_some_and(|state| state.is_driven) {
                     known.end();
                 }
                 known.news = [false; 2];
-                let waited = |(_, at): &(_, u64)| {
-                    self.now.checked_sub(*at).is_some_and(|waited| waited <= REPLY_US)
-                };
-                known.due = known.due.filter(waited);
             }
         }
     }
@@ -277,10 +299,13 @@ impl Story {
             let Some(frame) = self.joints.next_frame() else { break };
             assert!(sent < 12 + 2 + 3, "I1: bounded");
             (frame.header(), frame.data()).hash(&mut self.sent);
+            self.handed_out += 1;
             self.check(&frame);
+            let is_write = !matches!(Command::decode(frame.data()), Some(Command::Read(_)));
             if flags & 2 != 0 {
-                assert!(self.joints.requeue(&frame));
-                self.take_back(&frame);
+                self.give_back(&frame);
+            } else if flags & 8 != 0 && is_write && self.kept.len() < 8 {
+                self.kept.push(frame);
             }
         }
         for known in &self.known {
@@ -298,7 +323,7 @@ impl Story {
         let known = &mut self.known[index];
         assert!(known.due.is_none(), "sent while an answer is due: {known:?}");
         if let Command::Read(register) = command {
-            known.due = Some((register, self.tick));
+            known.due = Some((register, self.clock));
         }
         if let Command::Write(register, value) = command {
             match register {
@@ -334,7 +359,13 @@ impl Story {
         assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.tick);
     }
 
-    fn take_back(&mut self, frame: &CanFrame) {
+    fn give_back(&mut self, frame: &CanFrame) {
+        if !self.joints.requeue(frame) {
+            let is_detached = |joint| self.joints.link(joint).is_none();
+            assert!(self.handles.iter().any(|joint| is_detached(*joint)), "{frame:?}");
+            return;
+        }
+        self.given_back += 1;
         let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
         let known = &mut self.known[index.expect("checked before")];
         match Command::decode(frame.data()) {
@@ -355,6 +386,9 @@ impl Story {
         let malformed = counters.bad_length + counters.bad_field + counters.foreign_commands;
         assert_eq!(malformed, self.malformed, "I6");
         assert!(counters.unattached <= self.unrelated, "I6");
+        let sent = self.handed_out - self.given_back;
+        let waiting = counters.packed.checked_sub(counters.superseded + sent);
+        assert!(waiting.is_some_and(|waiting| waiting <= 9), "I6: {counters:?}, {sent} sent");
     }
 }
 

@@ -61,9 +61,11 @@ pub struct Joints {
     /// The same, given back: for the next update.
     pub(super) returned: (u16, u16, u16),
     pub(super) reads_first: bool,
-    /// Who was written to and asked last.
+    /// Who was chosen to be written to and asked last, and who was written to and asked last.
     pub(super) last_write: u8,
     pub(super) last_read: u8,
+    pub(super) written: u8,
+    pub(super) asked: u8,
     held_steps: u8,
     /// Frames that are sent are heard again.
     pub(super) echoes: bool,
@@ -92,9 +94,9 @@ pub struct Counters {
     pub unanswered: u32,
     /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
     pub bad_steps: u32,
-    /// Frames that an update had ready; wraps.
+    /// Frames that were ready: chosen by an update, or one that disables, whenever that is due; wraps.
     pub packed: u32,
-    /// Frames that were replaced by newer ones before they were taken; wraps.
+    /// Frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
     pub superseded: u32,
 }
 
@@ -116,6 +118,8 @@ impl Joints {
             reads_first: false,
             last_write: 0,
             last_read: IDS / 2,
+            written: IDS - 1,
+            asked: IDS - 1,
             held_steps: 0,
             echoes: false,
             stopped: false,
@@ -171,8 +175,7 @@ impl Joints {
         let Some(slot) = self.slot_mut(joint) else { return };
         slot.free();
         self.stop(joint.index());
-        self.reads &= !(1 << joint.index());
-        self.returned.2 &= !(1 << joint.index());
+        self.drop_read(joint.index());
     }
 
     /// Takes a received frame that arrived at `now`. Constant time.
@@ -210,34 +213,57 @@ impl Joints {
 
     /// Chooses who is asked and written to, and relaxes who may not move.
     ///
-    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that stands still, change nothing for one update; a
-    /// second one in a row relaxes all joints.
+    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that stands still, choose nobody for one update; a
+    /// second one in a row relaxes all joints. Who is to be disabled is so all the same.
     pub fn update(&mut self, tick: Tick) {
         let stands = tick.now() == self.now && self.now != Instant::START;
         if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() || stands {
-            count(&mut self.counters.bad_steps);
-            self.held_steps = self.held_steps.saturating_add(1);
-            if self.held_steps >= 2 {
-                (0..SLOTS).for_each(|index| self.relax_at(index));
-            }
-            return;
+            return self.hold(tick.now(), stands);
         }
         self.held_steps = 0;
         self.now = tick.now();
+        self.give_up(Some(self.reply_timeout));
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index) else { continue };
-            if slot.give_up(tick.now(), self.reply_timeout) {
-                count(&mut self.counters.unanswered);
-            }
-            if slot.id.is_none() {
-                continue;
-            }
-            let stops = slot.update(tick.now());
-            if stops || slot.wants_reminder(tick.now()) {
+            if slot.id.is_some() && slot.update(tick.now()) {
                 self.stop(index);
             }
         }
+        self.remind();
         self.plan();
+    }
+
+    /// An update without a step chooses nobody, but sees to what makes a joint safe.
+    fn hold(&mut self, now: Instant, stands: bool) {
+        count(&mut self.counters.bad_steps);
+        self.held_steps = self.held_steps.saturating_add(1);
+        if self.held_steps >= 2 {
+            (0..SLOTS).for_each(|index| self.relax_at(index));
+        }
+        self.now = self.now.max(now);
+        // A clock that stands never tells that an answer is overdue: then an update counts for a millisecond.
+        let held = Duration::from_millis(self.held_steps.into());
+        let is_long = held > self.reply_timeout || self.held_steps == u8::MAX;
+        self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
+        self.remind();
+        self.stop_again();
+    }
+
+    fn give_up(&mut self, reply_timeout: Option<Duration>) {
+        for slot in &mut self.slots {
+            if slot.give_up(self.now, reply_timeout) {
+                count(&mut self.counters.unanswered);
+            }
+        }
+    }
+
+    fn remind(&mut self) {
+        for index in 0..SLOTS {
+            let slot = self.slots.get(index).filter(|slot| slot.id.is_some());
+            if slot.is_some_and(|slot| slot.wants_reminder(self.now)) {
+                self.stop(index);
+            }
+        }
     }
 
     /// Takes the target of a joint away.

@@ -10,13 +10,13 @@ use embedded_can::Frame;
 impl Joints {
     /// Chooses the frames of this update: what was left or given back, then those whose turn it is.
     pub(super) fn plan(&mut self) {
-        let left = (self.stops | self.writes | self.reads).count_ones();
-        let (stops, writes, reads) = core::mem::take(&mut self.returned);
-        // What the driver refused goes first, so that neither starves the other.
-        self.reads_first = self.reads | reads != 0 && self.writes | writes == 0;
-        self.stops |= stops;
+        self.stop_again();
+        let (_, writes, reads) = core::mem::take(&mut self.returned);
+        self.drop_frames(self.writes.count_ones() + self.reads.count_ones());
         self.writes |= writes;
         self.reads |= reads;
+        // What had no room goes first, and where both had none, they take turns: neither starves the other.
+        self.reads_first = self.reads != 0 && !(self.writes != 0 && self.reads_first);
         // Whoever owes an answer is in nobody's way.
         let quiet = self.owing();
         // Who has news goes before who only hears the old again.
@@ -43,9 +43,22 @@ impl Joints {
                 self.last_read = index;
             }
         }
-        let packed = (self.stops | self.writes | self.reads).count_ones();
-        self.counters.packed = self.counters.packed.wrapping_add(packed);
-        self.counters.superseded = self.counters.superseded.wrapping_add(left);
+        self.pack(self.writes.count_ones() + self.reads.count_ones());
+    }
+
+    /// Has the joints whose disable was given back disabled now.
+    pub(super) fn stop_again(&mut self) {
+        let stops = core::mem::take(&mut self.returned.0);
+        self.pack((stops & !self.stops).count_ones());
+        self.stops |= stops;
+    }
+
+    const fn pack(&mut self, frames: u32) {
+        self.counters.packed = self.counters.packed.wrapping_add(frames);
+    }
+
+    const fn drop_frames(&mut self, frames: u32) {
+        self.counters.superseded = self.counters.superseded.wrapping_add(frames);
     }
 
     /// Tells whether a joint is there and owes no answer.
@@ -65,12 +78,14 @@ impl Joints {
             }
             return Command::DISABLE.frame(index + 1);
         }
-        let (write, read) = (lowest(self.writes & !quiet), lowest(self.reads & !quiet));
+        let write = next_after(self.written, self.writes & !quiet);
+        let read = next_after(self.asked, self.reads & !quiet);
         match (write, read) {
             (Some(index), None) => self.write(index),
             (Some(index), Some(_)) if !self.reads_first => self.write(index),
             (_, Some(index)) => {
                 self.reads &= !(1 << index);
+                self.asked = index;
                 count(&mut self.counters.requests);
                 self.slots.get_mut(usize::from(index))?.next_read(now).frame(index + 1)
             }
@@ -80,6 +95,7 @@ impl Joints {
 
     fn write(&mut self, index: u8) -> Option<CanFrame> {
         self.writes &= !(1 << index);
+        self.written = index;
         self.slots.get_mut(usize::from(index))?.next_write(self.now).frame(index + 1)
     }
 
@@ -91,41 +107,69 @@ impl Joints {
 
     /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
     pub fn requeue(&mut self, frame: &CanFrame) -> bool {
-        let index = frame.header().wrapping_sub(1);
-        let Some(slot) = self.slots.get_mut(index as usize) else { return false };
+        let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
+        let Some(slot) = self.slots.get_mut(usize::from(index)) else { return false };
         let Some(command) = Command::decode(frame.data()) else { return false };
         let (bit, attached) = (1 << index, slot.id.is_some());
+        // So that it is the next one.
+        let before = (index + IDS - 1) % IDS;
         match command {
             Command::DISABLE => {
                 slot.told_to_relax(self.now);
                 self.returned.0 |= bit;
-                // It comes first the next time too.
-                self.writes &= !bit;
+                self.drop_write(bit);
             }
             _ if !attached => return false,
             Command::Write(register, _) => {
                 slot.take_back(register);
                 self.returned.1 |= bit;
+                self.written = before;
             }
             Command::Read(_) => {
                 slot.awaiting = None;
                 self.returned.2 |= bit;
+                self.asked = before;
             }
         }
+        self.drop_frames(1);
         true
     }
 
     /// Has a joint disabled before all else.
     pub(super) const fn stop(&mut self, index: usize) {
-        self.stops |= 1 << index;
-        self.writes &= !(1 << index);
-        self.returned.1 &= !(1 << index);
+        let bit = 1 << index;
+        self.pack((bit & !self.stops).count_ones());
+        self.stops |= bit;
+        self.drop_write(bit);
+    }
+
+    /// What is to be disabled is written nothing else before.
+    const fn drop_write(&mut self, bit: u16) {
+        self.drop_frames((self.writes & bit).count_ones());
+        self.writes &= !bit;
+        self.returned.1 &= !bit;
+    }
+
+    /// Asks a joint that is detached nothing more.
+    pub(super) const fn drop_read(&mut self, index: usize) {
+        let bit = 1 << index;
+        self.drop_frames((self.reads & bit).count_ones());
+        self.reads &= !bit;
+        self.returned.2 &= !bit;
     }
 }
 
 /// All joints, beginning with the one after `last`.
 fn turns(last: u8) -> impl Iterator<Item = u8> {
     (1..=IDS).map(move |step| (last + step) % IDS)
+}
+
+/// Returns the first of some joints behind `last`, or else the first.
+const fn next_after(last: u8, joints: u16) -> Option<u8> {
+    match lowest(joints & (u16::MAX << (last + 1))) {
+        None => lowest(joints),
+        next => next,
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "at most 15")]

@@ -201,11 +201,11 @@ impl Slot {
         }
     }
 
-    /// Waits no longer for an answer that is overdue; returns whether one is.
-    pub(super) fn give_up(&mut self, now: Instant, reply_timeout: Duration) -> bool {
+    /// Waits no longer for an answer that is overdue; returns whether one is. Without a time-out any is.
+    pub(super) fn give_up(&mut self, now: Instant, reply_timeout: Option<Duration>) -> bool {
         let Some((_, since)) = self.awaiting else { return false };
         // A clock that was set back would have it wait for long.
-        let overdue = now.since(since) > reply_timeout || now < since;
+        let overdue = reply_timeout.is_none_or(|timeout| now.since(since) > timeout || now < since);
         if overdue {
             self.unanswered = self.unanswered.saturating_add(1);
             self.awaiting = None;

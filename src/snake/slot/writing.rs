@@ -40,9 +40,10 @@ impl Slot {
         }
     }
 
-    /// Takes back a write that was not sent: it is the next one.
+    /// Takes back a write that was not sent: its turn comes again, and after that those behind it. Whoever is before it in
+    /// the sequence stays there.
     pub(in crate::snake) fn take_back(&mut self, register: Register) {
-        self.ahead = self.renew(register).wrapping_neg();
+        self.ahead |= self.renew(register).wrapping_neg();
     }
 
     /// Has a register written anew; returns its bit.

@@ -124,3 +124,94 @@ fn a_driver_that_takes_one_frame_a_tick_starves_no_joint() {
     assert!(written.iter().all(|count| *count > 20), "{written:?}");
     assert!(asked.iter().all(|count| *count > 20), "{asked:?}");
 }
+
+/// A hostile reader had no question sent, and joint 12 written nothing, where more is written in an update than the driver
+/// has room for.
+#[test]
+fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
+    for (reads, writes, room) in [(1, 4, 3), (4, 1, 3), (4, 4, 3), (2, 5, 2), (1, 1, 1)] {
+        // Some of them ask seldom.
+        let patient = Timeouts::new().with_late(Duration::from_millis(400));
+        let patient = patient.with_offline(Duration::from_millis(500));
+        let mut joints = Joints::new().with_timeouts(patient).with_frames_per_update(reads, writes);
+        let handles = ALL.map(|id| joints.attach(Config::new(id)).unwrap());
+        let mut bench = Bench { joints, handles: handles.to_vec(), ..Bench::new(&[]) };
+        bench.run(60);
+        bench.joints.arm(at_ms(bench.ms)).unwrap();
+        let (mut asked, mut written) = ([0; 12], [0; 12]);
+        for _ in 0..1_200 {
+            bench.ms += 1;
+            for joint in handles {
+                _ = bench.joints.set_pulses(joint, 1_000);
+            }
+            bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+            for _ in 0..room {
+                let Some(frame) = bench.joints.next_frame() else { break };
+                let id = u8::try_from(frame.header()).unwrap();
+                let command = Command::decode(frame.data()).unwrap();
+                let is_read = matches!(command, Command::Read(_));
+                let counts = if is_read { &mut asked } else { &mut written };
+                counts[usize::from(id - 1)] += 1;
+                bench.answer(id, command);
+            }
+            if let Some(refused) = bench.joints.next_frame() {
+                assert!(bench.joints.requeue(&refused));
+            }
+        }
+        let all = asked.iter().chain(&written);
+        assert!(
+            all.clone().all(|count| *count >= 20),
+            "{reads} {writes} {room}: {asked:?} {written:?}"
+        );
+        assert!(bench.enabled == [1; 12], "{reads} {writes} {room}");
+    }
+}
+
+/// I6, through refusals, stops in the middle of a tick and detaching.
+#[test]
+fn frames_that_were_ready_are_sent_superseded_or_wait() {
+    let mut bench = Bench::armed(&ALL);
+    let before = bench.joints.counters();
+    let (mut taken, mut given_back) = (0_u32, 0_u32);
+    for round in 0..600_u32 {
+        bench.ms += 1;
+        for joint in bench.handles.clone() {
+            _ = bench.joints.set_pulses(joint, 1_000);
+        }
+        bench.joints.update(Tick::new(at_ms(bench.ms), if round % 7 == 3 { 0.0 } else { 0.001 }));
+        match round % 50 {
+            20 => bench.joints.relax(bench.handles[3]),
+            30 => bench.joints.emergency_stop(),
+            40 => {
+                bench.joints.clear_emergency_stop();
+                _ = bench.joints.arm(at_ms(bench.ms));
+            }
+            45 => {
+                bench.joints.detach(bench.handles[7]);
+                bench.handles[7] = bench.joints.attach(Config::new(8)).unwrap();
+            }
+            _ => {}
+        }
+        for place in 0..round % 6 {
+            let Some(frame) = bench.joints.next_frame() else { break };
+            taken += 1;
+            if (round + place) % 5 == 0 {
+                given_back += u32::from(bench.joints.requeue(&frame));
+            } else {
+                let id = u8::try_from(frame.header()).unwrap();
+                bench.answer(id, Command::decode(frame.data()).unwrap());
+            }
+        }
+        if round % 50 > 30 {
+            bench.joints.disarm(); // with what was just given back
+        }
+    }
+    bench.joints.update(Tick::new(at_ms(bench.ms + 1), 0.0)); // what came back is ready again
+    let waiting = core::iter::from_fn(|| bench.joints.next_frame()).count();
+    let waiting = u32::try_from(waiting).unwrap();
+    let after = bench.joints.counters();
+    let packed = after.packed - before.packed;
+    let superseded = after.superseded - before.superseded;
+    assert!(given_back > 50 && superseded > given_back);
+    assert_eq!(packed, taken - given_back + superseded + waiting);
+}

@@ -169,3 +169,48 @@ fn a_joint_that_got_settings_while_it_is_brought_up_is_disabled_all_the_same() {
     bench.joints.relax(joint);
     assert_eq!(writes(&bench.run(1)), [Command::DISABLE]);
 }
+
+/// What a driver with room for `room` frames takes of an update without a step, some milliseconds on.
+fn held(bench: &mut Bench, room: usize, ms: u64) -> Vec<(u8, Command)> {
+    bench.ms += ms;
+    bench.joints.update(Tick::new(at_ms(bench.ms), f32::NAN));
+    let mut taken = Vec::new();
+    while let Some(frame) = bench.joints.next_frame() {
+        if taken.len() == room {
+            assert!(bench.joints.requeue(&frame));
+            break;
+        }
+        taken.push((u8::try_from(frame.header()).unwrap(), Command::decode(frame.data()).unwrap()));
+    }
+    taken
+}
+
+/// A hostile reader had joints go on for ever whose disable was refused, or waited for an answer, while the updates had no
+/// step.
+#[test]
+fn updates_without_a_step_disable_all_however_small_the_driver_and_whoever_owes_an_answer() {
+    // The clock goes on with a step that is no number, and it stands.
+    for goes_on in [1, 0] {
+        let mut bench = Bench::armed(&ALL);
+        bench.drive(200);
+        bench.silent = ALL.to_vec();
+        bench.drive(1);
+        let mut disabled = Vec::new();
+        for _ in 0..12 {
+            let sent = held(&mut bench, 3, goes_on);
+            assert!(sent.iter().all(|(_, command)| *command == Command::DISABLE), "{sent:?}");
+            disabled.extend(sent.iter().map(|(id, _)| *id));
+        }
+        disabled.sort_unstable();
+        assert_eq!(disabled, ALL);
+    }
+}
+
+/// And is told again, as long as time passes.
+#[test]
+fn a_relaxed_joint_is_told_again_each_100_ms_by_updates_without_a_step() {
+    let mut bench = Bench::armed(&[3]);
+    bench.drive(20);
+    let sent: Vec<_> = (0..350).flat_map(|_| held(&mut bench, 3, 1)).collect();
+    assert_eq!(sent, [(3, Command::DISABLE); 4]);
+}
