@@ -6,74 +6,33 @@
 //! | DBUS | PC11, USART3 (the board inverts the signal) | DR16 receiver |
 //! | UART2, 4 pins | PB7 receive, PA9 transmit, USART1 | HiPNUC IMU, 115200 baud, 100 Hz |
 //!
-//! Pins and the 12 MHz crystal: DJI's own examples for this board. Flash with a probe on the SWD plug:
-//! `probe-rs run --chip STM32F407IGHx target/thumbv7em-none-eabihf/release/c-board-embassy`
+//! Pins and the 12 MHz crystal: DJI's own examples for this board. Flash with a probe on the SWD plug; what happens to the
+//! motors is told there: `probe-rs run --chip STM32F407IGHx target/thumbv7em-none-eabihf/release/c-board-embassy`
 #![no_std]
 #![no_main]
 
+use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use core::cell::RefCell;
+use defmt_rtt as _;
 use drivetrain::dji::Bus;
 use drivetrain::motor::CanDevice;
-use drivetrain::runner::{Nb, Runner};
-use drivetrain::time::Instant;
+use drivetrain::runner::Runner;
 use embassy_executor::Spawner;
-use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, Can, filter::Mask32};
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
-use embassy_stm32::{Config, bind_interrupts, peripherals, rcc, time::Hertz};
+use embassy_stm32::{bind_interrupts, peripherals, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
 use embassy_time::{Duration, Ticker};
-use embedded_can::ErrorKind;
 use embedded_io_async::Read;
-use panic_halt as _;
+use panic_probe as _;
 use pilot::{Pilot, Wish};
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Interrupts {
-    CAN1_TX => can::TxInterruptHandler<peripherals::CAN1>;
-    CAN1_RX0 => can::Rx0InterruptHandler<peripherals::CAN1>;
-    CAN1_RX1 => can::Rx1InterruptHandler<peripherals::CAN1>;
-    CAN1_SCE => can::SceInterruptHandler<peripherals::CAN1>;
     USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
     USART1 => usart::BufferedInterruptHandler<peripherals::USART1>;
 });
 
-/// embassy's buffered halves as one polled driver: neither of its CAN types implements a trait of `embedded-can`.
-struct Halves(BufferedCanSender, BufferedCanReceiver);
-
-impl embedded_can::nb::Can for Halves {
-    type Frame = can::Frame;
-    type Error = ErrorKind;
-
-    fn transmit(&mut self, frame: &can::Frame) -> nb::Result<Option<can::Frame>, ErrorKind> {
-        self.0.try_write(*frame).map(|()| None).map_err(|_| nb::Error::WouldBlock)
-    }
-
-    fn receive(&mut self) -> nb::Result<can::Frame, ErrorKind> {
-        match self.1.try_receive() {
-            Ok(Ok(envelope)) => Ok(envelope.frame),
-            Ok(Err(error)) => Err(nb::Error::Other(kind(&error))),
-            Err(_) => Err(nb::Error::WouldBlock),
-        }
-    }
-}
-
-fn kind(error: &can::enums::BusError) -> ErrorKind {
-    use can::enums::BusError;
-    match error {
-        BusError::Stuff => ErrorKind::Stuff,
-        BusError::Form => ErrorKind::Form,
-        BusError::Acknowledge => ErrorKind::Acknowledge,
-        BusError::BitRecessive | BusError::BitDominant => ErrorKind::Bit,
-        BusError::Crc => ErrorKind::Crc,
-        BusError::Software => ErrorKind::Other,
-    }
-}
-
 type Shared<T> = Mutex<ThreadModeRawMutex, RefCell<T>>;
-
-fn now() -> Instant {
-    Instant::from_micros(embassy_time::Instant::now().as_micros())
-}
 
 #[embassy_executor::task]
 async fn hear_remote(mut port: BufferedUartRx<'static>, pilot: &'static Shared<Pilot>) {
@@ -98,14 +57,6 @@ async fn hear_imu(mut port: BufferedUartRx<'static>, pilot: &'static Shared<Pilo
 async fn main(spawner: Spawner) {
     let board = embassy_stm32::init(clocks());
 
-    static SENDING: StaticCell<can::TxBuf<8>> = StaticCell::new();
-    static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
-    let mut can = Can::new(board.CAN1, board.PD0, board.PD1, Interrupts);
-    can.modify_filters().enable_bank(0, can::Fifo::Fifo0, Mask32::accept_all());
-    can.set_bitrate(1_000_000);
-    can.enable().await;
-    let can = can.buffered(SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
-
     let mut bus = Bus::new();
     let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
     static PILOT: StaticCell<Shared<Pilot>> = StaticCell::new();
@@ -126,8 +77,12 @@ async fn main(spawner: Spawner) {
     let Ok(port) = port else { panic!("the line of the IMU") };
     spawner.spawn(hear_imu(port.split().1, pilot).expect("the first"));
 
-    let mut runner = Runner::new(Nb(Halves(can.writer(), can.reader())), now, bus);
+    let can = can1(board.CAN1, board.PD0, board.PD1).await;
+    let mut runner = Runner::new(can, now, bus);
+    let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
+    let mut beat = runner.heartbeat();
     let mut millisecond = Ticker::every(Duration::from_millis(1));
+    watchdog.unleash();
     loop {
         millisecond.next().await;
         runner.poll(32);
@@ -135,31 +90,26 @@ async fn main(spawner: Spawner) {
         pilot.lock(|pilot| {
             let mut pilot = pilot.borrow_mut();
             match pilot.wish(tick.now()) {
-                Wish::Arm => _ = runner.arm(tick),
+                Wish::Arm => {
+                    if let Err(why) = runner.arm(tick) {
+                        defmt::warn!("{}", why);
+                    }
+                }
                 Wish::GoOn => {}
                 Wish::Rest => runner.device_mut().disarm(),
             }
             pilot.drive(runner.device_mut(), tick);
         });
         runner.tick(tick);
+        while let Some(edge) = runner.device_mut().next_edge() {
+            defmt::info!("{}", edge);
+        }
+        while let Some(edge) = runner.next_edge() {
+            defmt::warn!("{}", edge);
+        }
+        if beat != runner.heartbeat() {
+            beat = runner.heartbeat();
+            watchdog.pet();
+        }
     }
-}
-
-/// 168 MHz from the 12 MHz crystal; APB1 42 MHz, of which CAN makes 1 Mbit/s exactly.
-fn clocks() -> Config {
-    let mut config = Config::default();
-    config.rcc.hse = Some(rcc::Hse { freq: Hertz(12_000_000), mode: rcc::HseMode::Oscillator });
-    config.rcc.pll_src = rcc::PllSource::HSE;
-    config.rcc.pll = Some(rcc::Pll {
-        prediv: rcc::PllPreDiv::DIV6,
-        mul: rcc::PllMul::MUL168,
-        divp: Some(rcc::PllPDiv::DIV2),
-        divq: Some(rcc::PllQDiv::DIV7),
-        divr: None,
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_P;
-    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
-    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
-    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
-    config
 }

@@ -18,7 +18,8 @@
 
 use bxcan::{Frame, Tx};
 use core::convert::Infallible;
-use panic_halt as _;
+use defmt_rtt as _;
+use panic_probe as _;
 use stm32f4xx_hal::{can::Can, pac};
 
 /// The sending half of bxcan as a driver; frames are received in the interrupt.
@@ -52,7 +53,7 @@ mod app {
     use stm32f4xx_hal::pac::{CAN1, TIM2, USART1, USART3};
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::serial::{Config, Rx, Serial};
-    use stm32f4xx_hal::{rcc, timer::MonoTimerUs};
+    use stm32f4xx_hal::{rcc, timer::MonoTimerUs, watchdog::IndependentWatchdog};
 
     type Micros = MonoTimerUs<TIM2>;
     type Robot = Runner<Nb<Sending>, fn() -> Instant, Bus>;
@@ -72,6 +73,7 @@ mod app {
         receiving: Rx0<Can<CAN1>>,
         into_queue: FrameSender<'static>,
         queue: FrameReceiver<'static>,
+        watchdog: IndependentWatchdog,
         remote: Rx<USART3>,
         imu: Rx<USART1>,
     }
@@ -104,9 +106,12 @@ mod app {
         let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
         let runner = Runner::new(Nb(Sending(sending)), now as fn() -> Instant, bus);
         let (into_queue, queue) = cx.local.frames.split();
+        // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
+        let mut watchdog = IndependentWatchdog::new(cx.device.IWDG);
+        watchdog.start(20.millis());
         control::spawn().expect("the first");
         steer::spawn().expect("the first");
-        (Shared { runner, pilot }, Local { receiving, into_queue, queue, remote, imu })
+        (Shared { runner, pilot }, Local { receiving, into_queue, queue, watchdog, remote, imu })
     }
 
     #[task(binds = CAN1_RX0, priority = 4, local = [receiving, into_queue])]
@@ -135,9 +140,10 @@ mod app {
         }
     }
 
-    #[task(priority = 2, shared = [runner], local = [queue])]
+    #[task(priority = 2, shared = [runner], local = [queue, watchdog])]
     async fn control(mut cx: control::Context) {
         let mut next = Micros::now();
+        let mut beat = 0;
         loop {
             next += 1.millis();
             Micros::delay_until(next).await;
@@ -145,6 +151,10 @@ mod app {
                 runner.poll_queue(cx.local.queue, 64);
                 if let Some(tick) = runner.due() {
                     runner.tick(tick);
+                }
+                if beat != runner.heartbeat() {
+                    beat = runner.heartbeat();
+                    cx.local.watchdog.feed();
                 }
             });
         }
@@ -161,11 +171,21 @@ mod app {
             let tick = Tick::new(now(), PERIOD_S);
             (&mut runner, &mut pilot).lock(|runner, pilot| {
                 match pilot.wish(tick.now()) {
-                    Wish::Arm => _ = runner.arm(tick),
+                    Wish::Arm => {
+                        if let Err(why) = runner.arm(tick) {
+                            defmt::warn!("{}", why);
+                        }
+                    }
                     Wish::GoOn => {}
                     Wish::Rest => runner.device_mut().disarm(),
                 }
                 pilot.drive(runner.device_mut(), tick);
+                while let Some(edge) = runner.device_mut().next_edge() {
+                    defmt::info!("{}", edge);
+                }
+                while let Some(edge) = runner.next_edge() {
+                    defmt::warn!("{}", edge);
+                }
             });
         }
     }

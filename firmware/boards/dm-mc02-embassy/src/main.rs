@@ -13,6 +13,7 @@
 #![no_main]
 
 use core::cell::RefCell;
+use defmt_rtt as _;
 use drivetrain::dji::Bus;
 use drivetrain::motor::CanDevice;
 use drivetrain::time::{Instant, Tick};
@@ -20,11 +21,12 @@ use embassy_executor::Spawner;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
-use embassy_stm32::{Config, bind_interrupts, peripherals, rcc, time::Hertz};
+use embassy_stm32::{Config, Peri, bind_interrupts, peripherals, rcc, time::Hertz};
+use embassy_stm32::{peripherals::IWDG1, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
 use embassy_time::{Duration, Ticker};
 use embedded_io_async::Read;
-use panic_halt as _;
+use panic_probe as _;
 use pilot::{Pilot, Wish};
 use static_cell::StaticCell;
 
@@ -58,16 +60,24 @@ async fn receive(can: BufferedCanReceiver, robot: &'static Shared) {
 }
 
 #[embassy_executor::task]
-async fn control(mut can: BufferedCanSender, robot: &'static Shared) {
+async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<'static, IWDG1>) {
     const PERIOD_S: f32 = 0.001;
+    // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
+    const WATCHDOG_US: u32 = 20_000;
+    let mut watchdog = IndependentWatchdog::new(iwdg, WATCHDOG_US);
     let mut millisecond = Ticker::every(Duration::from_millis(1));
+    watchdog.unleash();
     loop {
         millisecond.next().await;
         let tick = Tick::new(micros(embassy_time::Instant::now()), PERIOD_S);
         robot.lock(|robot| {
             let Robot { bus, pilot } = &mut *robot.borrow_mut();
             match pilot.wish(tick.now()) {
-                Wish::Arm => _ = bus.arm(tick.now()),
+                Wish::Arm => {
+                    if let Err(why) = bus.arm(tick.now()) {
+                        defmt::warn!("{}", why);
+                    }
+                }
                 Wish::GoOn => {}
                 Wish::Rest => bus.disarm(),
             }
@@ -80,7 +90,11 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared) {
                     bus.requeue(&frame);
                 }
             }
+            while let Some(edge) = bus.next_edge() {
+                defmt::info!("{}", edge);
+            }
         });
+        watchdog.pet();
     }
 }
 
@@ -116,14 +130,15 @@ async fn main(spawner: Spawner) {
     static ROBOT: StaticCell<Shared> = StaticCell::new();
     let robot: &'static Shared = ROBOT.init(Mutex::new(RefCell::new(Robot { bus, pilot })));
 
-    static SENDING: StaticCell<can::TxBuf<8>> = StaticCell::new();
+    // What waits here cannot be called back when the bus comes back, so it is short.
+    static SENDING: StaticCell<can::TxBuf<1>> = StaticCell::new();
     static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
     let mut can = CanConfigurator::new(board.FDCAN1, board.PD0, board.PD1, Interrupts);
     can.set_bitrate(1_000_000);
     let can = can.into_normal_mode();
     let can = can.buffered(SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
     spawner.spawn(receive(can.reader(), robot).expect("the first"));
-    spawner.spawn(control(can.writer(), robot).expect("the first"));
+    spawner.spawn(control(can.writer(), robot, board.IWDG1).expect("the first"));
 
     static REMOTE: StaticCell<([u8; 4], [u8; 64])> = StaticCell::new();
     let (out, into) = REMOTE.init(([0; 4], [0; 64]));

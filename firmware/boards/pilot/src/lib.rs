@@ -15,7 +15,7 @@ use drivetrain::wire::Link;
 use drivetrain::wire::dbus::{Dbus, Remote, Stick, Switch};
 use drivetrain::wire::hipnuc::{EulerOrder, HipNuc, MAX_FRAME};
 
-/// A per rad/s and A per rad at the output shaft; `cargo run --example tune` finds those of your robot.
+/// A per rad/s and A per rad at the output shaft, gentle; the example `tune` shows how to find those of your robot.
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
 const CURRENT_LIMIT: Current = Current::from_amperes(10.0);
 const FASTEST_WHEEL: AngularVelocity = AngularVelocity::from_rpm(400.0);

@@ -1,0 +1,95 @@
+//! What the programs for this board share: its clocks, its CAN, its watchdog.
+#![no_std]
+
+use drivetrain::runner::Nb;
+use drivetrain::time::Instant;
+use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, Can, filter::Mask32};
+use embassy_stm32::peripherals::{CAN1, PD0, PD1};
+use embassy_stm32::{Config, Peri, bind_interrupts, rcc, time::Hertz};
+use embedded_can::ErrorKind;
+use static_cell::StaticCell;
+
+/// A loop that stands for so long is reset, and comes back disarmed. The watchdog's own oscillator is up to half off.
+pub const WATCHDOG_US: u32 = 20_000;
+
+bind_interrupts!(struct Interrupts {
+    CAN1_TX => can::TxInterruptHandler<CAN1>;
+    CAN1_RX0 => can::Rx0InterruptHandler<CAN1>;
+    CAN1_RX1 => can::Rx1InterruptHandler<CAN1>;
+    CAN1_SCE => can::SceInterruptHandler<CAN1>;
+});
+
+/// embassy's buffered halves as one polled driver: neither of its CAN types implements a trait of `embedded-can`.
+pub struct Halves(BufferedCanSender, BufferedCanReceiver);
+
+impl embedded_can::nb::Can for Halves {
+    type Frame = can::Frame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &can::Frame) -> nb::Result<Option<can::Frame>, ErrorKind> {
+        self.0.try_write(*frame).map(|()| None).map_err(|_| nb::Error::WouldBlock)
+    }
+
+    fn receive(&mut self) -> nb::Result<can::Frame, ErrorKind> {
+        match self.1.try_receive() {
+            Ok(Ok(envelope)) => Ok(envelope.frame),
+            Ok(Err(error)) => Err(nb::Error::Other(kind(&error))),
+            Err(_) => Err(nb::Error::WouldBlock),
+        }
+    }
+}
+
+fn kind(error: &can::enums::BusError) -> ErrorKind {
+    use can::enums::BusError;
+    match error {
+        BusError::Stuff => ErrorKind::Stuff,
+        BusError::Form => ErrorKind::Form,
+        BusError::Acknowledge => ErrorKind::Acknowledge,
+        BusError::BitRecessive | BusError::BitDominant => ErrorKind::Bit,
+        BusError::Crc => ErrorKind::Crc,
+        BusError::Software => ErrorKind::Other,
+    }
+}
+
+/// CAN1 with 1 Mbit/s. To be called once.
+pub async fn can1(
+    can1: Peri<'static, CAN1>,
+    receive: Peri<'static, PD0>,
+    transmit: Peri<'static, PD1>,
+) -> Nb<Halves> {
+    // What waits here cannot be called back when the bus comes back, so it is short.
+    static SENDING: StaticCell<can::TxBuf<1>> = StaticCell::new();
+    static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
+    let mut can = Can::new(can1, receive, transmit, Interrupts);
+    can.modify_filters().enable_bank(0, can::Fifo::Fifo0, Mask32::accept_all());
+    can.set_bitrate(1_000_000);
+    // Otherwise embassy drops a frame, and says nothing, while one with the same id still waits in a mailbox.
+    can.set_tx_fifo_scheduling(true);
+    can.enable().await;
+    let can = can.buffered(SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
+    Nb(Halves(can.writer(), can.reader()))
+}
+
+/// Reads the time, for the runner.
+pub fn now() -> Instant {
+    Instant::from_micros(embassy_time::Instant::now().as_micros())
+}
+
+/// 168 MHz from the 12 MHz crystal; APB1 42 MHz, of which CAN makes 1 Mbit/s exactly.
+pub fn clocks() -> Config {
+    let mut config = Config::default();
+    config.rcc.hse = Some(rcc::Hse { freq: Hertz(12_000_000), mode: rcc::HseMode::Oscillator });
+    config.rcc.pll_src = rcc::PllSource::HSE;
+    config.rcc.pll = Some(rcc::Pll {
+        prediv: rcc::PllPreDiv::DIV6,
+        mul: rcc::PllMul::MUL168,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: Some(rcc::PllQDiv::DIV7),
+        divr: None,
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_P;
+    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
