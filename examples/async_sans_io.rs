@@ -53,15 +53,15 @@ async fn receive(can: &AsyncCan<'_>, bus: &RefCell<Bus>) {
 async fn control(can: &AsyncCan<'_>, bus: &RefCell<Bus>, motor: Handle<M2006>) {
     const PERIOD: Duration = Duration::from_millis(1);
     let mut next = can.0.now();
+    let mut armed_once = false;
     loop {
         next = next + PERIOD;
         can.at(next).await;
         let tick = Tick::new(can.0.now(), PERIOD.as_secs_f32());
         {
             let mut bus = bus.borrow_mut();
-            if !bus.is_armed() {
-                _ = bus.arm(tick.now());
-            }
+            // When the motor is heard, and never again after a fault.
+            armed_once = armed_once || bus.arm(tick.now()).is_ok();
             _ = bus.set_velocity(motor, AngularVelocity::from_rpm(-100.0));
             bus.update(tick);
         }

@@ -150,6 +150,7 @@ mod simulation {
             }
             runner.poll(16);
             let Some(tick) = runner.due() else { continue };
+            // This robot arms by itself, which only a simulated one may.
             let _not_yet = runner.is_armed() || runner.arm(tick).is_ok();
             let (bus, mine) = runner.device_mut();
             _ = bus.set_velocity(wheel, AngularVelocity::from_rpm(rpm)); // refused until armed

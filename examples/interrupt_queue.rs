@@ -49,6 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         });
 
         let mut reached = 0.0_f32;
+        let mut armed_once = false;
         for ms in 0..1_000_u64 {
             let mut frames = 0;
             world.advance(Duration::from_millis(1));
@@ -70,9 +71,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             // The 1 kHz task.
             runner.poll_queue(&mut received, 32);
             let Some(tick) = runner.due() else { continue };
-            if !runner.is_armed() {
-                _ = runner.arm(tick);
-            }
+            // When the motor is heard, and never again after a fault or a stop.
+            armed_once = armed_once || runner.arm(tick).is_ok();
             let newest = target.lock().map_or(AngularVelocity::ZERO, |target| *target);
             _ = runner.device_mut().set_velocity(wheel, newest); // refused, harmlessly, until armed
             runner.tick(tick);

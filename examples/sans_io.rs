@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut bus = Bus::new();
     let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(ANGLE, RATE))?;
     let mut ticker = Ticker::new(Duration::from_millis(1));
+    let mut armed_once = false;
 
     for ms in 0..3_000_u32 {
         world.advance(Duration::from_millis(1));
@@ -48,8 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ = bus.ingest_raw(id, &data, now);
         }
         let Some(tick) = ticker.due(now) else { continue };
-        if !bus.is_armed() {
-            _ = bus.arm(now); // again in the next millisecond, until the motor is heard
+        if !armed_once {
+            // Again in the next millisecond, until the motor is heard; but never again after a fault.
+            armed_once = bus.arm(now).is_ok();
         } else {
             let target = if ms % 2_000 < 1_000 { 90.0 } else { 270.0 };
             bus.set_angle(yaw, Angle::from_degrees(target))?;

@@ -61,6 +61,7 @@ impl<'w, B> Axle<'w, B> {
         let Some(tick) = self.runner.due() else { return };
         match speeds {
             Some((left, right)) => {
+                // This robot arms by itself, which only a simulated one may.
                 let _not_yet = self.runner.is_armed() || self.runner.arm(tick).is_ok();
                 _ = self.runner.device_mut().drive([(self.left, left), (self.right, right)]);
             }

@@ -1,0 +1,98 @@
+//! What the command line asks for.
+
+use drivetrain::chassis::MecanumGeometry;
+
+pub(crate) const HELP: &str = "\
+usage: socketcan [--interface NAME] [--motors LIST] [--rpm N | --mecanum X,Y,W [--geometry R,L,B]] [--seconds S] [--arm]
+                 [--log FILE]
+
+Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift the wheels first.
+
+  --interface NAME  the interface (default: can0); bring it up before:
+                    sudo ip link set can0 up type can bitrate 1000000
+  --motors LIST     model:ids, models m3508 (at most 6 A here), m2006 (3 A), gm6020 (10 V) and gm6020-current (1 A, once
+                    it is switched on in the motor); default: m3508:1-4. All of them have to be there for --arm
+  --rpm N           speed of every output shaft (default: 0, they hold still)
+  --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
+                    front left, rear left and rear right
+  --geometry R,L,B  radius of the wheels, half of the wheelbase and half of the track in m (default: 0.076,0.2,0.18)
+  --seconds S       how long (default: 5); Ctrl-C ends it as well, with zeros
+  --arm             send commands; without it nothing is sent
+  --log FILE        every frame in the form of candump -L
+  --lock-step       for tests: a millisecond for each line on standard input, answered by a line";
+
+const GEOMETRY: MecanumGeometry =
+    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+
+pub(crate) struct Options {
+    pub(crate) interface: String,
+    pub(crate) motors: Vec<(String, u8)>,
+    pub(crate) rpm: f32,
+    pub(crate) twist: Option<[f32; 3]>,
+    pub(crate) geometry: MecanumGeometry,
+    pub(crate) seconds: u64,
+    pub(crate) arm: bool,
+    pub(crate) log: Option<String>,
+    pub(crate) lock_step: bool,
+}
+
+fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| format!("{option} {text}: not a number"))
+}
+
+/// Reads `0.2,0,0`.
+fn three(option: &str, text: &str) -> Result<[f32; 3], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|part| number(option, part)).collect();
+    <[f32; 3]>::try_from(numbers?).map_err(|_| format!("{option} takes three numbers"))
+}
+
+pub(crate) fn parse(
+    mut arguments: impl Iterator<Item = String>,
+) -> Result<Option<Options>, String> {
+    let mut options = Options {
+        interface: "can0".into(),
+        motors: motors("m3508:1-4")?,
+        rpm: 0.0,
+        twist: None,
+        geometry: GEOMETRY,
+        seconds: 5,
+        arm: false,
+        log: None,
+        lock_step: false,
+    };
+    while let Some(option) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{option} needs a value"));
+        match option.as_str() {
+            "-h" | "--help" => return Ok(None),
+            "--arm" => options.arm = true,
+            "--lock-step" => options.lock_step = true,
+            "--interface" => options.interface = value()?,
+            "--log" => options.log = Some(value()?),
+            "--motors" => options.motors = motors(&value()?)?,
+            "--rpm" => options.rpm = number("--rpm", &value()?)?,
+            "--seconds" => options.seconds = number("--seconds", &value()?)?,
+            "--mecanum" => options.twist = Some(three("--mecanum", &value()?)?),
+            "--geometry" => {
+                let [wheel_radius_m, half_wheelbase_m, half_track_m] =
+                    three("--geometry", &value()?)?;
+                options.geometry =
+                    MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m };
+            }
+            _ => return Err(format!("no option {option}; --help lists them")),
+        }
+    }
+    Ok(Some(options))
+}
+
+/// Reads `m3508:1-4,gm6020:5`.
+fn motors(list: &str) -> Result<Vec<(String, u8)>, String> {
+    let mut motors = Vec::new();
+    for item in list.split(',') {
+        let (model, ids) = item.split_once(':').ok_or(format!("--motors {item}: not model:ids"))?;
+        let (first, last) = ids.split_once('-').unwrap_or((ids, ids));
+        for id in number::<u8>("--motors", first)?..=number("--motors", last)? {
+            motors.push((model.trim().to_ascii_lowercase(), id));
+        }
+    }
+    Ok(motors)
+}

@@ -1,0 +1,226 @@
+//! Listens to the motors, or drives them.
+
+use crate::adapter::Adapter;
+use crate::options::{HELP, Options, parse};
+use drivetrain::chassis::{Mecanum, MecanumWheels};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{
+    AnyHandle, AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508,
+};
+use drivetrain::geometry::Twist;
+use drivetrain::motor::{ArmError, CanDevice, VelocityDrive};
+use drivetrain::runner::{Nb, Runner};
+use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
+use drivetrain::units::AngularVelocity;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::error::Error;
+use std::io::{self, BufRead, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Gentle limits for a first try: amperes of M3508 and M2006, volts of GM6020.
+const M3508_SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(6.0);
+const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(3.0);
+const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
+const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);
+
+/// Attaches all of them. In a chassis the motors on the right side are reversed.
+fn attach(bus: &mut Bus, options: &Options) -> Result<Vec<AnyHandle>, Box<dyn Error>> {
+    let attached = options.motors.iter().map(|(model, id)| {
+        let right = options.twist.is_some() && matches!(id, 1 | 4);
+        let done: Result<AnyHandle, AttachError> = match model.as_str() {
+            "m3508" => {
+                let config = Config::<M3508>::new(*id).speed_loop(M3508_SPEED);
+                bus.attach(if right { config.reversed() } else { config }).map(Into::into)
+            }
+            "m2006" => {
+                bus.attach(Config::<M2006>::new(*id).speed_loop(M2006_SPEED)).map(Into::into)
+            }
+            "gm6020" => bus
+                .attach(Config::<Gm6020Voltage>::new(*id).speed_loop(GM6020_SPEED))
+                .map(Into::into),
+            "gm6020-current" => bus
+                .attach(Config::<Gm6020Current>::new(*id).speed_loop(GM6020_CURRENT_SPEED))
+                .map(Into::into),
+            other => return Err(format!("no model {other}; --help lists them").into()),
+        };
+        Ok(done?)
+    });
+    attached.collect()
+}
+
+/// The speed of every motor.
+fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity>, Box<dyn Error>> {
+    let Some([x, y, w]) = options.twist else {
+        return Ok(vec![AngularVelocity::from_rpm(options.rpm); motors.len()]);
+    };
+    let wheels = (1..=4).map(|id| ("m3508".to_string(), id));
+    if !wheels.eq(options.motors.iter().cloned()) {
+        return Err("--mecanum needs --motors m3508:1-4".into());
+    }
+    let speeds = Mecanum::new(options.geometry)?.inverse(Twist::new(x, y, w));
+    let MecanumWheels { front_left, front_right, rear_left, rear_right } = speeds;
+    // Ids 1 to 4, as DJI counts them: from the front right, counter-clockwise.
+    Ok(vec![front_right, front_left, rear_left, rear_right])
+}
+
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    let Some(options) = parse(std::env::args().skip(1))? else {
+        println!("{HELP}");
+        return Ok(());
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    if options.lock_step {
+        let clock = ManualClock::new(Instant::from_micros(1_000_000));
+        let mut lines = io::stdin().lock().lines();
+        let pause = || clock.advance(Duration::from_millis(1));
+        let next = || lines.next().is_some();
+        return Session::new(&options, &clock)?.run(&options, &stop, next, pause);
+    }
+    let start = std::time::Instant::now();
+    let clock = move || Instant::START + Duration::from(start.elapsed());
+    let pause = || std::thread::sleep(std::time::Duration::from_micros(200));
+    let next = || start.elapsed().as_secs() < options.seconds;
+    Session::new(&options, clock)?.run(&options, &stop, next, pause)
+}
+
+struct Session<K> {
+    runner: Runner<Nb<Adapter>, K, Bus>,
+    motors: Vec<AnyHandle>,
+    speeds: Vec<AngularVelocity>,
+    armed_once: bool,
+    /// Why it is not armed yet.
+    refusal: Option<ArmError>,
+}
+
+impl<K: Clock> Session<K> {
+    fn new(options: &Options, clock: K) -> Result<Self, Box<dyn Error>> {
+        let mut bus = Bus::new();
+        let motors = attach(&mut bus, options)?;
+        let speeds = speeds(options, &motors)?;
+        let port = Adapter::open(options).map_err(|error| {
+            format!("cannot open {}: {error}; is it up? See --help", options.interface)
+        })?;
+        Ok(Self {
+            runner: Runner::new(Nb(port), clock, bus),
+            motors,
+            speeds,
+            armed_once: false,
+            refusal: None,
+        })
+    }
+
+    /// Runs until `next` or a signal ends it, and ends with zeros. In each `pause` some time passes.
+    fn run(
+        mut self,
+        options: &Options,
+        stop: &AtomicBool,
+        mut next: impl FnMut() -> bool,
+        mut pause: impl FnMut(),
+    ) -> Result<(), Box<dyn Error>> {
+        let mut ticks: u64 = 0;
+        while next() && !stop.load(Ordering::Relaxed) {
+            pause();
+            while self.runner.poll(64) == 64 {}
+            let Some(tick) = self.runner.due() else { continue };
+            ticks += 1;
+            if options.arm {
+                self.drive(tick);
+            } else {
+                self.listen(tick);
+            }
+            if options.lock_step {
+                println!(".");
+                io::stdout().flush()?;
+            } else if ticks.is_multiple_of(500) {
+                self.show();
+                if let Some(why) = self.refusal {
+                    println!("not armed: {why}");
+                }
+            }
+        }
+        if options.arm {
+            self.end(pause);
+        }
+        self.show();
+        self.report();
+        let (Nb(mut port), ..) = self.runner.into_parts();
+        Ok(port.flush()?)
+    }
+
+    /// Arms once, when all motors are heard: what was lost stays relaxed.
+    fn drive(&mut self, tick: Tick) {
+        if !self.armed_once {
+            self.refusal = self.runner.arm(tick).err();
+            self.armed_once = self.refusal.is_none();
+        }
+        // One wheel that was lost stops them all.
+        let armed = self.runner.is_armed();
+        for (motor, speed) in self.motors.iter().zip(&self.speeds) {
+            let speed = if armed { *speed } else { AngularVelocity::ZERO };
+            _ = self.runner.device_mut().drive([(*motor, speed)]);
+        }
+        self.runner.tick(tick);
+    }
+
+    /// Keeps the state up to date and sends nothing.
+    fn listen(&mut self, tick: Tick) {
+        self.runner.device_mut().update(tick);
+        while self.runner.device_mut().next_frame().is_some() {}
+    }
+
+    /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost.
+    fn end(&mut self, mut pause: impl FnMut()) {
+        self.runner.device_mut().disarm();
+        let mut ticks = 0;
+        while ticks < 30 {
+            pause();
+            let Some(tick) = self.runner.due() else { continue };
+            self.runner.tick(tick);
+            ticks += 1;
+        }
+    }
+
+    fn show(&self) {
+        let bus = self.runner.device();
+        for (motor, name) in bus.motors() {
+            match bus.state(motor) {
+                Some(state) => println!(
+                    "{} {:?}: {:8.1} rpm, {:6.2} A, position {:.3} turns, {}",
+                    state.motor,
+                    state.link,
+                    state.velocity.as_rpm(),
+                    state.current.as_amperes(),
+                    state.position.as_turns(),
+                    state.error.map_or("no error".to_string(), |error| error.to_string())
+                ),
+                None => println!("{name} is not heard"),
+            }
+        }
+    }
+
+    fn report(&self) {
+        let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
+        let counts = [
+            ("received", s.received),
+            ("taken", s.taken),
+            ("unrelated", s.unrelated),
+            ("malformed", s.malformed),
+            ("receive_errors", s.receive_errors.total()),
+            ("bad_length", bus.bad_length),
+            ("bad_field", bus.bad_field),
+            ("unattached", bus.unattached),
+            ("packed", bus.packed),
+            ("superseded", s.superseded),
+            ("offered", s.offered),
+            ("sent", s.sent),
+            ("refused", s.refused),
+            ("send_errors", s.send_errors.total()),
+            ("bus_losses", s.bus_losses),
+        ];
+        counts.iter().for_each(|(name, count)| println!("{name} {count}"));
+    }
+}
