@@ -8,7 +8,7 @@ pub(crate) const USAGE: &str = "usage: snake [options]
   --output FILE     where the plot goes (default snake.svg)
   --seed N          chooses phases, noise and chances (default 1)
   --fault NAME      host-line-cut, corrupt-stream, silent-joint, reset-in-motion, joint-power-loss
-                    or controller-reset; fails unless it ends as docs/faults.md demands
+                    or controller-reset; fails unless it ends as tests/snake_robot.rs demands
   --robot PORT      only the robot: waits for a host on 127.0.0.1
   --host PORT       only the host: connects to a robot on 127.0.0.1
   --help            shows this";

@@ -49,7 +49,8 @@ impl Joints {
         Ok(())
     }
 
-    /// Changes what a joint is set up with, while it moves too.
+    /// Changes what a joint is set up with, while it moves too. In the middle of its being brought up, a change may be
+    /// written after the enable: within seven of its turns.
     ///
     /// # Errors
     /// When a parameter is not usable. A detached joint changes nothing.
