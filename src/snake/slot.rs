@@ -237,7 +237,8 @@ impl Slot {
 
     /// Tells whether a relaxed joint is to be told again.
     pub(super) fn wants_reminder(&self, now: Instant) -> bool {
-        !self.driven && now.since(self.stopped) >= KEEP_RELAXED
+        // After a clock was set back it was told at a time that is to come.
+        !self.driven && (now.since(self.stopped) >= KEEP_RELAXED || now < self.stopped)
     }
 
     pub(super) const fn is_driven(&self) -> bool {

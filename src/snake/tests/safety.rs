@@ -206,6 +206,18 @@ fn updates_without_a_step_disable_all_however_small_the_driver_and_whoever_owes_
     }
 }
 
+/// A clock that ran ahead, and was set back: what it said then must not keep a joint from being told again.
+#[test]
+fn a_relaxed_joint_is_told_again_after_the_clock_was_set_back() {
+    for dt_s in [0.001, f32::NAN] {
+        let mut bench = Bench::armed(&[3]);
+        bench.joints.update(Tick::new(at_ms(1_000_000), dt_s));
+        bench.joints.disarm();
+        assert_eq!(writes(&bench.take()), [Command::DISABLE]);
+        assert_eq!(writes(&bench.run(250)), [Command::DISABLE; 3]);
+    }
+}
+
 /// And is told again, as long as time passes.
 #[test]
 fn a_relaxed_joint_is_told_again_each_100_ms_by_updates_without_a_step() {
