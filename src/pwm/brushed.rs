@@ -241,7 +241,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     fn command(&mut self, tick: Tick) -> f32 {
         if !self.guard.drives(tick.now()) {
-            // Late counts leave the integral as it is; without a target it starts afresh.
+            // Late counts leave the integral as it is, unless it was to be set; without a target it starts afresh.
             if self.guard.has_target() {
                 self.speed.iter_mut().for_each(Pid::forget_take_over);
             } else {
@@ -251,7 +251,11 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         }
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         if step.is_hold() {
-            return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
+            if core::mem::take(&mut self.may_hold) {
+                return self.output;
+            }
+            self.speed.iter_mut().for_each(Pid::forget_take_over);
+            return 0.0;
         }
         self.may_hold = true;
         match (self.target, &mut self.speed) {

@@ -208,7 +208,7 @@ impl Slot {
         self.goal = goal;
         if self.asked != action {
             if action == Action::Raw {
-                // The loops have no part in what is sent from now on.
+                // They have no part in what is sent from now on.
                 self.loops.reset();
             }
             self.asked = action;
@@ -239,9 +239,16 @@ impl Slot {
     /// What is asked for has an output from now on: its own, and not one from before the rest that a loop was to take
     /// over.
     pub(super) fn end_rest(&mut self) {
-        self.loops.forget_take_over();
+        self.forget_take_over();
         self.duty = Duty::Other;
         self.settle();
+    }
+
+    /// A zero was sent since a loop was to take over.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::dji) const fn forget_take_over(&mut self) {
+        self.loops.forget_take_over();
     }
 
     /// The speed loop takes over from a direct command at what was sent last: no jump of the output.

@@ -185,6 +185,8 @@ enum Call {
     Relax,
     /// An update with feedback that is too old, and a frame after it.
     Late,
+    /// An update without a step.
+    Hold,
     Step,
 }
 
@@ -195,6 +197,7 @@ fn call() -> impl Strategy<Value = Call> {
         1 => Just(Call::Nowhere),
         1 => Just(Call::Relax),
         1 => Just(Call::Late),
+        1 => Just(Call::Hold),
         4 => Just(Call::Step),
     ]
 }
@@ -211,6 +214,7 @@ struct Standing {
     held: i16,
     takes_over: bool,
     has_rested: bool,
+    holds: u8,
 }
 
 impl Standing {
@@ -226,6 +230,7 @@ impl Standing {
             held: 0,
             takes_over: false,
             has_rested: true,
+            holds: 0,
         }
     }
 
@@ -258,6 +263,7 @@ impl Standing {
                 self.rest();
                 self.step(11);
             }
+            Call::Hold => self.hold(),
             Call::Step => self.step(1),
         }
     }
@@ -278,8 +284,24 @@ impl Standing {
         self.has_rested = true;
     }
 
+    /// What was sent stays once, then zeros.
+    fn hold(&mut self) {
+        self.ms += 1;
+        self.holds += 1;
+        _ = self.bus.ingest(&feedback(0x201, 0, 0), at_ms(self.ms));
+        self.bus.update(Tick::new(at_ms(self.ms), f32::NAN));
+        let word = sent(&mut self.bus).last().map_or(self.word, |(_, words)| words[0]);
+        if self.holds > 1 && core::mem::take(&mut self.takes_over) {
+            self.held = 0;
+        }
+        let stays = self.holds == 1 && !self.has_rested;
+        assert_eq!(word, if stays { self.word } else { 0 });
+        self.word = word;
+    }
+
     fn step(&mut self, ms: u64) {
         self.ms += ms;
+        self.holds = 0;
         if self.ms - self.commanded_ms > 100 {
             self.relax();
         }
@@ -303,18 +325,19 @@ impl Standing {
     }
 }
 
-/// Hostile readers had full current from rest in five ways: from a direct command that was replaced before it was sent, from
+/// Hostile readers had full current from rest in six ways: from a direct command that was replaced before it was sent, from
 /// the integral of a loop that a direct command had replaced since, and from a take-over that a rest came before.
 #[test]
 fn a_speed_loop_goes_on_from_nothing_but_what_was_sent() {
-    use Call::{Late, Nowhere, Raw, Step, Velocity};
+    use Call::{Hold, Late, Nowhere, Raw, Step, Velocity};
     const FULL: Call = Raw(16_384);
-    let sequences: [&[Call]; 5] = [
+    let sequences: [&[Call]; 6] = [
         &[FULL, Velocity, Step],
         &[Velocity, Step, FULL, Velocity, Step],
         &[FULL, Step, Velocity, Step, Raw(0), Step, Late, Velocity, Step],
         &[FULL, Step, Velocity, Step, Raw(0), Step, Nowhere, Step, Velocity, Step],
         &[FULL, Step, Velocity, Nowhere, Step, Velocity, Step],
+        &[FULL, Step, Velocity, Hold, Hold, Step],
     ];
     for calls in sequences {
         let mut motor = Standing::new();
@@ -332,7 +355,8 @@ fn a_position_loop_does_not_go_on_from_a_direct_command_that_was_not_sent() {
     let loops = Config::<M3508>::new(1).position_loop(HOLDING, HOLDING);
     let here = Position::ZERO;
     let measured = Measured { angle: Angle::ZERO, velocity: AngularVelocity::ZERO, at: at_ms(2) };
-    let asking: [fn(&mut Bus, Handle<M3508>, Measured) -> Result<(), TargetError>; 3] = [
+    type Ask = fn(&mut Bus, Handle<M3508>, Measured) -> Result<(), TargetError>;
+    let asking: [Ask; 3] = [
         |bus, motor, _| bus.set_position(motor, Position::ZERO),
         |bus, motor, _| bus.set_angle(motor, Angle::ZERO),
         |bus, motor, measured| bus.set_angle_measured(motor, Angle::ZERO, measured),

@@ -103,6 +103,16 @@ fn a_speed_loop_does_not_go_on_from_before_a_duty_or_a_rest() {
         }
         assert_eq!(last(&log), 0);
     }
+    // Zeros for want of a step before the loop took over.
+    let log = Log::default();
+    let mut motor = integrator(&log);
+    full(&mut motor);
+    motor.update(tick(1)).unwrap();
+    velocity(&mut motor);
+    for (ms, dt_s, duty) in [(2, f32::NAN, 20_000), (3, f32::NAN, 0), (4, 0.001, 0)] {
+        motor.update(Tick::new(at_ms(ms), dt_s)).unwrap();
+        assert_eq!(last(&log), duty);
+    }
     // Late before the loop took over: the encoder is heard again at 30 ms.
     let log = Log::default();
     let mut motor = integrator(&log);
