@@ -60,14 +60,18 @@ pub async fn can1(
     // What waits here cannot be called back when the bus comes back, so it is short.
     static SENDING: StaticCell<can::TxBuf<1>> = StaticCell::new();
     static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
-    let mut can = Can::new(can1, receive, transmit, Interrupts);
-    can.modify_filters().enable_bank(0, can::Fifo::Fifo0, Mask32::accept_all());
-    can.set_bitrate(1_000_000);
+    let mut controller = Can::new(can1, receive, transmit, Interrupts);
+    controller.modify_filters().enable_bank(0, can::Fifo::Fifo0, Mask32::accept_all());
+    controller.set_bitrate(1_000_000);
     // Otherwise embassy drops a frame, and says nothing, while one with the same id still waits in a mailbox.
-    can.set_tx_fifo_scheduling(true);
-    can.enable().await;
-    let can = can.buffered(SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
-    Nb(Halves(can.writer(), can.reader()))
+    controller.set_tx_fifo_scheduling(true);
+    controller.enable().await;
+    let (sending, received) = (SENDING.init(can::TxBuf::new()), RECEIVED.init(can::RxBuf::new()));
+    let buffered = controller.buffered(sending, received);
+    let halves = Halves(buffered.writer(), buffered.reader());
+    // Dropped, they would reset the controller and put it to sleep.
+    core::mem::forget((controller, buffered));
+    Nb(halves)
 }
 
 /// Reads the time, for the runner.
