@@ -23,7 +23,8 @@ impl Joints {
     /// Sets how many joints are asked, and how many are written to, in an update; one each at first, 1 to 12.
     ///
     /// The fewer frames, the longer until a joint has its next turn: choose
-    /// [`Timeouts::late`](crate::motor::Timeouts::late) above three turns.
+    /// [`Timeouts::late`](crate::motor::Timeouts::late) above three turns. More than the driver has room for only wait, and
+    /// take turns; where it has room for fewer than it is given, it must not choose by the lowest id.
     ///
     /// # Examples
     /// ```

@@ -61,12 +61,13 @@ pub struct Joints {
     /// The same, given back: for the next update.
     pub(super) returned: (u16, u16, u16),
     pub(super) reads_first: bool,
-    /// Who was chosen to be written to and asked last, and who was written to and asked last.
+    /// Who was chosen to be written to and asked last, and who was disabled, written to and asked last.
     pub(super) last_write: u8,
     pub(super) last_read: u8,
+    pub(super) told: u8,
     pub(super) written: u8,
     pub(super) asked: u8,
-    held_steps: u8,
+    pub(super) held_steps: u8,
     /// Frames that are sent are heard again.
     pub(super) echoes: bool,
     pub(super) stopped: bool,
@@ -118,6 +119,7 @@ impl Joints {
             reads_first: false,
             last_write: 0,
             last_read: IDS / 2,
+            told: IDS - 1,
             written: IDS - 1,
             asked: IDS - 1,
             held_steps: 0,
@@ -165,7 +167,10 @@ impl Joints {
             return Err(AttachError::Taken(joint));
         }
         let generation = slot.next_generation().ok_or(AttachError::WornOut(joint))?;
+        // An answer to a joint that was here before may still come.
+        let awaiting = slot.awaiting;
         *slot = Slot::new(&config, self.timeouts, generation)?;
+        slot.awaiting = awaiting;
         self.returned.0 |= 1 << index;
         Ok(Joint::new(index, generation))
     }
@@ -218,7 +223,7 @@ impl Joints {
     pub fn update(&mut self, tick: Tick) {
         let stands = tick.now() == self.now && self.now != Instant::START;
         if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() || stands {
-            return self.hold(tick.now(), stands);
+            return self.hold(tick.now());
         }
         self.held_steps = 0;
         self.now = tick.now();
@@ -234,14 +239,15 @@ impl Joints {
     }
 
     /// An update without a step chooses nobody, but sees to what makes a joint safe.
-    fn hold(&mut self, now: Instant, stands: bool) {
+    fn hold(&mut self, now: Instant) {
         count(&mut self.counters.bad_steps);
         self.held_steps = self.held_steps.saturating_add(1);
         if self.held_steps >= 2 {
             (0..SLOTS).for_each(|index| self.relax_at(index));
         }
+        let stands = now <= self.now;
         self.now = self.now.max(now);
-        // A clock that stands never tells that an answer is overdue: then an update counts for a millisecond.
+        // A clock that stands or went back does not tell when an answer is overdue: then an update counts for a millisecond.
         let held = Duration::from_millis(self.held_steps.into());
         let is_long = held > self.reply_timeout || self.held_steps == u8::MAX;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));

@@ -66,9 +66,13 @@ impl CanDevice for Joints {
             let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
                 continue;
             };
+            let was_armed = slot.guard.is_armed();
             slot.guard.disarm();
             _ = slot.let_go();
-            self.stop(index);
+            // A program may disarm in each tick: what knows of it already is only reminded.
+            if was_armed || !slot.is_told() {
+                self.stop(index);
+            }
         }
     }
 
@@ -80,6 +84,7 @@ impl CanDevice for Joints {
     fn emergency_stop(&mut self) {
         if !self.stopped {
             self.disarm();
+            self.stop_all();
             self.stopped = true;
         }
     }

@@ -71,15 +71,18 @@ impl Joints {
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         let now = self.now;
         let quiet = self.owing();
-        if let Some(index) = lowest(self.stops & !quiet) {
+        if let Some(index) = next_after(self.told, self.stops & !quiet) {
             self.stops &= !(1 << index);
+            self.told = index;
             if let Some(slot) = self.slots.get_mut(usize::from(index)) {
                 slot.told_to_relax(now);
             }
             return Command::DISABLE.frame(index + 1);
         }
         let write = next_after(self.written, self.writes & !quiet);
-        let read = next_after(self.asked, self.reads & !quiet);
+        // An update without a step does not know how long an answer is waited for.
+        let reads = if self.held_steps == 0 { self.reads & !quiet } else { 0 };
+        let read = next_after(self.asked, reads);
         match (write, read) {
             (Some(index), None) => self.write(index),
             (Some(index), Some(_)) if !self.reads_first => self.write(index),
@@ -111,25 +114,29 @@ impl Joints {
         let Some(slot) = self.slots.get_mut(usize::from(index)) else { return false };
         let Some(command) = Command::decode(frame.data()) else { return false };
         let (bit, attached) = (1 << index, slot.id.is_some());
-        // So that it is the next one.
-        let before = (index + IDS - 1) % IDS;
-        match command {
+        let (stops, writes, reads) = &mut self.returned;
+        // The first that comes back is the next of its kind.
+        let (returned, last) = match command {
             Command::DISABLE => {
                 slot.told_to_relax(self.now);
-                self.returned.0 |= bit;
-                self.drop_write(bit);
+                (stops, &mut self.told)
             }
             _ if !attached => return false,
             Command::Write(register, _) => {
                 slot.take_back(register);
-                self.returned.1 |= bit;
-                self.written = before;
+                (writes, &mut self.written)
             }
             Command::Read(_) => {
-                slot.awaiting = None;
-                self.returned.2 |= bit;
-                self.asked = before;
+                slot.take_back_question();
+                (reads, &mut self.asked)
             }
+        };
+        if *returned == 0 {
+            *last = (index + IDS - 1) % IDS;
+        }
+        *returned |= bit;
+        if command == Command::DISABLE {
+            self.drop_write(bit);
         }
         self.drop_frames(1);
         true
@@ -141,6 +148,14 @@ impl Joints {
         self.pack((bit & !self.stops).count_ones());
         self.stops |= bit;
         self.drop_write(bit);
+    }
+
+    pub(super) fn stop_all(&mut self) {
+        for index in 0..self.slots.len() {
+            if self.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
+                self.stop(index);
+            }
+        }
     }
 
     /// What is to be disabled is written nothing else before.

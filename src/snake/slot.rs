@@ -20,6 +20,8 @@ const KEEP_RELAXED: Duration = Duration::from_millis(100);
 const JUMP: i32 = PULSES_PER_TURN / 16;
 /// Every so many readings of the speed make way for one that looks whether the drive is still enabled.
 const CHECKS: u8 = 8;
+/// Two positions and one of the others, until all others had their turn.
+const TURNS: u8 = 3 * CHECKS;
 
 /// All registers of [`Register::SEQUENCE`], and the last of them: the enable.
 const ALL: u8 = 0x7F;
@@ -250,7 +252,12 @@ impl Slot {
     pub(super) const fn let_go(&mut self) -> bool {
         let stops = self.driven && !(self.guard.is_armed() && self.guard.has_target());
         self.driven = self.driven && !stops;
-        stops && self.ahead != ALL
+        stops && !self.is_told()
+    }
+
+    /// Tells whether it was disabled, and written nothing since.
+    pub(super) const fn is_told(&self) -> bool {
+        self.ahead == ALL
     }
 
     /// Returns the frame that asks for what is next in turn.
@@ -261,9 +268,15 @@ impl Slot {
             (2, None) => Register::ActualSpeed,
             _ => Register::ActualPosition,
         };
-        self.turn = (self.turn + 1) % (3 * CHECKS);
+        self.turn = (self.turn + 1) % TURNS;
         self.awaiting = Some((register, now));
         Command::Read(register)
+    }
+
+    /// Takes back a question that was not sent: its turn comes again.
+    pub(super) const fn take_back_question(&mut self) {
+        self.awaiting = None;
+        self.turn = (self.turn + TURNS - 1) % TURNS;
     }
 
     /// Sets a target in pulses from the joint's zero.

@@ -125,14 +125,40 @@ fn a_driver_that_takes_one_frame_a_tick_starves_no_joint() {
     assert!(asked.iter().all(|count| *count > 20), "{asked:?}");
 }
 
-/// A hostile reader had no question sent, and joint 12 written nothing, where more is written in an update than the driver
-/// has room for.
+/// What a driver with room for `room` frames takes of an update, and its answers; it gives back the first that it has no
+/// room for, or all of them.
+fn take_some(bench: &mut Bench, room: usize, all_come_back: bool) -> Vec<(u8, Command)> {
+    let mut taken = Vec::new();
+    let mut refused = Vec::new();
+    while let Some(frame) = bench.joints.next_frame() {
+        if taken.len() == room {
+            refused.push(frame);
+            if !all_come_back {
+                break;
+            }
+            continue;
+        }
+        let id = u8::try_from(frame.header()).unwrap();
+        let command = Command::decode(frame.data()).unwrap();
+        bench.answer(id, command);
+        taken.push((id, command));
+    }
+    assert!(refused.iter().all(|frame| bench.joints.requeue(frame)));
+    taken
+}
+
+/// Hostile readers had no question sent, joint 12 written nothing, and joints asked for anything but their position, where
+/// an update has more frames than the driver has room for.
 #[test]
 fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
-    for (reads, writes, room) in [(1, 4, 3), (4, 1, 3), (4, 4, 3), (2, 5, 2), (1, 1, 1)] {
-        // Some of them ask seldom.
-        let patient = Timeouts::new().with_late(Duration::from_millis(400));
-        let patient = patient.with_offline(Duration::from_millis(500));
+    // Some of them ask seldom.
+    let patient = Timeouts::new().with_late(Duration::from_millis(400));
+    let patient = patient.with_offline(Duration::from_millis(500));
+    let budgets = (1..=5).flat_map(|reads| (1..=5).map(move |writes| (reads, writes)));
+    let drivers = || (1..=3).flat_map(|room| [(room, false), (room, true)]);
+    for ((reads, writes), (room, all_come_back)) in
+        budgets.flat_map(|budget| drivers().map(move |driver| (budget, driver)))
+    {
         let mut joints = Joints::new().with_timeouts(patient).with_frames_per_update(reads, writes);
         let handles = ALL.map(|id| joints.attach(Config::new(id)).unwrap());
         let mut bench = Bench { joints, handles: handles.to_vec(), ..Bench::new(&[]) };
@@ -145,25 +171,40 @@ fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
                 _ = bench.joints.set_pulses(joint, 1_000);
             }
             bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
-            for _ in 0..room {
-                let Some(frame) = bench.joints.next_frame() else { break };
-                let id = u8::try_from(frame.header()).unwrap();
-                let command = Command::decode(frame.data()).unwrap();
+            for (id, command) in take_some(&mut bench, room, all_come_back) {
                 let is_read = matches!(command, Command::Read(_));
                 let counts = if is_read { &mut asked } else { &mut written };
                 counts[usize::from(id - 1)] += 1;
-                bench.answer(id, command);
-            }
-            if let Some(refused) = bench.joints.next_frame() {
-                assert!(bench.joints.requeue(&refused));
             }
         }
+        let which = (reads, writes, room, all_come_back);
         let all = asked.iter().chain(&written);
-        assert!(
-            all.clone().all(|count| *count >= 20),
-            "{reads} {writes} {room}: {asked:?} {written:?}"
-        );
-        assert!(bench.enabled == [1; 12], "{reads} {writes} {room}");
+        assert!(all.clone().all(|count| *count >= 20), "{which:?}: {asked:?} {written:?}");
+        assert_eq!((bench.enabled, bench.joints.is_armed()), ([1; 12], true), "{which:?}");
+    }
+}
+
+/// A hostile reader had nine joints hold on for ever: a program that disarms in each tick had the first three disabled again
+/// and again. And 12 000 frames a second, where the driver has room.
+#[test]
+fn a_program_that_disarms_in_each_tick_disables_all_and_floods_nobody() {
+    for (room, step_ms) in [(3, 1), (100, 1), (1, 10)] {
+        let mut bench = Bench::armed(&ALL);
+        bench.drive(200);
+        assert_eq!(bench.enabled, [1; 12]);
+        let (mut disables, mut questions) = (0, 0);
+        for _ in 0..1_000 {
+            bench.ms += step_ms;
+            bench.joints.disarm();
+            bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+            for (_, command) in take_some(&mut bench, room, false) {
+                disables += usize::from(command == Command::DISABLE);
+                questions += usize::from(matches!(command, Command::Read(_)));
+            }
+        }
+        assert_eq!(bench.enabled, [0; 12], "{room}");
+        // Where a tick has room for a tenth of what is to be said, all of it goes to what is safe.
+        assert!(step_ms > 1 || disables <= 12 + 120 && questions >= 900, "{disables}, {questions}");
     }
 }
 

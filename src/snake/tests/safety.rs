@@ -189,12 +189,13 @@ fn held(bench: &mut Bench, room: usize, ms: u64) -> Vec<(u8, Command)> {
 /// step.
 #[test]
 fn updates_without_a_step_disable_all_however_small_the_driver_and_whoever_owes_an_answer() {
-    // The clock goes on with a step that is no number, and it stands.
-    for goes_on in [1, 0] {
+    // The clock goes on with a step that is no number, it stands, and it goes back, to a place from where it goes on.
+    for (goes_on, back) in [(1, 0), (0, 0), (1, 150), (0, 150)] {
         let mut bench = Bench::armed(&ALL);
         bench.drive(200);
         bench.silent = ALL.to_vec();
         bench.drive(1);
+        bench.ms -= back;
         let mut disabled = Vec::new();
         for _ in 0..12 {
             let sent = held(&mut bench, 3, goes_on);
@@ -204,6 +205,41 @@ fn updates_without_a_step_disable_all_however_small_the_driver_and_whoever_owes_
         disabled.sort_unstable();
         assert_eq!(disabled, ALL);
     }
+}
+
+#[test]
+fn an_emergency_stop_tells_also_those_that_were_told_before_and_once() {
+    let mut bench = Bench::new(&ALL);
+    bench.run(30);
+    for disables in [12, 0] {
+        bench.joints.emergency_stop();
+        assert_eq!(writes(&bench.take()), std::vec![Command::DISABLE; disables]);
+    }
+}
+
+/// A question that is handed out without a step would have to be waited for, nobody knows how long.
+#[test]
+fn an_update_without_a_step_asks_nobody() {
+    let mut joints = Joints::new().with_frames_per_update(12, 1);
+    let handles = ALL.map(|id| joints.attach(Config::new(id)).unwrap());
+    let mut bench = Bench { joints, handles: handles.to_vec(), ..Bench::new(&[]) };
+    bench.run(3);
+    bench.joints.update(Tick::new(at_ms(4), 0.001));
+    assert!(bench.joints.next_frame().is_some(), "one of twelve questions");
+    assert_eq!(held(&mut bench, 100, 4), []);
+    assert_eq!(bench.take(), []);
+}
+
+/// It would collide with the answer: both have one id.
+#[test]
+fn a_joint_that_comes_while_one_that_went_owes_an_answer_is_not_disabled_yet() {
+    let mut bench = Bench::new(&[3]);
+    bench.silent = std::vec![3];
+    assert!(bench.run(1).iter().any(|(_, command)| matches!(command, Command::Read(_))));
+    bench.joints.detach(bench.handles[0]);
+    bench.joints.attach(Config::new(3)).unwrap();
+    assert_eq!(bench.run(2), []);
+    assert_eq!(writes(&bench.run(1)), [Command::DISABLE]);
 }
 
 /// A clock that ran ahead, and was set back: what it said then must not keep a joint from being told again.
