@@ -228,7 +228,7 @@ impl<B> Bus<B> {
         let step = self.step;
         let mut rest = self.slots.get_mut(..usize::from(self.used)).unwrap_or_default();
         while let [slot, others @ ..] = rest {
-            let raw = slot.update(&step, &self.step);
+            let raw = slot.update(&step, &self.step, &self.outbox);
             self.outbox.put(slot.place, raw);
             rest = others;
         }
@@ -341,12 +341,6 @@ impl<B> Bus<B> {
     }
 
     pub(super) fn slot_mut(&mut self, motor: AnyHandle<B>) -> Option<&mut Slot> {
-        find(&mut self.slots, motor.key())
+        self.slots.get_mut(motor.key().index()).filter(|slot| slot.matches(motor.key()))
     }
-}
-
-/// Returns the slot of a motor, without borrowing the rest of its bus.
-#[inline]
-pub(super) fn find(slots: &mut [Slot], key: Key) -> Option<&mut Slot> {
-    slots.get_mut(key.index()).filter(|slot| slot.matches(key))
 }

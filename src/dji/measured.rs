@@ -1,6 +1,6 @@
 //! Angles by another sensor than the encoder of the motor.
 
-use super::bus::{LONGEST_PAUSE, find};
+use super::bus::LONGEST_PAUSE;
 use super::{AnyHandle, Bus};
 use crate::encoder::Position;
 use crate::motor::{Measured, TargetError};
@@ -96,11 +96,10 @@ impl<B> Bus<B> {
         let is_ahead = self.running && at.since(self.updated) > LONGEST_PAUSE;
         let is_far = is_ahead || self.updated.since(at) > timeouts.measured();
         let at = (!is_far).then(|| at.stamp());
-        let Self { slots, outbox, .. } = self;
-        let slot = find(slots, motor.key()).ok_or(TargetError::Detached)?;
+        let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
         let before = slot.conditions;
-        let rate = velocity.as_rad_per_s();
-        let outcome = slot.set_measured(way.as_radians(), rate, at, now, &timeouts, outbox);
+        let outcome =
+            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts);
         let after = slot.conditions;
         self.journal.note(motor.key().place(), &before, &after, self.updated);
         outcome?;

@@ -120,16 +120,11 @@ impl<B> Bus<B> {
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
-        let stops = self.held_steps >= 2 || late;
-        if stops {
+        if self.held_steps >= 2 || late {
             self.outbox.clear();
         }
-        for slot in self.slots.get_mut(..usize::from(self.used)).unwrap_or_default() {
-            if stops {
-                slot.forget_take_over();
-            } else if slot.has_rested() {
-                self.outbox.put(slot.place, 0);
-            }
+        for slot in self.slots.iter().filter(|slot| slot.has_rested()) {
+            self.outbox.put(slot.place, 0);
         }
         self.outbox.keep_alive(self.now);
         self.outbox.finish_update();

@@ -1,7 +1,5 @@
 //! What the application asks of the motors.
 
-use super::bus::find;
-use super::command::Outbox;
 use super::slot::Slot;
 use super::{AnyHandle, Bus, CurrentControlled, Handle, Model, VoltageControlled};
 use crate::control::PidConfig;
@@ -27,7 +25,7 @@ impl<B> Bus<B> {
         motor: Handle<M, B>,
         current: Current,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, _| slot.set_output(current.as_amperes(), now))
+        self.set(motor.into(), |slot, now| slot.set_output(current.as_amperes(), now))
     }
 
     /// Sets a terminal voltage, in nominal volts.
@@ -39,7 +37,7 @@ impl<B> Bus<B> {
         motor: Handle<M, B>,
         voltage: Voltage,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, _| slot.set_output(voltage.as_volts(), now))
+        self.set(motor.into(), |slot, now| slot.set_output(voltage.as_volts(), now))
     }
 
     /// Sets the command on the wire's own scale.
@@ -47,7 +45,7 @@ impl<B> Bus<B> {
     /// # Errors
     /// See above.
     pub fn set_raw(&mut self, motor: impl Into<AnyHandle<B>>, raw: i16) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, _| slot.set_raw(raw, now))
+        self.set(motor.into(), |slot, now| slot.set_raw(raw, now))
     }
 
     /// Sets the velocity that the speed loop follows.
@@ -60,9 +58,7 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         velocity: AngularVelocity,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, sent| {
-            slot.set_velocity(velocity.as_rad_per_s(), now, sent)
-        })
+        self.set(motor.into(), |slot, now| slot.set_velocity(velocity.as_rad_per_s(), now))
     }
 
     /// Sets the absolute angle that the position loop goes to, by the shortest way: 350° to 10° is +20°.
@@ -74,9 +70,7 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         angle: Angle,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, sent| {
-            slot.set_angle(Position::from_angle(angle), now, sent)
-        })
+        self.set(motor.into(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
     /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
@@ -88,7 +82,7 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now, sent| slot.set_position(position, now, sent))
+        self.set(motor.into(), |slot, now| slot.set_position(position, now))
     }
 
     /// Asks a motor for nothing: zero output from the next update on, loops reset. It stays armed, and frames that wait go
@@ -178,10 +172,10 @@ impl<B> Bus<B> {
     fn set(
         &mut self,
         motor: AnyHandle<B>,
-        set: impl FnOnce(&mut Slot, u32, &Outbox) -> Result<(), TargetError>,
+        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
     ) -> Result<(), TargetError> {
-        let Self { slots, outbox, now, .. } = self;
-        set(find(slots, motor.key()).ok_or(TargetError::Detached)?, *now, outbox)
+        let now = self.now;
+        set(self.slot_mut(motor).ok_or(TargetError::Detached)?, now)
     }
 }
 

@@ -80,6 +80,8 @@ pub struct Brushed<P, D> {
     target: Target,
     way: Way,
     output: f32,
+    /// The last update set a duty of its own; the loop goes on from there.
+    was_direct: bool,
     /// An update without a step may set the output once more.
     may_hold: bool,
     counted: Option<(u32, Instant)>,
@@ -108,6 +110,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             target: Target::Rest,
             way: Way::Coast,
             output: 0.0,
+            was_direct: false,
             may_hold: false,
             counted: None,
             counts: 0,
@@ -188,10 +191,6 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
     pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
         self.admit(share.is_finite())?;
-        if !matches!(self.target, Target::Duty(_)) {
-            // The loop has no part in the output from now on.
-            self.speed.iter_mut().for_each(Pid::reset);
-        }
         self.target = Target::Duty(share);
         Ok(())
     }
@@ -241,26 +240,33 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     fn command(&mut self, tick: Tick) -> f32 {
         if !self.guard.drives(tick.now()) {
-            // Late counts leave the integral as it is, unless it was to be set; without a target it starts afresh.
-            if self.guard.has_target() {
-                self.speed.iter_mut().for_each(Pid::forget_take_over);
-            } else {
+            // Late counts leave the integral as it is; without a target it starts afresh.
+            if !self.guard.has_target() {
                 self.rest();
             }
             return 0.0;
         }
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         if step.is_hold() {
-            if core::mem::take(&mut self.may_hold) {
-                return self.output;
-            }
-            self.speed.iter_mut().for_each(Pid::forget_take_over);
-            return 0.0;
+            return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
         }
         self.may_hold = true;
+        let is_direct = matches!(self.target, Target::Duty(_));
+        let was_direct = core::mem::replace(&mut self.was_direct, is_direct);
         match (self.target, &mut self.speed) {
-            (Target::Duty(share), _) => share,
-            (Target::Velocity(goal), Some(speed)) => speed.step(goal, self.rad_per_s, &step),
+            (Target::Duty(share), speed) => {
+                if !was_direct {
+                    // The loop has no part in it.
+                    speed.iter_mut().for_each(Pid::reset);
+                }
+                share
+            }
+            (Target::Velocity(goal), Some(speed)) => {
+                if was_direct {
+                    speed.reset_to(self.output);
+                }
+                speed.step(goal, self.rad_per_s, &step)
+            }
             (Target::Rest, _) | (Target::Velocity(_), None) => 0.0,
         }
     }
@@ -268,14 +274,13 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         if !self.guard.has_target() {
             // What was asked for before, and its output, are over.
-            (self.target, self.may_hold) = (Target::Rest, false);
-            self.speed.iter_mut().for_each(Pid::forget_take_over);
+            (self.target, self.may_hold, self.was_direct) = (Target::Rest, false, false);
         }
         self.guard.admit(is_finite)
     }
 
     fn rest(&mut self) {
-        self.target = Target::Rest;
+        (self.target, self.was_direct) = (Target::Rest, false);
         self.speed.iter_mut().for_each(Pid::reset);
     }
 

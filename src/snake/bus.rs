@@ -242,7 +242,8 @@ impl Joints {
     fn hold(&mut self, now: Instant) {
         count(&mut self.counters.bad_steps);
         self.held_steps = self.held_steps.saturating_add(1);
-        if self.held_steps >= 2 {
+        let is_late = now.since(self.now) > self.timeouts.late();
+        if self.held_steps >= 2 || is_late {
             (0..SLOTS).for_each(|index| self.relax_at(index));
         }
         let stands = now <= self.now;

@@ -80,12 +80,6 @@ impl Cascade {
         self.speed.interrupt();
     }
 
-    /// Resets the loops that were to take over from another controller, and did not.
-    pub(crate) const fn forget_take_over(&mut self) {
-        self.position.forget_take_over();
-        self.speed.forget_take_over();
-    }
-
     /// Returns the last output.
     #[must_use]
     #[inline]

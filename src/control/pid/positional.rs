@@ -215,14 +215,6 @@ impl Pid {
         self.options |= TRACK_OUTPUT;
     }
 
-    /// Resets, where [`reset_to`](Self::reset_to) gave an output that no call returned: a controller that was to be taken
-    /// over from, and was not.
-    pub(crate) const fn forget_take_over(&mut self) {
-        if self.options & TRACK_OUTPUT != 0 {
-            self.reset();
-        }
-    }
-
     /// Changes the gains without a jump of P: the integral takes up the difference. A new `kd` shows at once, in D, which passes;
     /// the integral would keep it after the shaft has come to rest.
     ///

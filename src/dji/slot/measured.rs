@@ -1,6 +1,5 @@
 use super::target::{Action, Goal, needs};
 use super::{Slot, age, is_near};
-use crate::dji::command::Outbox;
 use crate::motor::{TargetError, Timeouts};
 
 impl Slot {
@@ -13,7 +12,6 @@ impl Slot {
         at: Option<u32>,
         now: u32,
         timeouts: &Timeouts,
-        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
         needs(self.loops.position())?;
@@ -24,23 +22,11 @@ impl Slot {
             }
             return Err(TargetError::StaleMeasurement);
         };
-        if self.asked != Action::Measured {
-            self.enter_loops_at(rad_per_s, sent);
-        }
         // It counts until the measurement is too old: as if it had been set so long before.
         let commanded = at.wrapping_add(limit).wrapping_sub(command_us);
         let is_ahead = age(now, commanded) == 0;
         let goal = Goal::measured(way, rad_per_s);
         self.start(Action::Measured, goal, if is_ahead { now } else { commanded });
         Ok(())
-    }
-
-    /// Both loops start from a velocity by another sensor: no kick for the step from one to the other.
-    fn enter_loops_at(&mut self, rad_per_s: f32, sent: &Outbox) {
-        self.enter_speed_loop(sent);
-        if self.asked != Action::Rest && !self.asked.is_way() {
-            self.loops.position_mut().reset_to(rad_per_s);
-        }
-        self.loops.interrupt();
     }
 }

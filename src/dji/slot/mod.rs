@@ -66,6 +66,8 @@ pub(super) struct Slot {
     /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
     /// well when it was looked at last, and nothing has begun since.
     cool_below: u8,
+    /// What the last update did.
+    acted: Action,
     saturated: u16,
     pub(super) conditions: Latch,
     health: &'static HealthConfig,
@@ -112,6 +114,7 @@ impl Slot {
         arming: Arming::Disarmed,
         error_code: 0,
         cool_below: 0,
+        acted: Action::Rest,
         calm_word: 0,
         saturated: 0,
         conditions: Latch::NONE,

@@ -40,7 +40,7 @@ pub(super) enum Duty {
     Velocity,
     /// Both loops, as above.
     Position,
-    /// Whatever else is asked for, within what is left of the output.
+    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
     Other,
 }
 
@@ -119,11 +119,9 @@ impl Slot {
         &mut self,
         rad_per_s: f32,
         now: u32,
-        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
         needs(self.loops.speed())?;
-        self.enter_speed_loop(sent);
         self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
     }
@@ -133,7 +131,6 @@ impl Slot {
         &mut self,
         angle: Position,
         now: u32,
-        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
         needs(self.loops.position())?;
@@ -141,7 +138,6 @@ impl Slot {
             return Err(TargetError::NotHomed);
         }
         let (_, phase) = self.shaft.locate(angle);
-        self.enter_position_loop(sent);
         self.start(Action::Angle, Goal::of(phase), now);
         Ok(())
     }
@@ -151,12 +147,10 @@ impl Slot {
         &mut self,
         position: Position,
         now: u32,
-        sent: &Outbox,
     ) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
         needs(self.loops.position())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
-        self.enter_position_loop(sent);
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);
         Ok(())
@@ -207,10 +201,6 @@ impl Slot {
     fn ask(&mut self, action: Action, goal: Goal) {
         self.goal = goal;
         if self.asked != action {
-            if action == Action::Raw {
-                // They have no part in what is sent from now on.
-                self.loops.reset();
-            }
             self.asked = action;
             self.settle();
         }
@@ -229,6 +219,7 @@ impl Slot {
             _ if self.link != Link::Online => Duty::Rest,
             Action::Rest => Duty::Rest,
             _ if self.has_rested() => Duty::First,
+            _ if self.acted != self.asked => Duty::Other,
             Action::Raw => Duty::Raw,
             Action::Velocity if is_free => Duty::Velocity,
             Action::Position if is_free && self.loops.position().is_plain() => Duty::Position,
@@ -236,42 +227,45 @@ impl Slot {
         };
     }
 
-    /// What is asked for has an output from now on: its own, and not one from before the rest that a loop was to take
-    /// over.
+    /// What is asked for has an output from now on.
     pub(super) fn end_rest(&mut self) {
-        self.forget_take_over();
+        self.acted = Action::Rest;
         self.duty = Duty::Other;
         self.settle();
     }
 
-    /// A zero was sent since a loop was to take over.
+    /// What is asked for is done for the first time. The loops that have a part in it go on from what was done until now and
+    /// sent last, so that their output does not jump. What was asked for in between, and never done, is nothing to go on from.
     #[cold]
     #[inline(never)]
-    pub(in crate::dji) const fn forget_take_over(&mut self) {
-        self.loops.forget_take_over();
-    }
-
-    /// The speed loop takes over from a direct command at what was sent last: no jump of the output.
-    pub(super) fn enter_speed_loop(&mut self, sent: &Outbox) {
-        if self.asked == Action::Raw {
-            let last = self.in_units(sent.get(self.place));
-            self.loops.speed_mut().reset_to(last);
-        } else if self.asked == Action::Measured {
+    pub(super) fn take_over(&mut self, sent: &Outbox) {
+        let before = core::mem::replace(&mut self.acted, self.asked);
+        match before {
+            _ if self.asked == Action::Raw => self.loops.reset(),
+            Action::Raw => {
+                let last = self.in_units(sent.get(self.place));
+                self.loops.speed_mut().reset_to(last);
+            }
             // Another sensor: its last reading says nothing of the next one.
-            self.loops.interrupt();
+            Action::Measured => self.loops.interrupt(),
+            _ => {}
         }
-    }
-
-    /// The position loop starts from the present velocity: no jump of its output.
-    fn enter_position_loop(&mut self, sent: &Outbox) {
-        if self.asked.is_way() {
-            return;
+        let is_placed = before == Action::Rest || before.is_way();
+        match self.asked {
+            Action::Measured => {
+                if !is_placed {
+                    self.loops.position_mut().reset_to(self.goal.rate());
+                }
+                // No kick for the step from one velocity to the other.
+                self.loops.interrupt();
+            }
+            _ if self.asked.is_way() && !is_placed => {
+                let velocity = self.velocity().as_rad_per_s();
+                self.loops.position_mut().reset_to(velocity);
+            }
+            _ => {}
         }
-        self.enter_speed_loop(sent);
-        if self.asked != Action::Rest {
-            let velocity = self.velocity().as_rad_per_s();
-            self.loops.position_mut().reset_to(velocity);
-        }
+        self.settle();
     }
 }
 
@@ -317,6 +311,8 @@ mod tests {
             bus.update(Tick::new(now, 0.001));
             let velocity = duty(&bus);
             bus.set_position(motor, Position::ZERO).unwrap();
+            assert_eq!(duty(&bus), Duty::Other, "in place of another");
+            bus.update(Tick::new(Instant::from_micros(2_000), 0.001));
             assert_eq!([velocity, duty(&bus)], expected);
             let slot = bus.slot_mut(motor.erase()).unwrap();
             slot.range = Range::within(1_000);

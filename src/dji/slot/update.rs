@@ -1,7 +1,7 @@
 use super::target::{Action, Duty};
 use super::{Slot, age, is_near};
 use crate::control::TimeStep;
-use crate::dji::command::{free_to_raw, loop_to_raw, saturate};
+use crate::dji::command::{Outbox, free_to_raw, loop_to_raw, saturate};
 use crate::motor::{Condition, Link, Timeouts};
 
 /// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
@@ -32,7 +32,12 @@ impl Slot {
     /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
     /// stays in registers, because nobody else gets to see it.
     #[inline]
-    pub(in crate::dji) fn update(&mut self, plain: &TimeStep, step: &TimeStep) -> i16 {
+    pub(in crate::dji) fn update(
+        &mut self,
+        plain: &TimeStep,
+        step: &TimeStep,
+        sent: &Outbox,
+    ) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
         let goal = match self.duty {
             Duty::Velocity => self.goal.rad_per_s(),
@@ -40,12 +45,12 @@ impl Slot {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
                 match self.loops.position_mut().try_step_error(way, velocity, plain) {
                     Some(goal) => goal,
-                    None => return self.update_carefully(step),
+                    None => return self.update_carefully(step, sent),
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             // Out of line too: a zero for these would be loaded in every update of every motor.
-            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step),
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
         };
         match self.loops.speed_mut().try_step(goal, velocity, plain) {
             Some(output) => free_to_raw(output, self.raw_per_unit),
@@ -63,11 +68,14 @@ impl Slot {
     /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
-    fn update_carefully(&mut self, step: &TimeStep) -> i16 {
+    fn update_carefully(&mut self, step: &TimeStep, sent: &Outbox) -> i16 {
         match self.duty {
             Duty::Rest => return 0,
             Duty::First => self.end_rest(),
             _ => {}
+        }
+        if self.acted != self.asked {
+            self.take_over(sent);
         }
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {

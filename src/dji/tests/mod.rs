@@ -7,6 +7,7 @@ mod conversions;
 mod device;
 mod duplicates;
 mod health;
+mod holding;
 mod limiting;
 mod measured;
 mod receiving;

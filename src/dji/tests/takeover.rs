@@ -3,8 +3,6 @@
 use super::watching::{Bench, CALM, Told};
 use super::*;
 use crate::motor::{Condition, Measured};
-use proptest::collection::vec;
-use proptest::prelude::*;
 
 const STILL: Told = Told { rpm: 0, counts_per_ms: 0, ..CALM };
 /// 60 rpm: 2 pi rad/s, and 8.192 counts a millisecond.
@@ -173,212 +171,33 @@ fn a_position_loop_does_not_go_on_from_a_velocity_before_a_rest() {
     assert!((first - integral).abs() < 0.05, "{first} V: it is where it is to be");
 }
 
-/// Without an error it holds its output, whatever that is.
-const HOLDING: PidConfig = PidConfig::new(0.0, 0.01, 0.0);
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Call {
-    Raw(i16),
-    Velocity,
-    /// A target that is no number.
-    Nowhere,
-    Relax,
-    /// An update with feedback that is too old, and a frame after it.
-    Late,
-    /// An update without a step.
-    Hold,
-    Step,
-}
-
-fn call() -> impl Strategy<Value = Call> {
-    prop_oneof![
-        2 => (-16_384_i16..=16_384).prop_map(Call::Raw),
-        3 => Just(Call::Velocity),
-        1 => Just(Call::Nowhere),
-        1 => Just(Call::Relax),
-        1 => Just(Call::Late),
-        1 => Just(Call::Hold),
-        4 => Just(Call::Step),
-    ]
-}
-
-/// A motor that stands, and what its next word has to be.
-struct Standing {
-    bus: Bus,
-    motor: Handle<M3508>,
-    ms: u64,
-    asked: Call,
-    commanded_ms: u64,
-    word: i16,
-    /// What the loop sent itself since the last direct command, or is to take over.
-    held: i16,
-    takes_over: bool,
-    has_rested: bool,
-    holds: u8,
-}
-
-impl Standing {
-    fn new() -> Self {
-        let (bus, [motor]) = armed([Config::<M3508>::new(1).speed_loop(HOLDING)]);
-        Self {
-            bus,
-            motor,
-            ms: 1,
-            asked: Call::Relax,
-            commanded_ms: 1,
-            word: 0,
-            held: 0,
-            takes_over: false,
-            has_rested: true,
-            holds: 0,
-        }
-    }
-
-    fn call(&mut self, call: Call) {
-        match call {
-            Call::Raw(raw) => {
-                self.bus.set_raw(self.motor, raw).unwrap();
-                (self.held, self.takes_over) = (0, false);
-                self.ask(call);
-            }
-            Call::Velocity => {
-                self.bus.set_velocity(self.motor, AngularVelocity::ZERO).unwrap();
-                if matches!(self.asked, Call::Raw(_)) && !self.has_rested {
-                    (self.held, self.takes_over) = (self.word, true);
-                }
-                self.ask(call);
-            }
-            Call::Nowhere => {
-                let nowhere = AngularVelocity::from_rpm(f32::NAN);
-                let refused = self.bus.set_velocity(self.motor, nowhere);
-                assert_eq!(refused, Err(TargetError::NotFinite));
-                self.rest();
-                self.asked = call;
-            }
-            Call::Relax => {
-                self.bus.relax(self.motor);
-                self.relax();
-            }
-            Call::Late => {
-                self.rest();
-                self.step(11);
-            }
-            Call::Hold => self.hold(),
-            Call::Step => self.step(1),
-        }
-    }
-
-    fn ask(&mut self, call: Call) {
-        (self.asked, self.commanded_ms) = (call, self.ms);
-    }
-
-    fn relax(&mut self) {
-        self.rest();
-        (self.asked, self.held) = (Call::Relax, 0);
-    }
-
-    fn rest(&mut self) {
-        if core::mem::take(&mut self.takes_over) {
-            self.held = 0;
-        }
-        self.has_rested = true;
-    }
-
-    /// What was sent stays once, then zeros.
-    fn hold(&mut self) {
-        self.ms += 1;
-        self.holds += 1;
-        _ = self.bus.ingest(&feedback(0x201, 0, 0), at_ms(self.ms));
-        self.bus.update(Tick::new(at_ms(self.ms), f32::NAN));
-        let word = sent(&mut self.bus).last().map_or(self.word, |(_, words)| words[0]);
-        if self.holds > 1 && core::mem::take(&mut self.takes_over) {
-            self.held = 0;
-        }
-        let stays = self.holds == 1 && !self.has_rested;
-        assert_eq!(word, if stays { self.word } else { 0 });
-        self.word = word;
-    }
-
-    fn step(&mut self, ms: u64) {
-        self.ms += ms;
-        self.holds = 0;
-        if self.ms - self.commanded_ms > 100 {
-            self.relax();
-        }
-        if ms == 1 {
-            _ = self.bus.ingest(&feedback(0x201, 0, 0), at_ms(self.ms));
-        }
-        step(&mut self.bus, self.ms);
-        self.word = sent(&mut self.bus).last().map_or(self.word, |(_, words)| words[0]);
-        let expected = match self.asked {
-            _ if ms > 1 => 0,
-            Call::Raw(raw) => raw,
-            Call::Velocity => self.held,
-            _ => 0,
-        };
-        assert_eq!(self.word, expected, "at {} ms, {:?}", self.ms, self.asked);
-        self.has_rested = ms > 1 || !matches!(self.asked, Call::Raw(_) | Call::Velocity);
-        self.takes_over &= self.has_rested;
-        if ms > 1 {
-            _ = self.bus.ingest(&feedback(0x201, 0, 0), at_ms(self.ms));
-        }
-    }
-}
-
-/// Hostile readers had full current from rest in six ways: from a direct command that was replaced before it was sent, from
-/// the integral of a loop that a direct command had replaced since, and from a take-over that a rest came before.
+/// A program that asks for nothing, and then for what it wants, in each tick: a hostile reader had a loop that went on with its
+/// first output for ever.
 #[test]
-fn a_speed_loop_goes_on_from_nothing_but_what_was_sent() {
-    use Call::{Hold, Late, Nowhere, Raw, Step, Velocity};
-    const FULL: Call = Raw(16_384);
-    let sequences: [&[Call]; 6] = [
-        &[FULL, Velocity, Step],
-        &[Velocity, Step, FULL, Velocity, Step],
-        &[FULL, Step, Velocity, Step, Raw(0), Step, Late, Velocity, Step],
-        &[FULL, Step, Velocity, Step, Raw(0), Step, Nowhere, Step, Velocity, Step],
-        &[FULL, Step, Velocity, Nowhere, Step, Velocity, Step],
-        &[FULL, Step, Velocity, Hold, Hold, Step],
+fn what_is_replaced_before_it_is_done_leaves_the_loops_as_they_are() {
+    type Ask = fn(&mut Bus, Handle<Gm6020Voltage>);
+    let asks: [Ask; 3] = [
+        |bus, yaw| bus.set_raw(yaw, 0).unwrap(),
+        |bus, yaw| bus.set_velocity(yaw, AngularVelocity::ZERO).unwrap(),
+        |bus, yaw| bus.set_angle(yaw, Angle::from_degrees(90.0)).unwrap(),
     ];
-    for calls in sequences {
-        let mut motor = Standing::new();
-        calls.iter().for_each(|call| motor.call(*call));
-        assert_eq!(motor.word, 0, "{calls:?}");
-    }
-    // One that was sent it takes over, in a ramp of direct commands the last of them.
-    let mut motor = Standing::new();
-    [Raw(1_000), Step, FULL, Velocity, Step].into_iter().for_each(|call| motor.call(call));
-    assert_eq!(motor.word, 1_000);
-}
-
-#[test]
-fn a_position_loop_does_not_go_on_from_a_direct_command_that_was_not_sent() {
-    let loops = Config::<M3508>::new(1).position_loop(HOLDING, HOLDING);
-    let here = Position::ZERO;
-    let measured = Measured { angle: Angle::ZERO, velocity: AngularVelocity::ZERO, at: at_ms(2) };
-    type Ask = fn(&mut Bus, Handle<M3508>, Measured) -> Result<(), TargetError>;
-    let asking: [Ask; 3] = [
-        |bus, motor, _| bus.set_position(motor, Position::ZERO),
-        |bus, motor, _| bus.set_angle(motor, Angle::ZERO),
-        |bus, motor, measured| bus.set_angle_measured(motor, Angle::ZERO, measured),
+    let wanted: [Ask; 3] = [
+        |bus, yaw| bus.set_velocity(yaw, AngularVelocity::from_rad_per_s(RATE)).unwrap(),
+        |bus, yaw| bus.set_position(yaw, Position::from_turns(3)).unwrap(),
+        |bus, yaw| bus.set_raw(yaw, 1_000).unwrap(),
     ];
-    for ask in asking {
-        let (mut bus, [motor]) = armed([loops]);
-        bus.set_present_position(motor, here).unwrap();
-        bus.set_raw(motor, 1_000).unwrap();
-        step(&mut bus, 2);
-        bus.set_raw(motor, 16_384).unwrap();
-        ask(&mut bus, motor, measured).unwrap();
-        step(&mut bus, 3);
-        assert_eq!(sent(&mut bus).last().map(|(_, words)| words[0]), Some(1_000));
-    }
-}
-
-proptest! {
-    /// Law: a speed loop without an error goes on from what was sent; after a rest from what it sent itself, as long as no
-    /// direct command came since; and otherwise from zero.
-    #[test]
-    fn a_speed_loop_holds_what_was_sent_or_what_it_sent_itself(calls in vec(call(), 1..60)) {
-        let mut motor = Standing::new();
-        calls.into_iter().for_each(|call| motor.call(call));
+    for want in wanted {
+        for first in asks {
+            let (mut plain, mut twice) = (yaw(), yaw());
+            for tick in 0..50_i16 {
+                let told = Told { rpm: 2 * tick, counts_per_ms: tick.unsigned_abs() / 4, ..CALM };
+                let expected = volts(&mut plain, told, want);
+                let got = volts(&mut twice, told, |bus, yaw| {
+                    first(bus, yaw);
+                    want(bus, yaw);
+                });
+                assert_eq!(got.to_bits(), expected.to_bits(), "tick {tick}");
+            }
+        }
     }
 }

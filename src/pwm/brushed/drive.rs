@@ -22,12 +22,7 @@ impl<P: SetDutyCycle, D: Direction> VelocityDrive<()> for Brushed<P, D> {
             return Err(TargetError::NoLoop);
         }
         self.admit(target.as_rad_per_s().is_finite())?;
-        let goal = target.as_rad_per_s();
-        if let (Target::Duty(_), Some(speed)) = (self.target, &mut self.speed) {
-            // From the output that it has, if that is of this target.
-            speed.reset_to(if self.may_hold { self.output } else { 0.0 });
-        }
-        self.target = Target::Velocity(goal);
+        self.target = Target::Velocity(target.as_rad_per_s());
         Ok(())
     }
 }
