@@ -75,10 +75,12 @@ struct Story {
     /// The time of the last update, good or not.
     clock: u64,
     held: u32,
-    /// Writes that wait in the driver, which may still give them back.
+    /// Frames that wait in the driver, which may still give them back.
     kept: Vec<CanFrame>,
     handed_out: u32,
     given_back: u32,
+    /// Questions that were handed out and did not come back.
+    asked: u32,
     taken: u32,
     malformed: u32,
     unrelated: u32,
@@ -102,6 +104,7 @@ impl Story {
             kept: Vec::new(),
             handed_out: 0,
             given_back: 0,
+            asked: 0,
             taken: 0,
             malformed: 0,
             unrelated: 0,
@@ -167,7 +170,9 @@ impl Story {
         let outcome = self.joints.ingest(frame, Instant::from_micros(self.now));
         // Another controller's command is no reply, but noticed: it relaxes its joint.
         let rival = self.joints.counters().foreign_commands != rivals;
-        self.refused.push(outcome != Ingest::Taken && !rival);
+        // Nor is the answer of a joint that went refused: nothing is sent to it before.
+        let answers = self.answers(frame);
+        self.refused.push(outcome != Ingest::Taken && !rival && !answers);
         assert_eq!(outcome == Ingest::Taken, self.is_reply(frame), "{frame:?}: {outcome:?}");
         match outcome {
             Ingest::Taken => {
@@ -175,7 +180,6 @@ impl Story {
                 let reply = Reply::decode(frame.data()).expect("a reply");
                 let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
                 let known = &mut self.known[index.expect("of an attached joint")];
-                known.due = known.due.filter(|(register, _)| *register != reply.register());
                 if reply.register() == Register::ActualPosition {
                     known.heard = known.heard.max(Some(self.now));
                     known.news[0] = true;
@@ -186,16 +190,21 @@ impl Story {
         }
     }
 
-    /// By the protocol: `04`, a register of the table, and its value, from a joint that is attached.
+    /// From a joint that is attached.
     fn is_reply(&self, frame: &CanFrame) -> bool {
-        const REGISTERS: [u8; 9] = [6, 7, 8, 9, 10, 11, 12, 15, 16];
         let attached = self.joints.joints().any(|(_, name)| u32::from(name.id()) == frame.header());
-        let [kind, register, ..] = *frame.data() else { return false };
-        attached
-            && frame.is_data_frame()
-            && frame.is_standard()
-            && (frame.data().len(), kind) == (6, 4)
-            && REGISTERS.contains(&register)
+        attached && is_reply(frame)
+    }
+
+    /// Waits no longer for what a reply answers; `false` when it is none that was due.
+    fn answers(&mut self, frame: &CanFrame) -> bool {
+        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
+        let Some(known) = index.map(|index| &mut self.known[index]) else { return false };
+        let due =
+            known.due.is_some_and(|(register, _)| frame.data().get(1) == Some(&register.as_raw()));
+        let answers = due && is_reply(frame);
+        known.due = known.due.filter(|_| !answers);
+        answers
     }
 
     fn call(&mut self, op: u8, flags: u8, index: usize, payload: [u8; 8]) {
@@ -267,9 +276,10 @@ impl Story {
         self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
         let holds = self.joints.counters().bad_steps != bad_steps;
         let stands = self.now <= self.clock;
+        let is_late = self.now.saturating_sub(self.clock) > LATE_US;
         assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
         self.held = if holds { self.held + 1 } else { 0 };
-        if self.held >= 2 {
+        if self.held >= 2 || holds && is_late {
             self.known.iter_mut().for_each(Known::end);
         }
         self.clock = if holds { self.clock.max(self.now) } else { self.now };
@@ -301,10 +311,11 @@ impl Story {
             (frame.header(), frame.data()).hash(&mut self.sent);
             self.handed_out += 1;
             self.check(&frame);
-            let is_write = !matches!(Command::decode(frame.data()), Some(Command::Read(_)));
+            let is_read = matches!(Command::decode(frame.data()), Some(Command::Read(_)));
+            let keeps = if is_read { 64 } else { 8 };
             if flags & 2 != 0 {
                 self.give_back(&frame);
-            } else if flags & 8 != 0 && is_write && self.kept.len() < 8 {
+            } else if flags & keeps != 0 && self.kept.len() < 8 {
                 self.kept.push(frame);
             }
         }
@@ -324,6 +335,7 @@ impl Story {
         assert!(known.due.is_none(), "sent while an answer is due: {known:?}");
         if let Command::Read(register) = command {
             known.due = Some((register, self.clock));
+            self.asked += 1;
         }
         if let Command::Write(register, value) = command {
             match register {
@@ -360,6 +372,12 @@ impl Story {
     }
 
     fn give_back(&mut self, frame: &CanFrame) {
+        if let Some(Command::Read(register)) = Command::decode(frame.data()) {
+            let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
+            let known = &mut self.known[index.expect("checked before")];
+            known.due = known.due.filter(|(due, _)| *due != register);
+            self.asked -= 1;
+        }
         if !self.joints.requeue(frame) {
             let is_detached = |joint| self.joints.link(joint).is_none();
             assert!(self.handles.iter().any(|joint| is_detached(*joint)), "{frame:?}");
@@ -374,7 +392,6 @@ impl Story {
                 (known.moves, known.stop_due, known.stop_returned) = (true, true, true);
             }
             Some(Command::Write(register, _)) => known.written.retain(|other| *other != register),
-            Some(Command::Read(_)) => known.due = None,
             _ => {}
         }
     }
@@ -382,7 +399,7 @@ impl Story {
     /// I6: every frame that came is somewhere.
     fn add_up(&self) {
         let counters = self.joints.counters();
-        assert_eq!(counters.replies, self.taken, "I6");
+        assert_eq!((counters.replies, counters.requests), (self.taken, self.asked), "I6");
         let malformed = counters.bad_length + counters.bad_field + counters.foreign_commands;
         assert_eq!(malformed, self.malformed, "I6");
         assert!(counters.unattached <= self.unrelated, "I6");
@@ -390,6 +407,16 @@ impl Story {
         let waiting = counters.packed.checked_sub(counters.superseded + sent);
         assert!(waiting.is_some_and(|waiting| waiting <= 9), "I6: {counters:?}, {sent} sent");
     }
+}
+
+/// By the protocol: `04`, a register of the table, and its value.
+fn is_reply(frame: &CanFrame) -> bool {
+    const REGISTERS: [u8; 9] = [6, 7, 8, 9, 10, 11, 12, 15, 16];
+    let [kind, register, ..] = *frame.data() else { return false };
+    frame.is_data_frame()
+        && frame.is_standard()
+        && (frame.data().len(), kind) == (6, 4)
+        && REGISTERS.contains(&register)
 }
 
 fn frame(

@@ -1,7 +1,8 @@
+use super::answers::Answers;
 use super::budget::Budget;
 use super::model::IDS;
 use super::slot::{Slot, name};
-use super::{AttachError, Command, Config, Joint, Register, Reply, ReplyError, State};
+use super::{AttachError, Command, Config, Joint, Reply, ReplyError, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
@@ -53,6 +54,7 @@ pub struct Joints {
     pub(super) now: Instant,
     timeouts: Timeouts,
     reply_timeout: Duration,
+    pub(super) answers: Answers,
     pub(super) budget: Budget,
     /// Joints to be disabled before all else, to be written to, and to be asked; a bit each.
     pub(super) stops: u16,
@@ -89,7 +91,7 @@ pub struct Counters {
     pub foreign_commands: u32,
     /// Frames with the id of a joint that is not attached.
     pub unattached: u32,
-    /// Requests that were sent.
+    /// Requests that were sent, and not given back.
     pub requests: u32,
     /// Requests that were not answered in time.
     pub unanswered: u32,
@@ -111,6 +113,7 @@ impl Joints {
             now: Instant::START,
             timeouts: Timeouts::new().with_late(Duration::from_millis(40)),
             reply_timeout: Duration::from_millis(2),
+            answers: Answers::NONE,
             budget: Budget::new(),
             stops: 0,
             writes: 0,
@@ -167,10 +170,7 @@ impl Joints {
             return Err(AttachError::Taken(joint));
         }
         let generation = slot.next_generation().ok_or(AttachError::WornOut(joint))?;
-        // An answer to a joint that was here before may still come.
-        let awaiting = slot.awaiting;
         *slot = Slot::new(&config, self.timeouts, generation)?;
-        slot.awaiting = awaiting;
         self.returned.0 |= 1 << index;
         Ok(Joint::new(index, generation))
     }
@@ -188,11 +188,15 @@ impl Joints {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let counters = &mut self.counters;
+        let reply = Reply::decode(frame.data());
+        if let Ok(reply) = reply {
+            _ = self.answers.settle(index, reply.register());
+        }
         if slot.id.is_none() {
             count(&mut counters.unattached);
             return Ingest::Unrelated;
         }
-        match Reply::decode(frame.data()) {
+        match reply {
             Ok(reply) => {
                 count(&mut counters.replies);
                 slot.receive(reply, now);
@@ -256,14 +260,6 @@ impl Joints {
         self.stop_again();
     }
 
-    fn give_up(&mut self, reply_timeout: Option<Duration>) {
-        for slot in &mut self.slots {
-            if slot.give_up(self.now, reply_timeout) {
-                count(&mut self.counters.unanswered);
-            }
-        }
-    }
-
     fn remind(&mut self) {
         for index in 0..SLOTS {
             let slot = self.slots.get(index).filter(|slot| slot.id.is_some());
@@ -305,12 +301,6 @@ impl Joints {
     #[must_use]
     pub fn is_joint_armed(&self, joint: Joint) -> bool {
         self.slot(joint).is_some_and(|slot| slot.guard.is_armed())
-    }
-
-    /// Returns the register that a joint was asked for and has not answered yet.
-    #[must_use]
-    pub fn awaited(&self, joint: Joint) -> Option<Register> {
-        self.slot(joint)?.awaiting.map(|(register, _)| register)
     }
 
     /// Iterates over the attached joints, in the order of their ids.

@@ -81,6 +81,7 @@
 //! whether it answers for every register: if not for `10`, that shows as requests without an answer
 //! ([`State::unanswered`]), one of 24, and a drive that lost its enable is noticed only by its position.
 
+mod answers;
 mod budget;
 mod bus;
 mod command;

@@ -2,7 +2,6 @@
 
 use super::bus::count;
 use super::model::IDS;
-use super::slot::Slot;
 use super::{Command, Joints};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
@@ -18,7 +17,7 @@ impl Joints {
         // What had no room goes first, and where both had none, they take turns: neither starves the other.
         self.reads_first = self.reads != 0 && !(self.writes != 0 && self.reads_first);
         // Whoever owes an answer is in nobody's way.
-        let quiet = self.owing();
+        let quiet = self.answers.owing();
         // Who has news goes before who only hears the old again.
         for news in [true, false] {
             for index in turns(self.last_write) {
@@ -64,13 +63,13 @@ impl Joints {
     /// Tells whether a joint is there and owes no answer.
     fn is_free(&self, index: u8) -> bool {
         let slot = self.slots.get(usize::from(index));
-        slot.is_some_and(|slot| slot.id.is_some() && slot.awaiting.is_none())
+        slot.is_some_and(|slot| slot.id.is_some()) && self.answers.of(index.into()).is_none()
     }
 
     /// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         let now = self.now;
-        let quiet = self.owing();
+        let quiet = self.answers.owing();
         if let Some(index) = next_after(self.told, self.stops & !quiet) {
             self.stops &= !(1 << index);
             self.told = index;
@@ -90,7 +89,9 @@ impl Joints {
                 self.reads &= !(1 << index);
                 self.asked = index;
                 count(&mut self.counters.requests);
-                self.slots.get_mut(usize::from(index))?.next_read(now).frame(index + 1)
+                let register = self.slots.get_mut(usize::from(index))?.next_read();
+                self.answers.expect(index.into(), register, now);
+                Command::Read(register).frame(index + 1)
             }
             (None, None) => None,
         }
@@ -102,18 +103,19 @@ impl Joints {
         self.slots.get_mut(usize::from(index))?.next_write(self.now).frame(index + 1)
     }
 
-    /// Returns the joints that owe an answer.
-    fn owing(&self) -> u16 {
-        let owing = |(index, slot): (u32, &Slot)| u16::from(slot.awaiting.is_some()) << index;
-        (0..).zip(&self.slots).map(owing).fold(0, |all, one| all | one)
-    }
-
     /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
     pub fn requeue(&mut self, frame: &CanFrame) -> bool {
         let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
         let Some(slot) = self.slots.get_mut(usize::from(index)) else { return false };
         let Some(command) = Command::decode(frame.data()) else { return false };
         let (bit, attached) = (1 << index, slot.id.is_some());
+        if let Command::Read(register) = command {
+            self.counters.requests = self.counters.requests.saturating_sub(1);
+            // One that was given up had its turn, and another may be on its way.
+            if self.answers.settle(index.into(), register) {
+                slot.take_back_question();
+            }
+        }
         let (stops, writes, reads) = &mut self.returned;
         // The first that comes back is the next of its kind.
         let (returned, last) = match command {
@@ -126,10 +128,7 @@ impl Joints {
                 slot.take_back(register);
                 (writes, &mut self.written)
             }
-            Command::Read(_) => {
-                slot.take_back_question();
-                (reads, &mut self.asked)
-            }
+            Command::Read(_) => (reads, &mut self.asked),
         };
         if *returned == 0 {
             *last = (index + IDS - 1) % IDS;

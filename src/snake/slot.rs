@@ -5,7 +5,7 @@ mod writing;
 
 use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
-use super::{AttachError, Command, Config, Joint, Register, Reply, Settings, State};
+use super::{AttachError, Config, Joint, Register, Reply, Settings, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
@@ -48,7 +48,6 @@ pub(super) struct Slot {
     ahead: u8,
     driven: bool,
     stopped: Instant,
-    pub(super) awaiting: Option<(Register, Instant)>,
     turn: u8,
     pub(super) question: Option<Register>,
     pub(super) answer: Option<Reply>,
@@ -82,7 +81,6 @@ impl Slot {
         ahead: 0,
         driven: false,
         stopped: Instant::START,
-        awaiting: None,
         turn: 0,
         question: None,
         answer: None,
@@ -127,10 +125,9 @@ impl Slot {
         })
     }
 
-    /// Frees the slot; handles of the joint find nothing from now on. An answer that is due may still come.
+    /// Frees the slot; handles of the joint find nothing from now on.
     pub(super) const fn free(&mut self) {
-        let (generation, awaiting) = (self.generation + 1, self.awaiting);
-        *self = Self { generation, awaiting, ..Self::FREE };
+        *self = Self { generation: self.generation + 1, ..Self::FREE };
     }
 
     pub(super) const fn next_generation(&self) -> Option<u8> {
@@ -148,9 +145,6 @@ impl Slot {
     /// Takes a reply that arrived at `now`. Every reply is kept, only a position is a sign of life: it is what moves
     /// without being looked at.
     pub(super) fn receive(&mut self, reply: Reply, now: Instant) {
-        if self.awaiting.is_some_and(|(register, _)| register == reply.register()) {
-            self.awaiting = None;
-        }
         match reply.register() {
             Register::ActualPosition => self.receive_position(reply.value(), now),
             Register::ActualSpeed => self.raw_speed = reply.value(),
@@ -203,18 +197,6 @@ impl Slot {
         }
     }
 
-    /// Waits no longer for an answer that is overdue; returns whether one is. Without a time-out any is.
-    pub(super) fn give_up(&mut self, now: Instant, reply_timeout: Option<Duration>) -> bool {
-        let Some((_, since)) = self.awaiting else { return false };
-        // A clock that was set back would have it wait for long.
-        let overdue = reply_timeout.is_none_or(|timeout| now.since(since) > timeout || now < since);
-        if overdue {
-            self.unanswered = self.unanswered.saturating_add(1);
-            self.awaiting = None;
-        }
-        overdue
-    }
-
     /// Brings the joint to `now`. Returns whether it has to be told to relax.
     pub(super) fn update(&mut self, now: Instant) -> bool {
         let drives = self.guard.drives(now);
@@ -260,8 +242,8 @@ impl Slot {
         self.ahead == ALL
     }
 
-    /// Returns the frame that asks for what is next in turn.
-    pub(super) fn next_read(&mut self, now: Instant) -> Command {
+    /// Returns what is next in turn to be asked for.
+    pub(super) fn next_read(&mut self) -> Register {
         let register = match (self.turn % 3, self.question) {
             (2, Some(question)) => question,
             (2, None) if self.turn / 3 == CHECKS - 1 => Register::Enable,
@@ -269,13 +251,11 @@ impl Slot {
             _ => Register::ActualPosition,
         };
         self.turn = (self.turn + 1) % TURNS;
-        self.awaiting = Some((register, now));
-        Command::Read(register)
+        register
     }
 
     /// Takes back a question that was not sent: its turn comes again.
     pub(super) const fn take_back_question(&mut self) {
-        self.awaiting = None;
         self.turn = (self.turn + TURNS - 1) % TURNS;
     }
 

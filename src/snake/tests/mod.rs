@@ -1,5 +1,6 @@
 //! Rules of the joints, driven through their public face.
 
+mod answers;
 mod attaching;
 mod commanding;
 mod health;
@@ -72,7 +73,11 @@ impl Bench {
 
     /// Joint 1 says something.
     fn hear(&mut self, register: Register, value: i32) {
-        let outcome = self.joints.ingest(&reply(1, register, value), at_ms(self.ms));
+        self.hear_of(1, register, value);
+    }
+
+    fn hear_of(&mut self, id: u8, register: Register, value: i32) {
+        let outcome = self.joints.ingest(&reply(id, register, value), at_ms(self.ms));
         assert_eq!(outcome, Ingest::Taken);
     }
 
