@@ -111,3 +111,25 @@ impl Clock for StdClock {
         Instant::START + Duration::from(self.0.elapsed())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closure_is_a_clock() {
+        fn read(clock: &mut impl Clock) -> Instant {
+            clock.now()
+        }
+        assert_eq!(read(&mut || Instant::from_micros(7)), Instant::from_micros(7));
+    }
+
+    #[cfg(feature = "std")]
+    #[test]
+    fn the_clock_of_the_operating_system_counts_from_its_creation() {
+        let mut clock = StdClock::new();
+        let start = std::time::Instant::now();
+        while start.elapsed().as_millis() < 1 {}
+        assert!(clock.now() >= Instant::from_micros(1_000));
+    }
+}

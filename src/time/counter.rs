@@ -105,6 +105,8 @@ mod tests {
                 Some(CounterError { ticks_per_second })
             );
         }
+        let refused = std::format!("{}", CounterError { ticks_per_second: 8_388_593 });
+        assert!(refused.starts_with("a counter of 8388593 Hz has no exact ratio"), "{refused}");
     }
 
     #[test]

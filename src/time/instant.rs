@@ -61,3 +61,14 @@ impl core::ops::Sub for Instant {
         self.since(earlier)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_difference_of_two_instants_is_never_negative() {
+        let (early, late) = (Instant::from_micros(5), Instant::from_micros(12));
+        assert_eq!((late - early, early - late), (Duration::from_micros(7), Duration::ZERO));
+    }
+}
