@@ -1,8 +1,8 @@
 //! The queue between an interrupt and a task, with a thread for each: nothing is lost, torn, doubled or reordered.
 //!
-//! `.ci/miri` runs this under many schedules, with weak memory and a search for data races. The atomics are those of
-//! heapless, which neither loom nor shuttle can replace, so the schedules are drawn, not enumerated. Of our own there is
-//! one atomic, the count of dropped frames: only the sender writes it.
+//! `.ci/miri` runs this under many schedules, with weak memory and a search for data races. They are drawn; `.ci/loom`
+//! enumerates them, for a few frames. Of our own there is one atomic, the count of dropped frames: only the sender
+//! writes it.
 
 #![cfg(test)]
 
