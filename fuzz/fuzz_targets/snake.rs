@@ -47,8 +47,12 @@ struct Known {
     /// The target that counts, where it can be told exactly.
     target: Option<i32>,
     written: Vec<Register>,
-    /// What it was asked for and has not answered, and when.
-    due: Option<(Register, u64)>,
+    /// What it was asked for and has not answered, when, and with which of all frames.
+    due: Option<(Register, u64, u32)>,
+    /// The same, where that frame came back, but may have been an older one that was given up.
+    in_doubt: Option<(Register, u64)>,
+    /// Questions that were given up and not answered since.
+    given_up: Vec<Register>,
     /// Written to, and not disabled since.
     moves: bool,
     /// It was led and may be no longer: a disable comes first, whatever follows.
@@ -76,7 +80,7 @@ struct Story {
     clock: u64,
     held: u32,
     /// Frames that wait in the driver, which may still give them back.
-    kept: Vec<CanFrame>,
+    kept: Vec<(CanFrame, u32)>,
     handed_out: u32,
     given_back: u32,
     /// Questions that were handed out and did not come back.
@@ -146,7 +150,7 @@ impl Story {
                 11 => {
                     if flags & 4 != 0 {
                         let kept = core::mem::take(&mut self.kept);
-                        kept.iter().for_each(|frame| self.give_back(frame));
+                        kept.iter().for_each(|(frame, number)| self.give_back(frame, *number));
                     }
                     self.send(flags);
                 }
@@ -196,15 +200,21 @@ impl Story {
         attached && is_reply(frame)
     }
 
-    /// Waits no longer for what a reply answers; `false` when it is none that was due.
+    /// Waits no longer for what a reply answers; `false` when it is none.
     fn answers(&mut self, frame: &CanFrame) -> bool {
         let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-        let Some(known) = index.map(|index| &mut self.known[index]) else { return false };
-        let due =
-            known.due.is_some_and(|(register, _)| frame.data().get(1) == Some(&register.as_raw()));
-        let answers = due && is_reply(frame);
-        known.due = known.due.filter(|_| !answers);
-        answers
+        let Some(index) = index.filter(|_| is_reply(frame)) else { return false };
+        let known = &mut self.known[index];
+        let is_this = |register: Register| frame.data().get(1) == Some(&register.as_raw());
+        // A question that is answered was sent: the driver has it no longer.
+        self.kept.retain(|(kept, _)| match Command::decode(kept.data()) {
+            Some(Command::Read(register)) => kept.header() != frame.header() || !is_this(register),
+            _ => true,
+        });
+        known.given_up.retain(|register| !is_this(*register));
+        known.in_doubt.take_if(|(register, _)| is_this(*register));
+        known.due.take_if(|(register, ..)| is_this(*register));
+        true
     }
 
     fn call(&mut self, op: u8, flags: u8, index: usize, payload: [u8; 8]) {
@@ -285,12 +295,16 @@ impl Story {
         self.clock = if holds { self.clock.max(self.now) } else { self.now };
         for known in &mut self.known {
             known.stop_returned = false;
-            let waits = |(_, at): &(_, u64)| {
-                let waited = self.clock.checked_sub(*at);
-                waited.is_some_and(|waited| waited <= REPLY_US)
+            let waits = |at: u64| {
+                self.clock.abs_diff(at) <= REPLY_US
                     && !(holds && stands && u64::from(self.held) * 1_000 > REPLY_US)
             };
-            known.due = known.due.filter(waits);
+            if let Some((register, ..)) = known.due.take_if(|(_, at, _)| !waits(*at)) {
+                known.given_up.push(register);
+            }
+            if let Some((register, _)) = known.in_doubt.take_if(|(_, at)| !waits(*at)) {
+                known.given_up.push(register);
+            }
         }
         if !holds {
             (self.tick, self.updated) = (self.now, self.now);
@@ -314,13 +328,13 @@ impl Story {
             let is_read = matches!(Command::decode(frame.data()), Some(Command::Read(_)));
             let keeps = if is_read { 64 } else { 8 };
             if flags & 2 != 0 {
-                self.give_back(&frame);
+                self.give_back(&frame, self.handed_out);
             } else if flags & keeps != 0 && self.kept.len() < 8 {
-                self.kept.push(frame);
+                self.kept.push((frame, self.handed_out));
             }
         }
         for known in &self.known {
-            let waits = known.due.is_some() || known.stop_returned;
+            let waits = known.due.is_some() || known.in_doubt.is_some() || known.stop_returned;
             assert!(!known.stop_due || waits, "I9: not disabled at once: {known:?}");
         }
         self.add_up();
@@ -334,7 +348,8 @@ impl Story {
         let known = &mut self.known[index];
         assert!(known.due.is_none(), "sent while an answer is due: {known:?}");
         if let Command::Read(register) = command {
-            known.due = Some((register, self.clock));
+            assert!(known.in_doubt.is_none(), "asked while an answer may be due: {known:?}");
+            known.due = Some((register, self.clock, self.handed_out));
             self.asked += 1;
         }
         if let Command::Write(register, value) = command {
@@ -371,18 +386,16 @@ impl Story {
         assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.tick);
     }
 
-    fn give_back(&mut self, frame: &CanFrame) {
+    fn give_back(&mut self, frame: &CanFrame, number: u32) {
         if let Some(Command::Read(register)) = Command::decode(frame.data()) {
             let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
             let known = &mut self.known[index.expect("checked before")];
-            known.due = known.due.filter(|(due, _)| *due != register);
+            let back = known.due.take_if(|(_, _, due)| *due == number);
+            let in_doubt = back.filter(|_| known.given_up.contains(&register));
+            known.in_doubt = in_doubt.map(|(register, at, _)| (register, at)).or(known.in_doubt);
             self.asked -= 1;
         }
-        if !self.joints.requeue(frame) {
-            let is_detached = |joint| self.joints.link(joint).is_none();
-            assert!(self.handles.iter().any(|joint| is_detached(*joint)), "{frame:?}");
-            return;
-        }
+        assert!(self.joints.requeue(frame), "{frame:?}");
         self.given_back += 1;
         let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
         let known = &mut self.known[index.expect("checked before")];

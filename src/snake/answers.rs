@@ -4,34 +4,54 @@ use super::bus::{SLOTS, count};
 use super::{Joint, Joints, Register};
 use crate::time::{Duration, Instant};
 
-/// What each joint was asked for and has not answered, and when.
+/// What each joint was asked for and has not answered.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Answers([Option<(Register, Instant)>; SLOTS]);
+pub(super) struct Answers([Owed; SLOTS]);
+
+#[derive(Debug, Clone, Copy)]
+struct Owed {
+    due: Option<(Register, Instant)>,
+    /// Questions that were given up and not answered since, a bit each: a driver may still hold them.
+    given_up: u32,
+}
+
+const fn bit(register: Register) -> u32 {
+    1 << register.as_raw()
+}
 
 impl Answers {
-    pub(super) const NONE: Self = Self([None; SLOTS]);
+    pub(super) const NONE: Self = Self([Owed { due: None, given_up: 0 }; SLOTS]);
 
     pub(super) fn of(&self, index: usize) -> Option<Register> {
-        let (register, _) = (*self.0.get(index)?)?;
+        let (register, _) = self.0.get(index)?.due?;
         Some(register)
     }
 
     pub(super) fn expect(&mut self, index: usize, register: Register, now: Instant) {
         if let Some(owed) = self.0.get_mut(index) {
-            *owed = Some((register, now));
+            owed.due = Some((register, now));
         }
     }
 
-    /// Waits no longer for this answer; `false` when it was another that is due, or none.
-    pub(super) fn settle(&mut self, index: usize, register: Register) -> bool {
-        let owed = self.0.get_mut(index);
-        let owed = owed.filter(|owed| owed.is_some_and(|(asked, _)| asked == register));
-        owed.and_then(Option::take).is_some()
+    /// Takes an answer: none is due any more, unless it was another.
+    pub(super) fn take(&mut self, index: usize, register: Register) {
+        if let Some(owed) = self.0.get_mut(index) {
+            owed.given_up &= !bit(register);
+            owed.due = owed.due.filter(|(asked, _)| *asked != register);
+        }
+    }
+
+    /// Takes back a question that was not sent; `false` when it is one that was given up, or may be: then the answer to
+    /// another is still due.
+    pub(super) fn take_back(&mut self, index: usize, register: Register) -> bool {
+        let Some(owed) = self.0.get_mut(index) else { return false };
+        let is_given_up = owed.given_up & bit(register) != 0;
+        owed.due.take_if(|(asked, _)| *asked == register && !is_given_up).is_some()
     }
 
     /// Returns the joints that owe one, a bit each.
     pub(super) fn owing(&self) -> u16 {
-        (0..).zip(&self.0).map(|(index, owed)| u16::from(owed.is_some()) << index).sum()
+        (0..).zip(&self.0).map(|(index, owed)| u16::from(owed.due.is_some()) << index).sum()
     }
 }
 
@@ -46,10 +66,11 @@ impl Joints {
     pub(super) fn give_up(&mut self, reply_timeout: Option<Duration>) {
         let now = self.now;
         for (owed, slot) in self.answers.0.iter_mut().zip(&mut self.slots) {
-            let Some((_, since)) = *owed else { continue };
+            let Some((register, since)) = owed.due else { continue };
             // A clock that was set back would have it wait for long.
-            if reply_timeout.is_none_or(|timeout| now.since(since) > timeout || now < since) {
-                *owed = None;
+            let passed = now.since(since).max(since.since(now));
+            if reply_timeout.is_none_or(|timeout| passed > timeout) {
+                *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
                 count(&mut slot.unanswered);
                 count(&mut self.counters.unanswered);
             }

@@ -70,6 +70,8 @@ pub struct Joints {
     pub(super) written: u8,
     pub(super) asked: u8,
     pub(super) held_steps: u8,
+    /// An update came, so that `now` is the time of one.
+    begun: bool,
     /// Frames that are sent are heard again.
     pub(super) echoes: bool,
     pub(super) stopped: bool,
@@ -93,9 +95,9 @@ pub struct Counters {
     pub unattached: u32,
     /// Requests that were sent, and not given back.
     pub requests: u32,
-    /// Requests that were not answered in time.
+    /// Requests that were not answered in time, those too that were given back after that.
     pub unanswered: u32,
-    /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
+    /// Updates whose time step was zero, negative, infinite or NaN, or whose time stood still.
     pub bad_steps: u32,
     /// Frames that were ready: chosen by an update, or one that disables, whenever that is due; wraps.
     pub packed: u32,
@@ -126,6 +128,7 @@ impl Joints {
             written: IDS - 1,
             asked: IDS - 1,
             held_steps: 0,
+            begun: false,
             echoes: false,
             stopped: false,
             counters: Counters {
@@ -150,15 +153,15 @@ impl Joints {
         self
     }
 
-    /// Sets how long a joint has to answer; 2 ms at first. For so long nothing is sent to it, a stop neither: see the
-    /// [module](super).
+    /// Sets how long a joint has to answer; 2 ms at first. Until the first update after that nothing is sent to it, a stop
+    /// neither: see the [module](super).
     #[must_use]
     pub const fn with_reply_timeout(mut self, timeout: Duration) -> Self {
         self.reply_timeout = timeout;
         self
     }
 
-    /// Attaches a joint. It is disabled with the next update.
+    /// Attaches a joint. It is disabled with the next update, or as soon as one that was there before owes no answer.
     ///
     /// # Errors
     /// When its id is out of range or taken, or a parameter is not usable. Nothing changed then.
@@ -190,7 +193,7 @@ impl Joints {
         let counters = &mut self.counters;
         let reply = Reply::decode(frame.data());
         if let Ok(reply) = reply {
-            _ = self.answers.settle(index, reply.register());
+            self.answers.take(index, reply.register());
         }
         if slot.id.is_none() {
             count(&mut counters.unattached);
@@ -225,7 +228,7 @@ impl Joints {
     /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that stands still, choose nobody for one update; a
     /// second one in a row relaxes all joints. Who is to be disabled is so all the same.
     pub fn update(&mut self, tick: Tick) {
-        let stands = tick.now() == self.now && self.now != Instant::START;
+        let stands = core::mem::replace(&mut self.begun, true) && tick.now() == self.now;
         if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() || stands {
             return self.hold(tick.now());
         }

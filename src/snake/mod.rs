@@ -53,8 +53,8 @@
 //!
 //! # One id, two senders
 //! Two nodes that begin to send one id in the same bit do not arbitrate: they destroy each other's frames until one is
-//! off the bus. So while an answer is due, [`Joints`] sends nothing to that joint, a stop neither, for
-//! [`Joints::with_reply_timeout`] at most (2 ms). `embedded-can` has frames of one id sent in order, so a write before a
+//! off the bus. So while an answer is due, [`Joints`] sends nothing to that joint, a stop neither, until the first update after
+//! [`Joints::with_reply_timeout`] (2 ms, so the third at 1 kHz). `embedded-can` has frames of one id sent in order, so a write before a
 //! read does no harm.
 //!
 //! # The budget

@@ -108,11 +108,13 @@ impl Joints {
         let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
         let Some(slot) = self.slots.get_mut(usize::from(index)) else { return false };
         let Some(command) = Command::decode(frame.data()) else { return false };
+        if !slot.was_ever_attached() {
+            return false;
+        }
         let (bit, attached) = (1 << index, slot.id.is_some());
         if let Command::Read(register) = command {
             self.counters.requests = self.counters.requests.saturating_sub(1);
-            // One that was given up had its turn, and another may be on its way.
-            if self.answers.settle(index.into(), register) {
+            if self.answers.take_back(index.into(), register) {
                 slot.take_back_question();
             }
         }
@@ -123,7 +125,10 @@ impl Joints {
                 slot.told_to_relax(self.now);
                 (stops, &mut self.told)
             }
-            _ if !attached => return false,
+            _ if !attached => {
+                self.drop_frames(1);
+                return true;
+            }
             Command::Write(register, _) => {
                 slot.take_back(register);
                 (writes, &mut self.written)

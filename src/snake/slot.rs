@@ -130,6 +130,10 @@ impl Slot {
         *self = Self { generation: self.generation + 1, ..Self::FREE };
     }
 
+    pub(super) const fn was_ever_attached(&self) -> bool {
+        self.id.is_some() || self.generation > 0
+    }
+
     pub(super) const fn next_generation(&self) -> Option<u8> {
         if self.generation < Joint::GENERATIONS { Some(self.generation) } else { None }
     }

@@ -262,6 +262,28 @@ fn a_relaxed_joint_is_told_again_after_the_clock_was_set_back() {
     }
 }
 
+/// A hostile reader stopped a clock at its start, and twelve joints that fell silent were never disabled.
+#[test]
+fn a_clock_that_stands_at_its_start_stands() {
+    let mut bench = Bench::armed(&ALL);
+    bench.drive(200);
+    bench.silent = ALL.to_vec();
+    let update = |bench: &mut Bench| {
+        bench.joints.update(Tick::new(Instant::START, 0.001));
+        bench.take()
+    };
+    for _ in 0..30 {
+        update(&mut bench);
+    }
+    assert_eq!((bench.enabled, bench.joints.counters().bad_steps), ([0; 12], 29));
+    bench.joints.emergency_stop();
+    assert_eq!(bench.take(), ALL.map(|id| (id, Command::DISABLE)));
+    // The first update of all may be there.
+    let mut bench = Bench::new(&[3]);
+    assert_eq!(update(&mut bench).len(), 2);
+    assert_eq!(bench.joints.counters().bad_steps, 0);
+}
+
 /// And is told again, as long as time passes.
 #[test]
 fn a_relaxed_joint_is_told_again_each_100_ms_by_updates_without_a_step() {
