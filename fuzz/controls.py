@@ -83,8 +83,6 @@ DEFECTS = [
     ("snake", "does not wait for an answer", "src/snake/schedule.rs",
      "self.answers.expect(index.into(), register, now);", ""),
     ("snake", "waits for another's answer", "src/snake/answers.rs", "*asked != register", "*asked == register"),
-    ("snake", "a question of long ago that comes back ends the wait for another", "src/snake/answers.rs",
-     "*asked == register && !is_given_up", "{ _ = asked; !is_given_up }"),
     ("snake", "of two equal questions that of long ago ends the wait for the other", "src/snake/answers.rs",
      "*asked == register && !is_given_up", "{ _ = is_given_up; *asked == register }"),
     ("snake", "who owes an answer is written what was left over", "src/snake/schedule.rs",
