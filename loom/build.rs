@@ -58,7 +58,7 @@ const DEFECTS: [Defect; 9] = [
         file: "spsc",
         from: "self.tail.store(next_tail, Ordering::Release)",
         to: "self.tail.store(next_tail, Ordering::Relaxed)",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: RACE,
     },
     Defect {
@@ -66,7 +66,7 @@ const DEFECTS: [Defect; 9] = [
         file: "spsc",
         from: "if current_head == self.tail.load(Ordering::Acquire)",
         to: "if current_head == self.tail.load(Ordering::Relaxed)",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: RACE,
     },
     Defect {
@@ -74,7 +74,7 @@ const DEFECTS: [Defect; 9] = [
         file: "spsc",
         from: ".store(self.increment(current_head), Ordering::Release);\n\n            Some(v)",
         to: ".store(self.increment(current_head), Ordering::Relaxed);\n\n            Some(v)",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: RACE,
     },
     Defect {
@@ -82,7 +82,7 @@ const DEFECTS: [Defect; 9] = [
         file: "spsc",
         from: "if next_tail == self.head.load(Ordering::Acquire)",
         to: "if next_tail == self.head.load(Ordering::Relaxed)",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: RACE,
     },
     Defect {
@@ -93,7 +93,7 @@ const DEFECTS: [Defect; 9] = [
             self.tail.store(next_tail, Ordering::Release);",
         to: "self.tail.store(next_tail, Ordering::Release);
             (self.buffer.borrow().get_unchecked(current_tail).get()).write(MaybeUninit::new(val));",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: RACE,
     },
     Defect {
@@ -101,7 +101,7 @@ const DEFECTS: [Defect; 9] = [
         file: "queue",
         from: "dropped.saturating_add(1)",
         to: "dropped",
-        model: "exchange::<2>",
+        model: "Exchange",
         panic: "kept and dropped are all",
     },
     Defect {
@@ -109,7 +109,7 @@ const DEFECTS: [Defect; 9] = [
         file: "queue",
         from: "self.frames.dequeue()",
         to: "{ self.dropped.store(self.dropped(), Ordering::Relaxed); self.frames.dequeue() }",
-        model: "count::<2>",
+        model: "Count",
         panic: "one end writes what is the other's",
     },
     Defect {
@@ -117,7 +117,7 @@ const DEFECTS: [Defect; 9] = [
         file: "queue",
         from: "\"FrameReceiver({} waiting)\", self.frames.len()",
         to: "\"FrameReceiver({} waiting)\", self.frames.len() + 1",
-        model: "views::<2>",
+        model: "Views",
         panic: "fewer frames than were waiting",
     },
     Defect {
@@ -125,7 +125,7 @@ const DEFECTS: [Defect; 9] = [
         file: "queue",
         from: "\"FrameSender({} waiting)\", self.frames.len()",
         to: "\"FrameSender({} waiting)\", self.frames.len().saturating_sub(1)",
-        model: "views::<2>",
+        model: "Views",
         panic: "fewer places than were free",
     },
 ];
@@ -183,12 +183,15 @@ fn modules(sources: &[Source], defect: Option<&Defect>) -> String {
             "{}: an atomic that loom does not see",
             path.display()
         );
-        format!("#[allow(warnings, clippy::all)]\nmod {file} {{\n{code}}}\n")
+        format!("mod {file} {{\n{code}}}\n")
     };
     sources.iter().map(module).collect()
 }
 
 fn main() {
+    // What heapless asks for and its own build may set.
+    println!("cargo::rustc-check-cfg=cfg(has_atomic_load_store)");
+    println!("cargo::rustc-check-cfg=cfg(feature, values(\"portable-atomic\", \"mpmc_large\"))");
     let here = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap());
     let root = here.parent().unwrap();
     let read = |path: &Path| {
@@ -215,11 +218,10 @@ fn main() {
         written += &format!(
             "mod {name} {{
                 {}
-                #[allow(dead_code)]
                 mod models {{ {models} }}
                 #[test]
                 #[should_panic(expected = {panic:?})]
-                fn is_found() {{ models::{model}(); }}
+                fn is_found() {{ models::run::<2>(crate::Model::{model}); }}
             }}\n",
             modules(&sources, Some(defect))
         );

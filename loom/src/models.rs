@@ -1,7 +1,7 @@
 //! What one end of the queue does while the other does something else.
 
 use super::queue::{FrameQueue, FrameReceiver, FrameSender};
-use crate::turns;
+use crate::{turns, Model};
 use drivetrain::frame::CanFrame;
 use drivetrain::time::Instant;
 use loom::thread;
@@ -57,8 +57,16 @@ fn waiting(end: &impl Debug) -> usize {
     number.parse().unwrap()
 }
 
+pub fn run<const N: usize>(model: Model) {
+    match model {
+        Model::Exchange => exchange::<N>(),
+        Model::Count => count::<N>(),
+        Model::Views => views::<N>(),
+    }
+}
+
 /// What is popped is what was kept: once, in order and whole. What was refused is counted.
-pub fn exchange<const N: usize>() {
+fn exchange<const N: usize>() {
     let outcomes = explore(&format!("exchange, places: {}", N - 1), || {
         let (sender, mut receiver) = ends::<N>();
         let interrupt = thread::spawn(move || push_all(sender, N + 1));
@@ -80,7 +88,7 @@ pub fn exchange<const N: usize>() {
 }
 
 /// The count of dropped frames, read while it grows.
-pub fn count<const N: usize>() {
+fn count<const N: usize>() {
     let outcomes = explore(&format!("count, places: {}", N - 1), || {
         let (sender, mut receiver) = ends::<N>();
         let interrupt = thread::spawn(move || push_all(sender, N + 1).len());
@@ -104,7 +112,7 @@ pub fn count<const N: usize>() {
 }
 
 /// An end may see the other too late, but never what is not there.
-pub fn views<const N: usize>() {
+fn views<const N: usize>() {
     explore(&format!("views, places: {}", N - 1), || {
         let (mut sender, mut receiver) = ends::<N>();
         let interrupt = thread::spawn(move || {
