@@ -182,8 +182,7 @@ impl Story {
             Ingest::Taken => {
                 self.taken += 1;
                 let reply = Reply::decode(frame.data()).expect("a reply");
-                let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-                let known = &mut self.known[index.expect("of an attached joint")];
+                let known = &mut self.known[index_of(frame).expect("of an attached joint")];
                 if reply.register() == Register::ActualPosition {
                     known.heard = known.heard.max(Some(self.now));
                     known.news[0] = true;
@@ -202,8 +201,7 @@ impl Story {
 
     /// Waits no longer for what a reply answers; `false` when it is none.
     fn answers(&mut self, frame: &CanFrame) -> bool {
-        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-        let Some(index) = index.filter(|_| is_reply(frame)) else { return false };
+        let Some(index) = index_of(frame).filter(|_| is_reply(frame)) else { return false };
         let known = &mut self.known[index];
         let is_this = |register: Register| frame.data().get(1) == Some(&register.as_raw());
         // A question that is answered was sent: the driver has it no longer.
@@ -342,8 +340,7 @@ impl Story {
 
     fn check(&mut self, frame: &CanFrame) {
         assert!(frame.is_data_frame(), "I3: {frame:?}");
-        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-        let index = index.unwrap_or_else(|| panic!("I3: nobody's id: {frame:?}"));
+        let index = index_of(frame).unwrap_or_else(|| panic!("I3: nobody's id: {frame:?}"));
         let command = Command::decode(frame.data()).expect("I3: a command");
         let known = &mut self.known[index];
         assert!(known.due.is_none(), "sent while an answer is due: {known:?}");
@@ -387,25 +384,23 @@ impl Story {
     }
 
     fn give_back(&mut self, frame: &CanFrame, number: u32) {
-        if let Some(Command::Read(register)) = Command::decode(frame.data()) {
-            let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-            let known = &mut self.known[index.expect("checked before")];
-            let back = known.due.take_if(|(_, _, due)| *due == number);
-            let in_doubt = back.filter(|_| known.given_up.contains(&register));
-            known.in_doubt = in_doubt.map(|(register, at, _)| (register, at)).or(known.in_doubt);
-            self.asked -= 1;
-        }
         assert!(self.joints.requeue(frame), "{frame:?}");
         self.given_back += 1;
-        let index = IDS.iter().position(|id| u32::from(*id) == frame.header());
-        let known = &mut self.known[index.expect("checked before")];
+        let known = &mut self.known[index_of(frame).expect("checked before")];
         match Command::decode(frame.data()) {
             Some(Command::DISABLE) => {
                 known.written.clear();
                 (known.moves, known.stop_due, known.stop_returned) = (true, true, true);
             }
             Some(Command::Write(register, _)) => known.written.retain(|other| *other != register),
-            _ => {}
+            Some(Command::Read(register)) => {
+                let back = known.due.take_if(|(_, _, due)| *due == number);
+                let in_doubt = back.filter(|_| known.given_up.contains(&register));
+                known.in_doubt =
+                    in_doubt.map(|(register, at, _)| (register, at)).or(known.in_doubt);
+                self.asked -= 1;
+            }
+            None => {}
         }
     }
 
@@ -420,6 +415,11 @@ impl Story {
         let waiting = counters.packed.checked_sub(counters.superseded + sent);
         assert!(waiting.is_some_and(|waiting| waiting <= 9), "I6: {counters:?}, {sent} sent");
     }
+}
+
+/// Whose frame it is, by its id.
+fn index_of(frame: &CanFrame) -> Option<usize> {
+    IDS.iter().position(|id| u32::from(*id) == frame.header())
 }
 
 /// By the protocol: `04`, a register of the table, and its value.
