@@ -11,6 +11,9 @@ use embedded_can::Frame;
 
 pub(super) const SLOTS: usize = IDS as usize;
 
+/// A stop waits for an answer that is due: longer than this it must not.
+const LONGEST_REPLY: Duration = Duration::from_millis(10);
+
 /// Any time step is right here: the loops are in the drives.
 const ANY_STEP_S: f32 = f32::INFINITY;
 
@@ -153,11 +156,12 @@ impl Joints {
         self
     }
 
-    /// Sets how long a joint has to answer; 2 ms at first. Until the first update after that nothing is sent to it, a stop
-    /// neither: see the [module](super).
+    /// Sets how long a joint has to answer; 2 ms at first, 10 ms at most: a longer time counts as that. Until the first
+    /// update after that nothing is sent to it, a stop neither: see the [module](super).
     #[must_use]
     pub const fn with_reply_timeout(mut self, timeout: Duration) -> Self {
-        self.reply_timeout = timeout;
+        let is_long = timeout.as_micros() > LONGEST_REPLY.as_micros();
+        self.reply_timeout = if is_long { LONGEST_REPLY } else { timeout };
         self
     }
 

@@ -54,8 +54,8 @@
 //! # One id, two senders
 //! Two nodes that begin to send one id in the same bit do not arbitrate: they destroy each other's frames until one is
 //! off the bus. So while an answer is due, [`Joints`] sends nothing to that joint, a stop neither, until the first update after
-//! [`Joints::with_reply_timeout`] (2 ms, so the third at 1 kHz). `embedded-can` has frames of one id sent in order, so a write before a
-//! read does no harm.
+//! [`Joints::with_reply_timeout`] (2 ms, so the third at 1 kHz; 10 ms at most). `embedded-can` has frames of one id sent in
+//! order, so a write before a read does no harm.
 //!
 //! # The budget
 //! Each update asks one joint and writes to one ([`Joints::with_frames_per_update`]), in turn: 12 joints report each
