@@ -2,6 +2,7 @@
 """Plants one defect at a time in a copy of the crate, and expects the fuzz target to find it.
 
     fuzz/controls.py [--seconds N] [WORD]...     60 s at most for each; WORD: only rows in whose target or defect it occurs
+    fuzz/controls.py --check                     only looks whether the texts are there, and the rows in README.md
 """
 
 import argparse
@@ -104,25 +105,40 @@ DEFECTS = [
      "self.give_up((!(stands && is_long)).then_some(self.reply_timeout));", "_ = (stands, is_long);"),
     ("snake", "a frame given back is not counted", "src/snake/schedule.rs",
      "        self.drop_frames(1);\n        true\n", "        true\n"),
+    ("snake", "an old speed is written", "src/snake/slot.rs",
+     "self.speed = speed;\n            self.renew(Register::Speed);", "self.renew(Register::Speed);"),
+    ("snake", "old settings are written", "src/snake/slot.rs", "self.settings = settings;\n", "_ = settings;\n"),
     ("candump", "an id of two digits", "src/wire/candump/mod.rs", '"{:03X}"', '"{:02X}"'),
     ("wire_dbus", "the signal is never lost", "src/wire/deadline.rs",
      "self.live && now.since(self.met) <= self.limit", "self.live"),
     ("wire_dbus", "a truncated frame is not counted", "src/wire/dbus/mod.rs",
      "count(&mut self.counts.skipped_bytes, u32::try_from(self.length).unwrap_or(u32::MAX));", ""),
+    ("wire_dbus", "a switch in the middle is refused", "src/wire/dbus/remote.rs", "3 => Some(Switch::Middle),", ""),
+    ("wire_dbus", "two channels are exchanged", "src/wire/dbus/remote.rs",
+     "left: Stick { x: channel(22)?, y: channel(33)? },", "left: Stick { x: channel(33)?, y: channel(22)? },"),
     ("wire_feetech", "noise is not counted", "src/wire/deframer.rs",
      "self.give_up(noise);", "self.discard(noise);"),
     ("wire_feetech", "a frame behind noise is lost with it", "src/wire/deframer.rs",
      "                self.give_up(1);\n            }\n        }\n    }", "                self.give_up(total);\n            }\n        }\n    }"),
+    ("wire_feetech", "the sum is not looked at", "src/wire/feetech/status.rs",
+     "checksum(summed) != *sum", "checksum(summed) != *sum && false"),
+    ("wire_feetech", "an answer without parameters is refused", "src/wire/feetech/status.rs",
+     "if checksum(summed) != *sum", "if checksum(summed) != *sum || parameters.is_empty()"),
     ("wire_hipnuc", "the signal is never lost", "src/wire/deadline.rs",
      "self.live && now.since(self.met) <= self.limit", "self.live"),
     ("wire_hipnuc", "a bad checksum costs all that it stands in", "src/wire/deframer.rs",
      "                self.give_up(1);\n            }\n        }\n    }", "                self.give_up(total);\n            }\n        }\n    }"),
     ("wire_hipnuc", "a motion that is no number is taken", "src/wire/hipnuc/mod.rs",
      "imu.filter(Imu::is_finite)", "imu"),
+    ("wire_hipnuc", "the checksum is not looked at", "src/wire/hipnuc/mod.rs",
+     "if digest.finalize() != u16::from_le_bytes(*crc) {", "if digest.finalize() != u16::from_le_bytes(*crc) && false {"),
+    ("wire_hipnuc", "every frame is refused", "src/wire/hipnuc/mod.rs", "(0x91, 76) =>", "(0x91, 77) =>"),
     ("wire_host_link", "the signal is never lost", "src/wire/deadline.rs",
      "self.live && now.since(self.met) <= self.limit", "self.live"),
     ("wire_host_link", "a bad checksum costs all that it stands in", "src/wire/deframer.rs",
      "                self.give_up(1);\n            }\n        }\n    }", "                self.give_up(total);\n            }\n        }\n    }"),
+    ("wire_host_link", "the checksum is not looked at", "src/wire/host_link/mod.rs",
+     "if CRC.checksum(body) == u16::from_be_bytes(*crc) {", "if CRC.checksum(body) == u16::from_be_bytes(*crc) || true {"),
     ("wire_host_link", "an angle that is no number is refused", "src/wire/host_link/telemetry.rs",
      "self.read(check(frame)?).ok_or(Reject::Length)",
      "self.read(check(frame)?).filter(|telemetry| telemetry.imu_angles_deg.as_flattened().iter().all(|angle| angle.is_finite())).ok_or(Reject::Content)"),
@@ -163,11 +179,27 @@ def fuzz(tree, binary, target, seconds):
     return done.returncode != 0, time.monotonic() - started, said.group(1)[:70] if said else hung
 
 
+def check():
+    """Every text stands where it is to be replaced, once, and the README has every row."""
+    readme = (ROOT / "fuzz" / "README.md").read_text()
+    for target, what, file, there, instead in DEFECTS:
+        if (count := (ROOT / file).read_text().count(there)) != 1:
+            sys.exit(f"{file}: {count} times, not once: {there!r}")
+        if there == instead:
+            sys.exit(f"{file}: no defect: {there!r}")
+        if f"| `{target}` | {what} |" not in readme:
+            sys.exit(f"fuzz/README.md has no row `{target}`, {what}")
+    print(f"planted defects: {len(DEFECTS)} texts are where they are replaced, and in the README")
+
+
 def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--seconds", type=int, default=60)
+    arguments.add_argument("--check", action="store_true")
     arguments.add_argument("words", nargs="*")
     arguments = arguments.parse_args()
+    if arguments.check:
+        return check()
     missed = 0
     print("| target | defect | found after | by |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as tree:

@@ -7,7 +7,7 @@ use drivetrain::wire::host_link::{
     ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
     Telemetry, TelemetryFormat, TelemetryHeader,
 };
-use drivetrain_fuzz::{Input, any_split_gives_the_same};
+use drivetrain_fuzz::{Input, any_split_gives_the_same, refuses_a_flipped_bit};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
@@ -29,6 +29,7 @@ fn command(input: &mut Input) -> Vec<u8> {
     let command = Command { joints, gm6020_position, c610_position, sts3032_degrees, reset };
     let frame = command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec();
     assert_eq!(CommandFormat.parse(&frame), Ok(command));
+    refuses_a_flipped_bit(CommandFormat, &frame);
     frame
 }
 
@@ -45,5 +46,6 @@ fn telemetry(format: TelemetryFormat, input: &mut Input) -> Vec<u8> {
     let read = format.parse(&frame).expect("a whole frame");
     assert_eq!(format!("{read:?}"), format!("{telemetry:?}"));
     assert_eq!(format.encode(&read, &mut [0; TELEMETRY_LENGTH]), Ok(&frame[..]));
+    refuses_a_flipped_bit(format, &frame);
     frame
 }

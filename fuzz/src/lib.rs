@@ -11,5 +11,5 @@ pub use alone::words;
 pub use controllers::Observed;
 pub use input::Input;
 pub use motors::{COUNT, Target};
-pub use split::any_split_gives_the_same;
+pub use split::{any_split_gives_the_same, refuses_a_flipped_bit};
 pub use watched::Watched;

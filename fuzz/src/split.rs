@@ -78,6 +78,16 @@ fn stream(mut input: Input, frame: impl Fn(&mut Input) -> Vec<u8>) -> Vec<u8> {
     bytes
 }
 
+/// One bit that was turned over on the way, wherever it is behind the header and the length, makes a frame none. Which bit is chosen
+/// by what the frame holds.
+pub fn refuses_a_flipped_bit<P: Protocol<Frame: Debug>>(protocol: P, frame: &[u8]) {
+    let seed = frame.iter().fold(0_usize, |sum, byte| sum * 31 % 65_521 + usize::from(*byte));
+    let mut damaged = frame.to_vec();
+    damaged[P::PREFIX + seed / 8 % (frame.len() - P::PREFIX)] ^= 1 << (seed % 8);
+    let outcome = protocol.parse(&damaged);
+    assert!(matches!(outcome, Err(Reject::Checksum)), "{damaged:02X?}: {outcome:?}");
+}
+
 /// The first byte says how the others are split: the frames found and the counts must not depend on it. `frame` writes what the
 /// protocol takes.
 pub fn any_split_gives_the_same<P: Protocol<Frame: Copy + Debug> + Copy>(
