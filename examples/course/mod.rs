@@ -186,8 +186,13 @@ pub(crate) fn plot<const WHEELS: usize>(
 pub(crate) fn output(example: &str) -> Result<std::path::PathBuf, Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
+    let usage = format!("usage: {example} [FILE.svg]");
+    if ["-h", "--help"].contains(&path.as_str()) {
+        println!("{usage}");
+        std::process::exit(0);
+    }
     if path.starts_with('-') || arguments.next().is_some() {
-        return Err(format!("usage: {example} [FILE.svg]").into());
+        return Err(usage.into());
     }
     Ok(path.into())
 }

@@ -22,6 +22,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 #[cfg(target_os = "linux")]
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    session::main()
+fn main() -> std::process::ExitCode {
+    match session::main() {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("socketcan: {error}");
+            std::process::ExitCode::FAILURE
+        }
+    }
 }

@@ -10,16 +10,16 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
 
   --interface NAME  the interface (default: can0); bring it up before:
                     sudo ip link set can0 up type can bitrate 1000000
-  --motors LIST     model:ids, models m3508 (at most 6 A here), m2006 (3 A), gm6020 (10 V) and gm6020-current (1 A, once
-                    it is switched on in the motor); default: m3508:1-4. All of them have to be there for --arm
+  --motors LIST     model:ids, models m3508 or c620 (at most 6 A here), m2006 or c610 (3 A), gm6020 (10 V) and
+                    gm6020-current (1 A, once it is switched on in the motor); default: m3508:1-4. All of them have to be
+                    there for --arm
   --rpm N           speed of every output shaft (default: 0, they hold still)
   --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
                     front left, rear left and rear right
   --geometry R,L,B  radius of the wheels, half of the wheelbase and half of the track in m (default: 0.076,0.2,0.18)
-  --seconds S       how long (default: 5); Ctrl-C ends it as well, with zeros
+  --seconds S       how long, a whole number (default: 5); Ctrl-C ends it as well, with zeros
   --arm             send commands; without it nothing is sent
-  --log FILE        every frame in the form of candump -L
-  --lock-step       for tests: a millisecond for each line on standard input, answered by a line";
+  --log FILE        every frame in the form of candump -L";
 
 const GEOMETRY: MecanumGeometry =
     MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
@@ -33,11 +33,12 @@ pub(crate) struct Options {
     pub(crate) seconds: u64,
     pub(crate) arm: bool,
     pub(crate) log: Option<String>,
+    /// For tests: a millisecond for each line on standard input, answered by a line.
     pub(crate) lock_step: bool,
 }
 
 fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T, String> {
-    text.trim().parse().map_err(|_| format!("{option} {text}: not a number"))
+    text.trim().parse().map_err(|_| format!("{option} {text}: not a number that it can be"))
 }
 
 /// Reads `0.2,0,0`.
@@ -60,6 +61,7 @@ pub(crate) fn parse(
         log: None,
         lock_step: false,
     };
+    let (mut rpm, mut geometry) = (None, None);
     while let Some(option) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("{option} needs a value"));
         match option.as_str() {
@@ -69,18 +71,24 @@ pub(crate) fn parse(
             "--interface" => options.interface = value()?,
             "--log" => options.log = Some(value()?),
             "--motors" => options.motors = motors(&value()?)?,
-            "--rpm" => options.rpm = number("--rpm", &value()?)?,
+            "--rpm" => rpm = Some(number("--rpm", &value()?)?),
             "--seconds" => options.seconds = number("--seconds", &value()?)?,
             "--mecanum" => options.twist = Some(three("--mecanum", &value()?)?),
             "--geometry" => {
                 let [wheel_radius_m, half_wheelbase_m, half_track_m] =
                     three("--geometry", &value()?)?;
-                options.geometry =
-                    MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m };
+                geometry = Some(MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m });
             }
             _ => return Err(format!("no option {option}; --help lists them")),
         }
     }
+    match options.twist {
+        Some(_) if rpm.is_some() => return Err("--rpm or --mecanum, not both".into()),
+        None if geometry.is_some() => return Err("--geometry needs --mecanum".into()),
+        _ => {}
+    }
+    options.rpm = rpm.unwrap_or(options.rpm);
+    options.geometry = geometry.unwrap_or(options.geometry);
     Ok(Some(options))
 }
 
@@ -88,11 +96,21 @@ pub(crate) fn parse(
 fn motors(list: &str) -> Result<Vec<(String, u8)>, String> {
     let mut motors = Vec::new();
     for item in list.split(',') {
-        let (model, ids) = item.split_once(':').ok_or(format!("--motors {item}: not model:ids"))?;
+        let refused =
+            || format!("--motors {item}: not model:id or model:first-last, as in m3508:1-4");
+        let (model, ids) = item.split_once(':').ok_or_else(refused)?;
         let (first, last) = ids.split_once('-').unwrap_or((ids, ids));
-        for id in number::<u8>("--motors", first)?..=number("--motors", last)? {
-            motors.push((model.trim().to_ascii_lowercase(), id));
+        let id = |text: &str| text.trim().parse::<u8>().map_err(|_| refused());
+        let (first, last) = (id(first)?, id(last)?);
+        if first > last {
+            return Err(refused());
         }
+        let model = match model.trim().to_ascii_lowercase().as_str() {
+            "c620" => "m3508".to_string(),
+            "c610" => "m2006".to_string(),
+            model => model.to_string(),
+        };
+        motors.extend((first..=last).map(|id| (model.clone(), id)));
     }
     Ok(motors)
 }

@@ -12,7 +12,7 @@ use drivetrain::motor::{ArmError, CanDevice, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use std::error::Error;
 use std::io::{self, BufRead, Write};
 use std::sync::Arc;
@@ -70,7 +70,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
+    // The last is that of a terminal which is closed, or whose line is cut.
+    for signal in [SIGINT, SIGTERM, SIGQUIT, SIGHUP] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     if options.lock_step {
@@ -102,7 +103,10 @@ impl<K: Clock> Session<K> {
         let motors = attach(&mut bus, options)?;
         let speeds = speeds(options, &motors)?;
         let port = Adapter::open(options).map_err(|error| {
-            format!("cannot open {}: {error}; is it up? See --help", options.interface)
+            let interface = &options.interface;
+            format!(
+                "cannot open {interface}: {error}; does `ip link` show it, and is it up? See --help"
+            )
         })?;
         Ok(Self {
             runner: Runner::new(Nb(port), clock, bus),
@@ -113,14 +117,33 @@ impl<K: Clock> Session<K> {
         })
     }
 
-    /// Runs until `next` or a signal ends it, and ends with zeros. In each `pause` some time passes.
+    /// Runs until `next` or a signal ends it, or nobody takes what it says, and ends with zeros. In each `pause` some time
+    /// passes.
     fn run(
         mut self,
         options: &Options,
         stop: &AtomicBool,
-        mut next: impl FnMut() -> bool,
+        next: impl FnMut() -> bool,
         mut pause: impl FnMut(),
     ) -> Result<(), Box<dyn Error>> {
+        let said = self.go_on(options, stop, next, &mut pause);
+        if options.arm {
+            self.end(pause);
+        }
+        said?;
+        self.show()?;
+        self.report()?;
+        let (Nb(mut port), ..) = self.runner.into_parts();
+        Ok(port.flush()?)
+    }
+
+    fn go_on(
+        &mut self,
+        options: &Options,
+        stop: &AtomicBool,
+        mut next: impl FnMut() -> bool,
+        mut pause: impl FnMut(),
+    ) -> io::Result<()> {
         let mut ticks: u64 = 0;
         while next() && !stop.load(Ordering::Relaxed) {
             pause();
@@ -133,22 +156,15 @@ impl<K: Clock> Session<K> {
                 self.listen(tick);
             }
             if options.lock_step {
-                println!(".");
-                io::stdout().flush()?;
+                writeln!(io::stdout(), ".")?;
             } else if ticks.is_multiple_of(500) {
-                self.show();
+                self.show()?;
                 if let Some(why) = self.refusal {
-                    println!("not armed: {why}");
+                    writeln!(io::stdout(), "not armed: {why}")?;
                 }
             }
         }
-        if options.arm {
-            self.end(pause);
-        }
-        self.show();
-        self.report();
-        let (Nb(mut port), ..) = self.runner.into_parts();
-        Ok(port.flush()?)
+        Ok(())
     }
 
     /// Arms once, when all motors are heard: what was lost stays relaxed.
@@ -184,11 +200,12 @@ impl<K: Clock> Session<K> {
         }
     }
 
-    fn show(&self) {
-        let bus = self.runner.device();
+    fn show(&self) -> io::Result<()> {
+        let (bus, mut out) = (self.runner.device(), io::stdout().lock());
         for (motor, name) in bus.motors() {
             match bus.state(motor) {
-                Some(state) => println!(
+                Some(state) => writeln!(
+                    out,
                     "{} {:?}: {:8.1} rpm, {:6.2} A, position {:.3} turns, {}",
                     state.motor,
                     state.link,
@@ -196,13 +213,14 @@ impl<K: Clock> Session<K> {
                     state.current.as_amperes(),
                     state.position.as_turns(),
                     state.error.map_or("no error".to_string(), |error| error.to_string())
-                ),
-                None => println!("{name} is not heard"),
+                )?,
+                None => writeln!(out, "{name} is not heard")?,
             }
         }
+        Ok(())
     }
 
-    fn report(&self) {
+    fn report(&self) -> io::Result<()> {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         let counts = [
             ("received", s.received),
@@ -221,6 +239,7 @@ impl<K: Clock> Session<K> {
             ("send_errors", s.send_errors.total()),
             ("bus_losses", s.bus_losses),
         ];
-        counts.iter().for_each(|(name, count)| println!("{name} {count}"));
+        let mut out = io::stdout().lock();
+        counts.iter().try_for_each(|(name, count)| writeln!(out, "{name} {count}"))
     }
 }

@@ -339,3 +339,31 @@ fn a_mecanum_chassis_moves_as_it_is_asked_and_is_left_at_zero() {
     assert!(off.iter().all(|off| off.abs() < 0.02), "{moved:?}");
     println!("chassis: {moved:.3?}");
 }
+
+/// What a drive does with its last current when nobody sends it another is not known.
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn the_motors_are_left_at_zero_when_the_terminal_is_gone_or_nobody_reads_on() {
+    let witness = Witness::new();
+    for hangs_up in [true, false] {
+        let world = World::new(3);
+        world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+        let mut robot = Robot::new(world);
+        let mut example = Example::start(&["--motors", "m3508:1", "--rpm", "60"]);
+        for _ in 0..500 {
+            example.step();
+            robot.step();
+        }
+        let Example { mut child, mut steps, answers } = example;
+        let answers = hangs_up.then_some(answers);
+        if hangs_up {
+            output("busybox", &["kill", "-HUP", &child.id().to_string()]);
+        }
+        writeln!(steps).unwrap();
+        assert_eq!(child.wait().unwrap().success(), hangs_up);
+        drop(answers);
+        robot.mark(&witness, END, hangs_up.into());
+        robot.receive();
+        end_with_zeros(&robot.received, &["200"]);
+    }
+}
