@@ -20,6 +20,9 @@ bind_interrupts!(struct Interrupts {
 });
 
 /// embassy's buffered halves as one polled driver: neither of its CAN types implements a trait of `embedded-can`.
+///
+/// In embassy-stm32 0.6 no error of the bus comes this way, and a frame for which its buffer had no room is dropped without a
+/// word: what was lost shows in the rate and the longest gap of each motor's health.
 pub struct Halves(BufferedCanSender, BufferedCanReceiver);
 
 impl embedded_can::nb::Can for Halves {
@@ -33,21 +36,9 @@ impl embedded_can::nb::Can for Halves {
     fn receive(&mut self) -> nb::Result<can::Frame, ErrorKind> {
         match self.1.try_receive() {
             Ok(Ok(envelope)) => Ok(envelope.frame),
-            Ok(Err(error)) => Err(nb::Error::Other(kind(&error))),
+            Ok(Err(_)) => Err(nb::Error::Other(ErrorKind::Other)),
             Err(_) => Err(nb::Error::WouldBlock),
         }
-    }
-}
-
-fn kind(error: &can::enums::BusError) -> ErrorKind {
-    use can::enums::BusError;
-    match error {
-        BusError::Stuff => ErrorKind::Stuff,
-        BusError::Form => ErrorKind::Form,
-        BusError::Acknowledge => ErrorKind::Acknowledge,
-        BusError::BitRecessive | BusError::BitDominant => ErrorKind::Bit,
-        BusError::Crc => ErrorKind::Crc,
-        BusError::Software => ErrorKind::Other,
     }
 }
 

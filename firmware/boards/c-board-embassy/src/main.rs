@@ -99,6 +99,7 @@ async fn main(spawner: Spawner) {
                 Wish::Rest => runner.device_mut().disarm(),
             }
             pilot.drive(runner.device_mut(), tick);
+            pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));
         });
         runner.tick(tick);
         while let Some(edge) = runner.device_mut().next_edge() {

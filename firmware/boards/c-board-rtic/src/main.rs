@@ -43,6 +43,7 @@ mod app {
     use super::Sending;
     use bxcan::filter::Mask32;
     use bxcan::{Fifo, Interrupt, Rx0};
+    use core::sync::atomic::{AtomicU32, Ordering};
     use drivetrain::dji::Bus;
     use drivetrain::motor::CanDevice;
     use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, Runner};
@@ -57,6 +58,9 @@ mod app {
 
     type Micros = MonoTimerUs<TIM2>;
     type Robot = Runner<Nb<Sending>, fn() -> Instant, Bus>;
+
+    /// Times that the controller's FIFO ran over.
+    static OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
     fn now() -> Instant {
         Instant::from_micros(Micros::now().ticks())
@@ -119,8 +123,8 @@ mod app {
         loop {
             match cx.local.receiving.receive() {
                 Ok(frame) => _ = cx.local.into_queue.push(&frame, now()),
-                // The controller's FIFO ran over: what came after is still to be read.
-                Err(nb::Error::Other(_)) => {}
+                // What came after is still to be read.
+                Err(nb::Error::Other(_overrun)) => _ = OVERRUNS.fetch_add(1, Ordering::Relaxed),
                 Err(nb::Error::WouldBlock) => break,
             }
         }
@@ -149,6 +153,7 @@ mod app {
             Micros::delay_until(next).await;
             cx.shared.runner.lock(|runner| {
                 runner.poll_queue(cx.local.queue, 64);
+                runner.note_lost(OVERRUNS.swap(0, Ordering::Relaxed));
                 if let Some(tick) = runner.due() {
                     runner.tick(tick);
                 }
@@ -180,6 +185,7 @@ mod app {
                     Wish::Rest => runner.device_mut().disarm(),
                 }
                 pilot.drive(runner.device_mut(), tick);
+                pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));
                 while let Some(edge) = runner.device_mut().next_edge() {
                     defmt::info!("{}", edge);
                 }

@@ -52,7 +52,8 @@ fn micros(instant: embassy_time::Instant) -> Instant {
 #[embassy_executor::task]
 async fn receive(can: BufferedCanReceiver, robot: &'static Shared) {
     loop {
-        // An error of the bus is not a frame: the motors' ages do the rest.
+        // An error of the bus is not a frame: the ages of the motors do the rest. What its buffer has no room for, embassy
+        // does not say.
         let Ok(envelope) = can.receive().await else { continue };
         let (frame, arrived) = envelope.parts(); // stamped in the interrupt
         robot.lock(|robot| _ = robot.borrow_mut().bus.ingest_any(&frame, micros(arrived)));
@@ -64,7 +65,10 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
     const PERIOD_S: f32 = 0.001;
     // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
     const WATCHDOG_US: u32 = 20_000;
+    // A bus that takes nothing for so long is down: what it would do when it comes back is nobody's wish any more.
+    const BUS_DOWN_TICKS: u32 = 100;
     let mut watchdog = IndependentWatchdog::new(iwdg, WATCHDOG_US);
+    let mut refused_ticks: u32 = 0;
     let mut millisecond = Ticker::every(Duration::from_millis(1));
     watchdog.unleash();
     loop {
@@ -82,18 +86,26 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
                 Wish::Rest => bus.disarm(),
             }
             pilot.drive(bus, tick);
+            pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));
             bus.update(tick);
+            let mut is_refused = false;
             while let Some(frame) = bus.next_frame() {
                 // No waiting here: a frame without a place goes with the next tick, with newer values.
                 let offered = frame.convert::<can::Frame>();
                 if offered.is_none_or(|offered| can.try_write(offered).is_err()) {
+                    is_refused = true;
                     bus.requeue(&frame);
                 }
+            }
+            refused_ticks = if is_refused { refused_ticks.saturating_add(1) } else { 0 };
+            if refused_ticks >= BUS_DOWN_TICKS {
+                bus.disarm();
             }
             while let Some(edge) = bus.next_edge() {
                 defmt::info!("{}", edge);
             }
         });
+        // One executor runs all tasks: one that hangs keeps this one from coming here.
         watchdog.pet();
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Arm: both sticks at rest, turn the right switch from anywhere to the top. Stop: turn it away, or lose the remote.
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
-//! without one, forward is where the chassis looks.
+//! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU
+//! falls silent while one is held, the robot stops until both are let go.
 #![cfg_attr(not(test), no_std)]
 
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
@@ -11,9 +12,9 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::{Heading, Twist};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
-use drivetrain::wire::Link;
 use drivetrain::wire::dbus::{Dbus, Remote, Stick, Switch};
 use drivetrain::wire::hipnuc::{EulerOrder, HipNuc, MAX_FRAME};
+use drivetrain::wire::{Edge, Link};
 
 /// A per rad/s and A per rad at the output shaft, gentle; the example `tune` shows how to find those of your robot.
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
@@ -34,6 +35,17 @@ pub enum Wish {
     Rest,
 }
 
+/// Where a stick that is pushed ahead points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Forward {
+    /// Where the chassis looks.
+    Chassis,
+    /// Where the yaw of the IMU is zero.
+    Room,
+    /// Nowhere: with another one, a stick that is held would turn the robot's way around.
+    Lost,
+}
+
 /// The robot without its board.
 #[derive(Debug)]
 pub struct Pilot {
@@ -42,6 +54,7 @@ pub struct Pilot {
     dbus: Dbus,
     imu: Link<HipNuc, MAX_FRAME>,
     switch: Switch,
+    forward: Forward,
 }
 
 impl Pilot {
@@ -63,7 +76,8 @@ impl Pilot {
             ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
         let imu = Link::new(HipNuc, IMU_DEADLINE);
-        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch: Switch::Absent })
+        let (switch, forward) = (Switch::Absent, Forward::Chassis);
+        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch, forward })
     }
 
     /// Takes bytes of the remote control that arrived at `now`.
@@ -74,6 +88,16 @@ impl Pilot {
     /// Takes bytes of the IMU that arrived at `now`.
     pub fn hear_imu(&mut self, mut bytes: &[u8], now: Instant) {
         while self.imu.read(&mut bytes, now).is_some() {}
+    }
+
+    /// Hands over who was heard and lost since, for the log.
+    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, Edge)) {
+        while let Some(edge) = self.dbus.edge(now) {
+            log("remote control", edge);
+        }
+        while let Some(edge) = self.imu.edge(now) {
+            log("IMU", edge);
+        }
     }
 
     /// Returns what the remote control asks for; to be called once a tick.
@@ -101,12 +125,20 @@ impl Pilot {
         let Stick { x, y } = remote.right;
         let turn = -remote.left.x * FASTEST_RAD_S;
         let (vx, vy) = (y * FASTEST_M_S, -x * FASTEST_M_S);
-        match self.imu.latest(now) {
-            Some(imu) => {
-                let (_, _, yaw) = imu.attitude.euler(EulerOrder::RollX);
-                self.chassis.set_world(Twist::new(vx, vy, turn), Heading::new(yaw));
-            }
-            None => self.chassis.set_body(Twist::new(vx, vy, turn)),
+        let yaw = self.imu.latest(now).map(|imu| {
+            let (_, _, yaw) = imu.attitude.euler(EulerOrder::RollX);
+            Heading::new(yaw)
+        });
+        self.forward = match (self.forward, yaw) {
+            (_, Some(_)) if at_rest(remote) => Forward::Room,
+            (_, None) if at_rest(remote) => Forward::Chassis,
+            (Forward::Room, None) => Forward::Lost,
+            (as_before, _) => as_before,
+        };
+        match (self.forward, yaw) {
+            (Forward::Chassis, _) => self.chassis.set_body(Twist::new(vx, vy, turn)),
+            (Forward::Room, Some(yaw)) => self.chassis.set_world(Twist::new(vx, vy, turn), yaw),
+            (Forward::Room, None) | (Forward::Lost, _) => self.chassis.set_body(Twist::ZERO),
         }
     }
 }
@@ -147,5 +179,61 @@ mod tests {
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
         assert_eq!(wishes(&[frame(1024, UP)]), Wish::Rest, "at power-on");
         assert_eq!(wishes(&[frame(1024, UP), frame(1024, MIDDLE)]), Wish::Rest);
+    }
+
+    /// A frame of the IMU at a yaw of 180°; its time goes on, otherwise it would count as frozen.
+    fn turned_around(now: Instant) -> [u8; 82] {
+        let mut frame = [0; 82];
+        frame[..4].copy_from_slice(&[0x5A, 0xA5, 76, 0]);
+        frame[6] = 0x91;
+        frame[14..18].copy_from_slice(&now.as_micros().to_le_bytes()[..4]);
+        frame[78..].copy_from_slice(&1.0_f32.to_le_bytes());
+        // CRC-16/XMODEM of all but itself.
+        let covered = frame[..4].iter().chain(&frame[6..]);
+        let crc = covered.fold(0_u16, |crc, byte| {
+            (0..8).fold(crc ^ u16::from(*byte) << 8, |crc, _| {
+                if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ 0x1021 }
+            })
+        });
+        frame[4..6].copy_from_slice(&crc.to_le_bytes());
+        frame
+    }
+
+    /// At a yaw of 180°, right in the room is left of the chassis.
+    #[test]
+    fn a_stick_that_is_held_never_turns_the_way_around_when_the_imu_comes_and_goes() {
+        const RIGHT: u64 = 1684;
+        const REST: u64 = 1024;
+        const UNHEARD: MecanumWheels<Option<AngularVelocity>> = MecanumWheels {
+            front_left: None,
+            front_right: None,
+            rear_left: None,
+            rear_right: None,
+        };
+        let mut pilot = Pilot::new(&mut Bus::new()).unwrap();
+        let mut now = Instant::START;
+        // The sideways speed after a second in which the stick is there and the IMU is heard, or not.
+        let mut after = |stick: u64, is_heard: bool| {
+            for _ in 0..100 {
+                now = now + Duration::from_millis(10);
+                pilot.hear_remote(&frame(stick, 1), now);
+                if is_heard {
+                    pilot.hear_imu(&turned_around(now), now);
+                }
+                pilot.steer(&pilot.dbus.remote(now), now);
+                pilot.chassis.update(UNHEARD, Tick::new(now, 0.01));
+            }
+            (pilot.chassis.reference().vy_m_s * 100.0).round() / 100.0
+        };
+        assert_eq!([after(REST, true), after(RIGHT, true)], [0.0, FASTEST_M_S]);
+        assert_eq!([after(RIGHT, false), after(RIGHT, true)], [0.0, 0.0], "until it is let go");
+        assert_eq!([after(REST, true), after(RIGHT, true)], [0.0, FASTEST_M_S]);
+        // Begun without an IMU, it stays without one.
+        assert_eq!([after(REST, false), after(RIGHT, false)], [0.0, -FASTEST_M_S]);
+        assert_eq!([after(RIGHT, true), after(REST, true)], [-FASTEST_M_S, 0.0]);
+        assert_eq!(after(RIGHT, true), FASTEST_M_S);
+        let mut seen = 0;
+        pilot.edges(now, |_, _| seen += 1);
+        assert!(seen >= 2, "who was heard, for the log");
     }
 }
