@@ -508,7 +508,7 @@ def word_at(image, function):
 # Together `frames`, `foreign`, `commands` and `route` are all ids, flags, lengths and data on a bus that has heard nothing,
 # and with `operation` instead of `route`, on one that has heard each motor.
 PROOFS = [
-    ("decode", [decode], "decode", "all 2^64 frames", "decode_faulty"),
+    ("decode", [decode], "decode", "all 2^64 frames", "decode_faulty", "decode_swapped"),
     ("unwrap", [unwrap], "unwrap", "all 2^32 pairs", "unwrap_faulty"),
     ("frames", [exists], "frame", "all ids, flags, lengths and data", "frame_cut"),
     ("foreign", [foreign(bus) for bus in BUSES], "route", "all frames but data of family and commands, both buses", "route_by_number", "route_aside"),

@@ -17,6 +17,17 @@ extern "C" fn decode_faulty(high: u32, low: u32, fields: &mut [i32; 5]) -> u32 {
     u32::from(accepted)
 }
 
+/// Takes speed and current for little-endian, and the right frames.
+#[unsafe(no_mangle)]
+extern "C" fn decode_swapped(high: u32, low: u32, fields: &mut [i32; 5]) -> u32 {
+    let accepted = crate::decode(high, low, fields);
+    if accepted == 1 {
+        let [_, rpm, current, ..] = fields;
+        [*rpm, *current] = [*rpm as i16, *current as i16].map(i16::swap_bytes).map(i32::from);
+    }
+    accepted
+}
+
 /// Takes the remainder, which has the sign of the dividend.
 #[unsafe(no_mangle)]
 extern "C" fn unwrap_faulty(previous: u32, next: u32) -> i32 {
