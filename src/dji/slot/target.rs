@@ -314,6 +314,11 @@ mod tests {
             assert_eq!(duty(&bus), Duty::Other, "in place of another");
             bus.update(Tick::new(Instant::from_micros(2_000), 0.001));
             assert_eq!([velocity, duty(&bus)], expected);
+            bus.set_raw(motor, 5).unwrap();
+            bus.update(Tick::new(Instant::from_micros(3_000), 0.001));
+            assert_eq!(duty(&bus), Duty::Raw, "it has no loop");
+            bus.set_position(motor, Position::ZERO).unwrap();
+            bus.update(Tick::new(Instant::from_micros(4_000), 0.001));
             let slot = bus.slot_mut(motor.erase()).unwrap();
             slot.range = Range::within(1_000);
             slot.settle();
