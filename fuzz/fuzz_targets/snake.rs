@@ -140,7 +140,7 @@ impl Story {
                 frames += 1;
             };
             if op >= 250 {
-                self.go_well(id, register % 64, &mut hear);
+                self.go_well(id, register % 24, &mut hear);
                 continue;
             }
             let index = usize::from(id) % 3;
