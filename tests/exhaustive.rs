@@ -10,12 +10,12 @@ use drivetrain::dji::{
     AttachError, Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006,
     M3508, Model,
 };
-use drivetrain::encoder::shortest;
+use drivetrain::encoder::{Position, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{CanDevice, Ingest, Malformed, TargetError};
-use drivetrain::time::{Instant, Tick};
-use drivetrain::units::{Current, Voltage};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{Angle, Current, Voltage};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use std::ops::Range;
 use std::thread;
@@ -255,6 +255,49 @@ fn every_f32_wraps_to_the_same_direction() {
             }
         }
         2 * (bits.end - bits.start)
+    });
+}
+
+/// Every `f32`: whole turns and the rest of one are the angle, as far as `f32` can tell it; beyond 2^31 turns it saturates, and
+/// what is not finite stays so.
+#[test]
+#[ignore = "2^32 angles: by .ci/run"]
+fn every_f32_is_a_number_of_turns_and_a_rest() {
+    const FURTHEST: f64 = 2_147_483_648.0;
+    both_halves("angles as positions", 0..1 << 32, |bits| {
+        for bits in bits.clone() {
+            let radians = f32::from_bits(u32::try_from(bits).unwrap());
+            let position = Position::from_angle(Angle::from_radians(radians));
+            let rest = position.angle().as_radians();
+            if !radians.is_finite() {
+                assert!(!position.is_finite() && position.turns() == 0, "{radians:e}");
+                continue;
+            }
+            assert!((0.0..core::f32::consts::TAU).contains(&rest), "{radians:e}: {rest:e}");
+            let exact = f64::from(radians) / core::f64::consts::TAU;
+            let turns = position.turns() as f64 + f64::from(rest) / core::f64::consts::TAU;
+            let inside = exact.clamp(-FURTHEST, FURTHEST);
+            assert!((turns - inside).abs() <= 3e-7 * (1.0 + inside.abs()), "{radians:e}: {turns}");
+        }
+        bits.end - bits.start
+    });
+}
+
+/// Every `f32`: to the nearest microsecond that `f32` can tell, or refused.
+#[test]
+#[ignore = "2^32 times: by .ci/run"]
+fn every_f32_of_seconds_is_a_duration_or_refused() {
+    both_halves("times in seconds", 0..1 << 32, |bits| {
+        for bits in bits.clone() {
+            let seconds = f32::from_bits(u32::try_from(bits).unwrap());
+            let duration = Duration::from_secs_f32(seconds);
+            assert_eq!(duration.is_some(), (0.0..=4294.0).contains(&seconds), "{seconds:e}");
+            let Some(duration) = duration else { continue };
+            let exact = f64::from(seconds) * 1e6;
+            let off = (duration.as_micros() as f64 - exact).abs();
+            assert!(off <= 0.5 + exact * 1.2e-7, "{seconds:e}: {duration:?}");
+        }
+        bits.end - bits.start
     });
 }
 

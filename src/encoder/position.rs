@@ -51,9 +51,11 @@ impl Position {
         let truncated = turns as i32;
         let whole = if truncated as f32 > turns { truncated.saturating_sub(1) } else { truncated };
         let rest = turns - whole as f32;
-        // A negative tiny rest rounds up to a whole turn; beyond 2^31 turns nothing sensible is left.
+        // A negative tiny rest rounds up to a whole turn; beyond 2^31 turns nothing sensible is left, in either direction.
         if rest >= 1.0 {
             Self { turns: whole as i64 + 1, angle: Angle::ZERO }
+        } else if rest < 0.0 {
+            Self { turns: whole as i64, angle: Angle::ZERO }
         } else {
             Self { turns: whole as i64, angle: Angle::from_radians(rest * TAU) }
         }
@@ -146,9 +148,17 @@ mod tests {
         for degrees in [-720.0_f32, -361.0, -0.01, 0.0, 359.99, 360.0, 1e6, -1e6, 3e12, -3e12] {
             let position = Position::from_angle(Angle::from_degrees(degrees));
             let turns = position.angle().as_turns();
-            assert!((0.0..1.0).contains(&turns) || degrees.abs() > 1e12, "{degrees}: {position:?}");
+            assert!((0.0..1.0).contains(&turns), "{degrees}: {position:?}");
             let error = (position.as_angle().as_degrees() - degrees).abs();
             assert!(error <= 1e-6 * degrees.abs().max(360.0) || degrees.abs() > 1e12);
+        }
+    }
+
+    #[test]
+    fn beyond_two_to_the_31_turns_it_saturates_on_a_whole_turn() {
+        for (degrees, turns) in [(3e12, 1 << 31), (-3e12, -1 << 31), (-f32::MAX, -1 << 31)] {
+            let position = Position::from_angle(Angle::from_degrees(degrees));
+            assert_eq!(position, Position::from_turns(turns), "{degrees}");
         }
     }
 

@@ -92,5 +92,6 @@ fn last(log: &Log) -> u16 {
 }
 
 mod brushed;
+mod conversions;
 mod holding;
 mod rc;

@@ -3,6 +3,7 @@
 mod answers;
 mod attaching;
 mod commanding;
+mod conversions;
 mod health;
 mod polling;
 mod receiving;
