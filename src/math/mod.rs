@@ -20,6 +20,8 @@
 //! ```
 
 mod root;
+#[cfg(test)]
+pub(crate) mod tests;
 mod trigonometry;
 mod wrap;
 

@@ -4,6 +4,7 @@ use crate::dji::command::{free_to_raw, loop_to_raw};
 use crate::dji::model::ALL_FACTS;
 use crate::dji::range::Range;
 use crate::dji::{Config, Gm6020Voltage};
+use crate::math::tests::every_f32;
 
 /// A scale, and the ranges of a motor that has all of it, or less than a third and one direction.
 #[derive(Debug, Clone, Copy)]
@@ -89,19 +90,6 @@ fn values_about_each_step_and_each_end_become_the_nearest_word() {
     }
 }
 
-/// Two threads, as the machine of the checks has cores.
-fn every_f32(case: Case) {
-    std::thread::scope(|scope| {
-        for sign in [0, 1 << 31] {
-            scope.spawn(move || {
-                for bits in 0..1 << 31 {
-                    case.check(sign | bits);
-                }
-            });
-        }
-    });
-}
-
 #[test]
 #[ignore = "2^32 values for one scale a day: by .ci/run"]
 fn every_f32_of_a_loop_becomes_the_nearest_word() {
@@ -111,7 +99,7 @@ fn every_f32_of_a_loop_becomes_the_nearest_word() {
     for (turn, case) in (0..).zip(Case::all()) {
         let scale = (case.raw_per_unit, case.limit);
         if all || turn == today {
-            every_f32(case);
+            every_f32(|bits| case.check(bits));
             std::println!("exhaustive: loop outputs at {scale:?}: 4294967296 values");
         } else {
             std::println!("exhaustive: loop outputs at {scale:?}: not today");
