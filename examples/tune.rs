@@ -187,8 +187,8 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
 fn main() -> Outcome<()> {
     let path = match std::env::args().nth(1) {
         Some(option) if option.starts_with('-') => {
-            println!("usage: tune [FILE.svg]");
-            std::process::exit(if option == "--help" { 0 } else { 2 });
+            eprintln!("usage: tune [FILE.svg]");
+            std::process::exit(if ["-h", "--help"].contains(&option.as_str()) { 0 } else { 2 });
         }
         path => path.unwrap_or_else(|| "tune.svg".into()),
     };

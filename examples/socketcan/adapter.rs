@@ -17,12 +17,12 @@ pub(crate) struct Adapter {
 }
 
 impl Adapter {
-    pub(crate) fn open(options: &Options) -> io::Result<Self> {
+    pub(crate) fn open(options: &Options, log: Option<File>) -> io::Result<Self> {
         let socket = CanSocket::open(&options.interface)?;
         socket.set_nonblocking(true)?;
         // Bus errors are counted by kind.
         socket.set_error_filter_accept_all()?;
-        let log = options.log.as_ref().map(File::create).transpose()?.map(BufWriter::new);
+        let log = log.map(BufWriter::new);
         let start = std::time::Instant::now();
         Ok(Self { socket, interface: options.interface.clone(), log, start })
     }

@@ -41,9 +41,15 @@ fn number<T: std::str::FromStr>(option: &str, text: &str) -> Result<T, String> {
     text.trim().parse().map_err(|_| format!("{option} {text}: not a number that it can be"))
 }
 
+/// Neither NaN nor infinity.
+fn finite(option: &str, text: &str) -> Result<f32, String> {
+    let value: f32 = number(option, text)?;
+    if value.is_finite() { Ok(value) } else { Err(format!("{option} {text}: not finite")) }
+}
+
 /// Reads `0.2,0,0`.
 fn three(option: &str, text: &str) -> Result<[f32; 3], String> {
-    let numbers: Result<Vec<f32>, _> = text.split(',').map(|part| number(option, part)).collect();
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|part| finite(option, part)).collect();
     <[f32; 3]>::try_from(numbers?).map_err(|_| format!("{option} takes three numbers"))
 }
 
@@ -71,7 +77,7 @@ pub(crate) fn parse(
             "--interface" => options.interface = value()?,
             "--log" => options.log = Some(value()?),
             "--motors" => options.motors = motors(&value()?)?,
-            "--rpm" => rpm = Some(number("--rpm", &value()?)?),
+            "--rpm" => rpm = Some(finite("--rpm", &value()?)?),
             "--seconds" => options.seconds = number("--seconds", &value()?)?,
             "--mecanum" => options.twist = Some(three("--mecanum", &value()?)?),
             "--geometry" => {

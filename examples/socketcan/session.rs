@@ -14,6 +14,7 @@ use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use std::error::Error;
+use std::fs::File;
 use std::io::{self, BufRead, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -102,7 +103,11 @@ impl<K: Clock> Session<K> {
         let mut bus = Bus::new();
         let motors = attach(&mut bus, options)?;
         let speeds = speeds(options, &motors)?;
-        let port = Adapter::open(options).map_err(|error| {
+        let log = options
+            .log
+            .as_ref()
+            .map(|file| File::create(file).map_err(|error| format!("--log {file}: {error}")));
+        let port = Adapter::open(options, log.transpose()?).map_err(|error| {
             let interface = &options.interface;
             format!(
                 "cannot open {interface}: {error}; does `ip link` show it, and is it up? See --help"
@@ -117,7 +122,7 @@ impl<K: Clock> Session<K> {
         })
     }
 
-    /// Runs until `next` or a signal ends it, or nobody takes what it says, and ends with zeros. In each `pause` some time
+    /// Runs until `next` or a signal ends it, or the reader of what it says is gone, and ends with zeros. In each `pause` some time
     /// passes.
     fn run(
         mut self,

@@ -99,6 +99,9 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
             }
             refused_ticks = if is_refused { refused_ticks.saturating_add(1) } else { 0 };
             if refused_ticks >= BUS_DOWN_TICKS {
+                if refused_ticks == BUS_DOWN_TICKS {
+                    defmt::warn!("the bus takes nothing: disarmed");
+                }
                 bus.disarm();
             }
             while let Some(edge) = bus.next_edge() {

@@ -232,8 +232,11 @@ mod tests {
         assert_eq!([after(REST, false), after(RIGHT, false)], [0.0, -FASTEST_M_S]);
         assert_eq!([after(RIGHT, true), after(REST, true)], [-FASTEST_M_S, 0.0]);
         assert_eq!(after(RIGHT, true), FASTEST_M_S);
-        let mut seen = 0;
-        pilot.edges(now, |_, _| seen += 1);
-        assert!(seen >= 2, "who was heard, for the log");
+        let (mut remote, mut imu) = (false, false);
+        pilot.edges(now, |who, _| match who {
+            "remote control" => remote = true,
+            _ => imu = who == "IMU",
+        });
+        assert!(remote && imu, "who was heard, for the log");
     }
 }
