@@ -261,7 +261,7 @@ impl Joints {
         self.now = self.now.max(now);
         // A clock that stands or went back does not tell when an answer is overdue: then an update counts for a millisecond.
         let held = Duration::from_millis(self.held_steps.into());
-        let is_long = held > self.reply_timeout || self.held_steps == u8::MAX;
+        let is_long = held > self.reply_timeout;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
         self.remind();
         self.stop_again();
