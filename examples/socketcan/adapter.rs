@@ -1,9 +1,13 @@
 //! A SocketCAN socket as the crate wants a driver.
 
 use crate::options::Options;
+use crate::outlet::Outlet;
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Frame, Socket, SocketOptions};
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io;
+
+/// Frames that wait for the disk: six seconds of a bus with nothing between its frames.
+const LOG_ROOM: usize = 1 << 16;
 
 /// A SocketCAN socket as the crate wants a driver.
 ///
@@ -12,7 +16,7 @@ use std::io::{self, BufWriter, Write};
 pub(crate) struct Adapter {
     socket: CanSocket,
     interface: String,
-    log: Option<BufWriter<File>>,
+    log: Option<Outlet>,
     start: std::time::Instant,
 }
 
@@ -22,33 +26,44 @@ impl Adapter {
         socket.set_nonblocking(true)?;
         // Bus errors are counted by kind.
         socket.set_error_filter_accept_all()?;
-        let log = log.map(BufWriter::new);
+        let log = log.map(|file| Outlet::new(file, LOG_ROOM));
         let start = std::time::Instant::now();
         Ok(Self { socket, interface: options.interface.clone(), log, start })
     }
 
-    /// Writes what the log still keeps back.
-    pub(crate) fn flush(&mut self) -> io::Result<()> {
-        self.log.as_mut().map_or(Ok(()), Write::flush)
+    /// Waits until the log is written.
+    ///
+    /// # Errors
+    /// Where a part of it is missing.
+    pub(crate) fn finish(self) -> io::Result<()> {
+        let Some(log) = self.log else { return Ok(()) };
+        let lost = log.lost();
+        match log.finish(String::new()) {
+            Ok(()) if lost == 0 => Ok(()),
+            Ok(()) => Err(io::Error::other(format!("--log: {lost} frames came too fast for it"))),
+            Err(error) => Err(io::Error::new(error.kind(), format!("--log: {error}"))),
+        }
     }
 
-    /// The form of `candump -L`.
-    fn record(&mut self, frame: &CanFrame) -> io::Result<()> {
-        let Some(log) = &mut self.log else { return Ok(()) };
-        write!(log, "({:.6}) {} ", self.start.elapsed().as_secs_f64(), self.interface)?;
-        match frame {
-            CanFrame::Error(_) => write!(log, "{:08X}#", frame.id_word())?,
-            _ if frame.is_extended() => write!(log, "{:08X}#", frame.raw_id())?,
-            _ => write!(log, "{:03X}#", frame.raw_id())?,
-        }
-        if frame.is_remote_frame() {
-            return match frame.dlc() {
-                0 => writeln!(log, "R"),
-                length => writeln!(log, "R{length}"),
-            };
-        }
-        frame.data().iter().try_for_each(|byte| write!(log, "{byte:02X}"))?;
-        writeln!(log)
+    fn record(&mut self, frame: &CanFrame) {
+        let Some(log) = &mut self.log else { return };
+        let seconds = self.start.elapsed().as_secs_f64();
+        // What is lost is said at the end.
+        _ = log.offer(format!("({seconds:.6}) {} {}\n", self.interface, text_of(frame)));
+    }
+}
+
+/// A frame in the form of `candump -L`.
+fn text_of(frame: &CanFrame) -> String {
+    let id = match frame {
+        CanFrame::Error(_) => format!("{:08X}", frame.id_word()),
+        _ if frame.is_extended() => format!("{:08X}", frame.raw_id()),
+        _ => format!("{:03X}", frame.raw_id()),
+    };
+    match frame.dlc() {
+        0 if frame.is_remote_frame() => format!("{id}#R"),
+        length if frame.is_remote_frame() => format!("{id}#R{length}"),
+        _ => frame.data().iter().fold(id + "#", |text, byte| format!("{text}{byte:02X}")),
     }
 }
 
@@ -60,7 +75,7 @@ impl embedded_can::nb::Can for Adapter {
         const ENOBUFS: i32 = 105;
         match self.socket.write_frame(frame) {
             Ok(()) => {
-                self.record(frame).map_err(socketcan::Error::from)?;
+                self.record(frame);
                 Ok(None)
             }
             Err(error) if error.raw_os_error() == Some(ENOBUFS) => Err(nb::Error::WouldBlock),
@@ -77,7 +92,7 @@ impl embedded_can::nb::Can for Adapter {
             }
             Err(error) => return Err(nb::Error::Other(error.into())),
         };
-        self.record(&frame).map_err(socketcan::Error::from)?;
+        self.record(&frame);
         match frame {
             CanFrame::Error(frame) => Err(nb::Error::Other(frame.into())),
             frame => Ok(frame),

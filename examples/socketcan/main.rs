@@ -14,6 +14,8 @@ mod adapter;
 #[cfg(target_os = "linux")]
 mod options;
 #[cfg(target_os = "linux")]
+mod outlet;
+#[cfg(target_os = "linux")]
 mod session;
 
 #[cfg(not(target_os = "linux"))]

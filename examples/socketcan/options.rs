@@ -6,7 +6,8 @@ pub(crate) const HELP: &str = "\
 usage: socketcan [--interface NAME] [--motors LIST] [--rpm N | --mecanum X,Y,W [--geometry R,L,B]] [--seconds S] [--arm]
                  [--log FILE]
 
-Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift the wheels first.
+Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift the wheels first, and keep the switch of the
+battery at hand: nobody sends zeros where this program is killed, the PC halts or the adapter is pulled out.
 
   --interface NAME  the interface (default: can0); bring it up before:
                     sudo ip link set can0 up type can bitrate 1000000
@@ -17,7 +18,7 @@ Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift t
   --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
                     front left, rear left and rear right
   --geometry R,L,B  radius of the wheels, half of the wheelbase and half of the track in m (default: 0.076,0.2,0.18)
-  --seconds S       how long, a whole number (default: 5); Ctrl-C ends it as well, with zeros
+  --seconds S       how long, a whole number (default: 5); Ctrl-C and Ctrl-Z end it as well, with zeros
   --arm             send commands; without it nothing is sent
   --log FILE        every frame in the form of candump -L";
 
@@ -32,6 +33,8 @@ pub(crate) struct Options {
     pub(crate) geometry: MecanumGeometry,
     pub(crate) seconds: u64,
     pub(crate) arm: bool,
+    /// By `--rpm` or `--mecanum`.
+    pub(crate) asks_for_motion: bool,
     pub(crate) log: Option<String>,
     /// For tests: a millisecond for each line on standard input, answered by a line.
     pub(crate) lock_step: bool,
@@ -64,6 +67,7 @@ pub(crate) fn parse(
         geometry: GEOMETRY,
         seconds: 5,
         arm: false,
+        asks_for_motion: false,
         log: None,
         lock_step: false,
     };
@@ -93,6 +97,7 @@ pub(crate) fn parse(
         None if geometry.is_some() => return Err("--geometry needs --mecanum".into()),
         _ => {}
     }
+    options.asks_for_motion = rpm.is_some() || options.twist.is_some();
     options.rpm = rpm.unwrap_or(options.rpm);
     options.geometry = geometry.unwrap_or(options.geometry);
     Ok(Some(options))

@@ -2,6 +2,7 @@
 
 use crate::adapter::Adapter;
 use crate::options::{HELP, Options, parse};
+use crate::outlet::Outlet;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{
@@ -12,10 +13,10 @@ use drivetrain::motor::{ArmError, CanDevice, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGTTOU};
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,6 +25,13 @@ const M3508_SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(6
 const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(3.0);
 const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
 const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);
+
+/// What ends or halts a program, as far as it may have a say: in a halted one the last current would stand. SIGHUP is that of a
+/// terminal which is closed, SIGTSTP is Ctrl-Z, SIGTTOU of a terminal that takes nothing from the background.
+const SIGNALS: [i32; 6] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGTTOU];
+
+/// Texts that wait for a reader.
+const ROOM: usize = 64;
 
 /// Attaches all of them. In a chassis the motors on the right side are reversed.
 fn attach(bus: &mut Bus, options: &Options) -> Result<Vec<AnyHandle>, Box<dyn Error>> {
@@ -70,23 +78,36 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         println!("{HELP}");
         return Ok(());
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    // The last is that of a terminal which is closed, or whose line is cut.
-    for signal in [SIGINT, SIGTERM, SIGQUIT, SIGHUP] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let end = End::new()?;
     if options.lock_step {
         let clock = ManualClock::new(Instant::from_micros(1_000_000));
         let mut lines = io::stdin().lock().lines();
         let pause = || clock.advance(Duration::from_millis(1));
-        let next = || lines.next().is_some();
-        return Session::new(&options, &clock)?.run(&options, &stop, next, pause);
+        let next = || matches!(lines.next(), Some(Ok(_)));
+        return Session::new(&options, &clock)?.run(&options, &end, next, pause);
     }
     let start = std::time::Instant::now();
     let clock = move || Instant::START + Duration::from(start.elapsed());
     let pause = || std::thread::sleep(std::time::Duration::from_micros(200));
     let next = || start.elapsed().as_secs() < options.seconds;
-    Session::new(&options, clock)?.run(&options, &stop, next, pause)
+    Session::new(&options, clock)?.run(&options, &end, next, pause)
+}
+
+/// A signal asks for an end with zeros. Once they are sent it does what it does to any program.
+struct End {
+    is_asked_for: Arc<AtomicBool>,
+    is_safe: Arc<AtomicBool>,
+}
+
+impl End {
+    fn new() -> io::Result<Self> {
+        let end = Self { is_asked_for: Arc::default(), is_safe: Arc::default() };
+        for signal in SIGNALS {
+            signal_hook::flag::register_conditional_default(signal, Arc::clone(&end.is_safe))?;
+            signal_hook::flag::register(signal, Arc::clone(&end.is_asked_for))?;
+        }
+        Ok(end)
+    }
 }
 
 struct Session<K> {
@@ -127,30 +148,13 @@ impl<K: Clock> Session<K> {
     fn run(
         mut self,
         options: &Options,
-        stop: &AtomicBool,
-        next: impl FnMut() -> bool,
-        mut pause: impl FnMut(),
-    ) -> Result<(), Box<dyn Error>> {
-        let said = self.go_on(options, stop, next, &mut pause);
-        if options.arm {
-            self.end(pause);
-        }
-        said?;
-        self.show()?;
-        self.report()?;
-        let (Nb(mut port), ..) = self.runner.into_parts();
-        Ok(port.flush()?)
-    }
-
-    fn go_on(
-        &mut self,
-        options: &Options,
-        stop: &AtomicBool,
+        end: &End,
         mut next: impl FnMut() -> bool,
         mut pause: impl FnMut(),
-    ) -> io::Result<()> {
-        let mut ticks: u64 = 0;
-        while next() && !stop.load(Ordering::Relaxed) {
+    ) -> Result<(), Box<dyn Error>> {
+        let mut out = Outlet::new(io::stdout(), ROOM);
+        let (mut ticks, mut is_read) = (0_u64, true);
+        while is_read && next() && !end.is_asked_for.load(Ordering::Relaxed) {
             pause();
             while self.runner.poll(64) == 64 {}
             let Some(tick) = self.runner.due() else { continue };
@@ -161,15 +165,20 @@ impl<K: Clock> Session<K> {
                 self.listen(tick);
             }
             if options.lock_step {
-                writeln!(io::stdout(), ".")?;
+                is_read = out.offer(".\n".into());
             } else if ticks.is_multiple_of(500) {
-                self.show()?;
-                if let Some(why) = self.refusal {
-                    writeln!(io::stdout(), "not armed: {why}")?;
-                }
+                is_read = out.offer(self.state(options));
             }
         }
-        Ok(())
+        if options.arm {
+            self.relax(pause);
+        }
+        end.is_safe.store(true, Ordering::Relaxed);
+        let report = self.state(options) + &self.report(out.lost());
+        let (Nb(port), ..) = self.runner.into_parts();
+        let logged = port.finish();
+        out.finish(report).map_err(|error| format!("standard output: {error}"))?;
+        Ok(logged?)
     }
 
     /// Arms once, when all motors are heard: what was lost stays relaxed.
@@ -194,7 +203,7 @@ impl<K: Clock> Session<K> {
     }
 
     /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost.
-    fn end(&mut self, mut pause: impl FnMut()) {
+    fn relax(&mut self, mut pause: impl FnMut()) {
         self.runner.device_mut().disarm();
         let mut ticks = 0;
         while ticks < 30 {
@@ -205,27 +214,31 @@ impl<K: Clock> Session<K> {
         }
     }
 
-    fn show(&self) -> io::Result<()> {
-        let (bus, mut out) = (self.runner.device(), io::stdout().lock());
-        for (motor, name) in bus.motors() {
-            match bus.state(motor) {
-                Some(state) => writeln!(
-                    out,
-                    "{} {:?}: {:8.1} rpm, {:6.2} A, position {:.3} turns, {}",
-                    state.motor,
-                    state.link,
-                    state.velocity.as_rpm(),
-                    state.current.as_amperes(),
-                    state.position.as_turns(),
-                    state.error.map_or("no error".to_string(), |error| error.to_string())
-                )?,
-                None => writeln!(out, "{name} is not heard")?,
+    fn state(&self, options: &Options) -> String {
+        let bus = self.runner.device();
+        let motors = bus.motors().map(|(motor, name)| match bus.state(motor) {
+            Some(state) => format!(
+                "{} {:?}: {:8.1} rpm, {:6.2} A, position {:.3} turns, {}\n",
+                state.motor,
+                state.link,
+                state.velocity.as_rpm(),
+                state.current.as_amperes(),
+                state.position.as_turns(),
+                state.error.map_or("no error".to_string(), |error| error.to_string())
+            ),
+            None => format!("{name} is not heard\n"),
+        });
+        let why = match self.refusal {
+            Some(refusal) => format!("not armed: {refusal}\n"),
+            None if options.asks_for_motion && !options.arm => {
+                "nothing is sent without --arm\n".into()
             }
-        }
-        Ok(())
+            None => String::new(),
+        };
+        motors.chain([why]).collect()
     }
 
-    fn report(&self) -> io::Result<()> {
+    fn report(&self, unread: u32) -> String {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         let counts = [
             ("received", s.received),
@@ -243,8 +256,8 @@ impl<K: Clock> Session<K> {
             ("refused", s.refused),
             ("send_errors", s.send_errors.total()),
             ("bus_losses", s.bus_losses),
+            ("unread", unread),
         ];
-        let mut out = io::stdout().lock();
-        counts.iter().try_for_each(|(name, count)| writeln!(out, "{name} {count}"))
+        counts.iter().map(|(name, count)| format!("{name} {count}\n")).collect()
     }
 }

@@ -1,0 +1,171 @@
+//! Whatever ends the example or holds up what it says, the motors are left at zero. What a drive does with its last current
+//! when nobody sends it another is not known.
+
+use super::{END, Example, Robot, Witness, output, wait_until};
+use crate::judge::end_with_zeros;
+use drivetrain::sim::{Model, MotorConfig, World};
+use std::fs::File;
+use std::io::{BufRead, Write};
+use std::net::Shutdown;
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::ExitStatus;
+
+const ZEROS: &str = "200#0000000000000000";
+
+/// Half a second later the motor turns.
+fn driven(more: &[&str]) -> (Robot, Example) {
+    let world = World::new(3);
+    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let mut robot = Robot::new(world);
+    let mut example = Example::start(&[&["--motors", "m3508:1", "--rpm", "60"], more].concat());
+    for _ in 0..500 {
+        example.step();
+        robot.step();
+    }
+    assert_ne!(robot.received.last().unwrap(), ZEROS);
+    (robot, example)
+}
+
+fn signal(name: &str, example: &Example) {
+    output("busybox", &["kill", name, &example.child.id().to_string()]);
+}
+
+/// What comes before the marker is all that it sent.
+fn is_left_at_zero(robot: &mut Robot, witness: &Witness) {
+    robot.mark(witness, END, 0);
+    robot.receive();
+    end_with_zeros(&robot.received, &["200"]);
+}
+
+fn ends(example: &mut Example) -> ExitStatus {
+    wait_until("the end of the example", || example.child.try_wait().unwrap().is_some());
+    example.child.wait().unwrap()
+}
+
+/// A closed terminal, and Ctrl-Z.
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn the_motors_are_left_at_zero_when_a_terminal_is_closed_or_would_halt_it() {
+    let witness = Witness::new();
+    for name in ["-HUP", "-TSTP"] {
+        let (mut robot, mut example) = driven(&[]);
+        signal(name, &example);
+        writeln!(example.steps).unwrap();
+        assert!(ends(&mut example).success(), "{name}");
+        is_left_at_zero(&mut robot, &witness);
+    }
+}
+
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn the_motors_are_left_at_zero_when_nobody_can_read_what_it_says() {
+    let witness = Witness::new();
+    let (mut robot, mut example) = driven(&[]);
+    example.answers.get_ref().shutdown(Shutdown::Both).unwrap();
+    wait_until("the end of the example", || {
+        robot.step();
+        _ = writeln!(example.steps);
+        example.child.try_wait().unwrap().is_some()
+    });
+    assert!(!ends(&mut example).success(), "it says nothing of its lost reader");
+    is_left_at_zero(&mut robot, &witness);
+}
+
+/// A thousand answers that nobody reads, as with a full pipe or Ctrl-S: the motor is driven on, and a signal ends that at once.
+/// Then only what is to be read waits.
+fn unread() -> (Robot, Example) {
+    let (mut robot, mut example) = driven(&[]);
+    for _ in 0..1_000 {
+        let seen = robot.received.len();
+        writeln!(example.steps).unwrap();
+        wait_until("a command", || {
+            robot.receive();
+            robot.received.len() > seen
+        });
+        robot.step();
+    }
+    end_held_up(&mut robot, &mut example);
+    (robot, example)
+}
+
+/// The motors are safe at once, whatever is still to be written.
+fn end_held_up(robot: &mut Robot, example: &mut Example) {
+    assert_ne!(robot.received.last().unwrap(), ZEROS);
+    signal("-TERM", example);
+    writeln!(example.steps).unwrap();
+    wait_until("zeros", || {
+        robot.receive();
+        robot.received.iter().rev().take_while(|frame| *frame == ZEROS).count() >= 2
+    });
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    assert!(example.child.try_wait().unwrap().is_none(), "nobody held it up");
+}
+
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_reader_who_does_not_read_holds_up_no_motor() {
+    let (mut robot, mut example) = unread();
+    let said: Vec<String> = (&mut example.answers).lines().map(Result::unwrap).collect();
+    assert!(ends(&mut example).success());
+    is_left_at_zero(&mut robot, &Witness::new());
+    let answered = said.iter().take_while(|line| *line == ".").count();
+    let unread = said.iter().find_map(|line| line.strip_prefix("unread ")).unwrap();
+    let unread: usize = unread.parse().unwrap();
+    assert_eq!(answered + unread, 1_000);
+    assert!(unread > 0);
+    println!("of 1000 answers that nobody read for a while {unread} were lost, and no command");
+}
+
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_second_signal_ends_it_for_a_reader_who_does_not_read() {
+    let (mut robot, mut example) = unread();
+    signal("-TERM", &example);
+    assert_eq!(ends(&mut example).signal(), Some(15));
+    is_left_at_zero(&mut robot, &Witness::new());
+}
+
+/// A pipe that nobody empties: full after half a second.
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_log_that_takes_nothing_holds_up_no_motor() {
+    let pipe = PathBuf::from(std::env::var("VCAN_RESULTS").unwrap()).join("pipe");
+    let pipe = pipe.to_str().unwrap();
+    output("busybox", &["mkfifo", pipe]);
+    // To open it waits for the other side.
+    let reader = std::thread::spawn({
+        let pipe = pipe.to_owned();
+        move || File::open(pipe).unwrap()
+    });
+    let (mut robot, mut example) = driven(&["--log", pipe]);
+    for _ in 0..1_000 {
+        example.step();
+        robot.step();
+    }
+    end_held_up(&mut robot, &mut example);
+    let log = std::io::read_to_string(reader.join().unwrap()).unwrap();
+    assert!(ends(&mut example).success());
+    is_left_at_zero(&mut robot, &Witness::new());
+    let commands = |frames: &mut dyn Iterator<Item = &str>| -> Vec<String> {
+        frames.filter(|frame| frame.starts_with("200#")).map(str::to_owned).collect()
+    };
+    let logged = commands(&mut log.lines().filter_map(|line| line.split(' ').nth(2)));
+    assert_eq!(logged, commands(&mut robot.received.iter().map(String::as_str)));
+}
+
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_log_on_a_full_disk_holds_up_no_motor_and_is_an_error_at_the_end() {
+    let (mut robot, mut example) = driven(&["--log", "/dev/full"]);
+    for _ in 0..100 {
+        example.step();
+        robot.step();
+    }
+    assert_ne!(robot.received.last().unwrap(), ZEROS);
+    signal("-TERM", &example);
+    writeln!(example.steps).unwrap();
+    assert_eq!(ends(&mut example).code(), Some(1));
+    is_left_at_zero(&mut robot, &Witness::new());
+    assert!(example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+}
