@@ -3,10 +3,11 @@
 use crate::options::Options;
 use crate::outlet::Outlet;
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Frame, Socket, SocketOptions};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 
-/// Frames that wait for the disk: six seconds of a bus with nothing between its frames.
+/// Frames that wait for the disk: seven seconds of 8-byte frames with nothing between them.
 const LOG_ROOM: usize = 1 << 16;
 
 /// A SocketCAN socket as the crate wants a driver.
@@ -17,6 +18,8 @@ pub(crate) struct Adapter {
     socket: CanSocket,
     interface: String,
     log: Option<Outlet>,
+    /// By id: whether the last command that the interface took asks for anything.
+    standing: BTreeMap<u32, bool>,
     start: std::time::Instant,
 }
 
@@ -26,23 +29,25 @@ impl Adapter {
         socket.set_nonblocking(true)?;
         // Bus errors are counted by kind.
         socket.set_error_filter_accept_all()?;
-        let log = log.map(|file| Outlet::new(file, LOG_ROOM));
-        let start = std::time::Instant::now();
-        Ok(Self { socket, interface: options.interface.clone(), log, start })
+        let log = log.map(|file| Outlet::new("--log", file, LOG_ROOM)).transpose()?;
+        let (interface, start) = (options.interface.clone(), std::time::Instant::now());
+        Ok(Self { socket, interface, log, standing: BTreeMap::new(), start })
+    }
+
+    /// Tells whether the interface took a zero after whatever else it took, for every motor.
+    pub(crate) fn is_at_zero(&self) -> bool {
+        !self.standing.values().any(|asks| *asks)
     }
 
     /// Waits until the log is written.
     ///
     /// # Errors
     /// Where a part of it is missing.
-    pub(crate) fn finish(self) -> io::Result<()> {
+    pub(crate) fn finish(self) -> Result<(), String> {
         let Some(log) = self.log else { return Ok(()) };
         let lost = log.lost();
-        match log.finish(String::new()) {
-            Ok(()) if lost == 0 => Ok(()),
-            Ok(()) => Err(io::Error::other(format!("--log: {lost} frames came too fast for it"))),
-            Err(error) => Err(io::Error::new(error.kind(), format!("--log: {error}"))),
-        }
+        log.finish(String::new())?;
+        if lost == 0 { Ok(()) } else { Err(format!("--log: {lost} frames came too fast for it")) }
     }
 
     fn record(&mut self, frame: &CanFrame) {
@@ -75,6 +80,8 @@ impl embedded_can::nb::Can for Adapter {
         const ENOBUFS: i32 = 105;
         match self.socket.write_frame(frame) {
             Ok(()) => {
+                let asks = frame.data().iter().any(|byte| *byte != 0);
+                self.standing.insert(frame.raw_id(), asks);
                 self.record(frame);
                 Ok(None)
             }

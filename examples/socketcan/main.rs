@@ -25,10 +25,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 #[cfg(target_os = "linux")]
 fn main() -> std::process::ExitCode {
+    use std::io::Write;
+
     match session::main() {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("socketcan: {error}");
+            _ = writeln!(std::io::stderr(), "socketcan: {error}");
             std::process::ExitCode::FAILURE
         }
     }

@@ -2,10 +2,12 @@
 
 use std::io::{self, BufWriter, Write};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::thread::{JoinHandle, spawn};
+use std::thread::{Builder, JoinHandle, sleep};
+use std::time::{Duration, Instant};
 
 /// Lines that a thread of its own writes: a reader who reads no more, or a disk that hangs, does not hold up who drives motors.
 pub(crate) struct Outlet {
+    name: String,
     lines: SyncSender<String>,
     writer: JoinHandle<io::Result<()>>,
     lost: u32,
@@ -13,9 +15,17 @@ pub(crate) struct Outlet {
 
 impl Outlet {
     /// `room` is the number of texts that wait at most; what comes after them is lost.
-    pub(crate) fn new(sink: impl Write + Send + 'static, room: usize) -> Self {
+    ///
+    /// # Errors
+    /// Where there can be no thread more.
+    pub(crate) fn new(
+        name: &str,
+        sink: impl Write + Send + 'static,
+        room: usize,
+    ) -> io::Result<Self> {
         let (lines, waiting) = sync_channel(room);
-        Self { lines, writer: spawn(|| write(waiting, BufWriter::new(sink))), lost: 0 }
+        let writer = Builder::new().spawn(|| write(waiting, BufWriter::new(sink)))?;
+        Ok(Self { name: name.into(), lines, writer, lost: 0 })
     }
 
     /// Leaves a text to be written, or loses it where there is no room. Returns whether anybody can still read it.
@@ -34,16 +44,30 @@ impl Outlet {
         self.lost
     }
 
-    /// Waits, for ever if need be, until all is written and this `text` after it.
+    /// Waits, for ever if need be, until all is written and this `text` after it. Says so when that takes a while.
     ///
     /// # Errors
     /// That of the first text that could not be written.
-    pub(crate) fn finish(self, text: String) -> io::Result<()> {
-        let Self { lines, writer, .. } = self;
+    pub(crate) fn finish(self, mut text: String) -> Result<(), String> {
+        let Self { name, lines, writer, .. } = self;
+        let (begun, mut is_said) = (Instant::now(), false);
+        let mut wait = || {
+            sleep(Duration::from_millis(5));
+            if begun.elapsed() > Duration::from_secs(1) && !std::mem::replace(&mut is_said, true) {
+                say(format!("nothing more is sent; waits for {name}, and a signal ends that"));
+            }
+        };
         // Where the writer is gone, it says why below.
-        _ = lines.send(text);
+        while let Err(TrySendError::Full(back)) = lines.try_send(text) {
+            text = back;
+            wait();
+        }
         drop(lines);
-        writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        while !writer.is_finished() {
+            wait();
+        }
+        let written = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        written.map_err(|error| format!("{name}: {error}"))
     }
 }
 
@@ -54,4 +78,72 @@ fn write(waiting: Receiver<String>, mut sink: impl Write) -> io::Result<()> {
         sink.flush()?;
     }
     Ok(())
+}
+
+/// Says something on standard error, and waits for nobody to read it.
+pub(crate) fn say(text: String) {
+    _ = Builder::new().spawn(move || writeln!(io::stderr(), "socketcan: {text}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Sender, channel};
+    use std::sync::{Arc, Mutex};
+
+    /// Says when it is written to, and is held up then.
+    struct HeldUp {
+        begins: Sender<()>,
+        may_go_on: Receiver<()>,
+        written: Arc<Mutex<String>>,
+    }
+
+    impl Write for HeldUp {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            _ = self.begins.send(());
+            _ = self.may_go_on.recv();
+            self.written.lock().unwrap().push_str(std::str::from_utf8(bytes).unwrap());
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn what_finds_no_room_is_lost_and_counted_and_the_rest_is_written_in_order() {
+        let (begins, has_begun) = channel();
+        let (go_on, may_go_on) = channel();
+        let written = Arc::<Mutex<String>>::default();
+        let sink = HeldUp { begins, may_go_on, written: Arc::clone(&written) };
+        let mut outlet = Outlet::new("a pipe", sink, 2).unwrap();
+        assert!(outlet.offer("a".into()));
+        has_begun.recv().unwrap();
+        for text in ["b", "c", "d", "e"] {
+            assert!(outlet.offer(text.into()), "it may still be read");
+        }
+        assert_eq!(outlet.lost(), 2);
+        drop(go_on);
+        outlet.finish("f".into()).unwrap();
+        assert_eq!(*written.lock().unwrap(), "abcf");
+    }
+
+    #[test]
+    fn who_can_read_no_more_is_noticed_and_the_reason_is_kept() {
+        struct Gone;
+        impl Write for Gone {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::BrokenPipe.into())
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut outlet = Outlet::new("a pipe", Gone, 2).unwrap();
+        while outlet.offer("a".into()) {
+            std::thread::yield_now();
+        }
+        assert_eq!(outlet.finish("b".into()), Err("a pipe: broken pipe".into()));
+    }
 }

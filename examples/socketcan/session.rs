@@ -2,7 +2,7 @@
 
 use crate::adapter::Adapter;
 use crate::options::{HELP, Options, parse};
-use crate::outlet::Outlet;
+use crate::outlet::{Outlet, say};
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{
@@ -13,10 +13,13 @@ use drivetrain::motor::{ArmError, CanDevice, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGTTOU};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1,
+    SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
+};
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -26,9 +29,16 @@ const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(
 const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
 const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);
 
-/// What ends or halts a program, as far as it may have a say: in a halted one the last current would stand. SIGHUP is that of a
-/// terminal which is closed, SIGTSTP is Ctrl-Z, SIGTTOU of a terminal that takes nothing from the background.
-const SIGNALS: [i32; 6] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGTTOU];
+/// What somebody may send to a program that would end it or halt it, and the last current would stand. SIGHUP is that of a
+/// terminal which is closed (`nohup` does not help against it), SIGTSTP is Ctrl-Z, SIGTTOU of a terminal that takes nothing
+/// from the background.
+const SIGNALS: [i32; 14] = [
+    SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGALRM,
+    SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
+];
+
+/// The interface may take this long to take zeros, when all is over.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 
 /// Texts that wait for a reader.
 const ROOM: usize = 64;
@@ -75,8 +85,7 @@ fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let Some(options) = parse(std::env::args().skip(1))? else {
-        println!("{HELP}");
-        return Ok(());
+        return Ok(writeln!(io::stdout(), "{HELP}")?);
     };
     let end = End::new()?;
     if options.lock_step {
@@ -93,7 +102,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     Session::new(&options, clock)?.run(&options, &end, next, pause)
 }
 
-/// A signal asks for an end with zeros. Once they are sent it does what it does to any program.
+/// A signal asks for an end with zeros; where nothing may move, it does what it does to any program.
 struct End {
     is_asked_for: Arc<AtomicBool>,
     is_safe: Arc<AtomicBool>,
@@ -101,12 +110,18 @@ struct End {
 
 impl End {
     fn new() -> io::Result<Self> {
-        let end = Self { is_asked_for: Arc::default(), is_safe: Arc::default() };
+        let end = Self { is_asked_for: Arc::default(), is_safe: Arc::new(true.into()) };
         for signal in SIGNALS {
             signal_hook::flag::register_conditional_default(signal, Arc::clone(&end.is_safe))?;
             signal_hook::flag::register(signal, Arc::clone(&end.is_asked_for))?;
         }
+        // A file that may grow no more is an error of its writer's then.
+        signal_hook::flag::register(SIGXFSZ, Arc::default())?;
         Ok(end)
+    }
+
+    fn is_safe(&self, is_safe: bool) {
+        self.is_safe.store(is_safe, Ordering::Relaxed);
     }
 }
 
@@ -152,7 +167,8 @@ impl<K: Clock> Session<K> {
         mut next: impl FnMut() -> bool,
         mut pause: impl FnMut(),
     ) -> Result<(), Box<dyn Error>> {
-        let mut out = Outlet::new(io::stdout(), ROOM);
+        let mut out = Outlet::new("standard output", io::stdout(), ROOM)?;
+        end.is_safe(false);
         let (mut ticks, mut is_read) = (0_u64, true);
         while is_read && next() && !end.is_asked_for.load(Ordering::Relaxed) {
             pause();
@@ -170,15 +186,13 @@ impl<K: Clock> Session<K> {
                 is_read = out.offer(self.state(options));
             }
         }
-        if options.arm {
-            self.relax(pause);
-        }
-        end.is_safe.store(true, Ordering::Relaxed);
+        let relaxed = if options.arm { self.relax(options, end, pause) } else { Ok(()) };
+        end.is_safe(true);
         let report = self.state(options) + &self.report(out.lost());
         let (Nb(port), ..) = self.runner.into_parts();
-        let logged = port.finish();
-        out.finish(report).map_err(|error| format!("standard output: {error}"))?;
-        Ok(logged?)
+        let ends = [relaxed, out.finish(report), port.finish()];
+        let errors: Vec<String> = ends.into_iter().filter_map(Result::err).collect();
+        if errors.is_empty() { Ok(()) } else { Err(errors.join("; ").into()) }
     }
 
     /// Arms once, when all motors are heard: what was lost stays relaxed.
@@ -202,16 +216,39 @@ impl<K: Clock> Session<K> {
         while self.runner.device_mut().next_frame().is_some() {}
     }
 
-    /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost.
-    fn relax(&mut self, mut pause: impl FnMut()) {
+    /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost; waits where the interface takes none.
+    fn relax(
+        &mut self,
+        options: &Options,
+        end: &End,
+        mut pause: impl FnMut(),
+    ) -> Result<(), String> {
+        let interface = &options.interface;
+        let begun = std::time::Instant::now();
         self.runner.device_mut().disarm();
-        let mut ticks = 0;
-        while ticks < 30 {
+        let (mut ticks_at_zero, mut ticks_before) = (0, 0);
+        while ticks_at_zero < 30 {
             pause();
             let Some(tick) = self.runner.due() else { continue };
             self.runner.tick(tick);
-            ticks += 1;
+            if self.runner.port_mut().0.is_at_zero() {
+                ticks_at_zero += 1;
+                continue;
+            }
+            ticks_before += 1;
+            if ticks_before == 30 {
+                end.is_safe(true);
+                say(format!("{interface} takes no zeros: cut the battery; a signal ends the wait"));
+            }
+            if begun.elapsed() > PATIENCE {
+                return Err(format!(
+                    "{interface} took no zeros, and the last command may stand: cut the battery, and have \
+                     `ip link set {interface} down` empty the queue before it is back"
+                ));
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
         }
+        Ok(())
     }
 
     fn state(&self, options: &Options) -> String {

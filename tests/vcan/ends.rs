@@ -1,7 +1,7 @@
 //! Whatever ends the example or holds up what it says, the motors are left at zero. What a drive does with its last current
 //! when nobody sends it another is not known.
 
-use super::{END, Example, Robot, Witness, output, wait_until};
+use super::{END, Example, Robot, Witness, output, queueing, wait_until};
 use crate::judge::end_with_zeros;
 use drivetrain::sim::{Model, MotorConfig, World};
 use std::fs::File;
@@ -9,16 +9,22 @@ use std::io::{BufRead, Write};
 use std::net::Shutdown;
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
-use std::process::ExitStatus;
+use std::process::{Command, ExitStatus};
 
 const ZEROS: &str = "200#0000000000000000";
 
-/// Half a second later the motor turns.
-fn driven(more: &[&str]) -> (Robot, Example) {
+const ASKED: [&str; 4] = ["--motors", "m3508:1", "--rpm", "60"];
+
+fn robot() -> Robot {
     let world = World::new(3);
     world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
-    let mut robot = Robot::new(world);
-    let mut example = Example::start(&[&["--motors", "m3508:1", "--rpm", "60"], more].concat());
+    Robot::new(world)
+}
+
+/// Half a second later the motor turns.
+fn driven(more: &[&str]) -> (Robot, Example) {
+    let mut robot = robot();
+    let mut example = Example::start(&[&ASKED, more].concat());
     for _ in 0..500 {
         example.step();
         robot.step();
@@ -41,6 +47,62 @@ fn is_left_at_zero(robot: &mut Robot, witness: &Witness) {
 fn ends(example: &mut Example) -> ExitStatus {
     wait_until("the end of the example", || example.child.try_wait().unwrap().is_some());
     example.child.wait().unwrap()
+}
+
+/// As people use it, by the clock; all others here go step by step.
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn the_motors_are_left_at_zero_when_the_time_is_over_or_somebody_ends_it() {
+    let witness = Witness::new();
+    for (seconds, by) in [("1", None), ("100", Some("-INT"))] {
+        let mut robot = robot();
+        let mut example = Example::in_real_time(&[&ASKED[..], &["--seconds", seconds]].concat());
+        let millisecond = |robot: &mut Robot| {
+            robot.step();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        };
+        if let Some(by) = by {
+            wait_until("a motor that is driven", || {
+                millisecond(&mut robot);
+                robot.received.last().is_some_and(|frame| frame != ZEROS)
+            });
+            signal(by, &example);
+        }
+        wait_until("the end of the example", || {
+            millisecond(&mut robot);
+            !is_there(&mut example)
+        });
+        assert!(ends(&mut example).success());
+        is_left_at_zero(&mut robot, &witness);
+        assert!(example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+    }
+}
+
+/// Room for four frames, and none leaves: the last command stands, and so do those in the queue.
+#[test]
+#[ignore = "needs vcan0 and tc: tests/vcan/run starts a Linux that has them"]
+fn zeros_that_the_interface_does_not_take_are_waited_for_and_said() {
+    for code in [0, 1] {
+        let (mut robot, mut example) = driven(&[]);
+        queueing("add", "plug limit 64");
+        for _ in 0..5 {
+            example.step();
+            robot.step();
+        }
+        assert_ne!(robot.received.last().unwrap(), ZEROS);
+        signal("-TERM", &example);
+        writeln!(example.steps).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        assert!(is_there(&mut example), "it left the motor as it was");
+        if code == 0 {
+            queueing("change", "plug release_indefinite");
+        }
+        assert_eq!(ends(&mut example).code(), Some(code));
+        queueing("del", "");
+        if code == 0 {
+            is_left_at_zero(&mut robot, &Witness::new());
+        }
+    }
 }
 
 /// A closed terminal, and Ctrl-Z.
@@ -99,7 +161,11 @@ fn end_held_up(robot: &mut Robot, example: &mut Example) {
         robot.received.iter().rev().take_while(|frame| *frame == ZEROS).count() >= 2
     });
     std::thread::sleep(std::time::Duration::from_millis(50));
-    assert!(example.child.try_wait().unwrap().is_none(), "nobody held it up");
+    assert!(is_there(example), "nobody held it up");
+}
+
+fn is_there(example: &mut Example) -> bool {
+    example.child.try_wait().unwrap().is_none()
 }
 
 #[test]
@@ -121,7 +187,11 @@ fn a_reader_who_does_not_read_holds_up_no_motor() {
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_second_signal_ends_it_for_a_reader_who_does_not_read() {
     let (mut robot, mut example) = unread();
-    signal("-TERM", &example);
+    wait_until("its end by a signal", || {
+        // It may be about to reckon with one.
+        _ = Command::new("busybox").args(["kill", &example.child.id().to_string()]).output();
+        !is_there(&mut example)
+    });
     assert_eq!(ends(&mut example).signal(), Some(15));
     is_left_at_zero(&mut robot, &Witness::new());
 }

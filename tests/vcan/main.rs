@@ -89,10 +89,14 @@ struct Example {
 
 impl Example {
     fn start(arguments: &[&str]) -> Self {
+        Self::in_real_time(&[&["--lock-step"], arguments].concat())
+    }
+
+    fn in_real_time(arguments: &[&str]) -> Self {
         // Full after some hundred lines which nobody reads; a pipe would take 32 000.
         let (answers, stdout) = UnixStream::pair().unwrap();
         let mut child = Command::new(std::env::var("VCAN_EXAMPLE").unwrap())
-            .args(["--interface", BUS, "--arm", "--lock-step"])
+            .args(["--interface", BUS, "--arm"])
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(OwnedFd::from(stdout))
