@@ -39,14 +39,14 @@ impl Adapter {
         !self.standing.values().any(|asks| *asks)
     }
 
-    /// Waits until the log is written.
+    /// Waits until the log is written; has `say` say so when that takes a while.
     ///
     /// # Errors
     /// Where a part of it is missing.
-    pub(crate) fn finish(self) -> Result<(), String> {
+    pub(crate) fn finish(self, say: impl FnMut(String)) -> Result<(), String> {
         let Some(log) = self.log else { return Ok(()) };
         let lost = log.lost();
-        log.finish(String::new())?;
+        log.finish(String::new(), say)?;
         if lost == 0 { Ok(()) } else { Err(format!("--log: {lost} frames came too fast for it")) }
     }
 

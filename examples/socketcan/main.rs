@@ -28,7 +28,7 @@ fn main() -> std::process::ExitCode {
     use std::io::Write;
 
     match session::main() {
-        Ok(()) => std::process::ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             _ = writeln!(std::io::stderr(), "socketcan: {error}");
             std::process::ExitCode::FAILURE

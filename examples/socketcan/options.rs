@@ -14,7 +14,7 @@ out, or the bus takes no frames.
                     sudo ip link set can0 up type can bitrate 1000000
   --motors LIST     model:ids, models m3508 or c620 (at most 6 A here), m2006 or c610 (3 A), gm6020 (10 V) and
                     gm6020-current (1 A, once it is switched on in the motor); default: m3508:1-4. All of them have to be
-                    there for --arm
+                    there for --arm, and when one is lost all stop
   --rpm N           speed of every output shaft (default: 0, they hold still)
   --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
                     front left, rear left and rear right

@@ -44,11 +44,15 @@ impl Outlet {
         self.lost
     }
 
-    /// Waits, for ever if need be, until all is written and this `text` after it. Says so when that takes a while.
+    /// Waits, for ever if need be, until all is written and this `text` after it; has `say` say so when that takes a while.
     ///
     /// # Errors
     /// That of the first text that could not be written.
-    pub(crate) fn finish(self, mut text: String) -> Result<(), String> {
+    pub(crate) fn finish(
+        self,
+        mut text: String,
+        mut say: impl FnMut(String),
+    ) -> Result<(), String> {
         let Self { name, lines, writer, .. } = self;
         let (begun, mut is_said) = (Instant::now(), false);
         let mut wait = || {
@@ -78,11 +82,6 @@ fn write(waiting: Receiver<String>, mut sink: impl Write) -> io::Result<()> {
         sink.flush()?;
     }
     Ok(())
-}
-
-/// Says something on standard error, and waits for nobody to read it.
-pub(crate) fn say(text: String) {
-    _ = Builder::new().spawn(move || writeln!(io::stderr(), "socketcan: {text}"));
 }
 
 #[cfg(test)]
@@ -125,7 +124,7 @@ mod tests {
         }
         assert_eq!(outlet.lost(), 2);
         drop(go_on);
-        outlet.finish("f".into()).unwrap();
+        outlet.finish("f".into(), |_| {}).unwrap();
         assert_eq!(*written.lock().unwrap(), "abcf");
     }
 
@@ -144,6 +143,6 @@ mod tests {
         while outlet.offer("a".into()) {
             std::thread::yield_now();
         }
-        assert_eq!(outlet.finish("b".into()), Err("a pipe: broken pipe".into()));
+        assert_eq!(outlet.finish("b".into(), |_| {}), Err("a pipe: broken pipe".into()));
     }
 }

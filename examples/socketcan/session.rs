@@ -2,14 +2,14 @@
 
 use crate::adapter::Adapter;
 use crate::options::{HELP, Options, parse};
-use crate::outlet::{Outlet, say};
+use crate::outlet::Outlet;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508,
 };
 use drivetrain::geometry::Twist;
-use drivetrain::motor::{ArmError, CanDevice, VelocityDrive};
+use drivetrain::motor::{ArmError, CanDevice, Link, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
@@ -20,6 +20,7 @@ use signal_hook::consts::{
 use std::error::Error;
 use std::fs::File;
 use std::io::{self, BufRead, Write};
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -29,7 +30,7 @@ const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(
 const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
 const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);
 
-/// What somebody may send to a program that would end it or halt it, and the last current would stand. SIGHUP is that of a
+/// What is usually sent to a program and would end it or halt it, and the last current would stand. SIGHUP is that of a
 /// terminal which is closed (`nohup` does not help against it), SIGTSTP is Ctrl-Z, SIGTTOU of a terminal that takes nothing
 /// from the background.
 const SIGNALS: [i32; 14] = [
@@ -37,8 +38,8 @@ const SIGNALS: [i32; 14] = [
     SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
 ];
 
-/// The interface may take this long to take zeros, when all is over.
-const PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
+/// When all is over, it may take this long until the motors are seen to have their zeros.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(5);
 
 /// Texts that wait for a reader.
 const ROOM: usize = 64;
@@ -83,9 +84,10 @@ fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity
     Ok(vec![front_right, front_left, rear_left, rear_right])
 }
 
-pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+pub(crate) fn main() -> Result<ExitCode, Box<dyn Error>> {
     let Some(options) = parse(std::env::args().skip(1))? else {
-        return Ok(writeln!(io::stdout(), "{HELP}")?);
+        writeln!(io::stdout(), "{HELP}")?;
+        return Ok(ExitCode::SUCCESS);
     };
     let end = End::new()?;
     if options.lock_step {
@@ -132,6 +134,9 @@ struct Session<K> {
     armed_once: bool,
     /// Why it is not armed yet.
     refusal: Option<ArmError>,
+    /// Standard error: each thing is said at once.
+    errors: Outlet,
+    has_failed: bool,
 }
 
 impl<K: Clock> Session<K> {
@@ -155,59 +160,80 @@ impl<K: Clock> Session<K> {
             speeds,
             armed_once: false,
             refusal: None,
+            errors: Outlet::new("standard error", io::stderr(), ROOM)?,
+            has_failed: false,
         })
     }
 
-    /// Runs until `next` or a signal ends it, or the reader of what it says is gone, and ends with zeros. In each `pause` some time
-    /// passes.
+    /// Runs until `next` or a signal ends it, a motor is lost, or the reader of what it says is gone, and ends with zeros. In each
+    /// `pause` some time passes.
     fn run(
         mut self,
         options: &Options,
         end: &End,
         mut next: impl FnMut() -> bool,
         mut pause: impl FnMut(),
-    ) -> Result<(), Box<dyn Error>> {
+    ) -> Result<ExitCode, Box<dyn Error>> {
         let mut out = Outlet::new("standard output", io::stdout(), ROOM)?;
         end.is_safe(false);
-        let (mut ticks, mut is_read) = (0_u64, true);
-        while is_read && next() && !end.is_asked_for.load(Ordering::Relaxed) {
+        let (mut ticks, mut goes_on) = (0_u64, true);
+        while goes_on && next() && !end.is_asked_for.load(Ordering::Relaxed) {
             pause();
             while self.runner.poll(64) == 64 {}
             let Some(tick) = self.runner.due() else { continue };
             ticks += 1;
             if options.arm {
-                self.drive(tick);
+                goes_on = self.drive(tick);
             } else {
                 self.listen(tick);
             }
             if options.lock_step {
-                is_read = out.offer(".\n".into());
+                goes_on &= out.offer(".\n".into());
             } else if ticks.is_multiple_of(500) {
-                is_read = out.offer(self.state(options));
+                goes_on &= out.offer(self.state(options));
             }
         }
-        let relaxed = if options.arm { self.relax(options, end, pause) } else { Ok(()) };
+        if options.arm {
+            self.relax(options, end, pause);
+        }
         end.is_safe(true);
         let report = self.state(options) + &self.report(out.lost());
-        let (Nb(port), ..) = self.runner.into_parts();
-        let ends = [relaxed, out.finish(report), port.finish()];
-        let errors: Vec<String> = ends.into_iter().filter_map(Result::err).collect();
-        if errors.is_empty() { Ok(()) } else { Err(errors.join("; ").into()) }
+        let Self { runner, mut errors, mut has_failed, .. } = self;
+        let (Nb(port), ..) = runner.into_parts();
+        let mut say = |text| say(&mut errors, text);
+        let (said, logged) = (out.finish(report, &mut say), port.finish(&mut say));
+        for error in [said, logged].into_iter().filter_map(Result::err) {
+            say(error);
+            has_failed = true;
+        }
+        errors.finish(String::new(), |_| {})?;
+        Ok(if has_failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
     }
 
-    /// Arms once, when all motors are heard: what was lost stays relaxed.
-    fn drive(&mut self, tick: Tick) {
+    fn fail(&mut self, text: String) {
+        say(&mut self.errors, text);
+        self.has_failed = true;
+    }
+
+    /// Arms once, when all motors are heard, and returns whether that lasts: what was lost stays relaxed, and one wheel that was
+    /// lost stops them all.
+    fn drive(&mut self, tick: Tick) -> bool {
         if !self.armed_once {
             self.refusal = self.runner.arm(tick).err();
             self.armed_once = self.refusal.is_none();
         }
-        // One wheel that was lost stops them all.
-        let armed = self.runner.is_armed();
         for (motor, speed) in self.motors.iter().zip(&self.speeds) {
-            let speed = if armed { *speed } else { AngularVelocity::ZERO };
-            _ = self.runner.device_mut().drive([(*motor, speed)]);
+            _ = self.runner.device_mut().drive([(*motor, *speed)]);
         }
         self.runner.tick(tick);
+        let edges = std::iter::from_fn(|| self.runner.device_mut().next_edge());
+        let mut changes: Vec<String> = edges.map(|edge| edge.to_string()).collect();
+        changes.extend(self.runner.edges().map(|edge| edge.to_string()));
+        let is_lost = self.armed_once && !self.runner.is_armed();
+        if is_lost {
+            self.fail(format!("all stop: {}", changes.join(", ")));
+        }
+        !is_lost
     }
 
     /// Keeps the state up to date and sends nothing.
@@ -216,39 +242,48 @@ impl<K: Clock> Session<K> {
         while self.runner.device_mut().next_frame().is_some() {}
     }
 
-    /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost; waits where the interface takes none.
-    fn relax(
-        &mut self,
-        options: &Options,
-        end: &End,
-        mut pause: impl FnMut(),
-    ) -> Result<(), String> {
-        let interface = &options.interface;
+    /// Zeros at once, and then as keep-alives, each 10 ms, in case some are lost; waits where they may not have arrived.
+    fn relax(&mut self, options: &Options, end: &End, mut pause: impl FnMut()) {
         let begun = std::time::Instant::now();
         self.runner.device_mut().disarm();
-        let (mut ticks_at_zero, mut ticks_before) = (0, 0);
-        while ticks_at_zero < 30 {
+        let (mut good, mut bad) = (0, 0);
+        while good < 30 {
             pause();
+            while self.runner.poll(64) == 64 {}
             let Some(tick) = self.runner.due() else { continue };
             self.runner.tick(tick);
-            if self.runner.port_mut().0.is_at_zero() {
-                ticks_at_zero += 1;
+            let Some(doubt) = self.doubt(options) else {
+                good += 1;
                 continue;
+            };
+            bad += 1;
+            if bad == 30 {
+                say(&mut self.errors, format!("{doubt}: cut the battery"));
             }
-            ticks_before += 1;
-            if ticks_before == 30 {
+            if bad == 300 {
                 end.is_safe(true);
-                say(format!("{interface} takes no zeros: cut the battery; a signal ends the wait"));
             }
             if begun.elapsed() > PATIENCE {
-                return Err(format!(
-                    "{interface} took no zeros, and the last command may stand: cut the battery, and have \
-                     `ip link set {interface} down` empty the queue before it is back"
+                return self.fail(format!(
+                    "{doubt}, and the last command may stand. Cut the battery, and have `ip link set {} down` empty \
+                     the queue before it is back",
+                    options.interface
                 ));
             }
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
-        Ok(())
+    }
+
+    /// Why some motor may not have its zero. Only who is heard can have it; step by step nobody is, as no more steps come.
+    fn doubt(&mut self, options: &Options) -> Option<String> {
+        if !self.runner.port_mut().0.is_at_zero() {
+            return Some(format!("{} takes no zeros", options.interface));
+        }
+        let is_asked = self.armed_once && !options.lock_step;
+        let bus = self.runner.device();
+        let is_heard = |motor| bus.state(motor).is_some_and(|state| state.link == Link::Online);
+        let (_, name) = bus.motors().find(|(motor, _)| is_asked && !is_heard(*motor))?;
+        Some(format!("{name} is not heard"))
     }
 
     fn state(&self, options: &Options) -> String {
@@ -297,4 +332,8 @@ impl<K: Clock> Session<K> {
         ];
         counts.iter().map(|(name, count)| format!("{name} {count}\n")).collect()
     }
+}
+
+fn say(errors: &mut Outlet, text: String) {
+    _ = errors.offer(format!("socketcan: {text}\n"));
 }

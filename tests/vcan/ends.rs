@@ -1,14 +1,13 @@
 //! Whatever ends the example or holds up what it says, the motors are left at zero. What a drive does with its last current
 //! when nobody sends it another is not known.
 
-use super::{END, Example, Robot, Witness, output, queueing, wait_until};
+use super::{END, Example, Robot, Witness, output, queueing, result, said, wait_until};
 use crate::judge::end_with_zeros;
 use drivetrain::sim::{Model, MotorConfig, World};
 use std::fs::File;
 use std::io::{BufRead, Write};
 use std::net::Shutdown;
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
 use std::process::{Command, ExitStatus};
 
 const ZEROS: &str = "200#0000000000000000";
@@ -49,33 +48,79 @@ fn ends(example: &mut Example) -> ExitStatus {
     example.child.wait().unwrap()
 }
 
-/// As people use it, by the clock; all others here go step by step.
+/// As people use it, by the clock; the others here go step by step.
+struct ByTheClock {
+    robot: Robot,
+    example: Example,
+}
+
+impl ByTheClock {
+    /// Driven, for a second and more.
+    fn start() -> Self {
+        let (robot, arguments) = (robot(), [&ASKED[..], &["--seconds", "3"]].concat());
+        let mut running = Self { robot, example: Example::in_real_time(&arguments) };
+        wait_until("a motor that is driven", || {
+            running.millisecond();
+            running.robot.received.iter().any(|frame| frame != ZEROS)
+        });
+        (0..1_000).for_each(|_| running.millisecond());
+        running
+    }
+
+    fn millisecond(&mut self) {
+        self.robot.step();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+
+    fn end(mut self) -> ExitStatus {
+        wait_until("the end of the example", || {
+            self.millisecond();
+            !is_there(&mut self.example)
+        });
+        is_left_at_zero(&mut self.robot, &Witness::new());
+        assert!(self.example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+        self.example.child.wait().unwrap()
+    }
+}
+
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn the_motors_are_left_at_zero_when_the_time_is_over_or_somebody_ends_it() {
-    let witness = Witness::new();
-    for (seconds, by) in [("1", None), ("100", Some("-INT"))] {
-        let mut robot = robot();
-        let mut example = Example::in_real_time(&[&ASKED[..], &["--seconds", seconds]].concat());
-        let millisecond = |robot: &mut Robot| {
-            robot.step();
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        };
-        if let Some(by) = by {
-            wait_until("a motor that is driven", || {
-                millisecond(&mut robot);
-                robot.received.last().is_some_and(|frame| frame != ZEROS)
-            });
-            signal(by, &example);
-        }
-        wait_until("the end of the example", || {
-            millisecond(&mut robot);
-            !is_there(&mut example)
+    for by in [None, Some("-INT")] {
+        // Its Linux may stand still for a moment, in which a motor is lost: then it leaves zeros as well, but with an error.
+        let mut tries = (0..5).map(|_| {
+            let running = ByTheClock::start();
+            if let Some(by) = by {
+                signal(by, &running.example);
+            }
+            running.end().success()
         });
-        assert!(ends(&mut example).success());
-        is_left_at_zero(&mut robot, &witness);
-        assert!(example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+        assert!(tries.any(|good| good), "{by:?}: {}", said());
     }
+}
+
+/// The zeros are on the bus, but nobody knows whether it has them.
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_motor_that_falls_silent_at_the_end_is_named() {
+    let mut running = ByTheClock::start();
+    signal("-INT", &running.example);
+    assert_eq!(ends(&mut running.example).code(), Some(1));
+    is_left_at_zero(&mut running.robot, &Witness::new());
+    assert!(said().contains("M3508 #1 is not heard, and the last command may stand"), "{}", said());
+}
+
+#[test]
+#[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
+fn a_motor_that_falls_silent_stops_all_and_is_named() {
+    let (mut robot, mut example) = driven(&[]);
+    wait_until("the end of the example", || {
+        _ = writeln!(example.steps);
+        !is_there(&mut example)
+    });
+    assert_eq!(ends(&mut example).code(), Some(1));
+    is_left_at_zero(&mut robot, &Witness::new());
+    assert!(said().starts_with("socketcan: all stop: M3508 #1: "), "{}", said());
 }
 
 /// Room for four frames, and none leaves: the last command stands, and so do those in the queue.
@@ -92,7 +137,9 @@ fn zeros_that_the_interface_does_not_take_are_waited_for_and_said() {
         assert_ne!(robot.received.last().unwrap(), ZEROS);
         signal("-TERM", &example);
         writeln!(example.steps).unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(500));
+        wait_until("a word of it", || {
+            said() == "socketcan: vcan0 takes no zeros: cut the battery\n"
+        });
         assert!(is_there(&mut example), "it left the motor as it was");
         if code == 0 {
             queueing("change", "plug release_indefinite");
@@ -130,7 +177,8 @@ fn the_motors_are_left_at_zero_when_nobody_can_read_what_it_says() {
         _ = writeln!(example.steps);
         example.child.try_wait().unwrap().is_some()
     });
-    assert!(!ends(&mut example).success(), "it says nothing of its lost reader");
+    assert!(!ends(&mut example).success());
+    assert!(said().starts_with("socketcan: standard output: "), "{}", said());
     is_left_at_zero(&mut robot, &witness);
 }
 
@@ -187,6 +235,9 @@ fn a_reader_who_does_not_read_holds_up_no_motor() {
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_second_signal_ends_it_for_a_reader_who_does_not_read() {
     let (mut robot, mut example) = unread();
+    let waits =
+        "socketcan: nothing more is sent; waits for standard output, and a signal ends that\n";
+    wait_until("a word of it", || said() == waits);
     wait_until("its end by a signal", || {
         // It may be about to reckon with one.
         _ = Command::new("busybox").args(["kill", &example.child.id().to_string()]).output();
@@ -200,8 +251,7 @@ fn a_second_signal_ends_it_for_a_reader_who_does_not_read() {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_log_that_takes_nothing_holds_up_no_motor() {
-    let pipe = PathBuf::from(std::env::var("VCAN_RESULTS").unwrap()).join("pipe");
-    let pipe = pipe.to_str().unwrap();
+    let pipe = &result("pipe");
     output("busybox", &["mkfifo", pipe]);
     // To open it waits for the other side.
     let reader = std::thread::spawn({
@@ -237,5 +287,6 @@ fn a_log_on_a_full_disk_holds_up_no_motor_and_is_an_error_at_the_end() {
     writeln!(example.steps).unwrap();
     assert_eq!(ends(&mut example).code(), Some(1));
     is_left_at_zero(&mut robot, &Witness::new());
+    assert!(said().starts_with("socketcan: --log: "), "{}", said());
     assert!(example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
 }

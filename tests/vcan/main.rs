@@ -80,6 +80,17 @@ fn queue() -> (u64, u64) {
     counts.unwrap_or_else(|| panic!("what tc says has another form:\n{text}"))
 }
 
+/// A file that the host sees too.
+fn result(name: &str) -> String {
+    let folder = PathBuf::from(std::env::var("VCAN_RESULTS").unwrap());
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
+/// What the last example said on standard error.
+fn said() -> String {
+    fs::read_to_string(result("said")).unwrap()
+}
+
 /// The example, one millisecond after the other.
 struct Example {
     child: Child,
@@ -100,6 +111,7 @@ impl Example {
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(OwnedFd::from(stdout))
+            .stderr(File::create(result("said")).unwrap())
             .spawn()
             .unwrap();
         let steps = child.stdin.take().unwrap();
@@ -117,7 +129,7 @@ impl Example {
     fn end(mut self) -> Vec<String> {
         drop(self.steps);
         let report = self.answers.lines().map(Result::unwrap).collect();
-        assert!(self.child.wait().unwrap().success());
+        assert!(self.child.wait().unwrap().success(), "{}", said());
         report
     }
 }
@@ -235,20 +247,17 @@ impl Robot {
 #[test]
 #[ignore = "needs vcan0, candump and tc: tests/vcan/run starts a Linux that has them"]
 fn every_frame_on_a_real_can_stack_is_accounted_for() {
-    let results = PathBuf::from(std::env::var("VCAN_RESULTS").unwrap());
-    let path = |name: &str| results.join(name).to_str().unwrap().to_owned();
-
     let witness = Witness::new();
     let world = World::new(1);
     let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::new(Model::M3508, id)).collect();
     configs.push(MotorConfig::new(Model::Gm6020Voltage, 5));
     let keys: Vec<_> = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut robot = Robot::new(world);
-    let (motors, rpm, log) = ("m3508:1-4,gm6020:5", RPM.to_string(), path("ours.log"));
+    let (motors, rpm, log) = ("m3508:1-4,gm6020:5", RPM.to_string(), result("ours.log"));
     let mut example = Example::start(&["--motors", motors, "--rpm", &rpm, "--log", &log]);
     let mut candump = Command::new("candump")
         .args(["-L", "-r", "16777216", &format!("{BUS},0:0,#FFFFFFFF")])
-        .stdout(File::create(path("candump.log")).unwrap())
+        .stdout(File::create(result("candump.log")).unwrap())
         .spawn()
         .unwrap();
     wait_until("three sockets on the bus", || {
@@ -300,13 +309,13 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
         robot.data(StandardId::new(END).unwrap(), &[0; 8]);
     }
     wait_until("the end of what candump writes", || {
-        fs::read_to_string(path("candump.log")).unwrap().contains(" 7F1#")
+        fs::read_to_string(result("candump.log")).unwrap().contains(" 7F1#")
     });
     output("busybox", &["kill", "-TERM", &candump.id().to_string()]);
     candump.wait().unwrap();
 
     let judge =
-        Judge::new(&path("candump.log"), &path("ours.log"), &report, robot.received, phases);
+        Judge::new(&result("candump.log"), &result("ours.log"), &report, robot.received, phases);
     judge.bytes_are_equal();
     judge.all_motors_are_left_at_zero();
     judge.print_table();
