@@ -8,7 +8,8 @@ usage: socketcan [--interface NAME] [--motors LIST] [--rpm N | --mecanum X,Y,W [
 
 Shows DJI motors on a CAN interface of Linux, and with --arm drives them. Lift the wheels first, and keep the switch of the
 battery at hand: nobody sends zeros where this program is killed or halted by force, the PC hangs, the adapter is pulled
-out, or the bus takes no frames.
+out, or the bus takes no frames. Keep the interface's txqueuelen at 10: whether a longer queue sent its last zeros cannot be
+told from here.
 
   --interface NAME  the interface (default: can0); bring it up before:
                     sudo ip link set can0 up type can bitrate 1000000

@@ -9,7 +9,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508,
 };
 use drivetrain::geometry::Twist;
-use drivetrain::motor::{ArmError, CanDevice, Link, VelocityDrive};
+use drivetrain::motor::{ArmError, CanDevice, Condition, Link, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
@@ -226,8 +226,13 @@ impl<K: Clock> Session<K> {
             _ = self.runner.device_mut().drive([(*motor, *speed)]);
         }
         self.runner.tick(tick);
-        let edges = std::iter::from_fn(|| self.runner.device_mut().next_edge());
-        let mut changes: Vec<String> = edges.map(|edge| edge.to_string()).collect();
+        let mut changes = Vec::new();
+        while let Some(edge) = self.runner.device_mut().next_edge() {
+            if edge.began && edge.condition == Condition::SecondMaster {
+                say(&mut self.errors, format!("{edge}: another program or board commands it too"));
+            }
+            changes.push(edge.to_string());
+        }
         changes.extend(self.runner.edges().map(|edge| edge.to_string()));
         let is_lost = self.armed_once && !self.runner.is_armed();
         if is_lost {
@@ -256,6 +261,7 @@ impl<K: Clock> Session<K> {
                 good += 1;
                 continue;
             };
+            good = 0;
             bad += 1;
             if bad == 30 {
                 say(&mut self.errors, format!("{doubt}: cut the battery"));
@@ -274,7 +280,8 @@ impl<K: Clock> Session<K> {
         }
     }
 
-    /// Why some motor may not have its zero. Only who is heard can have it; step by step nobody is, as no more steps come.
+    /// Why some motor may not have its zero. Who is not heard may not have it; who is heard may still not, where only sending
+    /// fails. Step by step nobody is heard, as no more steps come.
     fn doubt(&mut self, options: &Options) -> Option<String> {
         if !self.runner.port_mut().0.is_at_zero() {
             return Some(format!("{} takes no zeros", options.interface));
