@@ -52,7 +52,8 @@ impl ExtendedCounter {
     /// Takes the frequency of a counter that wraps at 2^16.
     ///
     /// # Errors
-    /// For 0 Hz, and for a frequency whose ratio to 1 MHz is not exact in 32 bits (8 388 593 Hz, say).
+    /// For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not leave room for
+    /// the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 8 388 593 Hz and 268 435 250 Hz do not.
     pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, CounterError> {
         Self::new(ticks_per_second, 0xFFFF)
     }
@@ -73,13 +74,16 @@ impl ExtendedCounter {
         }
         let (numerator, denominator) = (1_000_000 / divisor, ticks_per_second / divisor);
         let Some(denominator) = NonZeroU32::new(denominator) else { return Err(error) };
-        if numerator.checked_mul(denominator.get()).is_none() {
+        // The largest rest of a division, scaled, and the largest remainder: `extend` adds the two.
+        if (denominator.get() - 1).checked_mul(numerator + 1).is_none() {
             return Err(error);
         }
         Ok(Self { micros: 0, last: 0, remainder: 0, mask, numerator, denominator })
     }
 
     /// Takes a reading of the counter and returns the time since reading 0.
+    ///
+    /// A reading below the last one is a wrap. The time stays at its largest value, 584 000 years, rather than wrap.
     pub const fn extend(&mut self, raw: u32) -> Instant {
         let ticks = raw.wrapping_sub(self.last) & self.mask;
         self.last = raw;
@@ -87,7 +91,8 @@ impl ExtendedCounter {
         let (whole, rest) = (ticks / denominator, ticks % denominator);
         let part = rest * self.numerator + self.remainder;
         self.remainder = part % denominator;
-        self.micros += whole as u64 * self.numerator as u64 + (part / denominator) as u64;
+        let step = whole as u64 * self.numerator as u64 + (part / denominator) as u64;
+        self.micros = self.micros.saturating_add(step);
         Instant::from_micros(self.micros)
     }
 }
@@ -96,10 +101,11 @@ impl ExtendedCounter {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::vec::Vec;
 
     #[test]
     fn a_frequency_without_exact_ratio_is_refused_by_name() {
-        for ticks_per_second in [0, 4_294_967_291, 8_388_593] {
+        for ticks_per_second in [0, 4_294_967_291, 8_388_593, 268_435_250] {
             assert_eq!(
                 ExtendedCounter::new_32_bit(ticks_per_second).err(),
                 Some(CounterError { ticks_per_second })
@@ -116,7 +122,59 @@ mod tests {
         assert_eq!(time.extend(0).as_micros(), 1 << 32);
     }
 
+    #[test]
+    fn a_slow_counter_that_swings_for_ever_stays_at_the_end_of_time() {
+        let mut time = ExtendedCounter::new_32_bit(1).unwrap();
+        let times: Vec<Instant> = (0..10_000).map(|step| time.extend(step % 2)).collect();
+        assert!(times.is_sorted());
+        assert_eq!(times.last(), Some(&Instant::from_micros(u64::MAX)));
+    }
+
+    fn greatest_common_divisor(a: u128, b: u128) -> u128 {
+        if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+    }
+
+    /// Frequencies of all kinds, most of them where `(numerator + 1) * (denominator - 1)` is near 2^32.
+    fn frequency() -> impl Strategy<Value = u32> {
+        let near = (0_u32..=6, 0_u32..=6, -500_i64..5_000).prop_map(|(twos, fives, off)| {
+            let numerator = 2_u32.pow(twos) * 5_u32.pow(fives);
+            let denominator = i64::from(u32::MAX / (numerator + 1)).saturating_add(off).max(1);
+            let hertz = denominator.unsigned_abs() * u64::from(1_000_000 / numerator);
+            u32::try_from(hertz).unwrap_or(u32::MAX)
+        });
+        prop_oneof![3 => near, 1 => any::<u32>(), 1 => (0_u32..5_000).prop_map(|khz| khz * 1_000)]
+    }
+
     proptest! {
+        /// Law: a frequency is accepted exactly when the scaled rest and the remainder fit 32 bits; each reading then
+        /// gives floor(total ticks / frequency) in microseconds, in the arithmetic of 128 bits.
+        #[test]
+        fn a_frequency_is_refused_or_no_reading_loses_a_tick(
+            frequency in frequency(),
+            wide in any::<bool>(),
+            steps in prop::collection::vec((any::<u32>(), 0_u32..4), 1..100),
+        ) {
+            let made = if wide { ExtendedCounter::new_32_bit(frequency) } else { ExtendedCounter::new_16_bit(frequency) };
+            let divisor = greatest_common_divisor(frequency.into(), 1_000_000).max(1);
+            let (numerator, denominator) = (1_000_000 / divisor, u128::from(frequency) / divisor);
+            let fits = denominator > 0 && (numerator + 1) * (denominator - 1) <= u32::MAX.into();
+            prop_assert_eq!(made.is_ok(), fits, "{} / {}", numerator, denominator);
+            let Ok(mut time) = made else { return Ok(()) };
+            let mask = if wide { u32::MAX } else { 0xFFFF };
+            let mut total = 0_u128;
+            for (step, short_of_whole) in steps {
+                // Most steps leave one of the largest rests, which is where an intermediate is largest.
+                let whole = u128::from(step & mask) / denominator * denominator;
+                let near = whole + denominator.saturating_sub(u128::from(short_of_whole));
+                let step = if near <= mask.into() && short_of_whole > 0 { near } else { (step & mask).into() };
+                total += step;
+                #[expect(clippy::cast_possible_truncation, reason = "the counter wraps")]
+                let raw = total as u32 & mask;
+                let expected = total * 1_000_000 / u128::from(frequency);
+                prop_assert_eq!(u128::from(time.extend(raw).as_micros()), expected.min(u64::MAX.into()));
+            }
+        }
+
         /// Law: after any readings, the extended time is floor(total ticks / frequency) in microseconds.
         #[test]
         fn no_tick_is_lost_for_common_frequencies(
