@@ -9,6 +9,8 @@
 //! dies, the command is zero two frames later, without anybody asking for it. The program fails when the gimbal is
 //! further off than it may be, or is driven by an IMU that is dead.
 
+mod arguments;
+
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 use drivetrain::frame::CanFrame;
@@ -189,7 +191,7 @@ fn worst(samples: &[Sample], from_s: f32, until_s: f32) -> f32 {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let (mut imu_dies, mut path) = (false, String::from("gimbal.svg"));
-    let mut options = std::env::args().skip(1);
+    let mut options = arguments::of("gimbal");
     while let Some(option) = options.next() {
         match option.as_str() {
             "--fault" if options.next().as_deref() == Some("dead-imu") => imu_dies = true,

@@ -7,6 +7,8 @@
 //! On a real robot the three steps are the same; lift the wheels off the ground first. The motors here are simulated, and some
 //! of their inertia and friction is an estimate: take the procedure home, not the gains.
 
+mod arguments;
+
 use drivetrain::control::{
     Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
 };
@@ -185,7 +187,7 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    let path = match std::env::args().nth(1) {
+    let path = match arguments::of("tune").next() {
         Some(option) if option.starts_with('-') => {
             eprintln!("usage: tune [FILE.svg]");
             std::process::exit(if ["-h", "--help"].contains(&option.as_str()) { 0 } else { 2 });

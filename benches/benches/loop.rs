@@ -72,7 +72,7 @@ impl Eight {
 /// Measures once by hand, so that the share of the control period stands beside criterion's own lines.
 fn share(name: &str, mut work: impl FnMut()) {
     const ROUNDS: u32 = 100_000;
-    if !std::env::args().any(|argument| argument == "--bench") {
+    if !std::env::args_os().any(|argument| argument == "--bench") {
         return work(); // once, in test mode
     }
     let start = HostInstant::now();

@@ -3,6 +3,8 @@
 //! `cargo run --example candump -- --motors "m3508:1-4,gm6020:1" drive.log`, or `candump can0 | .. candump`; `--help`
 //! lists the options.
 
+#[path = "../arguments/mod.rs"]
+mod arguments;
 mod options;
 mod replay;
 mod report;
@@ -14,7 +16,7 @@ use std::process::ExitCode;
 use options::{Asked, Options};
 
 fn main() -> ExitCode {
-    let options = match options::parse(std::env::args().skip(1)) {
+    let options = match options::parse(arguments::of("candump")) {
         Ok(Asked::Run(options)) => options,
         Ok(Asked::Help) => return finish(writeln!(io::stdout(), "{}", options::HELP)),
         Err(message) => {

@@ -8,6 +8,8 @@
 //!
 //! With a mode or a power limit, a pilot drives it under a gimbal instead; it fails when that does not do what it is for.
 
+#[path = "../arguments/mod.rs"]
+mod arguments;
 mod justfloat;
 mod log;
 mod modes;
@@ -30,7 +32,7 @@ use std::time::Instant;
 use verdict::Verdict;
 
 fn main() -> ExitCode {
-    match Options::parse(std::env::args().skip(1)) {
+    match Options::parse(arguments::of("chassis")) {
         Ok(Request::Run(options)) => {
             let outcome = match options.mode {
                 Some(mode) => run_mode(&options, mode),

@@ -1,5 +1,8 @@
 //! What the examples `omni` and `swerve` share: a course to drive, what came of it, and its picture.
 
+#[path = "../arguments/mod.rs"]
+mod arguments;
+
 use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
 use drivetrain::sim;
@@ -184,7 +187,7 @@ pub(crate) fn plot<const WHEELS: usize>(
 /// # Errors
 /// Says how the example is called when there is anything else.
 pub(crate) fn output(example: &str) -> Result<std::path::PathBuf, Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = arguments::of(example);
     let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
     let usage = format!("usage: {example} [FILE.svg]");
     if ["-h", "--help"].contains(&path.as_str()) {

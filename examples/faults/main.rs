@@ -9,6 +9,8 @@
     reason = "the cases are tests; what fails is told"
 )]
 
+#[path = "../arguments/mod.rs"]
+mod arguments;
 #[path = "../../tests/faults/case.rs"]
 mod case;
 #[path = "../../tests/faults/catalogue.rs"]
@@ -40,7 +42,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     // What fails is told in its row.
     set_hook(Box::new(|_| {}));
-    let wanted: Vec<String> = std::env::args().skip(1).map(|id| id.to_uppercase()).collect();
+    let wanted: Vec<String> = arguments::of("faults").map(|id| id.to_uppercase()).collect();
     let (mut held, mut wrong) = (0, 0);
     println!("id  | outcome | ticks to safe | fault | required | observed");
     for row in rows::rows(TABLE) {

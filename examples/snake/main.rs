@@ -8,6 +8,8 @@
 //! cargo run --release --example snake -- --host PORT [--seconds S]       in real time
 //! ```
 
+#[path = "../arguments/mod.rs"]
+mod arguments;
 mod options;
 mod plot;
 mod report;
@@ -23,7 +25,7 @@ use system::tcp;
 const FRAME_PERIOD_S: f32 = 0.05;
 
 fn main() -> ExitCode {
-    let outcome = match Options::parse(std::env::args().skip(1)) {
+    let outcome = match Options::parse(arguments::of("snake")) {
         Ok(Request::Run(options)) => simulate(&options),
         Ok(Request::Robot(port, options)) => robot(port, &options),
         Ok(Request::Host(port, options)) => host(port, &options),

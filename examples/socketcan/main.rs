@@ -12,6 +12,9 @@
 #[cfg(target_os = "linux")]
 mod adapter;
 #[cfg(target_os = "linux")]
+#[path = "../arguments/mod.rs"]
+mod arguments;
+#[cfg(target_os = "linux")]
 mod options;
 #[cfg(target_os = "linux")]
 mod outlet;

@@ -1,6 +1,7 @@
 //! Listens to the motors, or drives them.
 
 use crate::adapter::Adapter;
+use crate::arguments;
 use crate::options::{HELP, Options, parse};
 use crate::outlet::Outlet;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
@@ -85,16 +86,16 @@ fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity
 }
 
 pub(crate) fn main() -> Result<ExitCode, Box<dyn Error>> {
-    let Some(options) = parse(std::env::args().skip(1))? else {
+    let Some(options) = parse(arguments::of("socketcan"))? else {
         writeln!(io::stdout(), "{HELP}")?;
         return Ok(ExitCode::SUCCESS);
     };
     let end = End::new()?;
     if options.lock_step {
         let clock = ManualClock::new(Instant::from_micros(1_000_000));
-        let mut lines = io::stdin().lock().lines();
+        let mut steps = io::stdin().lock();
         let pause = || clock.advance(Duration::from_millis(1));
-        let next = || matches!(lines.next(), Some(Ok(_)));
+        let next = || matches!(steps.skip_until(b'\n'), Ok(1..));
         return Session::new(&options, &clock)?.run(&options, &end, next, pause);
     }
     let start = std::time::Instant::now();
