@@ -9,7 +9,7 @@ mod replay;
 #[path = "../examples/candump/report.rs"]
 mod report;
 
-use std::io::Write;
+use std::io::{BufReader, Cursor, Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
@@ -104,6 +104,52 @@ fn a_bad_line_is_reported_with_its_number_and_skipped() {
     assert!(complaints[1].starts_with("line 4: column 1: expected the name of an interface"));
     assert!(complaints[2].starts_with("line 6: column 18: expected a classic CAN frame"));
     assert_eq!(complaints[3], "3 lines skipped");
+}
+
+/// A frame and 60 MB of blanks in one line, and then a frame in a line of its own.
+fn long_line() -> impl Read {
+    let frame = b"can0 201#0E160000FFFD2100";
+    let line = std::io::repeat(b' ').take(60_000_000);
+    Cursor::new(frame).chain(line).chain(&b"\n"[..]).chain(&frame[..])
+}
+
+#[test]
+fn a_line_of_60_mb_is_one_line_with_one_complaint() {
+    let (mut output, mut complaints) = (Vec::new(), Vec::new());
+    let input = BufReader::new(long_line());
+    report::run(&options(""), input, &mut output, &mut complaints).unwrap();
+    assert_eq!(row(&String::from_utf8(output).unwrap(), "M3508 #1")[0], "1");
+    let complaints = String::from_utf8(complaints).unwrap();
+    let expected =
+        "line 1: 60000026 bytes, a line of candump has at most 4096; skipped\n1 lines skipped\n";
+    assert!(complaints.starts_with(expected), "{complaints}");
+}
+
+#[test]
+fn no_more_of_a_line_is_kept_than_a_line_may_have() {
+    let (mut input, mut line) = (BufReader::new(long_line()), Vec::new());
+    assert_eq!(report::next_line(&mut input, &mut line).unwrap(), 60_000_026);
+    assert_eq!(line.len(), report::LONGEST_LINE);
+    assert!(line.capacity() <= 2 * report::LONGEST_LINE, "{}", line.capacity());
+    assert_eq!(report::next_line(&mut input, &mut line).unwrap(), line.len());
+    assert_eq!(line, b"can0 201#0E160000FFFD2100");
+    assert_eq!(report::next_line(&mut input, &mut line).unwrap(), 0);
+}
+
+#[test]
+fn a_line_may_have_4096_bytes_with_its_end_and_not_one_more() {
+    let frame = REST.lines().next().unwrap();
+    for (length, end, fits) in
+        [(4095, "\n", true), (4096, "", true), (4096, "\n", false), (4097, "", false)]
+    {
+        let (table, complaints) = run("", &format!("{frame:<length$}{end}"));
+        let rows = table.lines().count() - 1;
+        assert_eq!(
+            (rows, complaints.contains("1 lines skipped")),
+            (fits.into(), !fits),
+            "{length}"
+        );
+    }
 }
 
 #[test]

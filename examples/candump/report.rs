@@ -9,8 +9,20 @@ use drivetrain::wire::candump::{Expected, Record};
 use super::options::Options;
 use super::replay::{Account, Replay};
 
-/// Longer lines are cut, and then reported as wrong: no log of candump has them.
-const LONGEST_LINE: u64 = 4096;
+/// In bytes, with the line end. Longer lines are reported as wrong and skipped: no log of candump has them.
+pub(crate) const LONGEST_LINE: usize = 4096;
+
+/// Reads the next line and returns its length with the line end, 0 at the end of `input`.
+///
+/// `line` holds its first [`LONGEST_LINE`] bytes; the rest of a longer line is read and dropped.
+pub(crate) fn next_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
+    line.clear();
+    let kept = input.by_ref().take(LONGEST_LINE as u64).read_until(b'\n', line)?;
+    if kept < LONGEST_LINE || line.ends_with(b"\n") {
+        return Ok(kept);
+    }
+    Ok(kept + input.skip_until(b'\n')?)
+}
 
 /// Reads all of `input`. Bad lines are reported to `complaints` and skipped.
 pub(crate) fn run(
@@ -25,11 +37,17 @@ pub(crate) fn run(
     }
     let (mut line, mut number, mut bad) = (Vec::new(), 0_u64, 0_u64);
     loop {
-        line.clear();
-        if input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line)? == 0 {
+        let length = next_line(&mut input, &mut line)?;
+        if length == 0 {
             break;
         }
         number += 1;
+        if length > LONGEST_LINE {
+            bad += 1;
+            let limit = "bytes, a line of candump has at most";
+            writeln!(complaints, "line {number}: {length} {limit} {LONGEST_LINE}; skipped")?;
+            continue;
+        }
         match Record::parse(&line) {
             Ok(record) => match replay.take(&record) {
                 Some((now, state)) if options.csv => row_of_frame(output, now, &state)?,

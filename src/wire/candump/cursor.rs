@@ -76,12 +76,12 @@ impl<'a> Cursor<'a> {
 
     /// Takes a decimal number, and counts its digits.
     fn decimal(&mut self) -> Result<(u64, u32), ParseError> {
-        let (mut value, mut digits) = (0_u64, 0);
+        let (mut value, mut digits) = (0_u64, 0_u32);
         while let Some(digit) = self.peek().filter(u8::is_ascii_digit) {
             let next = value.checked_mul(10);
             let next = next.and_then(|value| value.checked_add(u64::from(digit - b'0')));
             value = next.ok_or(self.error(Expected::Time))?;
-            digits += 1;
+            digits = digits.saturating_add(1);
             self.at += 1;
         }
         if digits == 0 { Err(self.error(Expected::Time)) } else { Ok((value, digits)) }
