@@ -8,6 +8,15 @@ mod scenario;
 #[path = "../examples/chassis/justfloat.rs"]
 mod justfloat;
 
+#[path = "../examples/chassis/silence.rs"]
+mod silence;
+
+#[path = "../examples/chassis/report.rs"]
+mod report;
+
+#[path = "../examples/chassis/plot.rs"]
+mod plot;
+
 #[path = "../examples/chassis/modes.rs"]
 mod modes;
 
@@ -76,6 +85,117 @@ fn a_lost_bus_disarms_and_lost_frames_do_not() {
     assert!(between(&bus_off, 3.4, 9.9).all(|sample| sample.armed));
     let lost = run(1, Some(Trouble::LostFrames));
     assert!(between(&lost, 3.0, 9.9).all(|sample| sample.armed));
+}
+
+/// A bus-off at 1 m/s ends 2 mm off the path: what the ESCs did has to be said all the same.
+#[test]
+fn the_currents_that_the_escs_keep_while_the_bus_is_off_are_told_and_drawn() {
+    let run = run(1, Some(Trouble::BusOff));
+    let silence = run.silence.unwrap();
+    assert!((silence.from_s - 3.0).abs() < 0.0015 && (silence.until_s - 3.3).abs() < 0.0015);
+    assert!((199..=202).contains(&silence.disarmed_ms), "{} ms", silence.disarmed_ms);
+    assert!((silence.way_m - 0.3).abs() < 0.01, "{} m", silence.way_m);
+    // Each ESC goes on with one current, that of friction at this speed, to the last bit of its command.
+    let kept = between(&run, 3.15, 3.16).next().unwrap().current_a.into_array();
+    for sample in between(&run, 3.005, 3.3) {
+        let off = sample.current_a.into_iter().zip(kept).map(|(a, b)| (a - b).abs());
+        assert!(
+            off.fold(0.0, f32::max) < 0.001 && kept.iter().all(|a| (0.3..1.0).contains(&a.abs()))
+        );
+    }
+    let told = report::table(&run);
+    let words = NAMES.iter().zip(kept).map(|(name, amperes)| format!("{name} {amperes:+.2} A"));
+    let words = words.chain(
+        [
+            "no command reached them for 301 ms from 2.999 s on",
+            "the robot went 0.30 m, and was disarmed for 201 ms",
+            "simulated ESCs hold their last command; what real ones do is not documented",
+        ]
+        .map(str::to_owned),
+    );
+    for word in words {
+        assert!(told.contains(&word), "no \"{word}\" in\n{told}");
+    }
+    let drawn = plot::Currents::of(&run);
+    assert_eq!(drawn.shaded_s, Some((silence.from_s, silence.until_s)));
+    assert!(drawn.from_s < 2.9 && drawn.until_s > 3.4 && drawn.title.contains("no command"));
+    for (wheel, line) in drawn.lines.iter().enumerate() {
+        let samples: Vec<_> = between(&run, drawn.from_s, drawn.until_s).collect();
+        let expected: Vec<_> =
+            samples.iter().map(|s| (s.time_s, s.current_a.into_array()[wheel])).collect();
+        assert_eq!(*line, expected);
+        assert!(
+            line.iter().any(|(time_s, amperes)| *time_s > 3.3 && amperes.abs() < 0.01),
+            "zeros"
+        );
+    }
+}
+
+const NAMES: [&str; 4] = ["front left", "front right", "rear left", "rear right"];
+
+/// With each part of the square shorter, the bus goes off while the robot speeds up.
+#[test]
+fn a_bus_that_is_lost_while_the_robot_speeds_up_leaves_more_current() {
+    let scenario = Scenario { seconds: 4.0, seed: 1, fault: Some(Trouble::BusOff) };
+    let run = scenario.run(|_| {}, |_| {}).unwrap();
+    let silence = run.silence.unwrap();
+    assert!(silence.kept_a.into_iter().all(|(least, most)| least.abs().min(most.abs()) > 5.0));
+    let off = run
+        .samples
+        .iter()
+        .map(|s| (s.position_m.0 - s.planned_m.0).hypot(s.position_m.1 - s.planned_m.1));
+    assert!(off.fold(0.0, f32::max) > 0.1, "it does no harm here either");
+}
+
+#[test]
+fn without_a_lost_command_nothing_is_said_of_kept_currents() {
+    for (fault, words) in [
+        (None, None),
+        (Some(Trouble::SilentMotor), Some("ESCs         commands reached them all the while\n")),
+    ] {
+        let run = run(1, fault);
+        let told = report::table(&run);
+        assert!(run.silence.is_none() && !told.contains("kept"), "{told}");
+        assert_eq!(
+            told.contains("ESCs"),
+            words.is_some_and(|words| told.contains(words)),
+            "{told}"
+        );
+        assert!((plot::Currents::of(&run).until_s - 9.999).abs() < 0.002);
+    }
+    let lost = run(1, Some(Trouble::LostFrames)).silence.unwrap();
+    assert!((0.002..0.02).contains(&(lost.until_s - lost.from_s)), "{lost:?}");
+}
+
+#[test]
+fn picture_and_rows_of_a_bus_off_have_the_currents() {
+    let run = run(1, Some(Trouble::BusOff));
+    let file = |name| std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let (picture, rows) = (file("bus-off.svg"), file("bus-off.csv"));
+    plot::write(&picture, &run).unwrap();
+    let picture = std::fs::read_to_string(picture).unwrap();
+    assert!(picture.contains("current of the ESCs, A (shaded: no command reaches them)"));
+    // Only these lines have the last two colours. 301 of 700 points of each stand at one height.
+    for color in ["#288C3C", "#965AAA"] {
+        let lines = picture.split("<polyline").filter(|line| line.contains(color));
+        let line = lines.max_by_key(|line| line.len()).unwrap();
+        let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+        let heights: Vec<_> =
+            points.split_whitespace().filter_map(|point| point.split(',').nth(1)).collect();
+        let at_one_height = heights.chunk_by(|a, b| a == b).map(<[_]>::len).max();
+        assert!(at_one_height >= Some(290), "{at_one_height:?} of {}", heights.len());
+    }
+    report::write_csv(&rows, &run).unwrap();
+    let rows = std::fs::read_to_string(rows).unwrap();
+    let mut rows = rows.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let column = header.iter().position(|name| *name == "rl_a").unwrap();
+    for (row, sample) in rows.zip(&run.samples) {
+        assert_eq!(
+            (row.len(), row[column]),
+            (header.len(), &*format!("{:.3}", sample.current_a.rear_left))
+        );
+    }
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod options;
 mod plot;
 mod report;
 mod scenario;
+mod silence;
 mod verdict;
 
 use drivetrain::chassis::Mode;

@@ -1,14 +1,12 @@
 //! Headings, wheels, power and path of a drive in a mode, as one picture.
 
 use super::modes::{Drive, Outcome, Sample};
-use super::plot::{Area, MEASURED, TARGET};
+use super::plot::{Area, COLORS, MEASURED};
 use plotters::prelude::*;
 use std::error::Error;
 use std::path::Path;
 
 type Curve = fn(&Sample) -> f32;
-
-const OTHERS: [RGBColor; 2] = [RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
 
 pub(crate) fn write(path: &Path, drive: &Drive, outcome: &Outcome) -> Result<(), Box<dyn Error>> {
     // Created first: a path that cannot be written is an error of the file, not of the drawing.
@@ -65,7 +63,7 @@ fn draw(
         .y_label_area_size(46)
         .build_cartesian_2d(0.0..end, 1.1 * low..1.1 * high)?;
     chart.configure_mesh().light_line_style(TRANSPARENT).x_labels(11).y_labels(5).draw()?;
-    for (line, color) in lines.iter().zip([TARGET, MEASURED].into_iter().chain(OTHERS)) {
+    for (line, color) in lines.iter().zip(COLORS) {
         let points = samples.iter().step_by(5).map(|sample| (sample.time_s, line(sample)));
         chart.draw_series(LineSeries::new(points, color))?;
     }

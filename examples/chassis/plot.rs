@@ -1,5 +1,6 @@
-//! Targets and speeds of the wheels, and the path, as one picture.
+//! Targets and speeds of the wheels, the path, and the currents of the ESCs, as one picture.
 
+use super::report::NAMES;
 use super::scenario::{Run, Sample};
 use plotters::prelude::*;
 use std::error::Error;
@@ -11,6 +12,9 @@ const TITLES: [&str; 4] =
 const MAP_HEIGHT: i32 = 440;
 pub(crate) const TARGET: RGBColor = RGBColor(200, 60, 40);
 pub(crate) const MEASURED: RGBColor = RGBColor(30, 80, 180);
+/// Of the wheels, in the order of [`TITLES`].
+pub(crate) const COLORS: [RGBColor; 4] =
+    [TARGET, MEASURED, RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
 const FAULT: RGBColor = RGBColor(245, 225, 160);
 
 pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
@@ -23,12 +27,79 @@ pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
     for (wheel, (area, title)) in rows.iter().zip(TITLES).enumerate() {
         draw_wheel(area, run, wheel, title)?;
     }
-    let (map, _) = map.split_vertically(MAP_HEIGHT);
+    let (map, currents) = map.split_vertically(MAP_HEIGHT);
     let line = |place: fn(&Sample) -> (f32, f32)| run.samples.iter().map(place).collect::<Vec<_>>();
     let (planned, driven) = (line(|sample| sample.planned_m), line(|sample| sample.position_m));
     let title = "path, m (red: planned, blue: driven)";
     draw_map(&map, title, &[(TARGET, &planned), (MEASURED, &driven)])?;
+    draw_currents(&currents, &Currents::of(run))?;
     root.present()?;
+    Ok(())
+}
+
+/// The currents of the ESCs around the time without a command; if they missed none, those of the whole run.
+pub(crate) struct Currents {
+    pub(crate) title: &'static str,
+    pub(crate) from_s: f32,
+    pub(crate) until_s: f32,
+    pub(crate) shaded_s: Option<(f32, f32)>,
+    /// In s and A.
+    pub(crate) lines: [Vec<(f32, f32)>; 4],
+}
+
+impl Currents {
+    pub(crate) fn of(run: &Run) -> Self {
+        const MARGIN_S: f32 = 0.2;
+        let end_s = run.samples.last().map_or(1.0, |sample| sample.time_s);
+        let (title, from_s, until_s, step) = match &run.silence {
+            Some(silence) => (
+                "current of the ESCs, A (shaded: no command reaches them)",
+                (silence.from_s - MARGIN_S).max(0.0),
+                (silence.until_s + MARGIN_S).min(end_s),
+                1,
+            ),
+            None => ("current of the ESCs, A", 0.0, end_s, 5),
+        };
+        let within = || {
+            let samples = run.samples.iter();
+            samples.filter(|sample| (from_s..=until_s).contains(&sample.time_s)).step_by(step)
+        };
+        let lines = std::array::from_fn(|wheel| {
+            let point =
+                |sample: &Sample| Some((sample.time_s, *sample.current_a.into_array().get(wheel)?));
+            within().filter_map(point).collect()
+        });
+        let missed = run.silence.map(|silence| (silence.from_s, silence.until_s));
+        let shaded_s = missed.or(run.trouble.map(|(_, from_s, until_s)| (from_s, until_s)));
+        Self { title, from_s, until_s, shaded_s, lines }
+    }
+}
+
+fn draw_currents(area: &Area<'_>, currents: &Currents) -> Result<(), Box<dyn Error>> {
+    let values = currents.lines.iter().flatten();
+    let reach = values.fold(1.0_f32, |reach, (_, amperes)| reach.max(amperes.abs())) * 1.1;
+    let mut chart = ChartBuilder::on(area)
+        .caption(currents.title, ("sans-serif", 16))
+        .margin(10)
+        .x_label_area_size(24)
+        .y_label_area_size(46)
+        .build_cartesian_2d(currents.from_s..currents.until_s, -reach..reach)?;
+    if let Some((from_s, until_s)) = currents.shaded_s {
+        let shade = Rectangle::new([(from_s, -reach), (until_s, reach)], FAULT.filled());
+        chart.draw_series(std::iter::once(shade))?;
+    }
+    chart.configure_mesh().light_line_style(TRANSPARENT).x_labels(6).draw()?;
+    for ((line, color), name) in currents.lines.iter().zip(COLORS).zip(NAMES) {
+        chart
+            .draw_series(LineSeries::new(line.iter().copied(), color))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerRight)
+        .background_style(WHITE.mix(0.8))
+        .draw()?;
     Ok(())
 }
 

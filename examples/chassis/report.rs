@@ -1,13 +1,14 @@
 //! Numbers for people, and rows for programs.
 
 use super::scenario::{Run, Sample};
+use super::silence::Silence;
 use drivetrain::chassis::MecanumWheels;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::Path;
 
-const NAMES: MecanumWheels<&str> = MecanumWheels {
+pub(crate) const NAMES: MecanumWheels<&str> = MecanumWheels {
     front_left: "front left",
     front_right: "front right",
     rear_left: "rear left",
@@ -64,7 +65,43 @@ pub(crate) fn table(run: &Run) -> String {
             run.refused_to_arm
         );
     }
+    if run.trouble.is_some() {
+        text += &escs(run);
+    }
     text
+}
+
+/// What the ESCs did while no command reached them.
+fn escs(run: &Run) -> String {
+    let Some(silence) = &run.silence else {
+        return "ESCs         commands reached them all the while\n".into();
+    };
+    let Silence { from_s, until_s, way_m, disarmed_ms, .. } = *silence;
+    let span_ms = (until_s - from_s) * 1e3;
+    let kept = NAMES.zip(silence.kept_a).map(|(name, (least, most))| {
+        let amperes = if most - least < 0.1 {
+            format!("{:+.2} A", 0.5 * (least + most))
+        } else {
+            format!("{least:+.2} to {most:+.2} A")
+        };
+        format!("{name} {amperes}")
+    });
+    let currents = run.samples.iter().flat_map(|sample| sample.current_a.into_array());
+    let largest = currents.fold(0.0_f32, |largest, amperes| largest.max(amperes.abs()));
+    let went = match disarmed_ms {
+        0 => String::new(),
+        _ => format!(
+            ", and was disarmed for {disarmed_ms} ms: zeros that do not arrive stop nothing"
+        ),
+    };
+    format!(
+        "ESCs         no command reached them for {span_ms:.0} ms from {from_s:.3} s on; each kept the current of its last one:
+             {} (positive drives ahead)
+             meanwhile the robot went {way_m:.2} m{went}
+             (the largest current of this run, {largest:.1} A, would have been kept in the same way)
+             simulated ESCs hold their last command; what real ones do is not documented\n",
+        kept.into_array().join(", ")
+    )
 }
 
 fn wheel_error(samples: &[Sample], wheel: usize) -> (f64, f32) {
@@ -89,7 +126,7 @@ pub(crate) fn write_csv(path: &Path, run: &Run) -> Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     writeln!(
         file,
-        "time_s,armed,target_fl_rpm,target_fr_rpm,target_rl_rpm,target_rr_rpm,fl_rpm,fr_rpm,rl_rpm,rr_rpm,x_m,y_m,heading_rad"
+        "time_s,armed,target_fl_rpm,target_fr_rpm,target_rl_rpm,target_rr_rpm,fl_rpm,fr_rpm,rl_rpm,rr_rpm,x_m,y_m,heading_rad,fl_a,fr_a,rl_a,rr_a"
     )?;
     for sample in &run.samples {
         write!(file, "{:.3},{}", sample.time_s, u8::from(sample.armed))?;
@@ -99,7 +136,11 @@ pub(crate) fn write_csv(path: &Path, run: &Run) -> Result<()> {
             write!(file, ",{rpm:.3}")?;
         }
         let (x, y) = sample.position_m;
-        writeln!(file, ",{x:.5},{y:.5},{:.5}", sample.heading_rad)?;
+        write!(file, ",{x:.5},{y:.5},{:.5}", sample.heading_rad)?;
+        for amperes in sample.current_a {
+            write!(file, ",{amperes:.3}")?;
+        }
+        writeln!(file)?;
     }
     file.flush()
 }

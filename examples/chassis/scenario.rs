@@ -1,5 +1,6 @@
 //! The robot, what it is asked to do, and what came of it.
 
+use super::silence::{CommandWatch, Silence};
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -20,6 +21,9 @@ pub(crate) const GEOMETRY: MecanumGeometry =
 const SPEED: PidConfig = PidConfig::new(4.0, 40.0, 0.0);
 const CRUISE_M_S: f32 = 1.0;
 const SPIN_RAD_S: f32 = 3.0;
+/// The motors on the right are mounted the other way around.
+const AHEAD: MecanumWheels<f32> =
+    MecanumWheels { front_left: 1.0, front_right: -1.0, rear_left: 1.0, rear_right: -1.0 };
 /// Everything speeds up and slows down within this time.
 const RAMP_S: f32 = 0.3;
 /// After this time of constant velocity the wheels have to be where they belong.
@@ -78,6 +82,8 @@ pub(crate) struct Sample {
     pub(crate) time_s: f32,
     pub(crate) target_rpm: MecanumWheels<f32>,
     pub(crate) measured_rpm: MecanumWheels<f32>,
+    /// The true current of each motor, also while nothing is heard of it, in A; positive drives the wheel ahead.
+    pub(crate) current_a: MecanumWheels<f32>,
     pub(crate) armed: bool,
     /// Where the robot is, and where it was to be: x and y in m.
     pub(crate) position_m: (f32, f32),
@@ -94,6 +100,8 @@ pub(crate) struct Run {
     pub(crate) statistics: Statistics,
     pub(crate) refused_to_arm: u32,
     pub(crate) trouble: Option<(Trouble, f32, f32)>,
+    /// The longest time in which the trouble kept all commands from the ESCs.
+    pub(crate) silence: Option<Silence>,
 }
 
 impl Scenario {
@@ -112,6 +120,7 @@ impl Scenario {
             }
             None => None,
         };
+        let mut commands = trouble.map(|(_, from_s, until_s)| CommandWatch::new(from_s, until_s));
         let (mut robot, wheels) = robot(&world)?;
         let mecanum = Mecanum::new(GEOMETRY)?;
         let plan = Plan::new(self.seconds);
@@ -123,10 +132,16 @@ impl Scenario {
             statistics: Statistics::default(),
             refused_to_arm: 0,
             trouble,
+            silence: None,
         };
         let mut planned = (0.0, 0.0);
         while world.now() < end {
-            world.advance_with(Duration::from_micros(100), &mut record);
+            world.advance_with(Duration::from_micros(100), |frame| {
+                record(frame);
+                if let Some(commands) = &mut commands {
+                    commands.see(frame);
+                }
+            });
             robot.poll(16);
             let Some(tick) = robot.due() else { continue };
             let time_s = seconds_of(tick.now());
@@ -136,7 +151,7 @@ impl Scenario {
                 (planned.0 + wanted.vx_m_s * tick.dt_s(), planned.1 + wanted.vy_m_s * tick.dt_s());
             let targets = mecanum.inverse(wanted.to_body(heading));
             run.refused_to_arm += u32::from(!drive(&mut robot, wheels, targets, tick));
-            let sample = observe(&world, &robot, wheels, targets, time_s, planned);
+            let sample = observe(&world, &robot, (motors, wheels), targets, time_s, planned);
             if plan.is_settled(time_s) && sample.armed {
                 run.settled_error = run.settled_error.max(share_of_error(&sample));
             }
@@ -146,6 +161,7 @@ impl Scenario {
             }
         }
         progress(1.0);
+        run.silence = commands.and_then(|commands| commands.finish(end, &run.samples));
         run.traffic = world.traffic(Line::Can1);
         run.statistics = robot.statistics();
         Ok(run)
@@ -200,7 +216,7 @@ fn drive(
 fn observe(
     world: &World,
     robot: &Robot<'_>,
-    wheels: Wheels,
+    (motors, wheels): (MecanumWheels<MotorKey>, Wheels),
     targets: MecanumWheels<AngularVelocity>,
     time_s: f32,
     planned_m: (f32, f32),
@@ -212,6 +228,9 @@ fn observe(
         target_rpm: targets.map(AngularVelocity::as_rpm),
         measured_rpm: wheels
             .map(|wheel| bus.state(wheel).map_or(0.0, |state| state.velocity.as_rpm())),
+        current_a: motors.zip(AHEAD).map(|(motor, ahead)| {
+            world.motor(motor).map_or(0.0, |state| ahead * state.current.as_amperes())
+        }),
         armed: robot.is_armed(),
         position_m: state.map_or((0.0, 0.0), |state| (narrow(state.x_m), narrow(state.y_m))),
         planned_m,
