@@ -16,6 +16,7 @@
 //! | single wrong samples | [`Median`] of 3 | |
 //! | a disturbance of a known period | [`MovingAverage`] of that many samples | |
 //! | the rate of a noisy signal | [`LinearDifferentiator`], [`OptimalDifferentiator`] | |
+//! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
 //! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
 //! # What they all do
@@ -59,5 +60,5 @@ pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter}
 pub use step::TimeStep;
 pub use tuning::{
     Gains, Oscillation, RelayFailure, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse,
-    TuningRule,
+    TuningRule, WheelTuning,
 };

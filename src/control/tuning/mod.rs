@@ -3,11 +3,15 @@
 //! 1. [`RelayTuner`] swings the plant with two output values and measures how it answers: an [`Oscillation`].
 //! 2. [`Oscillation::gains`] turns that into [`Gains`] by a [`TuningRule`] with a name and a source.
 //! 3. [`StepResponse`] measures what the loop with these gains does.
+//!
+//! Where mass and wheels of a robot are known, [`WheelTuning`] reckons gains to begin with.
 
 mod relay;
 mod rules;
 mod step_response;
+mod wheel;
 
 pub use relay::{RelayFailure, RelayTuner, RelayTunerConfig};
 pub use rules::{Gains, Oscillation, TuningRule};
 pub use step_response::{StepMeasures, StepResponse};
+pub use wheel::WheelTuning;
