@@ -25,6 +25,8 @@
 //!
 //! Positive is counter-clockwise looking at the shaft, for angle, speed, current and command alike.
 //!
+//! Gains in these raw numbers, of another program, are converted by [`WordGains`].
+//!
 //! # What collides on one bus
 //! A frame id and a slot have one owner each, so [`Bus::attach`] refuses:
 //! * the same feedback id: C6x0 #5..=8 with GM6020 #1..=4 *in either mode* (0x205..=0x208);
@@ -102,6 +104,7 @@ mod state;
 mod targets;
 #[cfg(test)]
 mod tests;
+mod word_gains;
 
 pub use bus::{Bus, Counters};
 pub use command::CommandFrame;
@@ -115,3 +118,4 @@ pub use model::{
 };
 pub use state::State;
 pub use targets::LoopError;
+pub use word_gains::WordGains;
