@@ -124,7 +124,7 @@ impl<B> Bus<B> {
     /// Changes the speed loop of a motor while it runs, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that is not usable; the loop is then as it was.
+    /// Names the parameter that `attach` would refuse; the loop is then as it was.
     pub fn set_speed_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -137,7 +137,7 @@ impl<B> Bus<B> {
     /// Changes the position loop of a motor while it runs, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that is not usable; the loop is then as it was.
+    /// Names the parameter that `attach` would refuse; the loop is then as it was.
     pub fn set_position_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,

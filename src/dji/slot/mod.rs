@@ -5,6 +5,7 @@ mod capability;
 mod health;
 mod measured;
 mod receive;
+mod steep;
 mod target;
 mod update;
 
@@ -160,10 +161,17 @@ impl Slot {
         let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
         let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
         let position = within(config.position, fastest);
-        let loops = match Cascade::new(position, within(config.speed, limit)) {
+        let speed = within(config.speed, limit);
+        let loops = match Cascade::new(position, speed) {
             Ok(loops) => loops,
             Err(error) => return Err(parameter!(error.parameter())),
         };
+        if let Some(name) = steep::position(&position, facts) {
+            return Err(parameter!(name));
+        }
+        if let Some(name) = steep::speed(&speed, facts, rad_per_s_per_rpm) {
+            return Err(parameter!(name));
+        }
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));
         }

@@ -1,5 +1,5 @@
 use super::arming::Arming;
-use super::{Slot, is_loop};
+use super::{Slot, is_loop, steep};
 use crate::control::{Pid, PidConfig};
 use crate::dji::LoopError;
 use crate::dji::command::{Outbox, to_raw};
@@ -158,8 +158,10 @@ impl Slot {
 
     /// Changes the gains of the speed loop without a jump of its output.
     pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
+        let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
-        let replaced = replace(self.loops.speed_mut(), config, limit);
+        let steep = steep::speed(&config, facts, self.rad_per_s_per_rpm);
+        let replaced = replace(self.loops.speed_mut(), config, limit, steep);
         self.settle();
         replaced
     }
@@ -168,7 +170,8 @@ impl Slot {
     pub(in crate::dji) fn set_position_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
         let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = super::no_load_velocity(facts, self.rad_per_s_per_rpm);
-        let replaced = replace(self.loops.position_mut(), config, limit);
+        let steep = steep::position(&config, facts);
+        let replaced = replace(self.loops.position_mut(), config, limit, steep);
         self.settle();
         replaced
     }
@@ -273,9 +276,17 @@ pub(super) fn needs(pid: &Pid) -> Result<(), TargetError> {
     if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
-fn replace(pid: &mut Pid, config: PidConfig, limit: f32) -> Result<(), LoopError> {
+fn replace(
+    pid: &mut Pid,
+    config: PidConfig,
+    limit: f32,
+    steep: Option<&'static str>,
+) -> Result<(), LoopError> {
     if !is_loop(pid) {
         return Err(LoopError::NoLoop);
+    }
+    if let Some(name) = steep {
+        return Err(LoopError::Parameter(name));
     }
     pid.set_config(super::within(Some(config), limit))
         .map_err(|error| LoopError::Parameter(error.parameter()))

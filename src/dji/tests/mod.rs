@@ -6,6 +6,7 @@ mod commanding;
 mod conversions;
 mod device;
 mod duplicates;
+mod gains;
 mod health;
 mod holding;
 mod limiting;

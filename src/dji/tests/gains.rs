@@ -1,0 +1,70 @@
+use super::*;
+use crate::encoder::GearRatio;
+
+const fn p(kp: f32) -> PidConfig {
+    PidConfig::new(kp, 0.0, 0.0)
+}
+
+/// The loops of `attach`, and those that are exchanged later: both with the same rule.
+fn assert_steepest<M: Model>(config: Config<M>, steepest: f32) {
+    let mut bus: Bus = Bus::new();
+    let error = bus.attach(config.speed_loop(p(1.001 * steepest))).unwrap_err();
+    assert!(error.to_string().ends_with("#1: kp of the speed loop is not usable"), "{error}");
+    let motor = bus.attach(config.speed_loop(p(0.999 * steepest))).unwrap();
+    let refused = Err(LoopError::Parameter("kp of the speed loop"));
+    assert_eq!(bus.set_speed_loop(motor, p(1.001 * steepest)), refused);
+    assert_eq!(bus.set_speed_loop(motor, p(0.999 * steepest)), Ok(()));
+}
+
+#[test]
+fn a_gain_with_which_one_rpm_of_the_rotor_asks_for_the_whole_range_is_refused() {
+    // Full scale over one rpm at the output shaft: 20 A * 60 / (2 pi) * 3591 / 187.
+    assert_steepest(Config::<M3508>::new(1), 3_667.54);
+    assert_steepest(Config::<M3508>::new(1).reversed(), 3_667.54);
+    assert_steepest(Config::<M3508>::new(1).with_gear(GearRatio::DIRECT), 190.986);
+    assert_steepest(Config::<M2006>::new(1), 3_437.75);
+    assert_steepest(Config::<Gm6020Voltage>::new(1), 229.183);
+    assert_steepest(Config::<Gm6020Current>::new(1), 28.647_9);
+    // The range is that of the model: a low limit for a first try makes no gain a bad one.
+    let gentle = Config::<M3508>::new(1).with_current_limit(Current::from_amperes(0.1));
+    assert_steepest(gentle, 3_667.54);
+}
+
+#[test]
+fn a_gain_with_which_one_count_of_the_encoder_asks_for_the_no_load_speed_is_refused() {
+    // 9256 and 320 rpm over 60 s, times 8192 counts.
+    let with = |kp| Config::<M3508>::new(1).position_loop(p(kp), SPEED);
+    let mut bus: Bus = Bus::new();
+    let error = bus.attach(with(1.265e6)).unwrap_err();
+    assert_eq!(error.to_string(), "M3508 #1: kp of the position loop is not usable");
+    let arm = bus.attach(with(1.263e6)).unwrap();
+    let refused = Err(LoopError::Parameter("kp of the position loop"));
+    assert_eq!(bus.set_position_loop(arm, p(1.265e6)), refused);
+    assert_eq!(bus.set_position_loop(arm, p(1.263e6)), Ok(()));
+    let yaw = |kp| Config::<Gm6020Voltage>::new(5).position_loop(p(kp), SPEED);
+    assert!(bus.attach(yaw(43_700.0)).is_err());
+    assert!(bus.attach(yaw(43_680.0)).is_ok());
+}
+
+#[test]
+fn gains_that_are_no_numbers_keep_their_name() {
+    let mut bus: Bus = Bus::new();
+    let wheel = Config::<M3508>::new(1);
+    for kp in [f32::INFINITY, f32::NAN, -1.0] {
+        let error = bus.attach(wheel.speed_loop(p(kp))).unwrap_err();
+        assert_eq!(error.to_string(), "M3508 #1: kp is not usable");
+    }
+    let motor = bus.attach(wheel.speed_loop(SPEED)).unwrap();
+    assert_eq!(bus.set_speed_loop(motor, p(f32::INFINITY)), Err(LoopError::Parameter("kp")));
+}
+
+/// In a `const` the same refusal is one of the compiler. A gain in words per rpm, taken as A per rad/s, is possible.
+#[test]
+fn the_check_runs_in_the_compiler_and_takes_what_physics_takes() {
+    const fn takes(kp: f32) -> bool {
+        let mut bus = Bus::new();
+        bus.attach(Config::<M3508>::new(1).speed_loop(p(kp))).is_ok()
+    }
+    const TAKEN: [bool; 3] = [takes(10.0), takes(3_600.0), takes(4_000.0)];
+    assert_eq!(TAKEN, [true, true, false]);
+}
