@@ -133,7 +133,7 @@ mod simulation {
 
         let mut bus = Bus::new();
         let wheel =
-            bus.attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(0.6, 6.0, 0.0)))?;
+            bus.attach(Config::<M3508>::new(1).speed_loop(PidConfig::new(1.9, 2.4, 0.0)))?;
         let robot = (bus, Own::new(MyMotor::new(3)?)); // a tuple of devices is a device
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), robot);
 

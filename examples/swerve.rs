@@ -29,8 +29,9 @@ use std::error::Error;
 const WHEEL_RADIUS_M: f32 = 0.06;
 /// A module turns with its wheel, fork and drive motor.
 const MODULE_INERTIA_KG_M2: f32 = 0.004;
-/// A per rad/s and A per rad of the wheel. The floor holds some 9 A on each.
-const DRIVE: PidConfig = PidConfig::new(3.0, 20.0, 0.0).with_output_limit(8.0);
+/// A per rad/s and A per rad of the wheel: as `WheelTuning` reckons for 20 kg, at twice its bandwidth. The floor holds some 9 A on
+/// each.
+const DRIVE: PidConfig = PidConfig::new(2.4, 6.0, 0.0).with_output_limit(8.0);
 /// rad/s per rad of the module, then V per rad/s and V per rad.
 const ANGLE: PidConfig = PidConfig::new(50.0, 0.0, 0.0).with_output_limit(25.0);
 const RATE: PidConfig = PidConfig::new(3.0, 30.0, 0.0);

@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Gentle limits for a first try: amperes of M3508 and M2006, volts of GM6020.
-const M3508_SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(6.0);
+const M3508_SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0).with_output_limit(6.0);
 const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(3.0);
 const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
 const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);

@@ -66,7 +66,7 @@ impl<H: Copy, D: VelocityDrive<H> + ?Sized> WheelDrive<H, AngularVelocity> for D
 /// use drivetrain::units::Angle;
 ///
 /// let mut bus = Bus::new();
-/// let speed = PidConfig::new(3.0, 20.0, 0.0);
+/// let speed = PidConfig::new(2.4, 6.0, 0.0);
 /// let drive = bus.attach(Config::<M3508>::new(1).speed_loop(speed))?;
 /// let angle = PidConfig::new(50.0, 0.0, 0.0);
 /// let steering = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(angle, speed))?;

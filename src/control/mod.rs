@@ -33,9 +33,9 @@
 //! ```
 //! use drivetrain::control::{Pid, PidConfig};
 //!
-//! let speed = PidConfig::new(0.1, 0.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
+//! let speed = PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 //! let mut wheel = Pid::new(speed)?;
-//! assert_eq!(wheel.update(50.0, 10.0, 0.001), 4.0); // A for rad/s: 0.1 times 40
+//! assert_eq!(wheel.update(14.0, 10.0, 0.001), 8.0); // A for rad/s: 2 times 4
 //! # Ok::<(), drivetrain::control::ConfigError>(())
 //! ```
 

@@ -13,7 +13,7 @@ use core::marker::PhantomData;
 /// use drivetrain::dji::{Config, M3508};
 /// use drivetrain::units::Current;
 ///
-/// const SPEED: PidConfig = PidConfig::new(0.8, 4.0, 0.0); // A per rad/s, A per rad
+/// const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0); // A per rad/s, A per rad: a wheel under 20 kg
 /// const WHEEL: Config<M3508> = Config::new(1)
 ///     .reversed()
 ///     .speed_loop(SPEED)

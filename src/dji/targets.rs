@@ -154,7 +154,7 @@ impl<B> Bus<B> {
     /// use drivetrain::control::PidConfig;
     /// use drivetrain::dji::{Bus, Config, Gm6020Voltage, M3508};
     ///
-    /// let speed = PidConfig::new(0.6, 6.0, 0.0);
+    /// let speed = PidConfig::new(1.9, 2.4, 0.0);
     /// let mut bus = Bus::new();
     /// let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(speed))?;
     /// let yaw = bus.attach(Config::<Gm6020Voltage>::new(1))?;

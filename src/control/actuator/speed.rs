@@ -9,7 +9,7 @@ use crate::control::step::TimeStep;
 /// ```
 /// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
 ///
-/// let wheel = SpeedActuatorConfig::new(PidConfig::new(0.1, 0.5, 0.0).with_output_limit(20.0))
+/// let wheel = SpeedActuatorConfig::new(PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0))
 ///     .with_feedback_filter(100.0)
 ///     .with_output_filter(0.0);
 /// assert_eq!(SpeedActuator::new(wheel).unwrap_err().parameter(), "output_filter");
@@ -70,8 +70,8 @@ impl SpeedActuatorConfig {
 /// ```
 /// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
 ///
-/// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(PidConfig::new(0.1, 0.5, 0.0)))?;
-/// assert_eq!(wheel.update(40.0, 10.0, 0.001), 3.0);
+/// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(PidConfig::new(2.0, 2.5, 0.0)))?;
+/// assert_eq!(wheel.update(14.0, 10.0, 0.001), 8.0);
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

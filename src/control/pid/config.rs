@@ -12,7 +12,7 @@ use crate::control::error::{
 /// use drivetrain::control::{Pid, PidConfig};
 ///
 /// const SPEED: PidConfig =
-///     PidConfig::new(0.1, 0.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
+///     PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 /// assert!(SPEED.validate().is_ok());
 /// // In a constant, a bad parameter does not compile:
 /// const LOOP: Pid = match Pid::new(SPEED) {
@@ -23,7 +23,7 @@ use crate::control::error::{
 /// As this does not:
 /// ```compile_fail
 /// # use drivetrain::control::{Pid, PidConfig};
-/// const LOOP: Pid = match Pid::new(PidConfig::new(0.1, 0.5, 0.0).with_output_limit(-20.0)) {
+/// const LOOP: Pid = match Pid::new(PidConfig::new(2.0, 2.5, 0.0).with_output_limit(-20.0)) {
 ///     Ok(pid) => pid,
 ///     Err(_) => panic!("the speed loop is not valid"),
 /// };

@@ -7,8 +7,8 @@
 #![cfg_attr(not(test), no_std)]
 
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
-use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::control::{PidConfig, WheelTuning};
+use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
@@ -16,8 +16,19 @@ use drivetrain::wire::dbus::{Dbus, Remote, Stick, Switch};
 use drivetrain::wire::hipnuc::{EulerOrder, HipNuc, MAX_FRAME};
 use drivetrain::wire::{Edge, Link};
 
-/// A per rad/s and A per rad at the output shaft, gentle; the example `tune` shows how to find those of your robot.
-const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
+/// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
+const WHEEL: WheelTuning = WheelTuning {
+    mass_kg: 20.0,
+    wheel_radius_m: 0.076,
+    driven_wheels: 4.0,
+    torque_constant_nm_per_a: M3508::FACTS.torque_constant_nm_per_a,
+    current_limit_a: CURRENT_LIMIT.as_amperes(),
+};
+/// 1.9 A per rad/s and 2.4 A per rad at the output shaft.
+const SPEED: PidConfig = match WHEEL.speed_loop() {
+    Ok(speed) => speed,
+    Err(_) => panic!("a value of the wheel is not above zero"),
+};
 const CURRENT_LIMIT: Current = Current::from_amperes(10.0);
 const FASTEST_WHEEL: AngularVelocity = AngularVelocity::from_rpm(400.0);
 const FASTEST_M_S: f32 = 1.5;
@@ -69,8 +80,11 @@ impl Pilot {
             rear_left: attach(wheel(3))?,
             rear_right: attach(wheel(4).reversed())?,
         };
-        let geometry =
-            MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+        let geometry = MecanumGeometry {
+            wheel_radius_m: WHEEL.wheel_radius_m,
+            half_wheelbase_m: 0.20,
+            half_track_m: 0.18,
+        };
         let mut chassis = Chassis::new(Mecanum::new(geometry).map_err(|_| "no such chassis")?);
         let limits =
             ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
@@ -168,6 +182,13 @@ mod tests {
             wish = pilot.wish(now);
         }
         wish
+    }
+
+    /// As the README has them.
+    #[test]
+    fn the_gains_are_those_that_the_comment_says() {
+        let (kp, ki, kd) = SPEED.gains();
+        assert_eq!([(10.0 * kp).round(), (10.0 * ki).round(), kd], [19.0, 24.0, 0.0]);
     }
 
     #[test]

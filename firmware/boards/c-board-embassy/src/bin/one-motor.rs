@@ -25,8 +25,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Ticker};
 use panic_probe as _;
 
-/// A per rad/s and A per rad at the output shaft: gentle.
-const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
+/// A per rad/s and A per rad at the output shaft: those of a wheel under 20 kg, calm on a motor alone.
+const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0);
 const CURRENT_LIMIT: Current = Current::from_amperes(3.0);
 const TARGET: AngularVelocity = AngularVelocity::from_rpm(60.0);
 
