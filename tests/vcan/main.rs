@@ -1,7 +1,7 @@
 //! A real CAN stack: the example `socketcan` on a `vcan0` of Linux, a simulated robot on its other side, and candump as the
-//! witness of both. [`run`](../run) starts a Linux of its own for it, so that nothing of the host's kernel is needed.
+//! witness of both. [`run`](../run) emulates a PC with a Linux of its own, so that nothing of the host's kernel is needed.
 //!
-//! The two go in lock-step, a millisecond for each line: in there the clock stalls. The interface loses and doubles frames,
+//! The two go in lock-step, a millisecond for each line: so no step depends on the clock. The interface loses and doubles frames,
 //! and its queue is full for a while; among the robot's frames are foreign, remote, extended, malformed and error
 //! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
 //! And a chassis has to move as the example is asked to.
