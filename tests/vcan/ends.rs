@@ -84,32 +84,24 @@ impl ByTheClock {
     }
 }
 
-/// This Linux may stand still for a moment, in which a motor is lost: then zeros are left as well, but something else is said.
-fn is_so_once(mut of: impl FnMut() -> bool) {
-    assert!((0..5).any(|_| of()), "{}", said());
-}
-
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn the_motors_are_left_at_zero_when_the_time_is_over_or_somebody_ends_it() {
-    is_so_once(|| ByTheClock::start("3").end(ByTheClock::millisecond).success());
-    is_so_once(|| {
-        let running = ByTheClock::start("100");
-        signal("-INT", &running.example);
-        running.end(ByTheClock::millisecond).success()
-    });
+    assert!(ByTheClock::start("3").end(ByTheClock::millisecond).success(), "{}", said());
+    let running = ByTheClock::start("100");
+    signal("-INT", &running.example);
+    assert!(running.end(ByTheClock::millisecond).success(), "{}", said());
 }
 
 /// The zeros are on the bus, but nobody knows whether it has them.
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_motor_that_falls_silent_at_the_end_is_named() {
-    is_so_once(|| {
-        let running = ByTheClock::start("100");
-        signal("-INT", &running.example);
-        let code = running.end(|silent| silent.robot.receive()).code();
-        code == Some(1) && said().contains("M3508 #1 is not heard, and the last command may stand")
-    });
+    let running = ByTheClock::start("100");
+    signal("-INT", &running.example);
+    assert_eq!(running.end(|silent| silent.robot.receive()).code(), Some(1));
+    let end = "M3508 #1 is not heard, and the last command may stand";
+    assert!(said().contains(end), "{}", said());
 }
 
 #[test]
