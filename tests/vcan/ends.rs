@@ -32,7 +32,7 @@ fn driven(more: &[&str]) -> (Robot, Example) {
     (robot, example)
 }
 
-fn signal(name: &str, example: &Example) {
+pub(crate) fn signal(name: &str, example: &Example) {
     output("busybox", &["kill", name, &example.child.id().to_string()]);
 }
 
@@ -43,7 +43,7 @@ fn is_left_at_zero(robot: &mut Robot, witness: &Witness) {
     end_with_zeros(&robot.received, &["200"]);
 }
 
-fn ends(example: &mut Example) -> ExitStatus {
+pub(crate) fn ends(example: &mut Example) -> ExitStatus {
     wait_until("the end of the example", || example.child.try_wait().unwrap().is_some());
     example.child.wait().unwrap()
 }
@@ -206,7 +206,7 @@ fn end_held_up(robot: &mut Robot, example: &mut Example) {
     assert!(is_there(example), "nobody held it up");
 }
 
-fn is_there(example: &mut Example) -> bool {
+pub(crate) fn is_there(example: &mut Example) -> bool {
     example.child.try_wait().unwrap().is_none()
 }
 

@@ -5,10 +5,13 @@
 //! and its queue is full for a while; among the robot's frames are foreign, remote, extended, malformed and error
 //! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
 //! And a chassis has to move as the example is asked to.
+//!
+//! Two CAN controllers with drivers carry the same example in [`controllers`].
 
 #![cfg(test)]
 #![cfg(target_os = "linux")]
 
+mod controllers;
 mod ends;
 mod judge;
 
@@ -63,13 +66,17 @@ fn output(program: &str, arguments: &[&str]) -> String {
 
 /// Changes what stands between the sockets and the bus.
 fn queueing(change: &str, discipline: &str) {
-    let words = ["qdisc", change, "dev", BUS, "root"].into_iter();
+    queueing_on(BUS, change, discipline);
+}
+
+fn queueing_on(interface: &str, change: &str, discipline: &str) {
+    let words = ["qdisc", change, "dev", interface, "root"].into_iter();
     output("tc", &words.chain(discipline.split_whitespace()).collect::<Vec<_>>());
 }
 
 /// Frames that the kernel dropped, and those that still wait.
-fn queue() -> (u64, u64) {
-    let text = output("tc", &["-s", "qdisc", "show", "dev", BUS]);
+fn queue(interface: &str) -> (u64, u64) {
+    let text = output("tc", &["-s", "qdisc", "show", "dev", interface]);
     let number = |after: &str| {
         let rest = text.split(after).nth(1)?;
         rest.split(|end: char| !end.is_ascii_digit()).next()?.parse().ok()
@@ -141,7 +148,11 @@ struct Witness(CanSocket);
 
 impl Witness {
     fn new() -> Self {
-        let socket = CanSocket::open(BUS).unwrap();
+        Self::on(BUS)
+    }
+
+    fn on(interface: &str) -> Self {
+        let socket = CanSocket::open(interface).unwrap();
         socket.set_nonblocking(true).unwrap();
         let filters = [MARKER, END].map(|id| CanFilter::new(id.into(), 0x7FF));
         socket.set_filters(&filters).unwrap();
@@ -167,7 +178,11 @@ struct Robot {
 
 impl Robot {
     fn new(world: World) -> Self {
-        let socket = CanSocket::open(BUS).unwrap();
+        Self::on(BUS, world)
+    }
+
+    fn on(interface: &str, world: World) -> Self {
+        let socket = CanSocket::open(interface).unwrap();
         socket.set_nonblocking(true).unwrap();
         Self { world, socket, written: Written::default(), received: Vec::new(), ms: 0 }
     }
@@ -198,6 +213,13 @@ impl Robot {
 
     /// A millisecond: takes the commands that have come, and sends feedback and much else.
     fn step(&mut self) {
+        self.feed_back();
+        self.noise();
+        self.ms += 1;
+    }
+
+    /// The motors alone.
+    fn feed_back(&mut self) {
         self.receive();
         let mut feedback: Vec<CanFrame> = Vec::new();
         self.world.advance_with(Duration::from_millis(1), |record| {
@@ -208,8 +230,6 @@ impl Robot {
         for frame in feedback {
             self.write(&frame.convert::<socketcan::CanFrame>().unwrap());
         }
-        self.noise();
-        self.ms += 1;
     }
 
     fn receive(&mut self) {
@@ -278,8 +298,8 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
         if discipline.starts_with("plug") {
             queueing("change", "plug release_indefinite");
         }
-        wait_until("an empty queue", || queue().1 == 0);
-        let dropped = if discipline.is_empty() { 0 } else { queue().0 };
+        wait_until("an empty queue", || queue(BUS).1 == 0);
+        let dropped = if discipline.is_empty() { 0 } else { queue(BUS).0 };
         if !discipline.is_empty() {
             queueing("del", "");
         }

@@ -1,0 +1,218 @@
+//! Two CAN controllers on one bus, the example on `can0` and the robot on `can1`. Unlike `vcan0` these have drivers: a frame
+//! leaves by a transmit queue and comes by an interrupt, and an interface that is taken down drops what waits in its queue.
+
+use super::{
+    END, Example, MARKER, RPM, Robot, Witness, output, queue, queueing_on, said, wait_until,
+};
+use crate::ends::{ends, is_there, signal};
+use crate::judge::end_with_zeros;
+use drivetrain::sim::{Model, MotorConfig, MotorKey, World};
+use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
+use std::fs;
+use std::io::{BufRead, Write};
+
+/// The interface of the example.
+const NEAR: &str = "can0";
+/// The interface of the robot.
+const FAR: &str = "can1";
+const COMMANDS: [&str; 2] = ["200", "2FF"];
+
+struct Bus {
+    robot: Robot,
+    motors: Vec<MotorKey>,
+    /// Writes markers behind the frames of the example.
+    near: CanSocket,
+    seen_near: Witness,
+    seen_far: Witness,
+    steps: u64,
+}
+
+/// Half a second later the motors turn.
+fn driven() -> (Bus, Example) {
+    let world = World::new(4);
+    let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::new(Model::M3508, id)).collect();
+    configs.push(MotorConfig::new(Model::Gm6020Voltage, 5));
+    let motors = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
+    let mut bus = Bus {
+        robot: Robot::on(FAR, world),
+        motors,
+        near: CanSocket::open(NEAR).unwrap(),
+        seen_near: Witness::on(NEAR),
+        seen_far: Witness::on(FAR),
+        steps: 0,
+    };
+    let rpm = RPM.to_string();
+    let mut example =
+        Example::start(&["--interface", NEAR, "--motors", "m3508:1-4,gm6020:5", "--rpm", &rpm]);
+    // It listens when it has answered.
+    example.step();
+    bus.drive(&mut example, 500);
+    assert!(!bus.is_left_at_zero());
+    (bus, example)
+}
+
+impl Bus {
+    fn drive(&mut self, example: &mut Example, ms: u32) {
+        for _ in 0..ms {
+            self.feed_back();
+            example.step();
+            self.deliver();
+        }
+    }
+
+    /// The number in the markers of this step.
+    fn step(&self) -> u8 {
+        self.steps.to_le_bytes()[0]
+    }
+
+    /// A millisecond of the robot. Returns when the example's interface has its frames.
+    fn feed_back(&mut self) {
+        self.steps += 1;
+        self.robot.feed_back();
+        self.robot.mark(&self.seen_near, MARKER, self.step());
+    }
+
+    /// Returns when the robot has every frame that the example's interface took.
+    fn deliver(&mut self) {
+        let marker = CanFrame::new(StandardId::new(END).unwrap(), &[self.step()]).unwrap();
+        self.near.write_frame(&marker).unwrap();
+        self.seen_far.has_seen(END, self.step());
+        self.robot.receive();
+    }
+
+    /// A bus on which frames that go first leave 16 ms to each command. Returns when the queue is full of commands.
+    fn congest(&mut self, example: &mut Example) {
+        queueing_on(NEAR, "add", "netem rate 8kbit limit 5");
+        for _ in 0..20 {
+            self.feed_back();
+            example.step();
+        }
+        assert!(queue(NEAR).1 > 2, "nothing waits");
+        self.robot.receive();
+        assert!(!self.is_left_at_zero());
+    }
+
+    fn commands<'a>(&'a self, id: &'a str) -> impl DoubleEndedIterator<Item = &'a String> {
+        self.robot.received.iter().filter(move |frame| frame.split('#').next() == Some(id))
+    }
+
+    /// By the last command of each id.
+    fn is_left_at_zero(&self) -> bool {
+        COMMANDS.iter().all(|id| {
+            let last = self.commands(id).next_back();
+            last.is_some_and(|frame| frame.ends_with("#0000000000000000"))
+        })
+    }
+
+    fn received_commands(&self) -> u64 {
+        COMMANDS.iter().map(|id| self.commands(id).count() as u64).sum()
+    }
+}
+
+/// What the driver of an interface counted.
+fn counted(interface: &str, counter: &str) -> u64 {
+    let file = format!("/sys/class/net/{interface}/statistics/{counter}");
+    fs::read_to_string(file).unwrap().trim().parse().unwrap()
+}
+
+/// What the example counted.
+fn reported(report: &[String], name: &str) -> u64 {
+    let count = report.iter().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    count.unwrap_or_else(|| panic!("no {name} in {report:?}")).parse().unwrap()
+}
+
+#[test]
+#[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
+fn two_controllers_drive_motors_and_their_drivers_count_the_same_frames() {
+    const COUNTERS: [(&str, &str); 8] = [
+        (NEAR, "tx_packets"),
+        (FAR, "rx_packets"),
+        (FAR, "tx_packets"),
+        (NEAR, "rx_packets"),
+        (NEAR, "tx_dropped"),
+        (FAR, "tx_dropped"),
+        (NEAR, "rx_over_errors"),
+        (FAR, "rx_over_errors"),
+    ];
+    let count = || COUNTERS.map(|(interface, counter)| counted(interface, counter));
+    let before = count();
+    let (mut bus, mut example) = driven();
+    bus.drive(&mut example, 1_000);
+    let speeds = |motor| bus.robot.world.motor(motor).unwrap().velocity.as_rpm();
+    let reached: Vec<f32> = bus.motors.iter().copied().map(speeds).collect();
+    let report = example.end();
+    bus.steps += 1;
+    bus.deliver();
+    end_with_zeros(&bus.robot.received, &COMMANDS);
+
+    let counts = std::array::from_fn(|index| count()[index] - before[index]);
+    let (sent, fed_back) = (reported(&report, "sent"), bus.robot.written.accepted);
+    assert_eq!(sent, bus.received_commands());
+    let (commanded, markers) = (sent + bus.steps, bus.steps - 1 + bus.steps - 1);
+    assert_eq!(counts, [commanded, commanded, fed_back, fed_back, 0, 0, 0, 0], "{COUNTERS:?}");
+    assert_eq!(reported(&report, "taken"), fed_back - (bus.steps - 1));
+    assert_eq!(reported(&report, "unrelated"), markers);
+    assert_eq!((reported(&report, "refused"), reported(&report, "send_errors")), (0, 0));
+    assert!(reached.iter().all(|rpm| (rpm - RPM).abs() < 3.0), "{reached:?} rpm, not {RPM}");
+    println!("{commanded} frames from can0 to can1, {fed_back} back, none lost");
+}
+
+#[test]
+#[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
+fn a_congested_bus_refuses_commands_loses_none_and_ends_with_zeros() {
+    let (mut bus, mut example) = driven();
+    bus.congest(&mut example);
+    signal("-TERM", &example);
+    writeln!(example.steps).unwrap();
+    assert!(ends(&mut example).success(), "{}", said());
+    wait_until("an empty queue", || queue(NEAR).1 == 0);
+    let dropped = queue(NEAR).0;
+    queueing_on(NEAR, "del", "");
+    bus.deliver();
+    assert!(bus.is_left_at_zero());
+    let report: Vec<String> = example.answers.lines().map(Result::unwrap).collect();
+    let refused = reported(&report, "refused");
+    assert_eq!(reported(&report, "sent"), bus.received_commands());
+    assert_eq!((refused, 0), (dropped, reported(&report, "send_errors")));
+    assert!(refused > 10, "{refused} refused: the queue was hardly full");
+    println!("{refused} refused by the queue, {} arrived", bus.received_commands());
+}
+
+/// The queue is full of commands that are not zero. Whether the interface comes back or not, they must not arrive.
+#[test]
+#[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
+fn an_interface_that_goes_down_stops_all_and_no_stale_command_follows() {
+    for comes_back in [true, false] {
+        let (mut bus, mut example) = driven();
+        bus.congest(&mut example);
+        output("ip", &["link", "set", NEAR, "down"]);
+        bus.robot.receive();
+        bus.robot.received.clear();
+        wait_until("a word of it", || {
+            bus.robot.feed_back();
+            _ = writeln!(example.steps);
+            said().contains("socketcan: can0 takes no zeros: cut the battery\n")
+        });
+        assert!(said().starts_with("socketcan: all stop: "), "{}", said());
+        assert!(is_there(&mut example), "it left the motors as they were");
+        if comes_back {
+            output("ip", &["link", "set", NEAR, "up"]);
+        }
+        assert_eq!(ends(&mut example).code(), Some(1));
+        if !comes_back {
+            let end =
+                "socketcan: can0 takes no zeros, and the last command may stand. Cut the battery";
+            assert!(said().contains(end), "{}", said());
+            output("ip", &["link", "set", NEAR, "up"]);
+        }
+        wait_until("an empty queue", || queue(NEAR).1 == 0);
+        queueing_on(NEAR, "del", "");
+        // The other one still has the error of the interface.
+        bus.near = CanSocket::open(NEAR).unwrap();
+        bus.deliver();
+        let zeros = bus.robot.received.iter().filter(|frame| frame.ends_with("#0000000000000000"));
+        assert_eq!(zeros.count() as u64, bus.received_commands(), "a stale command arrived");
+        assert_eq!(bus.is_left_at_zero(), comes_back);
+        print!("{}", said());
+    }
+}
