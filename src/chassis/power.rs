@@ -140,8 +140,8 @@ impl PowerModel {
     /// Returns the largest common factor of all torques, at most 1, with which the total stays within `limit_w`.
     ///
     /// The total is a parabola in the factor, and this is its exact root. Equal wheels stay equal, and a braking
-    /// wheel's power counts for the others. A limit below zero or NaN counts as zero. If a load is NaN or infinite,
-    /// the factor is zero.
+    /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and one of infinity cuts nothing. If a
+    /// load is NaN or infinite, the factor is zero.
     ///
     /// # Examples
     /// ```
