@@ -7,7 +7,6 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice;
 use drivetrain::sim::{Model, MotorConfig, World};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;

@@ -92,7 +92,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 mod simulation {
     use super::*;
-    use drivetrain::motor::{ArmError, CanDevice, Claim, Condition, Role, VelocityDrive};
+    use drivetrain::motor::{ArmError, Claim, Condition, Devices, Role, VelocityDrive};
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::sim::{Line, Model, MotorConfig, World};
     use drivetrain::time::{Duration, Instant};

@@ -5,7 +5,6 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice;
 use drivetrain::sim::{Controller, Model, MotorConfig, World};
 use drivetrain::time::{Duration, Tick, Ticker};
 use drivetrain::units::Angle;

@@ -9,7 +9,7 @@ use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Twist, Vec2};
-use drivetrain::motor::{CanDevice, VelocityDrive};
+use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, Controller, Fault, Line, Model, MotorConfig, SimClock, Wheel, World,
@@ -26,7 +26,7 @@ const SPEED: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
 
 /// rad/s per rad; V per rad/s and V per rad.
 const ANGLE: PidConfig = PidConfig::new(15.0, 0.0, 0.0).with_output_limit(4.0);
-const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0);
+const RATE: PidConfig = PidConfig::new(2.0, 10.0, 0.0);
 const HELD: Angle = Angle::from_degrees(90.0);
 
 struct Front;
@@ -62,8 +62,11 @@ impl<'w, B> Axle<'w, B> {
         let Some(tick) = self.runner.due() else { return };
         match speeds {
             Some((left, right)) => {
-                // This robot arms by itself, which only a simulated one may.
-                let _not_yet = self.runner.is_armed() || self.runner.arm(tick).is_ok();
+                // An operator presses the arming key each 110 ms as long as the axle is not armed.
+                let is_pressed = (tick.now().as_micros() / 1_000).is_multiple_of(110);
+                if is_pressed && !self.runner.is_armed() {
+                    _ = self.runner.arm(tick);
+                }
                 _ = self.runner.device_mut().drive([(self.left, left), (self.right, right)]);
             }
             None => self.runner.device_mut().disarm(),
@@ -140,7 +143,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         front.poll();
         rear.poll();
         let measured = front.velocities().zip(rear.velocities());
-        let speeds = measured.map(|_| mecanum.inverse(Twist::new(0.8, 0.3, 0.0)));
+        // Both axles, or none.
+        let is_ready = front.runner.is_armed() && rear.runner.is_armed();
+        let vx_m_s = if is_ready { 0.8 } else { 0.0 };
+        let speeds = measured.map(|_| mecanum.inverse(Twist::new(vx_m_s, 0.375 * vx_m_s, 0.0)));
         front.tick(speeds.map(|wheels| (wheels.front_left, wheels.front_right)));
         rear.tick(speeds.map(|wheels| (wheels.rear_left, wheels.rear_right)));
         gimbal.tick();

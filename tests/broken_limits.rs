@@ -350,3 +350,16 @@ fn a_power_limit_that_is_none_reaches_the_wire_as_zero() {
     let whole = words_under(f32::INFINITY);
     assert!(half > 0 && whole.iter().all(|word| *word > 2 * half), "{half} of {whole:?}");
 }
+
+/// A limit that is NaN was taken as none: the loop had the whole duty.
+#[cfg(feature = "hal")]
+#[test]
+fn a_speed_loop_of_a_brushed_motor_with_a_limit_of_nan_is_refused() {
+    use drivetrain::pwm::BrushedConfig;
+    let motor = BrushedConfig::new(1).with_encoder(1_320.0, 16);
+    let speed = PidConfig::new(0.02, 0.4, 0.0);
+    assert!(motor.with_speed_loop(speed.with_output_limit(f32::NAN)).validate().is_err());
+    assert!(motor.with_speed_loop(speed.with_output_range(f32::NAN, 1.0)).validate().is_err());
+    assert!(motor.with_speed_loop(speed.with_output_range(-1.0, f32::NAN)).validate().is_err());
+    assert!(motor.with_speed_loop(speed).validate().is_ok());
+}

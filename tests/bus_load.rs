@@ -4,7 +4,7 @@
 
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{BusLoad, CanDevice};
+use drivetrain::motor::{BusLoad, Devices};
 use drivetrain::runner::{MeasuredLoad, Nb, Runner};
 use drivetrain::sim::{
     Line, Model, MotorConfig, Sender, World, frame_bits, nominal_bits, worst_case_bits,

@@ -82,7 +82,7 @@ fn a_silent_motor_stops_the_robot_until_it_is_heard_again() {
 fn a_lost_bus_disarms_and_lost_frames_do_not() {
     let bus_off = run(1, Some(Trouble::BusOff));
     assert!(between(&bus_off, 3.12, 3.3).all(|sample| !sample.armed));
-    assert!(between(&bus_off, 3.4, 9.9).all(|sample| sample.armed));
+    assert!(between(&bus_off, 3.45, 9.9).all(|sample| sample.armed));
     let lost = run(1, Some(Trouble::LostFrames));
     assert!(between(&lost, 3.0, 9.9).all(|sample| sample.armed));
 }

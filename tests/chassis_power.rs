@@ -5,9 +5,9 @@
 
 use drivetrain::chassis::{PowerModel, WheelLoad};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
+use drivetrain::dji::{self, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest};
+use drivetrain::motor::Ingest;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Line, Model, MotorConfig, World};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -15,6 +15,11 @@ use drivetrain::units::{AngularVelocity, Current};
 use proptest::prelude::*;
 
 const SPEED: PidConfig = PidConfig::new(2.0, 40.0, 0.0);
+
+/// A motor whose output range opens at once: what is cut is what the loops ask for, from the first update on.
+fn at_once<M: dji::Model>(id: u8) -> Config<M> {
+    Config::new(id).with_opening(Duration::ZERO)
+}
 
 fn feedback(bus: &mut Bus, id: u16, rotor_rpm: i16, now: Instant) {
     let [high, low] = rotor_rpm.to_be_bytes();
@@ -43,7 +48,7 @@ proptest! {
         factor in prop_oneof![Just(f32::NAN), Just(f32::INFINITY), -2.0_f32..3.0],
     ) {
         let mut bus = Bus::new();
-        let config = |id| Config::<M3508>::new(id)
+        let config = |id| at_once::<M3508>(id)
             .speed_loop(SPEED)
             .with_current_limit(Current::from_amperes(limit));
         let motors = bus.attach_all([1, 2, 3, 4].map(config)).unwrap();
@@ -76,7 +81,7 @@ proptest! {
         limit_w in -50.0_f32..400.0,
     ) {
         let mut bus = Bus::new();
-        let motors = bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new)).unwrap();
+        let motors = bus.attach_all([1, 2, 3, 4].map(at_once::<M3508>)).unwrap();
         let now = Instant::from_micros(1_000);
         for (id, rpm) in (0x201..).zip(rpm) {
             feedback(&mut bus, id, rpm, now);
@@ -105,7 +110,7 @@ proptest! {
 #[test]
 fn a_stop_stays_a_stop_whatever_the_factor() {
     let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let motor = bus.attach(at_once::<M3508>(1)).unwrap();
     let now = Instant::from_micros(1_000);
     feedback(&mut bus, 0x201, 100, now);
     bus.arm(now).unwrap();
@@ -126,7 +131,7 @@ fn a_speed_loop_that_is_cut_does_not_wind_up() {
     // A shaft that cannot turn, a second long, with a tenth of the output let through; then the target is zero.
     let released = |factor: f32| {
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)).unwrap();
+        let motor = bus.attach(at_once::<M3508>(1).speed_loop(SPEED)).unwrap();
         for ms in 1..=1_001 {
             let now = Instant::from_micros(1_000 * ms);
             feedback(&mut bus, 0x201, 0, now);
@@ -151,8 +156,8 @@ fn the_runner_shows_what_the_loops_ask_for_before_it_sends() {
     let steering =
         world.attach(MotorConfig::new(Model::Gm6020Voltage, 1).with_line(Line::Can2)).unwrap();
     let (mut one, mut other) = (Bus::new(), Bus::new());
-    let wheel = one.attach(Config::<M3508>::new(1)).unwrap();
-    let module = other.attach(Config::<Gm6020Voltage>::new(1)).unwrap();
+    let wheel = one.attach(at_once::<M3508>(1)).unwrap();
+    let module = other.attach(at_once::<Gm6020Voltage>(1)).unwrap();
     let mut one = Runner::new(Nb(world.controller()), world.clock(), one);
     let mut other = Runner::new(Nb(world.controller_on(Line::Can2)), world.clock(), other);
     let mut seen = 0;

@@ -5,7 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::encoder::{Homing, Position};
-use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
+use drivetrain::motor::{Devices, Link, Recovery, TargetError};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Controller, Fault, Line, Model as SimModel, MotorConfig, MotorKey, Record, Sender, SimClock,
@@ -248,9 +248,13 @@ fn a_motor_silent_for_50_ms_comes_back_by_itself() {
 
 #[test]
 fn a_motor_with_a_ramp_is_driven_again_after_150_ms_of_silence() {
-    let ramp = Recovery::Ramp(Duration::from_millis(200));
-    let (sent, _, armed) =
-        silence(150, |id| Config::new(id).speed_loop(WHEEL_SPEED).with_recovery(ramp));
+    let opening = Duration::from_millis(200);
+    let (sent, _, armed) = silence(150, |id| {
+        Config::new(id)
+            .speed_loop(WHEEL_SPEED)
+            .with_recovery(Recovery::Resume)
+            .with_opening(opening)
+    });
     let back = sent.iter().find(|(at, words)| *at > 650_000 && words[0] != 0).unwrap();
     assert!((655_000..680_000).contains(&back.0), "driven again at {} us", back.0);
     assert!(back.1[0] < 2_000, "from zero: {}", back.1[0]);

@@ -460,7 +460,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 17);
+    assert_eq!(seen, 18);
 }
 
 #[test]

@@ -3,11 +3,11 @@
 #![cfg(test)]
 
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction, Recovery,
+    ArmError, CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction, Recovery,
     TargetError, Timeouts,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
@@ -39,6 +39,11 @@ fn sent(bus: &mut Bus) -> Vec<(u32, [i16; 4])> {
     std::iter::from_fn(|| bus.next_frame())
         .map(|frame| (frame.header(), [0, 1, 2, 3].map(|slot| word(&frame, slot))))
         .collect()
+}
+
+/// A motor whose output range opens at once, so that the first word after arming is the whole one.
+fn at_once<M: Model>(id: u8) -> Config<M> {
+    Config::new(id).with_opening(Duration::ZERO)
 }
 
 fn armed(config: Config<M3508>) -> (Bus, Handle<M3508>) {
@@ -80,8 +85,8 @@ fn the_emergency_stop_reaches_every_part_also_when_one_is_stopped_already() {
     static STOP: EmergencyStop = EmergencyStop::new();
     let clock = ManualClock::new(us(1_000));
     let (mut left, mut right) = (Bus::new(), Bus::new());
-    left.attach(Config::<M3508>::new(1)).unwrap();
-    let wheel = right.attach(Config::<M3508>::new(5)).unwrap();
+    left.attach(at_once::<M3508>(1)).unwrap();
+    let wheel = right.attach(at_once::<M3508>(5)).unwrap();
     hear(&mut left, feedback(0x201, 0, 0), 1_000);
     hear(&mut right, feedback(0x205, 0, 0), 1_000);
     let mut runner =
@@ -99,7 +104,8 @@ fn the_emergency_stop_reaches_every_part_also_when_one_is_stopped_already() {
 fn a_ramp_starts_at_zero_also_when_frames_are_stamped_after_the_tick() {
     let config = Config::<M3508>::new(1)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
-        .with_recovery(Recovery::Ramp(Duration::from_secs(2)));
+        .with_recovery(Recovery::Resume)
+        .with_opening(Duration::from_secs(2));
     let (mut bus, motor) = armed(config);
     for ms in 2..150 {
         step(&mut bus, ms * 1_000);
@@ -117,7 +123,8 @@ fn a_ramp_starts_at_zero_also_when_frames_are_stamped_after_the_tick() {
 fn a_speed_loop_does_not_wind_up_behind_the_limit_of_a_ramp() {
     let config = Config::<M3508>::new(1)
         .speed_loop(PidConfig::new(0.1, 50.0, 0.0))
-        .with_recovery(Recovery::Ramp(Duration::from_secs(2)));
+        .with_recovery(Recovery::Resume)
+        .with_opening(Duration::from_secs(2));
     let (mut bus, motor) = armed(config);
     for ms in 2..150 {
         step(&mut bus, ms * 1_000);
@@ -142,7 +149,7 @@ fn a_speed_loop_does_not_wind_up_behind_the_limit_of_a_ramp() {
 
 #[test]
 fn a_target_refused_for_late_feedback_takes_the_older_one_away() {
-    let (mut bus, motor) = armed(Config::new(1));
+    let (mut bus, motor) = armed(at_once(1));
     bus.set_raw(motor, 5_000).unwrap();
     for ms in 2..15 {
         step(&mut bus, ms * 1_000);
@@ -160,7 +167,7 @@ fn a_target_refused_for_late_feedback_takes_the_older_one_away() {
 fn frames_that_waited_for_a_stalled_loop_never_make_up_a_turn_silently() {
     for stall_us in (1_000..40_000_u64).step_by(333) {
         let mut bus = Bus::new();
-        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let wheel = bus.attach(at_once::<M3508>(1)).unwrap();
         // 9000 rpm, one frame a millisecond, none lost; all of them are polled when the stall is over.
         let counts = |ms: u64| i64::try_from(ms * 12_288 / 10).unwrap();
         let frame = |ms| feedback(0x201, u16::try_from(counts(ms) % 8192).unwrap(), 9_000);
@@ -180,7 +187,7 @@ fn frames_that_waited_for_a_stalled_loop_never_make_up_a_turn_silently() {
 #[test]
 fn frames_delayed_on_the_bus_are_not_followed_blindly() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(at_once::<M3508>(1)).unwrap();
     hear(&mut bus, feedback(0x201, 0, 9_256), 10_000);
     hear(&mut bus, feedback(0x201, 4_200, 9_256), 13_200); // 4200 counts take 3.32 ms
     assert_eq!(bus.state(wheel).unwrap().rotor_counts, 4_200);
@@ -190,7 +197,7 @@ fn frames_delayed_on_the_bus_are_not_followed_blindly() {
 fn a_zeroed_gm6020_keeps_its_angle_through_a_dropout() {
     let mut bus = Bus::new();
     let gains = PidConfig::new(1.0, 0.0, 0.0);
-    let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(gains, gains)).unwrap();
+    let yaw = bus.attach(at_once::<Gm6020Voltage>(1).position_loop(gains, gains)).unwrap();
     hear(&mut bus, feedback(0x205, 1_000, 0), 1_000);
     bus.zero(yaw).unwrap();
     for ms in 2..150 {
@@ -207,13 +214,13 @@ fn a_zeroed_gm6020_keeps_its_angle_through_a_dropout() {
 #[test]
 fn the_order_of_configuration_does_not_matter() {
     let mut bus = Bus::new();
-    let direct = Config::<M3508>::new(1).with_torque_constant(0.5).with_gear(GearRatio::DIRECT);
+    let direct = at_once::<M3508>(1).with_torque_constant(0.5).with_gear(GearRatio::DIRECT);
     let wheel = bus.attach(direct).unwrap();
     let ten_amperes = CanFrame::standard(0x201, [0, 0, 0, 0, 0x20, 0, 0, 0]).unwrap();
     hear(&mut bus, ten_amperes, 1_000);
     assert!((bus.state(wheel).unwrap().torque_nm - 5.0).abs() < 1e-5);
 
-    let limited = Config::<Gm6020Voltage>::new(1).with_voltage_limit(Voltage::from_volts(6.0));
+    let limited = at_once::<Gm6020Voltage>(1).with_voltage_limit(Voltage::from_volts(6.0));
     let yaw = bus.attach(limited.with_nominal_voltage(Voltage::from_volts(25.2))).unwrap();
     hear(&mut bus, feedback(0x205, 0, 0), 1_000);
     bus.arm(us(1_000)).unwrap();
@@ -223,31 +230,49 @@ fn the_order_of_configuration_does_not_matter() {
     assert_eq!(raw, 5_952); // 6 V of 25.2 V
 }
 
+/// The target has the time of the arming: an update at that time sends it, one before it would make it younger.
 #[test]
-fn a_target_set_between_an_arming_and_an_earlier_tick_counts() {
-    let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
-    hear(&mut bus, feedback(0x201, 0, 0), 1_000);
-    bus.arm(us(1_003)).unwrap();
-    bus.set_raw(motor, 77).unwrap();
-    step(&mut bus, 1_000);
-    assert_eq!(sent(&mut bus), [(0x200, [77, 0, 0, 0])]);
+fn a_target_set_after_an_arming_counts_from_the_arming_on_and_an_update_before_it_trips() {
+    for (update, word) in [(1_003, 77), (1_002, 0), (1_000, 0), (0, 0)] {
+        let mut bus = Bus::new();
+        let motor = bus.attach(at_once::<M3508>(1)).unwrap();
+        hear(&mut bus, feedback(0x201, 0, 0), 1_000);
+        bus.arm(us(1_003)).unwrap();
+        bus.set_raw(motor, 77).unwrap();
+        step(&mut bus, update);
+        assert_eq!(sent(&mut bus), [(0x200, [word, 0, 0, 0])], "{update}");
+        let (is_armed, is_lost) = (word != 0, word == 0);
+        assert_eq!(bus.is_motor_armed(motor), is_armed, "{update}");
+        assert_eq!(bus.conditions(motor).contains(Condition::ClockFault), is_lost, "{update}");
+    }
 }
 
 #[test]
 fn a_clock_that_stands_still_stops_the_motors() {
-    let (mut bus, motor) = armed(Config::new(1));
+    let (mut bus, motor) = armed(at_once(1));
     bus.set_raw(motor, 100).unwrap();
-    for _ in 0..4 {
+    step(&mut bus, 1_500);
+    assert_eq!(sent(&mut bus), [(0x200, [100, 0, 0, 0])]);
+    step(&mut bus, 1_500);
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])], "in the first update that stands");
+    assert_eq!(bus.set_raw(motor, 100), Err(TargetError::Relaxed));
+    for _ in 0..2 {
         step(&mut bus, 1_500);
     }
-    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
     assert_eq!(bus.counters().bad_steps, 3);
+    // It stays at rest when the time goes on, until it is armed anew.
+    for ms in 2..150 {
+        hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
+        assert_eq!(bus.set_raw(motor, 100), Err(TargetError::Relaxed), "{ms}");
+        step(&mut bus, ms * 1_000);
+        assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "{ms}");
+    }
+    assert_eq!(bus.arm(us(149_000)), Ok(()));
 }
 
 #[test]
 fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
-    let (mut bus, motor) = armed(Config::new(1));
+    let (mut bus, motor) = armed(at_once(1));
     bus.set_raw(motor, 100).unwrap();
     step(&mut bus, 2_000);
     assert_eq!(sent(&mut bus), [(0x200, [100, 0, 0, 0])]);
@@ -256,7 +281,7 @@ fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
 
     // The limit is that of feedback, 10 ms.
     for (pause, word) in [(10_000, 100), (10_001, 0)] {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         bus.set_raw(motor, 100).unwrap();
         step(&mut bus, 2_000);
         bus.update(Tick::new(us(2_000 + pause), 0.0));
@@ -267,7 +292,7 @@ fn an_old_command_is_not_repeated_by_a_late_step_without_length() {
 #[test]
 fn feedback_older_than_a_stamp_can_tell_does_not_arm() {
     let mut bus = Bus::new();
-    bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.attach(at_once::<M3508>(1)).unwrap();
     hear(&mut bus, feedback(0x201, 0, 0), 1_000);
     step(&mut bus, 1_000);
     assert!(bus.arm(us(1_005 + (1 << 32))).is_err());
@@ -276,27 +301,19 @@ fn feedback_older_than_a_stamp_can_tell_does_not_arm() {
 #[test]
 fn an_array_that_does_not_fit_leaves_no_trace() {
     let mut bus = Bus::new();
-    bus.attach(Config::<Gm6020Current>::new(3)).unwrap();
+    bus.attach(at_once::<Gm6020Current>(3)).unwrap();
     for _ in 0..40 {
-        assert!(bus.attach_all([1, 9].map(Config::<M3508>::new)).is_err());
+        assert!(bus.attach_all([1, 9].map(at_once::<M3508>)).is_err());
     }
     step(&mut bus, 1_000);
     assert_eq!(sent(&mut bus), [(0x1FE, [0; 4])], "no frame that nobody owns");
-    assert!(bus.attach(Config::<M3508>::new(1)).is_ok(), "no place is worn out");
-}
-
-#[test]
-fn the_offline_limit_is_the_one_in_force() {
-    let timeouts = Timeouts::new()
-        .with_late(Duration::from_millis(200))
-        .with_offline(Duration::from_millis(50));
-    assert_eq!(timeouts.offline(), Duration::from_millis(200));
+    assert!(bus.attach(at_once::<M3508>(1)).is_ok(), "no place is worn out");
 }
 
 #[test]
 fn frames_are_conserved_through_refusals_and_evictions() {
-    let (mut bus, first) = armed(Config::new(1));
-    let second = bus.attach(Config::<M3508>::new(5)).unwrap();
+    let (mut bus, first) = armed(at_once(1));
+    let second = bus.attach(at_once::<M3508>(5)).unwrap();
     hear(&mut bus, feedback(0x205, 0, 0), 1_000);
     bus.arm(us(1_000)).unwrap();
     let (mut taken, mut evicted, mut seed) = (0_u32, 0_u32, 1_u32);
@@ -326,7 +343,7 @@ fn frames_are_conserved_through_refusals_and_evictions() {
         }
     }
     // What is given back waits for the next update: one that marks nothing new brings it all out.
-    bus.update(Tick::new(us(1_999_000), 0.0));
+    bus.update(Tick::new(us(1_999_500), 0.0));
     let counters = bus.counters();
     let waiting = u32::try_from(sent(&mut bus).len()).unwrap();
     assert_eq!(counters.packed + evicted, taken + counters.superseded + waiting);
@@ -338,7 +355,7 @@ const WRAP_US: u64 = 1 << 32;
 fn stays_at_rest(bus: &mut Bus, motor: Handle<M3508>, micros: u64) {
     assert!(bus.arm(us(micros)).is_err(), "armed by feedback of long ago");
     assert!(bus.arm_only(&[motor.erase()], us(micros)).is_err(), "armed alone");
-    bus.engage(us(micros));
+    CanDevice::engage(bus, us(micros));
     assert!(bus.set_raw(motor, 5_000).is_err(), "takes targets");
     step(bus, micros);
     assert!(sent(bus).iter().all(|frame| frame.1 == [0; 4]), "driven");
@@ -351,11 +368,11 @@ const PAUSES_US: [u64; 5] = [WRAP_US - 9_999, WRAP_US - 1, WRAP_US, WRAP_US + 1,
 fn a_first_update_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
     for pause in PAUSES_US {
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let motor = bus.attach(at_once::<M3508>(1)).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), 1_000);
         stays_at_rest(&mut bus, motor, 1_000 + pause);
 
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         bus.set_raw(motor, 5_000).unwrap();
         step(&mut bus, 1_000 + pause);
         assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]), "{pause}");
@@ -366,7 +383,7 @@ fn a_first_update_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it(
 #[test]
 fn a_frame_that_ends_a_pause_before_the_first_update_is_the_first_of_a_motor_that_was_lost() {
     for pause in PAUSES_US {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         bus.set_raw(motor, 5_000).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), 1_000 + pause);
         assert_eq!(bus.link(motor), Some(Link::Recovering), "{pause}");
@@ -378,7 +395,7 @@ fn a_frame_that_ends_a_pause_before_the_first_update_is_the_first_of_a_motor_tha
 fn a_motor_that_joins_before_the_first_update_neither_hides_nor_shares_the_pause_of_another() {
     for pause in PAUSES_US {
         let mut bus = Bus::new();
-        let [old, young] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+        let [old, young] = bus.attach_all([1, 2].map(at_once::<M3508>)).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), 10_000);
         // At once after the pause, and all the time.
         for heard in [1, 100] {
@@ -387,14 +404,14 @@ fn a_motor_that_joins_before_the_first_update_neither_hides_nor_shares_the_pause
             for good in 1..10 {
                 hear(&mut bus, feedback(0x202, 0, 0), end + good);
             }
-            bus.engage(us(end + 9));
+            CanDevice::engage(&mut bus, us(end + 9));
             assert!(bus.set_raw(old, 5_000).is_err());
             bus.set_raw(young, 5_000).unwrap();
             step(&mut bus, end + 1_000);
             assert_eq!(sent(&mut bus), [(0x200, [0, 5_000, 0, 0])], "{pause} {heard}");
 
             bus = Bus::new();
-            _ = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+            _ = bus.attach_all([1, 2].map(at_once::<M3508>)).unwrap();
             hear(&mut bus, feedback(0x201, 0, 0), 10_000);
         }
     }
@@ -403,7 +420,7 @@ fn a_motor_that_joins_before_the_first_update_neither_hides_nor_shares_the_pause
 #[test]
 fn a_target_of_long_ago_drives_no_motor_at_the_first_update() {
     for pause in PAUSES_US {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         bus.set_raw(motor, 5_000).unwrap();
         for n in 1..=100 {
             hear(&mut bus, feedback(0x201, 0, 0), 1_000 + pause * n / 100);
@@ -417,13 +434,13 @@ fn a_target_of_long_ago_drives_no_motor_at_the_first_update() {
 fn an_update_without_a_step_that_ends_a_pause_drives_no_motor_by_what_was_heard_before_it() {
     for pause in PAUSES_US {
         for dt_s in [f32::NAN, 0.0, -0.001] {
-            let (mut bus, motor) = armed(Config::new(1));
+            let (mut bus, motor) = armed(at_once(1));
             step(&mut bus, 1_500);
             bus.set_raw(motor, 5_000).unwrap();
             bus.update(Tick::new(us(1_000 + pause), dt_s));
             stays_at_rest(&mut bus, motor, 1_500 + pause);
 
-            let (mut bus, motor) = armed(Config::new(1));
+            let (mut bus, motor) = armed(at_once(1));
             bus.set_raw(motor, 5_000).unwrap();
             bus.update(Tick::new(us(1_000 + pause), dt_s));
             stays_at_rest(&mut bus, motor, 1_500 + pause);
@@ -434,7 +451,7 @@ fn an_update_without_a_step_that_ends_a_pause_drives_no_motor_by_what_was_heard_
 #[test]
 fn updates_without_a_step_are_one_pause_however_many() {
     for updated in [true, false] {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         if updated {
             step(&mut bus, 1_500);
         }
@@ -452,7 +469,7 @@ fn a_stamp_that_wraps_before_the_first_update_is_no_pause() {
     for (before, after) in [(1, 0), (1, 1), (0, 1), (1_000, 1_000), (9_999, 0), (0, 9_999)] {
         for frames in 1..20 {
             let mut bus = Bus::new();
-            let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+            let motor = bus.attach(at_once::<M3508>(1)).unwrap();
             for n in (0..frames).rev() {
                 hear(&mut bus, feedback(0x201, 0, 0), WRAP_US - before - n * 1_000);
             }
@@ -469,7 +486,7 @@ fn a_stamp_that_wraps_before_the_first_update_is_no_pause() {
 fn a_clock_that_is_late_already_at_the_first_frame_is_no_pause() {
     for bad_update_first in [true, false] {
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let motor = bus.attach(at_once::<M3508>(1)).unwrap();
         if bad_update_first {
             bus.update(Tick::new(us(WRAP_US - 500), 0.0));
         }
@@ -484,13 +501,13 @@ fn a_clock_that_is_late_already_at_the_first_frame_is_no_pause() {
 #[test]
 fn a_minute_without_an_update_is_late_but_no_pause_and_a_microsecond_more_is_one() {
     for (pause, link) in [(60_000_000, Link::Online), (60_000_001, Link::Offline)] {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         step(&mut bus, 1_500);
         hear(&mut bus, feedback(0x201, 0, 0), 1_500 + pause - 1);
         step(&mut bus, 1_500 + pause);
         assert_eq!(bus.link(motor), Some(link), "{pause}");
 
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         step(&mut bus, 1_500);
         hear(&mut bus, feedback(0x201, 0, 0), 1_500);
         bus.update(Tick::new(us(1_500 + pause), 0.0));
@@ -510,7 +527,7 @@ fn a_minute_from_the_last_update_a_motor_is_armed_and_a_microsecond_more_is_too_
         (updated - MINUTE_US - 1, false),
     ] {
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let motor = bus.attach(at_once::<M3508>(1)).unwrap();
         step(&mut bus, updated);
         hear(&mut bus, feedback(0x201, 0, 0), now);
         assert_eq!(bus.arm(us(now)).is_ok(), is_near, "{now}");
@@ -523,7 +540,7 @@ fn a_minute_from_the_last_update_a_motor_is_armed_and_a_microsecond_more_is_too_
 #[test]
 fn an_error_of_5_ms_is_an_edge_whenever_it_comes() {
     for begin in 100..112 {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         let lasts = begin..begin + 5;
         let edges = edges_of_errors(&mut bus, 200, |ms| if lasts.contains(&ms) { 3 } else { 0 });
         let told: Vec<_> = edges.iter().map(|(_, edge)| (edge.condition, edge.began)).collect();
@@ -538,7 +555,7 @@ fn an_error_of_5_ms_is_an_edge_whenever_it_comes() {
 #[test]
 fn an_error_that_comes_with_every_other_frame_is_one_edge() {
     for codes in [[3, 0], [8, 0], [0, 8]] {
-        let (mut bus, _) = armed(Config::new(1));
+        let (mut bus, _) = armed(at_once(1));
         let code = |ms: u64| if ms < 900 { codes[usize::from(ms.is_multiple_of(2))] } else { 0 };
         let edges = edges_of_errors(&mut bus, 1_000, code);
         assert_eq!(edges.len(), 2, "{edges:?}");
@@ -547,7 +564,7 @@ fn an_error_that_comes_with_every_other_frame_is_one_edge() {
 
 #[test]
 fn codes_that_take_turns_do_not_flood() {
-    let (mut bus, _) = armed(Config::new(1));
+    let (mut bus, _) = armed(at_once(1));
     let edges = edges_of_errors(&mut bus, 1_200, |ms| if ms.is_multiple_of(2) { 3 } else { 8 });
     assert!(edges.len() <= 4 * 1_200 / 12, "{} edges in 1200 ms", edges.len());
     let fault = |edge: &&(u64, Edge)| edge.1.condition == Condition::Fault && edge.1.began;
@@ -557,7 +574,7 @@ fn codes_that_take_turns_do_not_flood() {
 #[test]
 fn a_motor_that_reports_a_fault_before_the_first_update_is_not_armed() {
     let mut bus = Bus::new();
-    bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.attach(at_once::<M3508>(1)).unwrap();
     let fault = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, 3]).unwrap();
     hear(&mut bus, fault, 1_000);
     assert!(bus.arm(us(1_000)).is_err());
@@ -570,16 +587,16 @@ fn a_motor_is_not_armed_at_a_time_of_long_ago() {
     for back in PAUSES_US {
         let now = 20 * WRAP_US;
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let motor = bus.attach(at_once::<M3508>(1)).unwrap();
         step(&mut bus, now);
         hear(&mut bus, feedback(0x201, 0, 0), now);
         assert!(bus.arm(us(now - back)).is_err());
         assert!(bus.arm_only(&[motor.erase()], us(now - back)).is_err());
-        bus.engage(us(now - back));
+        CanDevice::engage(&mut bus, us(now - back));
         assert!(bus.set_raw(motor, 5_000).is_err());
         bus.arm(us(now)).unwrap();
         // What is armed goes on, and its targets count from the bus's own time.
-        bus.engage(us(now - WRAP_US - 50_000));
+        CanDevice::engage(&mut bus, us(now - WRAP_US - 50_000));
         bus.set_raw(motor, 5_000).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), now + 60_000);
         step(&mut bus, now + 60_000);
@@ -590,35 +607,38 @@ fn a_motor_is_not_armed_at_a_time_of_long_ago() {
 /// The fuzzer found a motor that was offline, because the clock went back, driven once more.
 #[test]
 fn an_update_without_a_step_holds_no_command_of_a_motor_that_was_relaxed() {
+    const NOW_US: u64 = 11_000 + 20 * WRAP_US;
     type Work = fn(&mut Bus, Handle<M3508>) -> u64;
     let relaxing: [Work; 3] = [
         |bus, motor| {
             bus.relax(motor);
-            12_000
+            NOW_US + 2_000
         },
         |bus, motor| {
             bus.set_current(motor, Current::from_amperes(f32::NAN)).unwrap_err();
-            12_000
+            NOW_US + 2_000
         },
         // Hours back: as far as the stamps tell, it was heard long ago.
-        |_, _| 11_000 + WRAP_US / 4,
+        |_, _| NOW_US % WRAP_US + WRAP_US / 4,
     ];
     for relax in relaxing {
         let mut bus = Bus::new();
-        let [motor, other] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
-        let now = 11_000 + 20 * WRAP_US;
+        let [motor, other] = bus.attach_all([1, 2].map(at_once::<M3508>)).unwrap();
         for id in [0x201, 0x202] {
-            hear(&mut bus, feedback(id, 0, 0), now);
+            hear(&mut bus, feedback(id, 0, 0), NOW_US);
         }
-        bus.arm(us(now)).unwrap();
+        bus.arm(us(NOW_US)).unwrap();
         bus.set_raw(motor, 5_000).unwrap();
         bus.set_raw(other, 6_000).unwrap();
-        step(&mut bus, now + 1_000);
+        step(&mut bus, NOW_US + 1_000);
         assert_eq!(sent(&mut bus), [(0x200, [5_000, 6_000, 0, 0])]);
         let at = relax(&mut bus, motor);
         bus.update(Tick::new(us(at), 0.0));
-        let held = if at == 12_000 { 6_000 } else { 0 };
+        // Where the time goes back, nothing is held at all.
+        let goes_on = at > NOW_US;
+        let held = if goes_on { 6_000 } else { 0 };
         assert_eq!(sent(&mut bus), [(0x200, [0, held, 0, 0])]);
+        assert_eq!(bus.is_motor_armed(other), goes_on);
     }
 }
 
@@ -629,35 +649,39 @@ fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
     static CAREFUL: HealthConfig =
         HealthConfig::new().with_reaction(Condition::Warning, Reaction::Relax);
     type Work = fn(&mut Bus, Handle<M3508>);
-    let arm_again = |bus: &mut Bus| bus.arm(us(12_500)).unwrap();
-    let resting: [Work; 7] = [
-        |bus, motor| bus.relax(motor),
-        |bus, motor| bus.zero(motor).unwrap(),
-        |bus, _| bus.disarm(),
-        |bus, _| {
+    // Whether it trips: then it is armed again after the pause, with no update between.
+    let resting: [(bool, Work); 7] = [
+        (false, |bus, motor| bus.relax(motor)),
+        (false, |bus, motor| bus.zero(motor).unwrap()),
+        (false, |bus, _| bus.disarm()),
+        (true, |bus, _| {
             bus.emergency_stop();
             bus.clear_emergency_stop();
-        },
-        |bus, motor| {
+        }),
+        (false, |bus, motor| {
             let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
             assert_eq!(bus.set_velocity(motor, nowhere), Err(TargetError::NotFinite));
-        },
-        |bus, motor| {
+        }),
+        (false, |bus, motor| {
             let (angle, velocity) = (Angle::ZERO, AngularVelocity::ZERO);
             let old = Measured { angle, velocity, at: us(1_000_000) };
             let refused = bus.set_angle_measured(motor, Angle::ZERO, old);
             assert_eq!(refused, Err(TargetError::StaleMeasurement));
-        },
-        |bus, motor| {
+        }),
+        (true, |bus, motor| {
             let warning = CanFrame::standard(0x201, [0, 0, 0, 0, 0, 0, 25, 8]).unwrap();
             hear(bus, warning, 12_500);
             assert!(!bus.is_motor_armed(motor));
-        },
+        }),
     ];
-    for (case, rest) in resting.iter().enumerate() {
-        let mut bus = Bus::new();
+    // A pause of 100 ms is no longer than an update without a step may be late.
+    let patient = Timeouts::new()
+        .with_feedback(Duration::from_millis(200), Duration::from_millis(400))
+        .unwrap();
+    for (case, (trips, rest)) in resting.iter().enumerate() {
+        let mut bus: Bus = Bus::new().with_timeouts(patient);
         let loops = PidConfig::new(1.0, 0.0, 0.0);
-        let config = Config::<M3508>::new(1).position_loop(loops, loops).with_health(&CAREFUL);
+        let config = at_once::<M3508>(1).position_loop(loops, loops).with_health(&CAREFUL);
         let motor = bus.attach(config).unwrap();
         hear(&mut bus, feedback(0x201, 0, 0), 11_000);
         bus.arm(us(11_000)).unwrap();
@@ -665,16 +689,25 @@ fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
         step(&mut bus, 12_000);
         assert!(sent(&mut bus)[0].1[0] > 4_000, "{case}: it is driven");
         rest(&mut bus, motor);
-        arm_again(&mut bus);
+        let armed_again = bus.arm(us(12_500));
+        let mut now = 13_000;
+        if *trips {
+            assert_eq!(armed_again, Err(ArmError::NotReleased), "{case}");
+            now += 100_000;
+            hear(&mut bus, feedback(0x201, 0, 0), now - 600);
+            assert_eq!(bus.arm(us(now - 500)), Ok(()), "{case}");
+        } else {
+            assert_eq!(armed_again, Ok(()), "{case}");
+        }
         bus.set_velocity(motor, AngularVelocity::from_rpm(1.0)).unwrap();
-        bus.update(Tick::new(us(13_000), 0.0));
+        bus.update(Tick::new(us(now), 0.0));
         assert_eq!(sent(&mut bus).last(), Some(&(0x200, [0; 4])), "{case}");
         // From then on it is held as ever.
         bus.set_velocity(motor, AngularVelocity::from_rpm(1.0)).unwrap();
-        step(&mut bus, 14_000);
+        step(&mut bus, now + 1_000);
         let driven = sent(&mut bus)[0];
         assert_ne!(driven.1[0], 0, "{case}");
-        bus.update(Tick::new(us(15_000), 0.0));
+        bus.update(Tick::new(us(now + 2_000), 0.0));
         assert_eq!(sent(&mut bus), [driven], "{case}");
     }
 }
@@ -684,7 +717,7 @@ fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
 #[test]
 fn a_motor_that_is_relaxed_before_each_target_is_looked_at_by_what_it_was_sent() {
     for is_jammed in [false, true] {
-        let (mut bus, motor) = armed(Config::new(1));
+        let (mut bus, motor) = armed(at_once(1));
         let (mut rpm, mut counts, mut word) = (0, 0, 0_i16);
         let mut conditions = Vec::new();
         for ms in 2..1_000 {
@@ -708,20 +741,39 @@ fn a_motor_that_is_relaxed_before_each_target_is_looked_at_by_what_it_was_sent()
     }
 }
 
-/// A program may arm in each tick: a jam relaxes the motor again after each window all the same.
+/// A jam relaxes the motor again after each window, where it is armed again as soon as that is granted; a program that arms
+/// in each tick arms once.
 #[test]
 fn a_jam_that_relaxes_does_so_again_where_the_motor_is_armed_again_at_once() {
     static FEEDER: HealthConfig =
         HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
-    let (mut bus, motor) = armed(Config::new(1).with_health(&FEEDER));
-    let mut jams = 0;
-    for ms in 10..4_000 {
-        hear(&mut bus, feedback(0x201, 100, 0), ms * 1_000);
-        bus.arm(us(ms * 1_000)).unwrap();
-        bus.set_raw(motor, 12_000).unwrap();
-        step(&mut bus, ms * 1_000);
-        let edges = core::iter::from_fn(|| bus.next_edge());
-        jams += edges.filter(|edge| edge.condition == Condition::Stalled && edge.began).count();
-    }
+    let jams_of = |pause_ms: u64| {
+        let (mut bus, motor) = armed(at_once(1).with_health(&FEEDER));
+        let (mut jams, mut driven, mut asked) = (0, 0, 0);
+        for ms in 10..4_000 {
+            hear(&mut bus, feedback(0x201, 100, 0), ms * 1_000);
+            if ms >= asked + pause_ms {
+                let granted = bus.is_armed() || pause_ms >= 100;
+                let refusal = if granted { Ok(()) } else { Err(ArmError::NotReleased) };
+                assert_eq!(bus.arm(us(ms * 1_000)), refusal, "{ms}");
+                asked = ms;
+            }
+            _ = bus.set_raw(motor, 12_000);
+            step(&mut bus, ms * 1_000);
+            driven += u32::from(sent(&mut bus).iter().any(|frame| frame.1[0] != 0));
+            let edges = core::iter::from_fn(|| bus.next_edge());
+            let began = edges.filter(|edge| edge.condition == Condition::Stalled && edge.began);
+            if began.count() > 0 {
+                jams += 1;
+                // The hand is taken off the switch, and put on it again.
+                asked = ms;
+            }
+        }
+        (jams, driven)
+    };
+    let (jams, driven) = jams_of(100);
     assert!(jams >= 4, "{jams} jams in 4 s");
+    let (jams_when_asked_always, driven_when_asked_always) = jams_of(1);
+    assert_eq!(jams_when_asked_always, 1);
+    assert!(driven_when_asked_always * jams <= driven + jams, "as long as one of them");
 }

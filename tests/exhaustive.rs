@@ -13,7 +13,7 @@ use drivetrain::dji::{
 use drivetrain::encoder::{Position, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{wrap, wrap_pi, wrap_positive, wrap_tau};
-use drivetrain::motor::{CanDevice, Ingest, Malformed, TargetError};
+use drivetrain::motor::{Ingest, Malformed, TargetError};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, Current, Voltage};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -49,7 +49,8 @@ impl<M: Model, const N: usize> Words<M, N> {
     fn new(config: impl Fn(u8) -> Config<M>) -> Self {
         let mut bus = Bus::new();
         let ids: [u8; N] = core::array::from_fn(|index| u8::try_from(index + 1).unwrap());
-        let motors = bus.attach_all(ids.map(config)).unwrap();
+        let at_once = |id| config(id).with_opening(Duration::ZERO);
+        let motors = bus.attach_all(ids.map(at_once)).unwrap();
         for id in ids {
             let id = M::FACTS.feedback_base + u16::from(id);
             let rest = CanFrame::standard(id, [0, 0, 0, 0, 0, 0, 25, 0]).unwrap();

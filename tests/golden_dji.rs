@@ -5,8 +5,8 @@
 use drivetrain::dji::*;
 use drivetrain::encoder::{GearRatio, Shaft, shortest};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest, MotorName};
-use drivetrain::time::{Instant, Tick};
+use drivetrain::motor::{Ingest, MotorName};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Current;
 use serde_json::Value;
 
@@ -50,12 +50,17 @@ fn facts(device: &str) -> &'static Facts {
     }
 }
 
+/// A motor whose output range opens at once: the golden bytes are those of the first update.
+fn at_once<M: Model>(id: u8) -> Config<M> {
+    Config::new(id).with_opening(Duration::ZERO)
+}
+
 fn attach(bus: &mut Bus, device: &str, id: u8) -> Result<AnyHandle, AttachError> {
     Ok(match device {
-        "C610" => bus.attach(Config::<M2006>::new(id))?.erase(),
-        "C620" | "C6x0" => bus.attach(Config::<M3508>::new(id))?.erase(),
-        "GM6020_voltage" => bus.attach(Config::<Gm6020Voltage>::new(id))?.erase(),
-        "GM6020_current" => bus.attach(Config::<Gm6020Current>::new(id))?.erase(),
+        "C610" => bus.attach(at_once::<M2006>(id))?.erase(),
+        "C620" | "C6x0" => bus.attach(at_once::<M3508>(id))?.erase(),
+        "GM6020_voltage" => bus.attach(at_once::<Gm6020Voltage>(id))?.erase(),
+        "GM6020_current" => bus.attach(at_once::<Gm6020Current>(id))?.erase(),
         other => panic!("unknown device {other}"),
     })
 }
@@ -165,8 +170,7 @@ fn raw_commands_become_the_golden_bytes() {
 /// Commands four C620 from `first` on and returns their frame.
 fn drive(first: u8, raw: &[i64]) -> CanFrame {
     let mut bus = Bus::new();
-    let motors =
-        bus.attach_all([0, 1, 2, 3].map(|slot| Config::<M3508>::new(first + slot))).unwrap();
+    let motors = bus.attach_all([0, 1, 2, 3].map(|slot| at_once::<M3508>(first + slot))).unwrap();
     for id in 0..4 {
         let feedback = CanFrame::standard(0x200 + u16::from(first) + id, [0; 8]).unwrap();
         assert_eq!(bus.ingest(&feedback, NOW), Ingest::Taken);
@@ -183,7 +187,7 @@ fn drive(first: u8, raw: &[i64]) -> CanFrame {
 fn amperes_become_the_golden_bytes() {
     fn drive<M: CurrentControlled>(vector: &Value) {
         let mut bus = Bus::new();
-        let motors = bus.attach_all([1, 2, 3, 4].map(Config::<M>::new)).unwrap();
+        let motors = bus.attach_all([1, 2, 3, 4].map(at_once::<M>)).unwrap();
         for id in 1..=4 {
             let feedback = CanFrame::standard(M::FACTS.feedback_base + id, [0; 8]).unwrap();
             assert_eq!(bus.ingest(&feedback, NOW), Ingest::Taken);

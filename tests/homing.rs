@@ -6,7 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::encoder::Position;
 use drivetrain::motor::{
-    CanDevice, HomingError, HomingStep, Link, ShaftState, StopHoming, StopHomingConfig,
+    Devices, HomingError, HomingStep, Link, ShaftState, StopHoming, StopHomingConfig,
 };
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, Model, MotorConfig, MotorKey, World};

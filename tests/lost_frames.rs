@@ -9,7 +9,7 @@ mod own;
 
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{Ingest, Own, VelocityDrive};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
@@ -651,4 +651,33 @@ fn a_question_that_is_lost_is_asked_again_at_once() {
         assert!(sent.iter().any(|(_, command)| matches!(command, Command::Read(_))), "{sent:?}");
     }
     assert_eq!(snake.joints.counters().unanswered, 0);
+}
+
+/// A motor that moved from one bus struct to another: a frame given back went to the bus that sent it once, which then
+/// sent zeros on the id of the motor that runs.
+#[test]
+fn a_frame_goes_back_to_the_part_that_sends_it_now() {
+    let at_ms = |ms: u64| Instant::from_micros(1_000 * ms);
+    let silent = || Bus::new().with_keep_alive(Duration::from_secs(10));
+    let (mut before, mut now): (Bus, Bus) = (silent(), silent());
+    let gone = before.attach(Config::<M3508>::new(1)).unwrap();
+    before.detach(gone);
+    let wheel = now.attach(Config::<M3508>::new(1)).unwrap();
+    let mut both = (before, now);
+    for ms in 1_000..1_400 {
+        let feedback = CanFrame::standard(0x201, [0x10, 0, 0, 0, 0, 0, 30, 0]).unwrap();
+        assert_eq!(both.ingest(&feedback, at_ms(ms)), drivetrain::motor::Ingest::Taken);
+        if ms == 1_000 {
+            both.1.arm(at_ms(ms)).unwrap();
+        }
+        both.1.set_raw(wheel, 5_000).unwrap();
+        both.update(Tick::new(at_ms(ms), 0.001));
+        let sent: Vec<CanFrame> = std::iter::from_fn(|| both.next_frame(0)).collect();
+        if ms > 1_300 {
+            assert!(sent.iter().all(|frame| *frame.bytes() != [0; 8]), "{ms}: {sent:?}");
+        }
+        if ms > 1_100 && ms % 10 == 0 {
+            assert!(both.requeue(&sent[0]));
+        }
+    }
 }

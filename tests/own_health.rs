@@ -5,7 +5,7 @@
 use drivetrain::control::TimeStep;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Condition, HealthConfig, Ingest, Malformed, MotorName, Own, OwnMotor,
+    ArmError, Condition, Devices, HealthConfig, Ingest, Malformed, MotorName, Own, OwnMotor,
     Reaction, Severity, TargetError, VelocityDrive, Vitals,
 };
 use drivetrain::time::{Instant, Tick};

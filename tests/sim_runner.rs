@@ -5,7 +5,7 @@
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::motor::{CanDevice, Link};
+use drivetrain::motor::Link;
 use drivetrain::runner::{BlockingTx, Nb, Runner};
 use drivetrain::sim::{Controller, Fault, Line, Model, MotorConfig, MotorKey, SimClock, World};
 use drivetrain::time::{Duration, Instant, Tick};

@@ -4,7 +4,7 @@
 
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ArmError, CanDevice, Link, TargetError};
+use drivetrain::motor::{ArmError, Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Controller, Fault, JointConfig, JointKey, Line, Sender, SimClock, World};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register};
@@ -21,8 +21,11 @@ struct Robot<'w> {
     keys: Vec<JointKey>,
     /// Where they are told to be, in degrees.
     wanted: Option<f32>,
-    /// The application arms as soon as it sees itself disarmed.
+    /// The application arms as soon as it sees itself disarmed and, where it is told to release its request, 100 ms later.
     is_eager: bool,
+    /// When it asks next, and how often it was told so.
+    asks_at: Instant,
+    released: u32,
     /// What was written to the joint with the id 1.
     writes: Vec<Command>,
 }
@@ -42,7 +45,8 @@ impl<'w> Robot<'w> {
         let handles = (1..).take(keys.len()).map(|id| joints.attach(fast(id)).unwrap()).collect();
         let runner = Runner::new(Nb(world.controller()), world.clock(), joints);
         let (wanted, writes) = (None, Vec::new());
-        Self { world, runner, joints: handles, keys, wanted, is_eager: false, writes }
+        let (is_eager, asks_at, released) = (false, Instant::START, 0);
+        Self { world, runner, joints: handles, keys, wanted, is_eager, asks_at, released, writes }
     }
 
     fn run(&mut self, ms: u64) {
@@ -54,8 +58,11 @@ impl<'w> Robot<'w> {
             });
             self.runner.poll(16);
             let Some(tick) = self.runner.due() else { continue };
-            if self.is_eager && !self.runner.is_armed() {
-                _ = self.runner.arm(tick);
+            if self.is_eager && !self.runner.is_armed() && tick.now() >= self.asks_at {
+                if self.runner.arm(tick) == Err(ArmError::NotReleased) {
+                    self.released += 1;
+                    self.asks_at = tick.now() + Duration::from_millis(100);
+                }
             }
             if let Some(degrees) = self.wanted {
                 let position = Position::from_angle(Angle::from_degrees(degrees));
@@ -199,8 +206,8 @@ fn a_brown_out_shorter_than_any_time_limit_does_not_set_a_joint_going_again() {
     assert!(!robot.is_enabled(6) && !state.is_driven && !robot.runner.is_armed());
 }
 
-/// What disarms joint 1, and how it is counted: resets and jumps.
-type Event = (&'static str, fn(&mut Robot), (u16, u16));
+/// What disarms joint 1, how it is counted (resets and jumps), and how often the request to arm has to be released.
+type Event = (&'static str, fn(&mut Robot), (u16, u16), u32);
 
 fn brown_out(robot: &mut Robot) {
     let now = robot.world.now();
@@ -222,12 +229,12 @@ fn stop_and_clear(robot: &mut Robot) {
 #[test]
 fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_disarmed_it() {
     let events: [(i32, Event); 4] = [
-        (0, ("found disabled", brown_out, (1, 0))),
-        (25_000, ("further off than it can go", brown_out, (0, 1))),
-        (0, ("disarmed", |robot| robot.runner.device_mut().disarm(), (0, 0))),
-        (0, ("stopped and cleared", stop_and_clear, (0, 0))),
+        (0, ("found disabled", brown_out, (1, 0), 1)),
+        (25_000, ("further off than it can go", brown_out, (0, 1), 1)),
+        (0, ("disarmed", |robot| robot.runner.device_mut().disarm(), (0, 0), 0)),
+        (0, ("stopped and cleared", stop_and_clear, (0, 0), 1)),
     ];
-    for (position, (what, event, counts)) in events {
+    for (position, (what, event, counts, releases)) in events {
         let world = World::new(4);
         let config = JointConfig::new(1).with_position(position);
         let mut robot = Robot::of(&world, [config].into_iter(), Joints::new());
@@ -237,11 +244,17 @@ fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_
         robot.run(250);
         robot.writes.clear();
         event(&mut robot);
-        robot.run(300);
+        robot.run(400);
         let state = robot.runner.device().state(robot.joints[0]).unwrap();
         assert_eq!((state.resets, state.position_jumps), counts, "{what}");
         assert!(state.is_driven && robot.is_enabled(0), "{what}: {state:?}");
-        let mut since = robot.writes.iter().skip_while(|sent| **sent != Command::DISABLE);
+        assert_eq!(robot.released, releases, "{what}");
+        // A joint that waits to be armed is told again each 100 ms; the last time is the first step of bringing it up.
+        let is_disable = |sent: &Command| *sent == Command::DISABLE;
+        let told = robot.writes.iter().filter(|sent| is_disable(sent)).count();
+        assert!((1..=1 + 2 * usize::try_from(releases).unwrap()).contains(&told), "{what}: {told}");
+        let last = robot.writes.iter().rposition(is_disable).unwrap();
+        let mut since = robot.writes.iter().skip(last);
         let registers: Vec<_> = since.by_ref().take(8).map(register).collect();
         assert_eq!(registers, [0x10, 0x0F, 0x08, 0x0B, 0x0C, 0x09, 0x0A, 0x10], "{what}");
         assert!(since.all(|sent| register(sent) == 0x0A), "{what}: brought up once");
@@ -295,7 +308,7 @@ fn one_bus_carries_dji_motors_and_joints_and_finds_no_clash() {
         joints.attach(Config::new(id)).unwrap();
     }
     assert_eq!(joints.load().and(&bus.load()).to_string(), "70 % to 85 %");
-    let both = (joints, bus);
+    let mut both = (joints, bus);
     assert_eq!(both.clash(), None);
     let mut twice = [Joints::new(), Joints::new()];
     for joints in &mut twice {

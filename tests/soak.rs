@@ -10,9 +10,9 @@ use drivetrain::control::{PidConfig, TimeStep};
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M2006, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, TargetError, Timeouts,
+    ArmError, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, TargetError, Timeouts,
 };
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ExtendedId, Frame, StandardId};
 use std::thread;
@@ -69,6 +69,8 @@ struct Motor {
     is_empty: bool,
     /// It was at rest since the last update in which time passed.
     has_rested: bool,
+    /// When it was armed last, as long as it is.
+    armed: Option<u64>,
 }
 
 impl Motor {
@@ -99,6 +101,10 @@ impl Motor {
 
 const LATE_US: u64 = 10_000;
 const DEADLINE_US: u64 = 100_000;
+/// In which nobody may ask for arming after a trip.
+const PAUSE_US: u64 = 100_000;
+/// In which the output range of a motor opens, but for the integrator.
+const OPENING_US: u64 = 200_000;
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
 
 /// Random feedback looks like faults, heat and two motors with one id: a motor that is to run has to be blind to them.
@@ -124,7 +130,8 @@ fn attach(bus: &mut Bus, index: usize) -> AnyHandle {
         1 => bus.attach(m3508(2).reversed()).unwrap().into(),
         INTEGRATOR => {
             let integral = PidConfig::new(0.0, 50.0, 0.0);
-            let m2006 = Config::<M2006>::new(4).speed_loop(integral);
+            // Its range opens at once: a range that is still closed would hide an integral.
+            let m2006 = Config::<M2006>::new(4).speed_loop(integral).with_opening(Duration::ZERO);
             bus.attach(m2006.with_health(&BLIND)).unwrap().into()
         }
         3 => bus.attach(Config::<M2006>::new(6)).unwrap().into(),
@@ -144,6 +151,7 @@ fn motors(bus: &mut Bus) -> Vec<Motor> {
         is_velocity: false,
         is_empty: true,
         has_rested: true,
+        armed: None,
     };
     vec![
         of(0x201, 0x200, 0, 16_384, attach(bus, 0)),
@@ -200,6 +208,10 @@ struct Books {
     nonzero: u64,
     compared: u64,
     from_rest: u64,
+    armed: u64,
+    armed_after_a_trip: u64,
+    too_soon: u64,
+    opening: u64,
 }
 
 struct Soak {
@@ -209,6 +221,10 @@ struct Soak {
     books: Books,
     random: Random,
     now_us: u64,
+    /// A motor was relaxed since the last arming, other than by `disarm`.
+    tripped: bool,
+    /// The last request to arm, or trip.
+    asked_us: u64,
     /// Of everything that was sent: I10.
     digest: u64,
 }
@@ -218,7 +234,9 @@ impl Soak {
         let mut bus = Bus::new();
         let motors = motors(&mut bus);
         let (books, random) = (Books::default(), Random(seed));
-        Self { bus, alone: Alone::new(chosen), motors, books, random, now_us: 1, digest: 0 }
+        let alone = Alone::new(chosen);
+        let (tripped, asked_us) = (false, 0);
+        Self { bus, alone, motors, books, random, now_us: 1, tripped, asked_us, digest: 0 }
     }
 
     fn now(&self) -> Instant {
@@ -352,10 +370,22 @@ impl Soak {
             None if bits >> 8 & 31 == 16 => motor.rest(),
             _ => {}
         }
+        // Their masks leave the bits 8 to 12 out, which are the number of the call: 16 and above all have the bit 12.
         match bits >> 8 & 31 {
-            17 if bits & 0x7000 == 0 => self.both(Bus::disarm),
-            18 if bits & 0x7000 == 0 => self.both(Bus::emergency_stop),
-            19..=20 => self.both(Bus::clear_emergency_stop),
+            17 if bits & 0xF_E000 == 0 => {
+                self.look_who_rests();
+                // Not a trip.
+                self.motors.iter_mut().for_each(|motor| motor.armed = None);
+                self.both(Bus::disarm);
+            }
+            18 if bits & 0xF_E000 == 0 && !self.bus.is_stopped() => {
+                self.both(Bus::emergency_stop);
+                self.trip();
+            }
+            19..=20 if self.bus.is_stopped() => {
+                self.both(Bus::clear_emergency_stop);
+                self.trip();
+            }
             22..=26 => self.arm(now, &RUNNING),
             27.. => self.arm(now, &[0, 1, 2, 3, 4]),
             _ => {}
@@ -369,23 +399,53 @@ impl Soak {
         self.alone.drain(self.motors[self.alone.index].slot);
     }
 
+    fn trip(&mut self) {
+        (self.tripped, self.asked_us) = (true, self.now_us);
+    }
+
+    /// Arming is a gesture: after a trip the application mostly waits until it may ask again.
     fn arm(&mut self, now: Instant, which: &[usize]) {
         let handles: Vec<AnyHandle> =
             which.iter().map(|index| self.motors[*index].handle).collect();
         self.look_who_rests();
-        let armed = self.bus.arm_only(&handles, now).is_ok();
-        if armed && which.contains(&self.alone.index) {
+        let has_waited = self.now_us - self.asked_us >= PAUSE_US;
+        if self.tripped && !has_waited && self.random.below(500) > 0 {
+            return;
+        }
+        let armed = self.bus.arm_only(&handles, now);
+        self.asked_us = self.now_us;
+        self.books.too_soon += u64::from(armed == Err(ArmError::NotReleased));
+        if armed.is_err() {
+            assert!(armed != Err(ArmError::NotReleased) || (self.tripped && !has_waited));
+            return;
+        }
+        assert!(!self.tripped || has_waited, "armed too soon after a trip");
+        self.books.armed_after_a_trip += u64::from(self.tripped);
+        self.tripped = false;
+        for index in which {
+            let motor = &mut self.motors[*index];
+            self.books.armed += u64::from(motor.armed.is_none());
+            motor.armed = motor.armed.or(Some(self.now_us));
+        }
+        if which.contains(&self.alone.index) {
             assert_eq!(self.alone.bus.arm(now), Ok(()), "I8: armed among others only");
         }
     }
 
-    /// Who is not armed, or lost, rests.
+    /// Who is not armed, or lost, rests. Who was armed and was not disarmed has tripped.
     fn look_who_rests(&mut self) {
+        let mut trips = false;
         for motor in &mut self.motors {
             let is_lost = self.bus.link(motor.handle) == Some(Link::Offline);
-            if is_lost || !self.bus.is_motor_armed(motor.handle) {
+            let is_armed = self.bus.is_motor_armed(motor.handle);
+            if is_lost || !is_armed {
                 motor.rest();
             }
+            trips |= motor.armed.is_some() && !is_armed;
+            motor.armed = motor.armed.filter(|_| is_armed);
+        }
+        if trips {
+            self.trip();
         }
     }
 
@@ -406,6 +466,8 @@ impl Soak {
 
     /// Time goes on, mostly by a millisecond, sometimes by much more.
     fn update(&mut self) {
+        // What frames and calls tripped has the time of now.
+        self.look_who_rests();
         let bits = self.random.next();
         let before_us = self.now_us;
         self.now_us += match bits & 0xFF {
@@ -425,8 +487,11 @@ impl Soak {
         self.alone.drain(self.motors[self.alone.index].slot);
         let (one, other) = (self.motors[self.alone.index].handle, self.alone.handle);
         assert_eq!(self.bus.state(one), self.alone.bus.state(other), "I8");
-        // The last words stay for one update whose step is unusable.
-        let has_time = !TimeStep::new(dt_s, 0.02).is_hold() && self.now_us > before_us;
+        // The last words stay for one update whose step is unusable, and none where time stands.
+        let moved_on = self.now_us > before_us;
+        let has_time = !TimeStep::new(dt_s, 0.02).is_hold() && moved_on;
+        let is_armed = |motor: &Motor| self.bus.is_motor_armed(motor.handle);
+        assert!(moved_on || !self.motors.iter().any(is_armed), "armed where time stands");
         self.look_who_rests();
         // Each bit is a frame that the driver gives back; or it is full, and the others wait.
         let refuses = if bits >> 48 & 7 == 0 { bits >> 52 } else { 0 };
@@ -483,6 +548,14 @@ impl Soak {
             }
             let owner = owner.unwrap_or_else(|| panic!("a slot of nobody: {frame:?}"));
             let motor = &self.motors[owner];
+            let since_us = motor.armed.map_or(0, |armed| self.now_us - armed);
+            if owner != INTEGRATOR && since_us < OPENING_US {
+                // In units of 1.024 ms.
+                let share = (since_us + 2 * 1_024) as f64 / OPENING_US as f64;
+                let open = share.min(1.0) * f64::from(motor.limit);
+                assert!(f64::from(word).abs() <= open + 1.0, "{since_us} us: {frame:?}");
+                self.books.opening += 1;
+            }
             assert!((-motor.limit..=motor.limit).contains(&word), "{frame:?}");
             assert!(
                 !self.bus.is_stopped() && self.bus.is_motor_armed(motor.handle),
@@ -545,10 +618,13 @@ fn random_frames_and_calls_keep_the_invariants() {
                 let least = if RUNNING.contains(&chosen) { count / 20_000 } else { 0 };
                 assert!(books.nonzero > count / 2_000, "{}: hardly ever ran", books.nonzero);
                 assert!(books.compared >= least, "{}: {chosen} hardly ever ran", books.compared);
-                assert!(books.from_rest > count / 50_000, "{}: hardly ever from rest", books.from_rest);
+                assert!(books.from_rest > count / 150_000, "{}: hardly ever from rest", books.from_rest);
                 assert!(books.taken * 2 > books.offered, "half of the frames are good");
+                assert!(books.armed_after_a_trip > count / 500_000, "{}: hardly ever armed after a trip", books.armed_after_a_trip);
+                assert!(books.too_soon > count / 2_500_000, "{}: hardly ever asked too soon", books.too_soon);
+                assert!(books.opening > count / 20_000, "{}: hardly ever opening", books.opening);
                 format!(
-                    "{} frames: {} taken, {} of others, {} of a wrong length, {} with a bad field; {} sent, {} given back, {} words not zero, {} of them compared, {} first ones after a rest",
+                    "{} frames: {} taken, {} of others, {} of a wrong length, {} with a bad field; {} sent, {} given back, {} words not zero, {} of them compared, {} first ones after a rest, {} while the range opened; {} times armed, {} after a trip, {} times too soon",
                     books.offered,
                     books.taken,
                     books.unrelated,
@@ -558,7 +634,11 @@ fn random_frames_and_calls_keep_the_invariants() {
                     books.given_back,
                     books.nonzero,
                     books.compared,
-                    books.from_rest
+                    books.from_rest,
+                    books.opening,
+                    books.armed,
+                    books.armed_after_a_trip,
+                    books.too_soon
                 )
             })
             .collect();

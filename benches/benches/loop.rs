@@ -9,7 +9,6 @@ use drivetrain::control::{Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Body, Twist};
-use drivetrain::motor::CanDevice;
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use std::hint::black_box;

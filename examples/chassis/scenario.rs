@@ -152,7 +152,7 @@ impl Scenario {
                 (planned.0 + wanted.vx_m_s * tick.dt_s(), planned.1 + wanted.vy_m_s * tick.dt_s());
             let targets = mecanum.inverse(wanted.to_body(heading));
             run.refused_to_arm += u32::from(!drive(&mut robot, wheels, targets, tick));
-            let sample = observe(&world, &robot, (motors, wheels), targets, time_s, planned);
+            let sample = observe(&world, &mut robot, (motors, wheels), targets, time_s, planned);
             if plan.is_settled(time_s) && sample.armed {
                 run.settled_error = run.settled_error.max(share_of_error(&sample));
             }
@@ -200,14 +200,15 @@ pub(crate) fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>
 
 /// Drives all wheels, or none: a wheel that is lost stops the others until all can be armed again.
 ///
-/// This robot arms by itself, which only a simulated one may. Returns whether it is armed.
+/// An operator presses the arming key each 110 ms as long as the robot is not armed. Returns whether it is armed.
 fn drive(
     robot: &mut Robot<'_>,
     wheels: Wheels,
     targets: MecanumWheels<AngularVelocity>,
     tick: Tick,
 ) -> bool {
-    let armed = robot.is_armed() || robot.arm(tick).is_ok();
+    let is_pressed = (tick.now().as_micros() / 1_000).is_multiple_of(110);
+    let armed = robot.is_armed() || (is_pressed && robot.arm(tick).is_ok());
     let targets = if armed { targets } else { MecanumWheels::splat(AngularVelocity::ZERO) };
     _ = robot.device_mut().drive(wheels.zip(targets).into_array());
     robot.tick(tick);
@@ -216,12 +217,13 @@ fn drive(
 
 fn observe(
     world: &World,
-    robot: &Robot<'_>,
+    robot: &mut Robot<'_>,
     (motors, wheels): (MecanumWheels<MotorKey>, Wheels),
     targets: MecanumWheels<AngularVelocity>,
     time_s: f32,
     planned_m: (f32, f32),
 ) -> Sample {
+    let armed = robot.is_armed();
     let bus = robot.device();
     let state = world.chassis();
     Sample {
@@ -232,7 +234,7 @@ fn observe(
         current_a: motors.zip(AHEAD).map(|(motor, ahead)| {
             world.motor(motor).map_or(0.0, |state| ahead * state.current.as_amperes())
         }),
-        armed: robot.is_armed(),
+        armed,
         position_m: state.map_or((0.0, 0.0), |state| (narrow(state.x_m), narrow(state.y_m))),
         planned_m,
         heading_rad: state.map_or(0.0, |state| narrow(state.heading_rad)),

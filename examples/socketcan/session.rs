@@ -10,7 +10,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508,
 };
 use drivetrain::geometry::Twist;
-use drivetrain::motor::{ArmError, CanDevice, Condition, Link, VelocityDrive};
+use drivetrain::motor::{ArmError, Condition, Link, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, ManualClock, Tick};
 use drivetrain::units::AngularVelocity;
@@ -318,7 +318,7 @@ impl<K: Clock> Session<K> {
         motors.chain([why]).collect()
     }
 
-    fn report(&self, unread: u32) -> String {
+    fn report(&mut self, unread: u32) -> String {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         let counts = [
             ("received", s.received),

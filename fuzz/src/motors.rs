@@ -56,8 +56,8 @@ impl Motor {
         match index {
             0 => bus.attach(Config::new(1).speed_loop(speed)).map(Self::M3508),
             1 => {
-                let ramp = Recovery::Ramp(Duration::from_millis(50));
-                bus.attach(Config::new(2).reversed().with_recovery(ramp)).map(Self::M2006)
+                let opening = Duration::from_millis(50);
+                bus.attach(Config::new(2).reversed().with_recovery(Recovery::Resume).with_opening(opening)).map(Self::M2006)
             }
             INTEGRATOR => {
                 let config = Config::new(3).speed_loop(PidConfig::new(0.0, 50.0, 0.0));

@@ -3,7 +3,7 @@
 use crate::Shared;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Timeouts};
+use drivetrain::motor::{Devices, Timeouts};
 use drivetrain::time::{Duration, Instant, Tick};
 
 /// What a motor is asked for, on the wire's scale.
@@ -38,11 +38,14 @@ fn word((bus, motor): &mut (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
     })
 }
 
-/// Feedback is late after 10 s and targets are too old after 100 ms, so that either can be the first.
+/// Feedback is late after 1 s and targets are too old after 100 ms, so that either can be the first.
 #[unsafe(no_mangle)]
 extern "C" fn word_at(times: &[u64; 3]) -> i32 {
-    const LATE: Duration = Duration::from_secs(10);
-    static SETUP: Shared<(Bus, Handle<M3508>)> =
-        Shared::new(armed_with(Timeouts::new().with_late(LATE).with_offline(LATE)));
+    const LATE: Duration = Duration::from_secs(1);
+    const TIMEOUTS: Timeouts = match Timeouts::new().with_feedback(LATE, LATE) {
+        Ok(timeouts) => timeouts,
+        Err(_) => panic!("refused"),
+    };
+    static SETUP: Shared<(Bus, Handle<M3508>)> = Shared::new(armed_with(TIMEOUTS));
     word(SETUP.get(), times)
 }

@@ -5,7 +5,7 @@ use drivetrain::dji::{
     Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, TargetError};
+use drivetrain::motor::{Devices, TargetError};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Current, Voltage};
 

@@ -6,7 +6,7 @@ use super::slot::Slot;
 use super::{AnyHandle, CommandFrame, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Journal, Link, MotorName, Timeouts};
+use crate::motor::{Gesture, Ingest, Journal, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
@@ -34,21 +34,27 @@ pub(super) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_U
 /// ```
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::CanDevice;
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::Current;
 ///
 /// let mut bus = Bus::new();
 /// let wheel = bus.attach(Config::<M3508>::new(1))?;
-///
-/// let now = Instant::from_micros(1_000);
 /// let rest = CanFrame::standard(0x201, [0x0E, 0x16, 0, 0, 0xFF, 0xFD, 0x21, 0]).ok_or("not an 11-bit id")?;
-/// bus.ingest(&rest, now);
-/// bus.arm(now)?;
 ///
-/// bus.set_current(wheel, Current::from_amperes(1.0))?;
-/// bus.update(Tick::new(now, 0.001));
-/// let frame = bus.next_frame().ok_or("nothing to send")?;
+/// let mut sent = None;
+/// for millis in 1..=50 {
+///     let now = Instant::from_micros(1_000 * millis);
+///     bus.ingest(&rest, now);
+///     if millis == 1 {
+///         bus.arm(now)?; // the output range opens from here, in 0.2 s
+///     }
+///     bus.set_current(wheel, Current::from_amperes(1.0))?;
+///     bus.update(Tick::new(now, 0.001));
+///     while let Some(frame) = bus.next_frame() {
+///         sent = Some(frame); // to the driver
+///     }
+/// }
+/// let frame = sent.ok_or("nothing to send")?;
 /// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -64,6 +70,9 @@ pub struct Bus<B = ()> {
     pub(super) budget: Budget,
     /// The time of the last update; before the first one, that of the last frame of a motor.
     pub(super) updated: Instant,
+    /// The time of the last arming: no update lies before it.
+    pub(super) armed_at: Instant,
+    pub(super) gesture: Gesture,
     /// Until then no age exceeds its limit and no frame is due, unless something [disturbs](Self::disturb) that.
     pub(super) quiet_until: Instant,
     /// The last usable time step as it was given, and as the loops take it.
@@ -84,7 +93,7 @@ pub struct Bus<B = ()> {
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3720);
+const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3744);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -150,6 +159,8 @@ impl<B> Bus<B> {
             timeouts: Timeouts::new(),
             budget: Budget::new(),
             updated: Instant::START,
+            armed_at: Instant::START,
+            gesture: Gesture::NEW,
             quiet_until: Instant::START,
             dt_s: 0.001,
             step: TimeStep::new(0.001, LONGEST_STEP_S),
@@ -215,14 +226,15 @@ impl<B> Bus<B> {
 
     /// Runs every loop once and encodes the commands.
     ///
-    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that does not move on, change nothing and leave the
-    /// last commands for one update, but for motors that were relaxed; a second one in a row, or one that comes late, sends
-    /// zeros. Above 20 ms integrals and derivatives rest for the step.
+    /// An update that does not lie after the one before, or before the arming, sends zeros and relaxes every motor until it is
+    /// armed again. A `dt_s` of zero, below zero, infinite or NaN changes nothing and leaves the last commands for one update,
+    /// but for motors that were relaxed; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and
+    /// derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let before = core::mem::replace(&mut self.updated, tick.now());
         self.now = tick.now().stamp();
         if !self.takes_step(tick.dt_s()) || !self.takes_time(before) {
-            return self.hold(before);
+            return self.update_without_step(before);
         }
         self.check_one_slot();
         let step = self.step;
@@ -334,6 +346,23 @@ impl<B> Bus<B> {
     pub(super) const fn disturb(&mut self) {
         self.quiet_until = Instant::START;
         self.is_disturbed = true;
+    }
+
+    /// Changes a slot, and notes what follows: edges, and the pause after a trip.
+    pub(super) fn change<T>(
+        &mut self,
+        motor: u8,
+        now: Instant,
+        change: impl FnOnce(&mut Slot) -> T,
+    ) -> Option<T> {
+        let slot = self.slots.get_mut(usize::from(motor))?;
+        let (conditions, was_armed) = (slot.conditions, slot.is_armed());
+        let outcome = change(slot);
+        self.journal.note(motor, &conditions, &slot.conditions, now);
+        if was_armed && !slot.is_armed() {
+            self.gesture.trip(now);
+        }
+        Some(outcome)
     }
 
     pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {

@@ -1,7 +1,8 @@
 use super::{CurrentControlled, Facts, Gm6020Voltage, Model, VoltageControlled};
 use crate::control::PidConfig;
 use crate::encoder::GearRatio;
-use crate::motor::{HealthConfig, Recovery};
+use crate::motor::{HealthConfig, OPENING, Recovery};
+use crate::time::Duration;
 use crate::units::{Current, Voltage};
 use core::marker::PhantomData;
 
@@ -41,6 +42,7 @@ pub(super) struct PlainConfig {
     pub(super) speed: Option<PidConfig>,
     pub(super) position: Option<PidConfig>,
     pub(super) recovery: Recovery,
+    pub(super) opening: Duration,
     pub(super) health: &'static HealthConfig,
 }
 
@@ -66,6 +68,7 @@ impl<M: Model> Config<M> {
                 speed: None,
                 position: None,
                 recovery: Recovery::Rearm,
+                opening: OPENING,
                 health: &USUAL,
             },
             model: PhantomData,
@@ -122,6 +125,16 @@ impl<M: Model> Config<M> {
     #[must_use]
     pub const fn with_recovery(mut self, recovery: Recovery) -> Self {
         self.plain.recovery = recovery;
+        self
+    }
+
+    /// Sets the time in which the output range opens after arming and after a recovery, from zero to the whole: 0.2 s at first,
+    /// at most 65 s. Less than 1 ms opens it at once.
+    ///
+    /// A position loop asks for no more than that share of its velocity meanwhile, so it starts from where the shaft is.
+    #[must_use]
+    pub const fn with_opening(mut self, time: Duration) -> Self {
+        self.plain.opening = time;
         self
     }
 

@@ -4,7 +4,9 @@ use super::bus::LONGEST_PAUSE;
 use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Claim, Edge, Ingest, Link, Missing, MotorName, Role};
+use crate::motor::{
+    ArmError, CanDevice, Claim, Devices, Edge, Ingest, Link, Missing, MotorName, Role, Visitor,
+};
 use crate::time::{Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::StandardId;
@@ -18,7 +20,7 @@ impl<B> CanDevice for Bus<B> {
         Self::update(self, tick);
     }
 
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         Self::next_frame(self)
     }
 
@@ -62,56 +64,107 @@ impl<B> CanDevice for Bus<B> {
         Self::next_edge(self)
     }
 
+    fn ask(&mut self, now: Instant) -> bool {
+        self.gesture.ask(now)
+    }
+
     fn engage(&mut self, now: Instant) {
-        if !self.stopped && !self.is_far(now) {
-            self.now = now.stamp();
-            self.disturb();
-            for motor in 0..self.used {
-                self.engage_slot(motor, now);
-            }
+        if !self.stopped && !self.is_far(now) && self.gesture.take() {
+            self.engage_all(0..self.used, now);
         }
     }
 
     fn disarm(&mut self) {
+        Self::disarm(self);
+    }
+
+    fn trip(&mut self) {
+        Self::disarm(self);
+        self.gesture.trip(self.updated);
+    }
+
+    fn is_armed(&self) -> bool {
+        Self::is_armed(self)
+    }
+
+    fn emergency_stop(&mut self) {
+        Self::emergency_stop(self);
+    }
+
+    fn clear_emergency_stop(&mut self) {
+        Self::clear_emergency_stop(self);
+    }
+
+    fn is_stopped(&self) -> bool {
+        Self::is_stopped(self)
+    }
+}
+
+impl<B> Devices for Bus<B> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+}
+
+/// Arming and stopping, as of [`Devices`].
+impl<B> Bus<B> {
+    /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms.
+    ///
+    /// # Errors
+    /// As [`Devices::arm`].
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
+    pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        Devices::arm(self, now)
+    }
+
+    /// Relaxes every motor and refuses targets until armed again.
+    pub fn disarm(&mut self) {
         self.slots.iter_mut().for_each(Slot::disarm);
         self.outbox.clear();
     }
 
-    fn is_armed(&self) -> bool {
+    /// Tells whether every motor takes targets: false as long as one of them waits to be armed.
+    #[must_use]
+    pub fn is_armed(&self) -> bool {
         let mut attached = self.slots.iter().filter(|slot| slot.facts().is_some()).peekable();
         attached.peek().is_some() && attached.all(Slot::is_armed)
     }
 
-    fn emergency_stop(&mut self) {
+    /// Relaxes every motor at once, until the stop is cleared and the bus armed.
+    pub fn emergency_stop(&mut self) {
         if !self.stopped {
-            self.disarm();
+            CanDevice::trip(self);
             self.stopped = true;
         }
     }
 
-    fn clear_emergency_stop(&mut self) {
-        self.stopped = false;
+    /// Clears the emergency stop. The bus stays disarmed, and arming needs a new request.
+    pub const fn clear_emergency_stop(&mut self) {
+        if self.stopped {
+            self.gesture.trip(self.updated);
+            self.stopped = false;
+        }
     }
 
-    fn is_stopped(&self) -> bool {
+    /// Tells whether the emergency stop is set.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
         self.stopped
     }
-}
 
-impl<B> Bus<B> {
     /// Arms these motors only, whatever the others do.
     ///
     /// It knows this bus alone: where it is a part of a device of several families, look at
-    /// [`clash`](CanDevice::clash) of the whole first.
+    /// [`clash`](Devices::clash) of the whole first.
     ///
     /// # Errors
-    /// As [`CanDevice::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
+    /// As [`Devices::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
     ///
     /// # Examples
     /// ```
     /// use drivetrain::dji::{Bus, Config, M3508};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::CanDevice;
     /// use drivetrain::time::Instant;
     ///
     /// let mut bus = Bus::new();
@@ -125,6 +178,7 @@ impl<B> Bus<B> {
     /// ```
     #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
+        let granted = self.gesture.ask(now);
         if self.stopped {
             return Err(ArmError::Stopped);
         }
@@ -143,11 +197,13 @@ impl<B> Bus<B> {
         if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
             return Err(ArmError::Faulty(faulty));
         }
-        self.now = now.stamp();
-        self.disturb();
+        if !(granted && self.gesture.take()) {
+            return Err(ArmError::NotReleased);
+        }
         for motor in motors {
             if self.slot(*motor).is_some() {
-                self.engage_slot(motor.key().place(), now);
+                let place = motor.key().place();
+                self.engage_all(place..place + 1, now);
             }
         }
         Ok(())
@@ -163,11 +219,14 @@ impl<B> Bus<B> {
         now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE
     }
 
-    fn engage_slot(&mut self, motor: u8, now: Instant) {
-        let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
-        let before = slot.conditions;
-        slot.engage(now.stamp(), &self.timeouts);
-        self.journal.note(motor, &before, &slot.conditions, now);
+    fn engage_all(&mut self, motors: core::ops::Range<u8>, now: Instant) {
+        self.now = now.stamp();
+        self.armed_at = now;
+        self.disturb();
+        let timeouts = self.timeouts;
+        for motor in motors {
+            self.change(motor, now, |slot| slot.engage(now.stamp(), &timeouts));
+        }
     }
 
     /// Returns the measured velocity of a motor that is online.

@@ -79,7 +79,6 @@ impl<B> Bus<B> {
     /// # Examples
     /// ```
     /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::motor::CanDevice;
     /// use drivetrain::time::Instant;
     ///
     /// let mut bus = Bus::new();
@@ -161,7 +160,6 @@ impl<B> Bus<B> {
 
     #[inline(never)]
     fn check_closely(&mut self, motor: u8, word: i16) {
-        let Some(slot) = self.slots.get_mut(usize::from(motor)) else { return };
         let look = Look {
             now: self.now,
             elapsed: self.rounds.elapsed,
@@ -170,9 +168,7 @@ impl<B> Bus<B> {
             feedback_hz: self.budget.feedback_hz,
             is_alone: self.now.wrapping_sub(self.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
         };
-        let before = slot.conditions;
-        slot.check(&look);
-        self.journal.note(motor, &before, &slot.conditions, self.updated);
+        self.change(motor, self.updated, |slot| slot.check(&look));
     }
 
     /// Takes a frame of another node that may be one of our commands.
@@ -182,12 +178,12 @@ impl<B> Bus<B> {
             return;
         }
         self.rounds.rival_heard = now.stamp();
-        for (motor, slot) in (0..).zip(&mut self.slots) {
-            if slot.facts().is_some() && slot.place.frame() == frame {
-                let before = slot.conditions;
-                slot.hear_rival();
-                self.journal.note(motor, &before, &slot.conditions, now);
-            }
+        for motor in 0..self.used {
+            self.change(motor, now, |slot| {
+                if slot.facts().is_some() && slot.place.frame() == frame {
+                    slot.hear_rival();
+                }
+            });
         }
     }
 

@@ -27,12 +27,12 @@ impl<B> Bus<B> {
     /// use drivetrain::chassis::{PowerModel, WheelLoad};
     /// use drivetrain::dji::{Bus, Config, M3508};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::CanDevice;
-    /// use drivetrain::time::{Instant, Tick};
+    /// use drivetrain::time::{Duration, Instant, Tick};
     /// use drivetrain::units::Current;
     ///
     /// let mut bus = Bus::new();
-    /// let wheels = bus.attach_all([1, 2].map(Config::<M3508>::new))?;
+    /// let at_once = |id| Config::<M3508>::new(id).with_opening(Duration::ZERO); // for one update
+    /// let wheels = bus.attach_all([1, 2].map(at_once))?;
     /// let now = Instant::from_micros(1_000);
     /// for id in [0x201, 0x202] {
     ///     let at_100_rpm = [0, 0, 0x07, 0x80, 0, 0, 30, 0]; // 1920 rpm of the rotor, behind 19.2 to 1

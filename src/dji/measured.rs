@@ -30,14 +30,15 @@ impl<B> Bus<B> {
     /// use drivetrain::control::PidConfig;
     /// use drivetrain::dji::{Bus, Config, Gm6020Voltage};
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::{CanDevice, Measured, TargetError};
-    /// use drivetrain::time::{Instant, Tick};
+    /// use drivetrain::motor::{Measured, TargetError};
+    /// use drivetrain::time::{Duration, Instant, Tick};
     /// use drivetrain::units::{Angle, AngularVelocity};
     ///
     /// let angle = PidConfig::new(10.0, 0.0, 0.0); // rad/s per rad
     /// let rate = PidConfig::new(2.0, 0.0, 0.0); // V per rad/s
     /// let mut bus = Bus::new();
-    /// let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(angle, rate))?;
+    /// let config = Config::<Gm6020Voltage>::new(1).position_loop(angle, rate);
+    /// let yaw = bus.attach(config.with_opening(Duration::ZERO))?; // for one update
     /// let now = Instant::from_micros(1_000);
     /// bus.ingest(&CanFrame::standard(0x205, [0; 8]).ok_or("not an 11-bit id")?, now);
     /// bus.arm(now)?;

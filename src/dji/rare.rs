@@ -2,7 +2,7 @@
 
 use super::Feedback;
 use super::bus::{Bus, FIRST_FEEDBACK_ID, LONGEST_PAUSE};
-use super::slot::Ages;
+use super::slot::{Ages, Slot};
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, Malformed};
 use crate::time::{Duration, Instant};
@@ -35,15 +35,16 @@ impl<B> Bus<B> {
             let before = core::mem::replace(&mut self.updated, now);
             self.forget_bygones(before);
         }
-        let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
-        let before = slot.conditions;
-        let in_time = slot.receive(feedback, now.stamp());
-        if !in_time {
-            slot.receive_after_gap(facts, feedback, now.stamp(), &self.timeouts, self.running);
-        }
-        slot.hear_error(facts, feedback.error());
-        self.journal.note(motor, &before, &slot.conditions, now);
-        if !in_time {
+        let (timeouts, running) = (self.timeouts, self.running);
+        let in_time = self.change(motor, now, |slot| {
+            let in_time = slot.receive(feedback, now.stamp());
+            if !in_time {
+                slot.receive_after_gap(facts, feedback, now.stamp(), &timeouts, running);
+            }
+            slot.hear_error(facts, feedback.error());
+            in_time
+        });
+        if in_time == Some(false) {
             self.disturb();
         }
         Ingest::Taken
@@ -54,7 +55,7 @@ impl<B> Bus<B> {
     #[cold]
     #[inline(never)]
     pub(super) fn look_around(&mut self, before: Instant) -> bool {
-        if self.running && self.updated <= before {
+        if !self.moves_on(before) {
             return false;
         }
         if self.updated > before + LONGEST_PAUSE {
@@ -88,10 +89,9 @@ impl<B> Bus<B> {
     fn see_to_motors(&mut self) {
         let (now, timeouts) = (self.now, self.timeouts);
         self.is_disturbed = false;
-        for (motor, slot) in (0..self.used).zip(&mut self.slots) {
-            let before = slot.conditions;
-            self.is_disturbed |= !slot.see_to(now, &timeouts);
-            self.journal.note(motor, &before, &slot.conditions, self.updated);
+        for motor in 0..self.used {
+            let is_settled = self.change(motor, self.updated, |slot| slot.see_to(now, &timeouts));
+            self.is_disturbed |= is_settled == Some(false);
         }
     }
 
@@ -102,22 +102,35 @@ impl<B> Bus<B> {
     fn forget_bygones(&mut self, before: Instant) {
         let now = self.updated;
         let is_pause = now > before + LONGEST_PAUSE;
-        for (motor, slot) in (0..).zip(&mut self.slots) {
-            let before = slot.conditions;
-            slot.forget_bygones(now.stamp(), is_pause);
-            self.journal.note(motor, &before, &slot.conditions, now);
+        for motor in 0..self.used {
+            self.change(motor, now, |slot| slot.forget_bygones(now.stamp(), is_pause));
         }
     }
 
-    /// Ends an update whose time is not usable: the last commands stay once, then zeros. What asks for nothing gets zero at
-    /// once.
+    /// Tells whether the present update lies after the one before, and not before the arming.
+    fn moves_on(&self, before: Instant) -> bool {
+        (!self.running || before < self.updated) && self.armed_at <= self.updated
+    }
+
+    /// Ends an update whose time or time step is not usable.
     #[cold]
     #[inline(never)]
-    pub(super) fn hold(&mut self, before: Instant) {
+    pub(super) fn update_without_step(&mut self, before: Instant) {
+        let moves_on = self.moves_on(before);
         self.forget_bygones(before);
         self.running = true;
         self.disturb();
         self.rejects.bad_steps = self.rejects.bad_steps.saturating_add(1);
+        if moves_on {
+            self.hold(before);
+        } else {
+            self.lose_time();
+        }
+        self.outbox.finish_update();
+    }
+
+    /// Leaves the last commands once, then sends zeros. What asks for nothing gets zero at once.
+    fn hold(&mut self, before: Instant) {
         self.held_steps = self.held_steps.saturating_add(1);
         let late = self.updated.since(before) > self.timeouts.late();
         if self.held_steps >= 2 || late {
@@ -127,6 +140,15 @@ impl<B> Bus<B> {
             self.outbox.put(slot.place, 0);
         }
         self.outbox.keep_alive(self.now);
-        self.outbox.finish_update();
+    }
+
+    /// Sends zeros, and relaxes every motor until it is armed again: where time did not move on, no age is known.
+    fn lose_time(&mut self) {
+        for motor in 0..self.used {
+            self.change(motor, self.updated, Slot::lose_time);
+        }
+        // No target is left that an update before the arming could make younger.
+        self.armed_at = self.updated;
+        self.outbox.clear();
     }
 }

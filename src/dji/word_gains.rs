@@ -102,7 +102,6 @@ mod tests {
     use crate::dji::{Bus, Gm6020Current, Gm6020Voltage, M2006, M3508};
     use crate::encoder::GearRatio;
     use crate::frame::CanFrame;
-    use crate::motor::CanDevice;
     use crate::time::{Instant, Tick};
     use crate::units::{AngularVelocity, Voltage};
     use embedded_can::Frame;

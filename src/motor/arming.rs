@@ -14,14 +14,18 @@ impl Missing {
 
     /// Collects names; `None` when there are none.
     pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
-        let mut missing = Self { names: [None; Self::CAPACITY], total: 0 };
-        for name in names {
-            if let Some(place) = missing.names.get_mut(usize::from(missing.total)) {
-                *place = Some(name);
-            }
-            missing.total = missing.total.saturating_add(1);
-        }
+        let mut missing = Self::NONE;
+        names.for_each(|name| missing.add(name));
         (missing.total > 0).then_some(missing)
+    }
+
+    pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0 };
+
+    pub(super) fn add(&mut self, name: MotorName) {
+        if let Some(place) = self.names.get_mut(usize::from(self.total)) {
+            *place = Some(name);
+        }
+        self.total = self.total.saturating_add(1);
     }
 
     /// Iterates over the names that were kept.
@@ -67,6 +71,9 @@ pub enum ArmError {
     NoMotors,
     /// The driver takes no frames.
     BusDown,
+    /// A motor was relaxed since it was armed, and the last request to arm, or that moment, lies less than 100 ms back. A
+    /// request that is repeated in each tick is one request: it is never granted.
+    NotReleased,
 }
 
 impl core::fmt::Display for ArmError {
@@ -79,6 +86,9 @@ impl core::fmt::Display for ArmError {
             Self::Stopped => f.write_str("the emergency stop is set"),
             Self::NoMotors => f.write_str("no motor is attached"),
             Self::BusDown => f.write_str("the CAN driver takes no frames"),
+            Self::NotReleased => f.write_str(
+                "a motor was relaxed since it was armed: release the request to arm for 100 ms, then arm again",
+            ),
         }
     }
 }

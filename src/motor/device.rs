@@ -1,85 +1,58 @@
-use super::{ArmError, Claim, Edge, Missing, MotorName};
+use super::{Claim, Edge, MotorName};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
-/// The seam between a device family and whatever moves its frames: a runner, an async task, a test.
+/// A device family on a CAN bus: the seam between its motors and whatever moves their frames.
 ///
-/// The caller pushes received frames in and *pulls* frames to send out; a device never does I/O. In each cycle:
+/// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type that implements this trait
+/// implements that one by a line, `visitor.visit(self)`.
 ///
-/// 1. `ingest` every received frame, with the time of its arrival;
-/// 2. `update` once: all loops run, all commands are encoded;
-/// 3. `next_frame` until it returns `None`, sending each; give a frame that was not sent, or was sent and
-///    evicted again, back to `requeue`. It is offered again after the next update, with the newest values.
+/// No method has a body here. A device that forgets one does not compile:
+/// ```compile_fail,E0046
+/// use drivetrain::{frame::CanFrame, motor::*, time::*};
 ///
-/// Devices are combined statically: a tuple or array of devices and `&mut D` are devices.
-///
-/// # Examples
-/// A struct of two buses forwards to the tuple of both:
-/// ```
-/// use drivetrain::{dji, frame::CanFrame, motor::*, time::*};
-///
-/// struct Robot { chassis: dji::Bus, gimbal: dji::Bus }
-///
-/// impl CanDevice for Robot {
-///     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-///         (&mut self.chassis, &mut self.gimbal).ingest(frame, now)
-///     }
-///     fn update(&mut self, tick: Tick) { (&mut self.chassis, &mut self.gimbal).update(tick) }
-///     fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
-///         (&mut self.chassis, &mut self.gimbal).next_frame(turn)
-///     }
-///     fn requeue(&mut self, frame: &CanFrame) -> bool {
-///         (&mut self.chassis, &mut self.gimbal).requeue(frame)
-///     }
-///     fn superseded(&self) -> u32 { self.chassis.superseded().wrapping_add(self.gimbal.superseded()) }
-///     fn claims(&self) -> impl Iterator<Item = Claim> { self.chassis.claims().chain(self.gimbal.claims()) }
-///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-///         self.chassis.missing(now).chain(self.gimbal.missing(now))
-///     }
-///     fn faulty(&self) -> impl Iterator<Item = MotorName> { self.chassis.faulty().chain(self.gimbal.faulty()) }
-///     fn second_master(&self) -> Option<Claim> { self.chassis.second_master().or_else(|| self.gimbal.second_master()) }
-///     fn next_edge(&mut self) -> Option<Edge> { (&mut self.chassis, &mut self.gimbal).next_edge() }
-///     fn engage(&mut self, now: Instant) { (&mut self.chassis, &mut self.gimbal).engage(now) }
-///     fn disarm(&mut self) { (&mut self.chassis, &mut self.gimbal).disarm() }
-///     fn is_armed(&self) -> bool { self.chassis.is_armed() && self.gimbal.is_armed() }
-///     fn emergency_stop(&mut self) { (&mut self.chassis, &mut self.gimbal).emergency_stop() }
-///     fn clear_emergency_stop(&mut self) { (&mut self.chassis, &mut self.gimbal).clear_emergency_stop() }
-///     fn is_stopped(&self) -> bool { self.chassis.is_stopped() || self.gimbal.is_stopped() }
+/// struct Careless;
+/// impl CanDevice for Careless {
+///     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest { Ingest::Unrelated }
+///     fn update(&mut self, tick: Tick) {}
+///     fn next_frame(&mut self) -> Option<CanFrame> { None }
+///     fn requeue(&mut self, frame: &CanFrame) -> bool { false }
+///     fn superseded(&self) -> u32 { 0 }
+///     fn claims(&self) -> impl Iterator<Item = Claim> { core::iter::empty() }
+///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> { core::iter::empty() }
+///     // fn faulty(&self) -> impl Iterator<Item = MotorName>
+///     fn second_master(&self) -> Option<Claim> { None }
+///     fn next_edge(&mut self) -> Option<Edge> { None }
+///     fn ask(&mut self, now: Instant) -> bool { true }
+///     fn engage(&mut self, now: Instant) {}
+///     fn disarm(&mut self) {}
+///     fn trip(&mut self) {}
+///     fn is_armed(&self) -> bool { false }
+///     fn emergency_stop(&mut self) {}
+///     fn clear_emergency_stop(&mut self) {}
+///     fn is_stopped(&self) -> bool { false }
 /// }
-/// let robot = Robot { chassis: dji::Bus::new(), gimbal: dji::Bus::new() };
-/// assert!(!robot.is_armed());
 /// ```
 pub trait CanDevice {
     /// Takes a received frame that arrived at `now`. Constant time, no I/O, no control.
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest;
 
-    /// Takes a received frame of any driver's own type. One of more than 8 bytes is nobody's here.
-    fn ingest_any(&mut self, frame: &impl embedded_can::Frame, now: Instant) -> Ingest
-    where
-        Self: Sized,
-    {
-        CanFrame::copy_of(frame).map_or(Ingest::Unrelated, |frame| self.ingest(&frame, now))
-    }
-
     /// Runs every control loop once and encodes the commands.
+    ///
+    /// An update that does not lie after the one before sends zeros in that cycle, and relaxes every motor until it is armed
+    /// again.
     fn update(&mut self, tick: Tick);
 
     /// Returns a frame that waits to be sent, and takes it off the list.
-    ///
-    /// `turn` is any number that grows by one a cycle: a combined device starts with another part each time, so
-    /// that none starves on a full bus.
-    fn next_frame(&mut self, turn: u32) -> Option<CanFrame>;
+    fn next_frame(&mut self) -> Option<CanFrame>;
 
     /// Takes back a frame that was not sent, or was evicted; `false` when it is not this device's.
     ///
-    /// It is not offered again before the next update, and then with the newest values.
+    /// The frame is not offered again before the next update, and then with the newest values.
     fn requeue(&mut self, frame: &CanFrame) -> bool;
 
-    /// Returns how many frames were replaced by newer ones before they were taken, wrapping; 0 for a device that does
-    /// not count.
-    fn superseded(&self) -> u32 {
-        0
-    }
+    /// Returns how many frames were replaced by newer ones before they were taken, wrapping.
+    fn superseded(&self) -> u32;
 
     /// Lists the CAN ids that this device sends and expects.
     fn claims(&self) -> impl Iterator<Item = Claim>;
@@ -87,84 +60,44 @@ pub trait CanDevice {
     /// Lists the motors without fresh feedback at `now`.
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
-    /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say. None unless said
-    /// otherwise: a struct of devices has to forward it, and [`second_master`](Self::second_master), or it is armed in spite
-    /// of them.
-    fn faulty(&self) -> impl Iterator<Item = MotorName> {
-        core::iter::empty()
-    }
+    /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say.
+    fn faulty(&self) -> impl Iterator<Item = MotorName>;
 
-    /// Returns a command of this device that another node has sent within the last second; `None` for a device that does
-    /// not look for it.
-    fn second_master(&self) -> Option<Claim> {
-        None
-    }
+    /// Returns a command of this device that another node has sent within the last second.
+    fn second_master(&self) -> Option<Claim>;
 
-    /// Returns the oldest change of a motor's condition that was not read yet; of a combined device, that of its first part
-    /// with one. None for a device that notes none.
+    /// Returns the oldest change of a motor's condition that was not read yet.
     ///
     /// Changes wait until they are read, so it can be called as often or as seldom as is convenient.
-    fn next_edge(&mut self) -> Option<Edge> {
-        None
-    }
+    fn next_edge(&mut self) -> Option<Edge>;
 
-    /// Lets targets through from now on, for the motors that are heard; one that takes them already goes on
-    /// undisturbed. Called by [`arm`](Self::arm) when all of its conditions hold; without effect while the emergency
-    /// stop is set.
+    /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
+    /// 100 ms back.
+    fn ask(&mut self, now: Instant) -> bool;
+
+    /// Lets targets through from now on, for the motors that are heard; a motor that takes them already goes on
+    /// undisturbed. Called by [`arm`](super::Devices::arm) when all of its conditions hold; without effect while the emergency
+    /// stop is set, and, after a trip, unless the last request [counted](Self::ask).
     fn engage(&mut self, now: Instant);
 
     /// Relaxes every motor and refuses targets until armed again.
     fn disarm(&mut self);
 
+    /// Disarms because of a fault around the motors, such as a bus that is down: arming again needs a new request.
+    fn trip(&mut self);
+
     /// Tells whether every motor takes targets: false as long as one of them waits to be armed, at the start and after
     /// a fault that relaxed it.
     fn is_armed(&self) -> bool;
 
-    /// Relaxes every motor at once; the runner repeats it in each tick while the stop is set. From the next frame on, all commands are zero until it is cleared and armed.
+    /// Trips every motor at once. From the next frame on, all commands are zero until the stop is cleared and the device armed.
     fn emergency_stop(&mut self);
 
-    /// Clears the emergency stop. The device stays disarmed.
+    /// Clears the emergency stop. The device stays disarmed, and arming needs a new request.
     fn clear_emergency_stop(&mut self);
 
     /// Tells whether the emergency stop is set.
     fn is_stopped(&self) -> bool;
-
-    /// Arms the device: nothing moves before.
-    ///
-    /// # Errors
-    /// Names what stands in the way: motors without feedback, a CAN id with two owners or
-    /// two senders, a fault, a set emergency stop.
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
-    fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        if self.is_stopped() {
-            return Err(ArmError::Stopped);
-        }
-        if self.claims().next().is_none() {
-            return Err(ArmError::NoMotors);
-        }
-        if let Some((one, other)) = self.clash() {
-            return Err(ArmError::Clash(one, other));
-        }
-        if let Some(missing) = Missing::collect(self.missing(now)) {
-            return Err(ArmError::Missing(missing));
-        }
-        if let Some(claim) = self.second_master() {
-            return Err(ArmError::SecondMaster(claim));
-        }
-        if let Some(faulty) = Missing::collect(self.faulty()) {
-            return Err(ArmError::Faulty(faulty));
-        }
-        self.engage(now);
-        Ok(())
-    }
-
-    /// Returns two motors that use one CAN id, if any: on a bus with several families, say.
-    fn clash(&self) -> Option<(Claim, Claim)> {
-        self.claims().enumerate().find_map(|(index, claim)| {
-            let other = self.claims().skip(index + 1).find(|other| other.clashes_with(&claim))?;
-            Some((claim, other))
-        })
-    }
 }
 
 /// What a device did with a received frame.

@@ -1,13 +1,20 @@
-use super::{
-    Condition, Conditions, Edge, Health, Journal, Latch, Link, MotorName, TargetError, Timeouts,
-};
+use super::gesture::Gesture;
+use super::opening::{OPENING, Opening};
+use super::progress::Progress;
+use super::{Condition, Journal, Latch, Link, TargetError, Timeouts};
 use crate::time::{Duration, Instant};
+
+mod edges;
 
 /// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
 ///
-/// It keeps the rules that all motors here have in common, so that an own motor has them too: nothing before it is
-/// armed; feedback that is late or lost, a target that is old, NaN or infinite, and time that stands or goes back give
-/// zero; an emergency stop stays until it is cleared and armed. Times do not wrap.
+/// The rules of all motors of this crate, for one motor of your own:
+///
+/// * Nothing moves before the motor is armed. After a trip, arming needs a request that nobody made for 100 ms before.
+/// * Late or lost feedback, and a target that is old, NaN or infinite, give zero.
+/// * An update that does not lie after the one before gives zero in that cycle, and trips.
+/// * The output range [opens](Self::share) from zero after arming.
+/// * An emergency stop stays until it is cleared, and the motor armed.
 ///
 /// ```text
 /// feedback ──> hear(now)          target ──> admit(is_finite)?
@@ -32,8 +39,9 @@ use crate::time::{Duration, Instant};
 pub struct Guard {
     timeouts: Timeouts,
     now: Instant,
-    /// How often in a row the time of a tick was that of the one before.
-    stands: u8,
+    progress: Progress,
+    gesture: Gesture,
+    opening: Opening,
     heard: Option<Instant>,
     commanded: Option<Instant>,
     link: Link,
@@ -56,7 +64,9 @@ impl Guard {
         Self {
             timeouts: Timeouts::new(),
             now: Instant::START,
-            stands: 0,
+            progress: Progress::NEW,
+            gesture: Gesture::NEW,
+            opening: Opening::new(OPENING),
             heard: None,
             commanded: None,
             link: Link::Unheard,
@@ -83,6 +93,12 @@ impl Guard {
     #[must_use]
     pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
         Self { timeouts, ..self }
+    }
+
+    /// Sets the time in which the output range opens after arming, from zero to the whole; 0.2 s at first.
+    #[must_use]
+    pub const fn with_opening(self, time: Duration) -> Self {
+        Self { opening: Opening::new(time), ..self }
     }
 
     /// Notes valid feedback that arrived at `now`.
@@ -135,17 +151,11 @@ impl Guard {
     /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
     #[must_use]
     pub fn drives(&mut self, now: Instant) -> bool {
-        if now < self.now {
-            // Ages cannot be told any more.
-            self.reversals = self.reversals.saturating_add(1);
-            self.heard = self.heard.map(|heard| heard.min(now));
-            if self.commanded.is_some() {
-                self.note(Condition::CommandLost, true, now);
-            }
-            self.lose();
+        if self.progress.advance(now) {
+            self.note(Condition::ClockFault, false, now);
+        } else {
+            self.lose_time(now);
         }
-        // Ages stand as well then; one repetition is that of a tick in which it was armed.
-        self.stands = if now == self.now { self.stands.saturating_add(1) } else { 0 };
         self.now = now;
         self.age(now);
         if let Some(commanded) = self.commanded {
@@ -155,7 +165,29 @@ impl Guard {
                 self.note(Condition::CommandLost, true, now);
             }
         }
-        self.is_armed() && self.link == Link::Online && self.has_target() && self.stands < 2
+        self.is_armed() && self.link == Link::Online && self.has_target()
+    }
+
+    /// Returns the share of the output range that is open, 0 to 1: it rises from zero after arming.
+    pub fn share(&mut self) -> f32 {
+        self.opening.share(self.now)
+    }
+
+    /// Time did not move on, so that no age is known: feedback counts as late until the next one, and the motor trips.
+    pub(crate) fn lose_time(&mut self, now: Instant) {
+        self.note(Condition::ClockFault, true, now);
+        self.reversals = self.reversals.saturating_add(1);
+        self.heard = self.heard.map(|heard| heard.min(now));
+        self.now = now;
+        if self.listens && self.link == Link::Online {
+            self.set_late(now);
+        }
+        self.relax_until_armed();
+    }
+
+    fn set_late(&mut self, now: Instant) {
+        self.link = Link::Late;
+        self.note(Condition::Late, true, now);
     }
 
     fn age(&mut self, now: Instant) {
@@ -165,11 +197,10 @@ impl Guard {
         let Some(heard) = self.heard else { return };
         let age = now.since(heard);
         let ahead = heard.since(now) > self.timeouts.late();
-        if age > self.timeouts.offline().max(self.timeouts.late()) {
+        if age > self.timeouts.offline() {
             self.lose();
         } else if (ahead || age > self.timeouts.late()) && self.link == Link::Online {
-            self.link = Link::Late;
-            self.note(Condition::Late, true, now);
+            self.set_late(now);
         }
     }
 
@@ -183,84 +214,13 @@ impl Guard {
         self.relax_until_armed();
     }
 
-    /// Takes the target away and refuses others until it is engaged again: a fault.
+    /// Trips: takes the target away and refuses others until the motor is armed again.
     pub const fn relax_until_armed(&mut self) {
+        if self.is_armed() {
+            self.gesture.trip(self.now);
+        }
         self.latched = true;
         self.commanded = None;
-    }
-
-    /// Says whether a condition of the motor holds. A change is an edge, and waits to be read.
-    ///
-    /// Late and lost feedback and old targets are noted by the guard itself.
-    pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
-        self.look(now, |latch| latch.set(condition, holds));
-    }
-
-    /// Lets conditions change.
-    pub(super) fn look<T>(&mut self, now: Instant, look: impl FnOnce(&mut Latch) -> T) -> T {
-        let before = self.latch;
-        let seen = look(&mut self.latch);
-        self.journal.note(0, &before, &self.latch, now);
-        seen
-    }
-
-    /// Returns what is wrong with the motor.
-    #[must_use]
-    pub const fn conditions(&self) -> Conditions {
-        self.latch.active()
-    }
-
-    /// Returns the oldest change of a condition that was not read yet; the guard does not know its motor's name.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::motor::{Condition, Guard, MotorName};
-    /// use drivetrain::time::Instant;
-    ///
-    /// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
-    /// let mut guard = Guard::new();
-    /// guard.hear(at_ms(1));
-    /// assert!(!guard.drives(at_ms(12)));
-    /// let edge = guard.next_edge(MotorName::new("mine", 1)).ok_or("none")?;
-    /// assert_eq!((edge.condition, edge.began), (Condition::Late, true));
-    /// assert_eq!(guard.next_edge(MotorName::new("mine", 1)), None);
-    /// # Ok::<(), &str>(())
-    /// ```
-    pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge> {
-        while let Some(entry) = self.journal.pop() {
-            if self.latch.take(entry.condition, entry.began) {
-                let at = self.journal.time_of(&entry, self.now);
-                let (condition, began) = (entry.condition, entry.began);
-                return Some(Edge { motor, condition, began, at });
-            }
-        }
-        let (condition, began) = self.latch.next()?;
-        self.latch.take(condition, began);
-        Some(Edge { motor, condition, began, at: self.journal.last_time(self.now) })
-    }
-
-    /// Returns what the guard knows of a motor's health.
-    pub(crate) const fn health(&self, motor: MotorName) -> Health {
-        Health {
-            motor,
-            link: self.link,
-            armed: self.is_armed(),
-            conditions: self.conditions(),
-            feedback_hz: 0,
-            longest_gap: Duration::ZERO,
-            temperature_c: None,
-            error_code: 0,
-            saturated: 0,
-            refused_targets: self.refused_targets,
-            forgotten_targets: self.forgotten_targets,
-            ambiguous_gaps: 0,
-        }
-    }
-
-    /// Returns when the change that [`next_edge`](Self::next_edge) returns next was noted: to read several motors in order.
-    pub(crate) fn next_edge_at(&self) -> Option<Instant> {
-        self.latch.next()?;
-        Some(self.journal.first_time(self.now).unwrap_or_else(|| self.journal.last_time(self.now)))
     }
 
     /// Tells whether there is a target that still counts.
@@ -282,13 +242,38 @@ impl Guard {
         self.listens && !(self.link == Link::Online && self.heard.is_some_and(fresh))
     }
 
-    /// Lets targets through from now on, starting from none, if the motor is heard; one that takes them already goes
-    /// on undisturbed. Without effect while stopped. Returns whether it starts.
+    /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
+    /// 100 ms back. A request that is repeated in each tick never counts.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::Guard;
+    /// use drivetrain::time::Instant;
+    ///
+    /// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
+    /// let mut guard = Guard::new();
+    /// guard.hear(at_ms(1));
+    /// assert!(guard.ask(at_ms(1)) && guard.engage(at_ms(1)));
+    /// guard.relax_until_armed(); // a fault
+    /// guard.hear(at_ms(50));
+    /// assert!(!guard.ask(at_ms(50)) && !guard.engage(at_ms(50))); // too soon: ask again 100 ms later
+    /// guard.hear(at_ms(150));
+    /// assert!(guard.ask(at_ms(150)) && guard.engage(at_ms(150)));
+    /// ```
+    pub fn ask(&mut self, now: Instant) -> bool {
+        self.gesture.ask(now)
+    }
+
+    /// Lets targets through from now on, starting from none, if the motor is heard and, after a trip, the last request
+    /// [counts](Self::ask). A motor that takes targets already goes on undisturbed. Without effect while stopped. Returns
+    /// whether it starts.
     pub fn engage(&mut self, now: Instant) -> bool {
-        if self.stopped || self.is_armed() || self.is_missing(now) {
+        if self.stopped || self.is_armed() || self.is_missing(now) || !self.gesture.take() {
             return false;
         }
         self.now = self.now.max(now);
+        self.progress.begin(now);
+        self.opening.begin(now);
         self.note(Condition::CommandLost, false, self.now);
         self.commanded = None;
         self.latched = false;
@@ -302,14 +287,25 @@ impl Guard {
         self.commanded = None;
     }
 
-    /// Disarms, and stays so until it is cleared and engaged.
-    pub const fn emergency_stop(&mut self) {
+    /// Disarms, and requires a new request to arm.
+    pub const fn trip(&mut self) {
         self.disarm();
+        self.gesture.trip(self.now);
+    }
+
+    /// Trips, and stays so until it is cleared and armed.
+    pub const fn emergency_stop(&mut self) {
+        if !self.stopped {
+            self.trip();
+        }
         self.stopped = true;
     }
 
     /// Takes the emergency stop back; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
+        if self.stopped {
+            self.gesture.trip(self.now);
+        }
         self.stopped = false;
     }
 
@@ -343,7 +339,7 @@ impl Guard {
         self.forgotten_targets
     }
 
-    /// Returns how often time went back, saturating.
+    /// Returns how often an update did not lie after the one before, saturating.
     #[must_use]
     pub const fn reversals(&self) -> u16 {
         self.reversals
@@ -359,6 +355,7 @@ impl Default for Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motor::MotorName;
 
     fn at_ms(ms: u64) -> Instant {
         Instant::START + Duration::from_millis(ms)
@@ -383,9 +380,11 @@ mod tests {
         }
         guard.hear(at_ms(139));
         assert_eq!((guard.link(), guard.admit(true)), (Link::Online, Err(TargetError::Relaxed)));
-        guard.engage(at_ms(139));
+        assert!(!guard.ask(at_ms(139)) && !guard.engage(at_ms(139)), "37 ms after the trip");
+        guard.hear(at_ms(239));
+        assert!(guard.ask(at_ms(239)) && guard.engage(at_ms(239)));
         assert_eq!(guard.admit(true), Ok(()));
-        assert!(guard.drives(at_ms(140)));
+        assert!(guard.drives(at_ms(240)));
     }
 
     #[test]
@@ -410,12 +409,19 @@ mod tests {
     }
 
     #[test]
-    fn time_that_stands_still_is_never_fresh_for_ever() {
+    fn time_that_stands_still_trips() {
         for mut guard in [driving(), Guard { listens: false, ..driving() }] {
             assert!(guard.drives(at_ms(1)), "the tick in which it was armed");
-            assert!(!guard.drives(at_ms(1)) && !guard.drives(at_ms(1)));
-            assert!(guard.has_target() && guard.drives(at_ms(2)), "it ends by itself");
+            assert!(!guard.drives(at_ms(1)) && !guard.is_armed() && !guard.has_target());
+            guard.hear(at_ms(2));
+            assert!(!guard.ask(at_ms(2)) && !guard.engage(at_ms(2)) && !guard.drives(at_ms(2)));
         }
+    }
+
+    #[test]
+    fn an_update_before_the_arming_trips() {
+        let mut guard = driving();
+        assert!(!guard.drives(Instant::from_micros(999)) && !guard.is_armed());
     }
 
     #[test]
@@ -423,7 +429,7 @@ mod tests {
         let mut guard = Guard { listens: false, ..driving() };
         assert!(guard.drives(at_ms(5)) && !guard.drives(at_ms(4)));
         let edge = guard.next_edge(MotorName::new("fan", 1)).unwrap();
-        assert_eq!((edge.condition, edge.began), (Condition::CommandLost, true));
+        assert_eq!((edge.condition, edge.began), (Condition::ClockFault, true));
     }
 
     #[test]

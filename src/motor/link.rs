@@ -42,6 +42,9 @@ pub struct Timeouts {
 }
 
 impl Timeouts {
+    /// Feedback that is polled, one motor after the other: late after 40 ms, all else as [`new`](Self::new).
+    pub(crate) const POLLED: Self = Self { late_us: 40_000, ..Self::new() };
+
     /// Feedback late after 10 ms and offline after 100 ms, command deadline 100 ms, measurements of another sensor too old
     /// after 20 ms, back after 10 good frames.
     #[must_use]
@@ -55,32 +58,63 @@ impl Timeouts {
         }
     }
 
-    /// Sets the age from which feedback is late: at most 10 s.
-    #[must_use]
-    pub const fn with_late(self, late: Duration) -> Self {
-        Self { late_us: limited(late), ..self }
+    /// Sets the ages from which feedback is late and a motor offline: `late` at most 1 s, `offline` from `late` to 10 s.
+    ///
+    /// # Errors
+    /// Names the age that is out of its range, which is longer than a robot may be driven blindly.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::Timeouts;
+    /// use drivetrain::time::Duration;
+    ///
+    /// let slow = Timeouts::new().with_feedback(Duration::from_millis(40), Duration::from_millis(400))?;
+    /// assert_eq!(slow.late(), Duration::from_millis(40));
+    /// let blind = Timeouts::new().with_feedback(Duration::from_secs(10), Duration::from_millis(1));
+    /// assert_eq!(
+    ///     blind.map_err(|error| error.to_string()),
+    ///     Err("late after 10000000 us: 1 us to 1000000 us are allowed".into()),
+    /// );
+    /// # Ok::<(), drivetrain::motor::TimeoutError>(())
+    /// ```
+    pub const fn with_feedback(
+        self,
+        late: Duration,
+        offline: Duration,
+    ) -> Result<Self, TimeoutError> {
+        let late_us = match within("late", late, 1, BLIND_US) {
+            Ok(micros) => micros,
+            Err(error) => return Err(error),
+        };
+        match within("offline", offline, late_us, LONGEST_US) {
+            Ok(offline_us) => Ok(Self { late_us, offline_us, ..self }),
+            Err(error) => Err(error),
+        }
     }
 
-    /// Sets the age from which a motor is offline: at most 10 s. Taken as `late` when it is shorter.
-    #[must_use]
-    pub const fn with_offline(self, offline: Duration) -> Self {
-        Self { offline_us: limited(offline), ..self }
-    }
-
-    /// Sets the age from which a target no longer counts: at most 10 s, and longer than the period of the updates,
+    /// Sets the age from which a target no longer counts: at most 1 s, and longer than the period of the updates,
     /// because a target has the time of the update before it.
-    #[must_use]
-    pub const fn with_command(self, command: Duration) -> Self {
-        Self { command_us: limited(command), ..self }
+    ///
+    /// # Errors
+    /// The age is zero or longer than 1 s.
+    pub const fn with_command(self, command: Duration) -> Result<Self, TimeoutError> {
+        match within("command", command, 1, BLIND_US) {
+            Ok(command_us) => Ok(Self { command_us, ..self }),
+            Err(error) => Err(error),
+        }
     }
 
-    /// Sets the age from which a [measurement of another sensor](super::Measured) is too old to be followed: at most 10 s, in
-    /// whole milliseconds, at least one. It never counts for longer than the command deadline.
-    #[must_use]
-    pub const fn with_measured(self, measured: Duration) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "at most 10 000")]
-        let millis = (limited(measured) / 1_000) as u16;
-        Self { measured_ms: if millis == 0 { 1 } else { millis }, ..self }
+    /// Sets the age from which a [measurement of another sensor](super::Measured) is too old to be followed: 1 ms to 1 s, in
+    /// whole milliseconds. It never counts for longer than the command deadline.
+    ///
+    /// # Errors
+    /// The age is out of that range.
+    pub const fn with_measured(self, measured: Duration) -> Result<Self, TimeoutError> {
+        match within("measurement", measured, 1_000, BLIND_US) {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1000")]
+            Ok(micros) => Ok(Self { measured_ms: (micros / 1_000) as u16, ..self }),
+            Err(error) => Err(error),
+        }
     }
 
     /// Sets how many frames in a row bring an offline motor back: at least 1.
@@ -98,7 +132,7 @@ impl Timeouts {
     /// Returns the age from which a motor is offline.
     #[must_use]
     pub const fn offline(&self) -> Duration {
-        Duration::from_micros(self.offline_us() as u64)
+        Duration::from_micros(self.offline_us as u64)
     }
 
     /// Returns the age from which a target no longer counts.
@@ -124,7 +158,7 @@ impl Timeouts {
     }
 
     pub(crate) const fn offline_us(&self) -> u32 {
-        if self.offline_us > self.late_us { self.offline_us } else { self.late_us }
+        self.offline_us
     }
 
     pub(crate) const fn measured_us(&self) -> u32 {
@@ -142,12 +176,50 @@ impl Default for Timeouts {
     }
 }
 
-/// Ten seconds are far below the 71 minutes after which a 32-bit stamp would repeat.
-const fn limited(duration: Duration) -> u32 {
-    const LIMIT: u32 = 10_000_000;
-    match duration.micros_u32() {
-        Some(micros) if micros <= LIMIT => micros,
-        _ => LIMIT,
+/// The longest time that a motor may be driven without news of it, or without a new target.
+const BLIND_US: u32 = 1_000_000;
+
+/// Far below the 71 minutes after which a 32-bit stamp repeats.
+const LONGEST_US: u32 = 10_000_000;
+
+/// An age that [`Timeouts`] refuse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TimeoutError {
+    /// The name of the age.
+    pub parameter: &'static str,
+    /// The value that was given.
+    pub given: Duration,
+    /// The shortest that is allowed.
+    pub shortest: Duration,
+    /// The longest that is allowed.
+    pub longest: Duration,
+}
+
+impl core::fmt::Display for TimeoutError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { parameter, given, shortest, longest } = self;
+        let [given, shortest, longest] = [given, shortest, longest].map(|age| age.as_micros());
+        write!(f, "{parameter} after {given} us: {shortest} us to {longest} us are allowed")
+    }
+}
+
+impl core::error::Error for TimeoutError {}
+
+const fn within(
+    parameter: &'static str,
+    given: Duration,
+    shortest_us: u32,
+    longest_us: u32,
+) -> Result<u32, TimeoutError> {
+    match given.micros_u32() {
+        Some(micros) if micros >= shortest_us && micros <= longest_us => Ok(micros),
+        _ => Err(TimeoutError {
+            parameter,
+            given,
+            shortest: Duration::from_micros(shortest_us as u64),
+            longest: Duration::from_micros(longest_us as u64),
+        }),
     }
 }
 
@@ -158,6 +230,6 @@ pub enum Recovery {
     /// It stays relaxed until it is armed again.
     #[default]
     Rearm,
-    /// It takes targets again; its output limit rises from zero to full in this time, of 1 ms to 65 s.
-    Ramp(Duration),
+    /// It takes targets again; its output range opens from zero as after arming.
+    Resume,
 }

@@ -24,16 +24,17 @@
 //! | [`HealthConfig`] | what is looked for, and what follows |
 //! | [`BusLoad`] | how full the bus is |
 //!
-//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. Whatever
-//! does not fit that implements [`CanDevice`] itself, with a [`Guard`] for each motor. Devices are combined by tuples,
-//! arrays and `&mut`, so an own struct needs only to forward to a tuple of its fields.
+//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. A
+//! motor that does not fit implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays of devices are
+//! [`Devices`]; a struct of devices names its parts in one method.
 
 mod arming;
 mod capability;
 mod claim;
-mod combine;
 mod device;
+mod devices;
 mod drive;
+mod gesture;
 mod guard;
 mod health;
 mod homing;
@@ -41,7 +42,10 @@ mod link;
 mod load;
 mod measured;
 mod name;
+mod opening;
 mod own;
+mod progress;
+mod visitor;
 mod vitals;
 mod watch;
 
@@ -49,15 +53,21 @@ pub use arming::{ArmError, Missing};
 pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
+pub use devices::Devices;
 pub use drive::{AngleDrive, TargetError, VelocityDrive};
+pub(crate) use gesture::Gesture;
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
 pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
-pub use link::{Link, Recovery, Timeouts};
+pub use link::{Link, Recovery, TimeoutError, Timeouts};
 pub use load::BusLoad;
 pub use measured::Measured;
 pub use name::MotorName;
+pub use opening::OPENING;
 pub use own::{Own, OwnMotor};
+pub(crate) use progress::Progress;
+pub(crate) use visitor::Ask;
+pub use visitor::Visitor;
 pub use vitals::{Severity, Vitals};
 pub(crate) use watch::Watch;

@@ -1,6 +1,6 @@
 use super::{
-    CanDevice, Capabilities, Capability, Claim, Edge, Guard, Health, HealthConfig, Ingest,
-    Malformed, MotorName, Role, TargetError, Timeouts, VelocityDrive, Vitals, Watch,
+    CanDevice, Capabilities, Capability, Claim, Devices, Edge, Guard, Health, HealthConfig, Ingest,
+    Malformed, MotorName, Role, TargetError, Timeouts, VelocityDrive, Visitor, Vitals, Watch,
 };
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -235,7 +235,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.offer(output);
     }
 
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         if !core::mem::take(&mut self.waits) {
             return None;
         }
@@ -284,8 +284,17 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         }
     }
 
+    fn ask(&mut self, now: Instant) -> bool {
+        self.guard.ask(now)
+    }
+
     fn disarm(&mut self) {
         self.guard.disarm();
+        self.stop();
+    }
+
+    fn trip(&mut self) {
+        self.guard.trip();
         self.stop();
     }
 
@@ -308,6 +317,13 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 }
 
 /// There is one motor, so its handle is `()`.
+impl<M: OwnMotor> Devices for Own<M> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+}
+
 impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
     fn velocity(&self, (): ()) -> Option<AngularVelocity> {
         (self.guard.link() == super::Link::Online).then(|| self.motor.velocity())
@@ -363,24 +379,27 @@ mod tests {
     fn an_update_without_a_step_holds_no_output_from_before_a_rest() {
         let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
         let rad_per_s = AngularVelocity::from_rad_per_s;
-        let resting: [fn(&mut Own<Plain>); 2] = [CanDevice::disarm, |motor| {
-            let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
-            assert_eq!(motor.set_velocity((), nowhere), Err(TargetError::NotFinite));
-        }];
+        let resting: [fn(&mut Own<Plain>); 2] = [
+            |motor| CanDevice::disarm(motor),
+            |motor| {
+                let nowhere = AngularVelocity::from_rad_per_s(f32::NAN);
+                assert_eq!(motor.set_velocity((), nowhere), Err(TargetError::NotFinite));
+            },
+        ];
         for rest in resting {
             let mut motor = Own::new(Plain);
             let feedback = CanFrame::new(StandardId::ZERO, &[]).unwrap();
-            assert_eq!(motor.ingest(&feedback, at_ms(1)), Ingest::Taken);
+            assert_eq!(Devices::ingest(&mut motor, &feedback, at_ms(1)), Ingest::Taken);
             motor.arm(at_ms(1)).unwrap();
             motor.set_velocity((), rad_per_s(200.0)).unwrap();
             let sent = |motor: &mut Own<Plain>, ms: u64, dt_s| {
-                motor.update(Tick::new(at_ms(ms), dt_s));
-                let [a, b, c, d, ..] = *motor.next_frame(0).unwrap().bytes();
+                Devices::update(motor, Tick::new(at_ms(ms), dt_s));
+                let [a, b, c, d, ..] = *Devices::next_frame(motor, 0).unwrap().bytes();
                 [a, b, c, d]
             };
             assert_eq!(sent(&mut motor, 2, 0.001), 200.0_f32.to_le_bytes());
             rest(&mut motor);
-            motor.engage(at_ms(2));
+            CanDevice::engage(&mut motor, at_ms(2));
             let driven = 1.0_f32.to_le_bytes();
             motor.set_velocity((), rad_per_s(1.0)).unwrap();
             assert_eq!([3, 4].map(|ms| sent(&mut motor, ms, 0.0)), [[0; 4]; 2]);

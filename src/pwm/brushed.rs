@@ -63,10 +63,11 @@ impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedErr
 /// # let (channel, pin) = (Pin(0), Pin(0));
 ///
 /// let mut motor = Brushed::new(channel, OnePin(pin), BrushedConfig::new(1).with_limit(0.5))?;
-/// let now = Instant::from_micros(1_000);
-/// motor.arm(now)?;
-/// motor.set_duty(-0.9)?; // saturates at its limit
-/// motor.update(Tick::new(now, 0.001))?;
+/// motor.arm(Instant::from_micros(1_000))?;
+/// for millis in 1..=201 {
+///     motor.set_duty(-0.9)?; // saturates at its limit, which opens in 0.2 s
+///     motor.update(Tick::new(Instant::from_micros(1_000 * millis), 0.001))?;
+/// }
 /// assert_eq!((motor.channel().0, motor.direction().0.0), (500, 1)); // backward with half of 1000
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -106,7 +107,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             direction,
             config,
             speed,
-            guard: guard.with_timeouts(config.timeouts),
+            guard: guard.with_timeouts(config.timeouts).with_opening(config.opening),
             target: Target::Rest,
             way: Way::Coast,
             output: 0.0,
@@ -148,12 +149,16 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// When the emergency stop is set, or no counts came.
     #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        let granted = self.guard.ask(now);
         if self.guard.is_stopped() {
             return Err(ArmError::Stopped);
         }
         let missing = self.guard.is_missing(now).then_some(self.config.name);
         if let Some(missing) = Missing::collect(missing.into_iter()) {
             return Err(ArmError::Missing(missing));
+        }
+        if !granted {
+            return Err(ArmError::NotReleased);
         }
         if self.guard.engage(now) {
             self.watch.start(&mut self.guard, now);
@@ -200,12 +205,13 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// That of a pin; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
-        let limit = self.config.limit * self.look(tick.now());
+        let healthy = self.look(tick.now());
         let asked = self.command(tick);
+        let limit = self.config.limit * healthy.min(self.guard.share());
         self.output = asked.max(-limit).min(limit);
-        if limit < self.config.limit && asked.abs() > limit {
+        if limit < self.config.limit {
             // The loop knows only the full limit, and would wind up.
-            self.speed.iter_mut().for_each(|speed| speed.reset_to(self.output));
+            self.speed.iter_mut().for_each(|speed| speed.keep_integral_within(limit));
         }
         let output = if self.config.reversed { -self.output } else { self.output };
         let share = output.abs();

@@ -22,7 +22,7 @@
 //! that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency stop give
 //! the safe output. Each change is an [`Edge`](crate::motor::Edge) that waits in
 //! `next_edge`. They are no
-//! [`CanDevice`](crate::motor::CanDevice), so the program calls `update` in each tick itself. With
+//! [`Devices`](crate::motor::Devices), so the program calls `update` in each tick itself. With
 //! [`VelocityDrive`](crate::motor::VelocityDrive) they drive a chassis like any other motor.
 //!
 //! No runner watches them: where an [`EmergencyStop`](crate::runner::EmergencyStop) is set from an interrupt, call

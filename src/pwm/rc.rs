@@ -1,7 +1,7 @@
 use crate::control::TimeStep;
 use crate::motor::{
-    Capabilities, Capability, Conditions, Edge, Guard, Health, MotorName, TargetError, Timeouts,
-    VelocityDrive,
+    ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
+    OPENING, TargetError, Timeouts, VelocityDrive,
 };
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
@@ -48,6 +48,7 @@ pub struct RcConfig {
     arming: Duration,
     full_speed: Option<AngularVelocity>,
     timeouts: Timeouts,
+    opening: Duration,
 }
 
 impl RcConfig {
@@ -64,6 +65,7 @@ impl RcConfig {
             arming: Duration::from_secs(2),
             full_speed: None,
             timeouts: Timeouts::new(),
+            opening: OPENING,
         }
     }
 
@@ -108,6 +110,12 @@ impl RcConfig {
     #[must_use]
     pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
         Self { timeouts, ..self }
+    }
+
+    /// Sets the time in which the pulse may leave neutral after arming, from not at all to the whole way; 0.2 s at first.
+    #[must_use]
+    pub const fn with_opening(self, time: Duration) -> Self {
+        Self { opening: time, ..self }
     }
 
     /// Checks every parameter.
@@ -168,12 +176,14 @@ impl core::error::Error for PwmError {}
 ///
 /// let mut esc = RcPwm::new(channel, RcConfig::new())?;
 /// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
-/// esc.arm();
+/// esc.arm(Instant::START)?;
 /// for ms in 0..=2_000 {
 ///     esc.update(at_ms(ms))?; // neutral for 2 s
 /// }
-/// esc.set_throttle(0.5)?;
-/// esc.update(at_ms(2_001))?;
+/// for ms in 2_001..=2_200 {
+///     esc.set_throttle(0.5)?; // the throttle opens in 0.2 s
+///     esc.update(at_ms(ms))?;
+/// }
 /// assert_eq!(esc.channel().0, 1_750);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -205,16 +215,29 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// Names the parameter that is not usable.
     pub fn new(channel: P, config: RcConfig) -> Result<Self, PwmError> {
         config.validate()?;
-        let guard = Guard::without_feedback().with_timeouts(config.timeouts);
+        let guard =
+            Guard::without_feedback().with_timeouts(config.timeouts).with_opening(config.opening);
         Ok(Self { channel, config, guard, arming: Arming::Idle, throttle: 0.0, held_steps: 0 })
     }
 
     /// Begins to arm: the updates send neutral for the configured time, and targets are taken then. Without effect while
-    /// stopped, armed or arming.
-    pub fn arm(&mut self) {
-        if !self.guard.is_stopped() && !self.guard.is_armed() && self.arming == Arming::Idle {
+    /// armed or arming.
+    ///
+    /// # Errors
+    /// The emergency stop is set, or, after a trip, another request lies less than 100 ms back.
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
+    pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        let granted = self.guard.ask(now);
+        if self.guard.is_stopped() {
+            return Err(ArmError::Stopped);
+        }
+        if !granted {
+            return Err(ArmError::NotReleased);
+        }
+        if !self.guard.is_armed() && self.arming == Arming::Idle {
             self.arming = Arming::Asked;
         }
+        Ok(())
     }
 
     /// Sends idle, and refuses targets until armed again.
@@ -256,13 +279,18 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// That of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
         let drives = self.guard.drives(tick.now());
+        if self.guard.conditions().contains(Condition::ClockFault) {
+            // Nobody knows for how long neutral was sent.
+            self.arming = Arming::Idle;
+        }
         if self.arming != Arming::Idle {
             return self.go_on_arming(tick.now());
         }
         let holds = TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold();
         self.held_steps = if holds { self.held_steps.saturating_add(1) } else { 0 };
         if drives && self.held_steps < 2 {
-            self.send(self.pulse_us())
+            let pulse_us = self.pulse_us();
+            self.send(pulse_us)
         } else if self.config.idle == Idle::Off {
             self.channel.set_duty_cycle_fully_off()
         } else {
@@ -285,11 +313,12 @@ impl<P: SetDutyCycle> RcPwm<P> {
         Ok(())
     }
 
-    fn pulse_us(&self) -> f32 {
+    fn pulse_us(&mut self) -> f32 {
+        let open = self.guard.share();
         let RcConfig { low_us, neutral_us, high_us, .. } = self.config;
         let [low, neutral, high] = [low_us, neutral_us, high_us].map(f32::from);
         let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };
-        neutral + self.throttle * reach
+        neutral + self.throttle.clamp(-open, open) * reach
     }
 
     fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {

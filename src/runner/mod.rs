@@ -17,7 +17,7 @@
 //! the motors; [`Runner::next_edge`] hands them out. [`Runner::heartbeat`] is for the hardware watchdog, which alone
 //! can help when the loop itself stops.
 //!
-//! Nothing here is needed: a program can call [`CanDevice`] itself, as the examples `sans_io` and `async_sans_io` do.
+//! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
 mod edge;
 mod meter;
@@ -41,7 +41,7 @@ pub use statistics::{ErrorCounts, Statistics};
 pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice};
+use crate::motor::{ArmError, Ask, Devices};
 use crate::time::{Clock, Duration, Instant, Tick, Ticker};
 use meter::Meter;
 use statistics::increment;
@@ -93,7 +93,7 @@ pub struct Runner<P, K, D> {
     yields: Option<u32>,
 }
 
-impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
+impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes driver, clock and device; ticks at 1 kHz.
     #[must_use]
     pub const fn new(port: P, clock: K, device: D) -> Self {
@@ -157,10 +157,20 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     }
 
     /// Reads the clock and returns the step that is due, if any.
+    ///
+    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
+    /// until it is armed again. A clock stands when 200 000 readings show the same time; a received frame counts as 125.
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
+        if self.watch.take_standstill() {
+            // At the time of the last step, so that it does not count as time that moved on.
+            return Some(Tick::new(self.ticker.last(), 0.0));
+        }
         let before = self.ticker.overruns();
         let tick = self.ticker.due(now);
+        if tick.is_some() {
+            self.watch.begin_step(now);
+        }
         if self.ticker.overruns() != before {
             self.watch.edges.begin(BusCondition::TickOverrun, now);
         }
@@ -170,21 +180,25 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     /// Arms the device: nothing moves before.
     ///
     /// # Errors
-    /// Names what stands in the way; see [`CanDevice::arm`]. Also while the driver takes no frames.
+    /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. A refused call
+    /// counts as asking.
     #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
-        if self.stop.is_some_and(EmergencyStop::is_set) {
-            return Err(ArmError::Stopped);
-        }
-        if self.is_bus_down() {
-            return Err(ArmError::BusDown);
-        }
-        self.device.arm(tick.now())
+        let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
+            ArmError::Stopped
+        } else if self.is_bus_down() {
+            ArmError::BusDown
+        } else {
+            return self.device.arm(tick.now());
+        };
+        // A refused request is a request.
+        Ask::of(&mut self.device, tick.now());
+        Err(refusal)
     }
 
-    /// Tells whether every motor takes targets; see [`CanDevice::is_armed`].
+    /// Tells whether every motor takes targets; see [`Devices::is_armed`].
     #[must_use]
-    pub fn is_armed(&self) -> bool {
+    pub fn is_armed(&mut self) -> bool {
         self.device.is_armed()
     }
 
@@ -225,13 +239,13 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
         self.meter.finish(tick.now());
         if self.watch.finish(tick.now()) {
             increment(&mut self.statistics.bus_losses);
-            self.device.disarm();
+            self.device.trip();
         }
     }
 
     /// Returns what was counted.
     #[must_use]
-    pub fn statistics(&self) -> Statistics {
+    pub fn statistics(&mut self) -> Statistics {
         Statistics {
             superseded: self.device.superseded(),
             overruns: self.ticker.overruns(),

@@ -5,11 +5,11 @@ use super::FrameReceiver;
 use super::statistics::increment;
 use super::{BusCondition, Port, Received, Runner};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Ingest};
+use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Instant};
 use embedded_can::ErrorKind;
 
-impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
+impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
@@ -109,6 +109,7 @@ impl<P: Port, K: Clock, D: CanDevice> Runner<P, K, D> {
     /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         increment(&mut self.statistics.received);
+        self.watch.receive();
         self.meter.count(frame);
         let outcome = self.device.ingest(frame, now);
         increment(match outcome {

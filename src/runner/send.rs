@@ -3,7 +3,7 @@
 use super::statistics::increment;
 use super::{Port, Runner, Sent};
 use crate::frame::CanFrame;
-use crate::motor::CanDevice;
+use crate::motor::Devices;
 use crate::time::Instant;
 
 /// A bound on the frames of one tick, for devices that would offer frames for ever.
@@ -13,7 +13,7 @@ const FRAMES_A_TICK: usize = 64;
 /// successes would fail it there as well.
 const PATIENCE: u8 = 3;
 
-impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
+impl<P: Port, K, D: Devices> Runner<P, K, D> {
     /// Offers the frames of one tick to the driver; hands frames of others that it evicts to `evicted`.
     ///
     /// A frame for which there is no place goes first in the next tick. One that fails again and again takes another
@@ -37,13 +37,13 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
             };
             increment(&mut self.statistics.offered);
             match self.port.try_send(&frame) {
-                Sent::Accepted => self.count_sent(&frame),
+                Sent::Accepted => self.count_sent(&frame, now),
                 Sent::Evicted(other) => {
-                    self.count_sent(&frame);
+                    self.count_sent(&frame, now);
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
-                        self.watch.unsent(other.header(), now);
+                        self.watch.evicted(other.header(), now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
@@ -51,13 +51,13 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
                 }
                 Sent::Full => {
                     increment(&mut self.statistics.refused);
-                    self.watch.unsent(frame.header(), now);
+                    self.watch.refused(frame.header(), now);
                     refused = Some(frame);
                     break;
                 }
                 Sent::Failed(kind) => {
                     self.statistics.send_errors.count(kind);
-                    let tries = self.watch.unsent(frame.header(), now);
+                    let tries = self.watch.refused(frame.header(), now);
                     if tries >= PATIENCE && !is_first && goes_first.is_none() {
                         goes_first = Some(frame);
                     } else {
@@ -76,9 +76,9 @@ impl<P: Port, K, D: CanDevice> Runner<P, K, D> {
         }
     }
 
-    fn count_sent(&mut self, frame: &CanFrame) {
+    fn count_sent(&mut self, frame: &CanFrame, now: Instant) {
         increment(&mut self.statistics.sent);
         self.meter.count(frame);
-        self.watch.sent(frame.header());
+        self.watch.accepted(frame.header(), now);
     }
 }

@@ -31,7 +31,7 @@ pub struct Statistics {
     /// Frames of others that the driver gave back for ours, handed back.
     pub evicted_unrelated: u32,
     /// Command frames that newer ones replaced before the driver took them; wraps. See
-    /// [`CanDevice::superseded`](crate::motor::CanDevice::superseded).
+    /// [`Devices::superseded`](crate::motor::Devices::superseded).
     pub superseded: u32,
     /// Received frames that a queue dropped before they came here.
     pub lost: u32,

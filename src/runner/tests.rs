@@ -48,7 +48,7 @@ type TestRunner<'c> = Runner<Nb<Scripted>, &'c ManualClock, Bus>;
 /// Two M3508 in two command frames, armed, with a non-zero target for each.
 fn driving(clock: &ManualClock) -> (TestRunner<'_>, [Handle<M3508>; 2]) {
     let mut bus = Bus::new();
-    let wheels = bus.attach_all([1, 5].map(Config::<M3508>::new)).unwrap();
+    let wheels = bus.attach_all([1, 5].map(Config::<M3508>::at_once)).unwrap();
     let mut can = Scripted::default();
     can.receive.extend([0x201, 0x205].map(|id| Ok(frame(id, [0; 8]))));
     let mut runner = Runner::new(Nb(can), clock, bus);
@@ -202,7 +202,10 @@ fn a_bus_that_takes_nothing_for_100_ms_disarms_and_offers_zeros_afterwards() {
     runner.tick(Tick::new(clock.now(), 0.001));
     assert_eq!(offered(&mut runner), [(0x200, 0), (0x1FF, 0)]);
     assert!(!runner.is_bus_down() && !runner.is_armed());
-    assert_eq!(runner.arm(tick), Ok(()));
+    assert_eq!(runner.arm(tick), Err(ArmError::NotReleased), "asked for while the bus was down");
+    clock.advance(Duration::from_millis(100));
+    hear(&mut runner, &clock);
+    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
 }
 
 #[test]
@@ -246,7 +249,7 @@ fn a_frame_that_is_not_offered_any_more_is_not_waited_for() {
     };
     assert!(run(&mut runner, 200));
     let mut other = Bus::new();
-    other.attach(Config::<M3508>::new(1)).unwrap();
+    other.attach(Config::<M3508>::at_once(1)).unwrap();
     *runner.device_mut() = other;
     assert!(run(&mut runner, 900) && !run(&mut runner, 101));
 }
@@ -255,7 +258,7 @@ fn a_frame_that_is_not_offered_any_more_is_not_waited_for() {
 fn sent_beside_a_failure(place: usize) -> [usize; 3] {
     let clock = ManualClock::new(Instant::from_micros(1_000));
     let mut bus = Bus::new();
-    bus.attach_all([1, 5].map(Config::<M3508>::new)).unwrap();
+    bus.attach_all([1, 5].map(Config::<M3508>::at_once)).unwrap();
     bus.attach(Config::<crate::dji::Gm6020Voltage>::new(5)).unwrap();
     let bus = bus.with_keep_alive(Duration::ZERO);
     let mut runner = Runner::new(Nb(Scripted::default()), &clock, bus);
@@ -288,16 +291,20 @@ fn a_driver_that_fails_one_call_a_tick_keeps_no_frame_from_the_bus() {
 }
 
 #[test]
-fn a_clock_that_repeats_itself_for_a_million_readings_stands() {
+fn a_clock_that_repeats_itself_for_200_000_readings_stands() {
     let clock = ManualClock::new(Instant::from_micros(7));
     let mut runner = Runner::new(Nb(Scripted::default()), &clock, Bus::new());
     let standstills = |runner: &mut TestRunner<'_>, readings| {
-        (0..readings).for_each(|_| _ = runner.due());
+        for _ in 0..readings {
+            if let Some(tick) = runner.due() {
+                runner.tick(tick);
+            }
+        }
         runner.statistics().clock_standstills
     };
-    assert_eq!(standstills(&mut runner, 1_000_000), 0); // the first one is new
+    assert_eq!(standstills(&mut runner, 200_000), 0); // the first one is new
     assert_eq!(standstills(&mut runner, 1), 1);
-    assert_eq!(standstills(&mut runner, 999_999), 1);
+    assert_eq!(standstills(&mut runner, 199_999), 1);
     assert_eq!(standstills(&mut runner, 1), 2);
     let edge = runner.next_edge().unwrap();
     assert_eq!((edge.condition, edge.began), (BusCondition::ClockStandstill, true));
@@ -312,11 +319,17 @@ fn the_emergency_stop_acts_on_the_next_tick_and_stays() {
     let mut runner = runner.with_emergency_stop(&STOP);
     set(&mut runner, wheels, 50);
     STOP.set();
+    clock.advance(Duration::from_millis(1));
     runner.tick(Tick::new(clock.now(), 0.001));
     assert!(offered(&mut runner).iter().all(|(_, raw)| *raw == 0));
     assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::Stopped));
     runner.clear_emergency_stop();
     assert!(!runner.is_armed());
+    clock.advance(Duration::from_millis(99));
+    hear(&mut runner, &clock);
+    assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::NotReleased));
+    clock.advance(Duration::from_millis(100));
+    hear(&mut runner, &clock);
     assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
 }
 
@@ -369,7 +382,7 @@ impl embedded_can::blocking::Can for Blocking {
 fn a_blocking_driver_sends_and_is_never_asked_for_a_frame() {
     let clock = ManualClock::new(Instant::START);
     let mut bus = Bus::new();
-    bus.attach(Config::<M3508>::new(1)).unwrap();
+    bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let mut runner = Runner::new(BlockingTx(Blocking::default()), &clock, bus);
     assert_eq!(runner.poll(100), 0);
     for _ in 0..30 {

@@ -7,9 +7,12 @@ use crate::time::{Duration, Instant};
 /// Without feedback for this long, or with a command frame that waits for this long, something is wrong with the bus.
 const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
 
-/// A clock that shows the same time in so many readings stands: between a tenth of a second and some seconds of a
-/// loop that does nothing else.
-const READINGS_OF_A_STANDSTILL: u32 = 1_000_000;
+/// A clock that shows no later time in so many readings stands: a loop that does nothing else takes 50 ms to 1 s for them.
+const READINGS_OF_A_STANDSTILL: u32 = 200_000;
+
+/// A received frame counts as so many readings, for loops that sleep until a frame comes: 1600 frames take a bus of 1 Mbit/s
+/// 80 ms and more.
+const READINGS_OF_A_FRAME: u32 = 125;
 
 /// A frame that the device does not offer any more is not waited for.
 const FORGOTTEN_AFTER: Duration = Duration::from_secs(1);
@@ -23,6 +26,8 @@ struct Unsent {
     header: u32,
     since: Instant,
     offered: Instant,
+    /// The tick in which the driver took it, as long as it may come back.
+    accepted: Option<Instant>,
     tries: u8,
 }
 
@@ -36,6 +41,8 @@ pub(super) struct Watch {
     heard: bool,
     heard_at: Option<Instant>,
     reading: Instant,
+    /// The latest reading since the last step.
+    furthest: Instant,
     repeated: u32,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
@@ -52,6 +59,7 @@ impl Watch {
             heard: false,
             heard_at: None,
             reading: Instant::START,
+            furthest: Instant::START,
             repeated: 0,
             ticked: None,
             unsent: [None; WATCHED_FRAMES],
@@ -68,21 +76,38 @@ impl Watch {
         self.heard = true;
     }
 
+    /// Notes a received frame: time passed.
+    pub(super) const fn receive(&mut self) {
+        self.repeated = self.repeated.saturating_add(READINGS_OF_A_FRAME);
+    }
+
     /// Notes a reading of the clock.
     pub(super) fn read(&mut self, now: Instant) {
-        if now == self.reading {
-            self.repeated += 1;
-            if self.repeated >= READINGS_OF_A_STANDSTILL {
-                self.repeated = 0;
-                self.stand(now);
-            }
-            return;
+        if now > self.furthest {
+            self.furthest = now;
+            self.repeated = 0;
+        } else {
+            self.repeated = self.repeated.saturating_add(1);
         }
-        self.repeated = 0;
         if now < self.reading {
             self.go_back(now);
         }
         self.reading = now;
+    }
+
+    /// Notes a step: the clock may have gone back to it.
+    pub(super) const fn begin_step(&mut self, now: Instant) {
+        self.furthest = now;
+        self.repeated = 0;
+    }
+
+    /// Tells whether the clock stands; once for each time that it takes to be sure.
+    pub(super) fn take_standstill(&mut self) -> bool {
+        let stands = self.repeated >= READINGS_OF_A_STANDSTILL;
+        if stands {
+            self.repeated = 0;
+        }
+        stands
     }
 
     fn stand(&mut self, now: Instant) {
@@ -98,24 +123,47 @@ impl Watch {
         self.reading = now;
     }
 
-    /// Notes a frame that the driver took.
-    pub(super) fn sent(&mut self, header: u32) {
-        let taken = |unsent: &Option<Unsent>| unsent.is_some_and(|it| it.header == header);
-        self.unsent.iter_mut().filter(|unsent| taken(unsent)).for_each(|unsent| *unsent = None);
+    /// Notes a frame that the driver took. It counts as sent when it does not come back until the next tick has ended.
+    pub(super) fn accepted(&mut self, header: u32, now: Instant) {
+        for place in &mut self.unsent {
+            let Some(unsent) = place.as_mut().filter(|unsent| unsent.header == header) else {
+                continue;
+            };
+            if unsent.accepted.is_some_and(|before| before != now) {
+                *place = None;
+            } else {
+                (unsent.accepted, unsent.offered, unsent.tries) = (Some(now), now, 0);
+            }
+        }
     }
 
-    /// Notes a frame that the driver did not take, or gave back; returns how often in a row.
-    pub(super) fn unsent(&mut self, header: u32, now: Instant) -> u8 {
-        let known = self.unsent.iter_mut().flatten().find(|unsent| unsent.header == header);
-        if let Some(unsent) = known {
-            unsent.offered = now;
-            unsent.tries = unsent.tries.saturating_add(1);
-            return unsent.tries;
+    /// Notes a frame that the driver did not take; returns how often in a row.
+    pub(super) fn refused(&mut self, header: u32, now: Instant) -> u8 {
+        let Some(unsent) = self.unsent.iter_mut().flatten().find(|it| it.header == header) else {
+            self.begin(header, now);
+            return 1;
+        };
+        if unsent.accepted.take().is_some() {
+            // The frame of an earlier tick was taken and stayed.
+            unsent.since = now;
         }
+        unsent.offered = now;
+        unsent.tries = unsent.tries.saturating_add(1);
+        unsent.tries
+    }
+
+    /// Notes a frame that the driver had taken and gave back.
+    pub(super) fn evicted(&mut self, header: u32, now: Instant) {
+        match self.unsent.iter_mut().flatten().find(|it| it.header == header) {
+            Some(unsent) => (unsent.accepted, unsent.offered) = (None, now),
+            None => self.begin(header, now),
+        }
+    }
+
+    fn begin(&mut self, header: u32, now: Instant) {
         if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
-            *place = Some(Unsent { header, since: now, offered: now, tries: 1 });
+            *place = Some(Unsent { header, since: now, offered: now, accepted: None, tries: 1 });
         }
-        1
     }
 
     /// Ends a tick, after everything was offered to the driver. Returns whether the bus was lost just now.
@@ -153,9 +201,10 @@ impl Watch {
             let Some(unsent) = place else { continue };
             unsent.since = now.min(unsent.since);
             unsent.offered = now.min(unsent.offered);
-            if now.since(unsent.offered) >= FORGOTTEN_AFTER {
+            let stays_sent = unsent.accepted.is_some_and(|before| before != now);
+            if stays_sent || now.since(unsent.offered) >= FORGOTTEN_AFTER {
                 *place = None;
-            } else {
+            } else if unsent.accepted.is_none() {
                 lost |= now.since(unsent.since) >= BUS_LOST_AFTER;
             }
         }

@@ -5,7 +5,7 @@ use super::slot::{Slot, name};
 use super::{AttachError, Command, Config, Joint, Reply, ReplyError, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::motor::{Ingest, Link, Malformed, MotorName, Progress, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
 
@@ -26,7 +26,7 @@ const ANY_STEP_S: f32 = f32::INFINITY;
 /// ```
 /// use drivetrain::encoder::Position;
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::motor::CanDevice;
+/// use drivetrain::motor::Devices;
 /// use drivetrain::snake::{Config, Joints, Register, Reply};
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::Angle;
@@ -74,7 +74,7 @@ pub struct Joints {
     pub(super) asked: u8,
     pub(super) held_steps: u8,
     /// An update came, so that `now` is the time of one.
-    begun: bool,
+    progress: Progress,
     /// Frames that are sent are heard again.
     pub(super) echoes: bool,
     pub(super) stopped: bool,
@@ -116,7 +116,7 @@ impl Joints {
         Self {
             slots: [Slot::FREE; SLOTS],
             now: Instant::START,
-            timeouts: Timeouts::new().with_late(Duration::from_millis(40)),
+            timeouts: Timeouts::POLLED,
             reply_timeout: Duration::from_millis(2),
             answers: Answers::NONE,
             budget: Budget::new(),
@@ -131,7 +131,7 @@ impl Joints {
             written: IDS - 1,
             asked: IDS - 1,
             held_steps: 0,
-            begun: false,
+            progress: Progress::NEW,
             echoes: false,
             stopped: false,
             counters: Counters {
@@ -229,11 +229,15 @@ impl Joints {
 
     /// Chooses who is asked and written to, and relaxes who may not move.
     ///
-    /// A `dt_s` of zero, below zero, infinite or NaN, and a `now` that stands still, choose nobody for one update; a
-    /// second one in a row relaxes all joints. Who is to be disabled is so all the same.
+    /// An update that does not lie after the one before relaxes every joint until it is armed again. A `dt_s` of zero, below
+    /// zero, infinite or NaN chooses no joint for one update; a second one in a row relaxes all joints. Frames that disable
+    /// a joint are sent all the same.
     pub fn update(&mut self, tick: Tick) {
-        let stands = core::mem::replace(&mut self.begun, true) && tick.now() == self.now;
-        if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() || stands {
+        if !self.progress.advance(tick.now()) {
+            self.lose_time(tick.now());
+            return self.hold(tick.now());
+        }
+        if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() {
             return self.hold(tick.now());
         }
         self.held_steps = 0;
@@ -249,7 +253,18 @@ impl Joints {
         self.plan();
     }
 
-    /// An update without a step chooses nobody, but sees to what makes a joint safe.
+    /// Relaxes every joint until it is armed again: where time did not move on, no age is known.
+    fn lose_time(&mut self, now: Instant) {
+        for index in 0..SLOTS {
+            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
+                continue;
+            };
+            slot.guard.lose_time(now);
+            self.let_go(index);
+        }
+    }
+
+    /// An update without a step chooses no joint, but disables joints that have to rest.
     fn hold(&mut self, now: Instant) {
         count(&mut self.counters.bad_steps);
         self.held_steps = self.held_steps.saturating_add(1);

@@ -2,7 +2,7 @@
 
 use super::{Joints, slot::Slot};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Role};
+use crate::motor::{CanDevice, Claim, Devices, Edge, Guard, Ingest, MotorName, Role, Visitor};
 use crate::time::{Instant, Tick};
 use embedded_can::StandardId;
 
@@ -15,7 +15,7 @@ impl CanDevice for Joints {
         Self::update(self, tick);
     }
 
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         Self::next_frame(self)
     }
 
@@ -42,6 +42,11 @@ impl CanDevice for Joints {
         self.slots.iter().filter(move |slot| slot.is_missing(now)).filter_map(Slot::name)
     }
 
+    /// A fault of a joint is over when it is armed again.
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        core::iter::empty()
+    }
+
     fn second_master(&self) -> Option<Claim> {
         let slot = self.slots.iter().find(|slot| slot.has_rival())?;
         let id = StandardId::new(u16::from(slot.id?))?;
@@ -50,6 +55,14 @@ impl CanDevice for Joints {
 
     fn next_edge(&mut self) -> Option<Edge> {
         Self::next_edge(self)
+    }
+
+    fn ask(&mut self, now: Instant) -> bool {
+        let mut granted = true;
+        for slot in self.slots.iter_mut().filter(|slot| slot.id.is_some()) {
+            granted &= slot.guard.ask(now);
+        }
+        granted
     }
 
     fn engage(&mut self, now: Instant) {
@@ -62,18 +75,11 @@ impl CanDevice for Joints {
     }
 
     fn disarm(&mut self) {
-        for index in 0..self.slots.len() {
-            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
-                continue;
-            };
-            let was_armed = slot.guard.is_armed();
-            slot.guard.disarm();
-            _ = slot.let_go();
-            // A program may disarm in each tick: what knows of it already is only reminded.
-            if was_armed || !slot.is_told() {
-                self.stop(index);
-            }
-        }
+        self.rest_all(Guard::disarm);
+    }
+
+    fn trip(&mut self) {
+        self.rest_all(Guard::trip);
     }
 
     fn is_armed(&self) -> bool {
@@ -83,17 +89,43 @@ impl CanDevice for Joints {
 
     fn emergency_stop(&mut self) {
         if !self.stopped {
-            self.disarm();
+            self.rest_all(Guard::emergency_stop);
             self.stop_all();
             self.stopped = true;
         }
     }
 
     fn clear_emergency_stop(&mut self) {
+        self.slots.iter_mut().for_each(|slot| slot.guard.clear_emergency_stop());
         self.stopped = false;
     }
 
     fn is_stopped(&self) -> bool {
         self.stopped
+    }
+}
+
+impl Devices for Joints {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+}
+
+impl Joints {
+    /// Relaxes every joint.
+    fn rest_all(&mut self, rest: impl Fn(&mut Guard)) {
+        for index in 0..self.slots.len() {
+            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
+                continue;
+            };
+            let was_armed = slot.guard.is_armed();
+            rest(&mut slot.guard);
+            _ = slot.let_go();
+            // A program may disarm in each tick: a joint that knows of it already is only reminded.
+            if was_armed || !slot.is_told() {
+                self.stop(index);
+            }
+        }
     }
 }

@@ -184,7 +184,7 @@ impl Slot {
     fn distrust(&mut self, now: Instant) {
         self.guard.note(Condition::Fault, true, now);
         self.lose_zero(now);
-        self.guard.disarm();
+        self.guard.trip();
     }
 
     fn lose_zero(&mut self, now: Instant) {

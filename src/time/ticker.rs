@@ -38,6 +38,8 @@ impl Tick {
 /// Call [`due`](Self::due) as often as you like. Steps stay on the grid `first call + n * period`; a step
 /// that comes late does not move the later ones. Periods that passed without a call are skipped, not made
 /// up for: the step after them carries the real `dt_s`, and [`overruns`](Self::overruns) grows by their number.
+/// If the clock goes back behind the last step, a step with a `dt_s` of 0 is due at once, so that the devices notice, and
+/// the grid starts anew there.
 ///
 /// # Examples
 /// ```
@@ -84,7 +86,7 @@ impl Ticker {
             return Some(Tick::new(now, self.period().as_secs_f32()));
         };
         if now < next {
-            return None;
+            return self.go_back(now);
         }
         match now.since(next).micros_u32() {
             Some(late_us) => {
@@ -102,6 +104,21 @@ impl Ticker {
         let tick = Tick::new(now, now.since(self.last).as_secs_f32());
         self.last = now;
         Some(tick)
+    }
+
+    /// A clock that went back behind the last step starts a new grid with a step at once.
+    fn go_back(&mut self, now: Instant) -> Option<Tick> {
+        if now >= self.last {
+            return None;
+        }
+        self.last = now;
+        self.next = Some(now + self.period());
+        Some(Tick::new(now, 0.0))
+    }
+
+    /// Returns the time of the last step.
+    pub(crate) const fn last(&self) -> Instant {
+        self.last
     }
 
     /// Returns the number of periods that were skipped; `u32::MAX` after a single pause of over 71 minutes.
@@ -137,12 +154,14 @@ mod tests {
     }
 
     #[test]
-    fn time_that_goes_back_makes_no_step_and_no_overrun() {
+    fn time_that_goes_back_is_a_step_at_once_and_a_new_grid() {
         let mut ticker = Ticker::new(Duration::from_millis(1));
         assert!(ticker.due(at(10_000)).is_some());
-        assert_eq!(ticker.due(at(2_000)), None);
-        assert_eq!(ticker.overruns(), 0);
-        assert_eq!(ticker.due(at(11_000)).map(Tick::dt_s), Some(0.001));
+        assert_eq!(ticker.due(at(10_500)), None);
+        assert_eq!(ticker.due(at(10_200)), None, "back, but not behind the last step");
+        assert_eq!(ticker.due(at(2_000)), Some(Tick::new(at(2_000), 0.0)));
+        assert_eq!((ticker.due(at(2_999)), ticker.overruns()), (None, 0));
+        assert_eq!(ticker.due(at(3_000)).map(Tick::dt_s), Some(0.001));
     }
 
     #[test]

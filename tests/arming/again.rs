@@ -4,8 +4,8 @@ use crate::at_ms;
 use crate::own::{feedback, own};
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
-use drivetrain::motor::{Condition, HealthConfig, Ingest, Recovery, TargetError, VelocityDrive};
+use drivetrain::motor::Devices;
+use drivetrain::motor::{Condition, HealthConfig, Ingest, TargetError, VelocityDrive};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -168,32 +168,6 @@ fn a_silence_lets_a_runaway_begin_anew_too() {
     }
     dji.spell(SPELL_MS);
     assert!(!dji.ran_away() && dji.bus.is_armed());
-}
-
-/// A motor that came back by itself opens over a minute; one that is armed by hand does not wait for that.
-#[test]
-fn a_recovery_that_began_before_arming_is_over() {
-    let mut dji = Dji::with(Config::new(1).with_recovery(Recovery::Ramp(Duration::from_secs(60))));
-    dji.bus.arm(at_ms(dji.ms)).unwrap();
-    // Lost, and heard again.
-    dji.ms += 200;
-    dji.bus.update(Tick::new(at_ms(dji.ms), 0.001));
-    (0..50).for_each(|_| _ = dji.step(0, 0));
-    assert!(dji.bus.is_armed(), "it ramps back");
-    let largest = |dji: &mut Dji| {
-        let mut word = 0;
-        for _ in 0..300 {
-            dji.bus.set_raw(dji.motor, 10_000).unwrap();
-            word = dji.step(0, 0).unwrap_or(word);
-        }
-        word
-    };
-    let ramping = largest(&mut dji);
-    assert!(ramping < 1_000, "{ramping}");
-    dji.bus.disarm();
-    (0..150).for_each(|_| _ = dji.step(0, 0));
-    dji.bus.arm(at_ms(dji.ms)).unwrap();
-    assert_eq!(largest(&mut dji), 10_000);
 }
 
 /// Heard for the first time outside of its soft limits, armed at once and driven outward: not even in the first update.

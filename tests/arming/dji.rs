@@ -3,7 +3,7 @@
 use crate::{PAUSE_MS, RIVAL_MS, at_ms};
 use drivetrain::dji::{AnyHandle, Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{self, ArmError, Ingest};
 use drivetrain::time::Tick;
 

@@ -2,7 +2,7 @@
 
 use crate::own::{Mine, faulty, healthy, own};
 use crate::{PAUSE_MS, at_ms};
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{self, Guard, Ingest, Own, TargetError, Timeouts, VelocityDrive};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::AngularVelocity;
@@ -80,7 +80,9 @@ fn a_guard_engages_with_fresh_feedback_only() {
         assert_eq!(armed(&mut guard, ms), ms >= 1_210, "{ms}");
     }
     // Its own limit counts, not the usual one.
-    let timeouts = Timeouts::new().with_late(Duration::from_millis(40));
+    let timeouts = Timeouts::new()
+        .with_feedback(Duration::from_millis(40), Duration::from_millis(100))
+        .unwrap();
     for (ms, expected) in [(1_040, true), (1_041, false)] {
         let mut guard = Guard::new().with_timeouts(timeouts);
         guard.hear(at_ms(1_000));

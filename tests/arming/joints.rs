@@ -2,7 +2,7 @@
 
 use crate::{PAUSE_MS, RIVAL_MS, at_ms};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{self, ArmError, Ingest};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply};
 use drivetrain::time::Tick;

@@ -3,7 +3,7 @@
 use crate::own::{Mine, faulty, healthy, own, rival};
 use crate::{PAUSE_MS, RIVAL_MS, at_ms};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{ArmError, Condition, Ingest, Own, TargetError, VelocityDrive};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;

@@ -90,7 +90,7 @@ struct Esc {
 
 impl Esc {
     fn arm(&mut self) {
-        self.esc.arm();
+        _ = self.esc.arm(at_ms(self.ms));
     }
 
     /// Some milliseconds at full throttle; whether it is armed then, and its duty.

@@ -3,7 +3,7 @@
 use crate::own::{faulty, healthy, own};
 use crate::{PAUSE_MS, at_ms};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::CanDevice as Devices;
+use drivetrain::motor::Devices;
 use drivetrain::motor::{ArmError, Ingest, Own, TargetError, VelocityDrive};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Duration, ManualClock, Tick};

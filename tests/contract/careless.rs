@@ -3,7 +3,7 @@
 use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
-use drivetrain::motor::{Claim, Edge, Ingest, MotorName};
+use drivetrain::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Visitor};
 use drivetrain::sim::{Rule, Violation};
 use drivetrain::time::{Duration, Instant, Tick};
 
@@ -26,6 +26,7 @@ enum Mistake {
     KeepsNan,
     KeepsRefused,
     TrustsTheStep,
+    ArmsAgainAndAgain,
 }
 
 /// An own motor with a mistake of its maker in front of it; what it was told last, and whether that was refused.
@@ -37,10 +38,10 @@ impl CanDevice for Careless {
         let long = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
         match self.1 {
             Mistake::TakesShortFrames if same_number && frame.is_data_frame() => {
-                self.0.ingest(&long, now)
+                CanDevice::ingest(&mut self.0, &long, now)
             }
-            Mistake::HearsRemoteFrames if same_number => self.0.ingest(&long, now),
-            _ => self.0.ingest(frame, now),
+            Mistake::HearsRemoteFrames if same_number => CanDevice::ingest(&mut self.0, &long, now),
+            _ => CanDevice::ingest(&mut self.0, frame, now),
         }
     }
     fn update(&mut self, tick: Tick) {
@@ -49,20 +50,20 @@ impl CanDevice for Careless {
                 let forgets_limit = self.1 == Mistake::ForgetsTheLimit;
                 if forgets_limit && self.0.is_armed() {
                     let long = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
-                    _ = self.0.ingest(&long, tick.now());
+                    _ = CanDevice::ingest(&mut self.0, &long, tick.now());
                 } else if self.0.is_armed() && self.3 != 0.0 {
                     _ = drive_own(&mut self.0, self.3);
                 }
-                self.0.update(tick);
+                CanDevice::update(&mut self.0, tick);
             }
             Mistake::KeepsRefused => {
                 if self.4 && drive_own(&mut self.0, self.3).is_ok() {
                     self.4 = false;
                 }
-                self.0.update(tick);
+                CanDevice::update(&mut self.0, tick);
             }
-            Mistake::TrustsTheStep => self.0.update(Tick::new(tick.now(), 0.001)),
-            _ => self.0.update(tick),
+            Mistake::TrustsTheStep => CanDevice::update(&mut self.0, Tick::new(tick.now(), 0.001)),
+            _ => CanDevice::update(&mut self.0, tick),
         }
         if self.1 == Mistake::MovesDisarmed
             || (self.1 == Mistake::IgnoresTheStop && self.is_stopped())
@@ -70,8 +71,8 @@ impl CanDevice for Careless {
             self.2 = CanFrame::standard(0x123, [1; 8]);
         }
     }
-    fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
-        let frame = self.2.take().or_else(|| self.0.next_frame(turn));
+    fn next_frame(&mut self) -> Option<CanFrame> {
+        let frame = self.2.take().or_else(|| CanDevice::next_frame(&mut self.0));
         match self.1 {
             Mistake::OffersForEver => frame.or(CanFrame::standard(0x123, [0; 8])),
             Mistake::SendsUnclaimed => {
@@ -84,7 +85,7 @@ impl CanDevice for Careless {
         if self.1 == Mistake::OffersAtOnce {
             self.2 = Some(*frame);
         }
-        self.0.requeue(frame) || self.1 == Mistake::RequeuesAnything
+        CanDevice::requeue(&mut self.0, frame) || self.1 == Mistake::RequeuesAnything
     }
     fn claims(&self) -> impl Iterator<Item = Claim> {
         self.0.claims()
@@ -92,32 +93,54 @@ impl CanDevice for Careless {
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
         self.0.missing(now).filter(|_| self.1 != Mistake::ArmsUnheard)
     }
+    fn superseded(&self) -> u32 {
+        CanDevice::superseded(&self.0)
+    }
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        self.0.faulty()
+    }
     fn second_master(&self) -> Option<Claim> {
         self.0.second_master()
     }
     fn next_edge(&mut self) -> Option<Edge> {
-        self.0.next_edge()
+        CanDevice::next_edge(&mut self.0)
+    }
+    fn ask(&mut self, now: Instant) -> bool {
+        let granted = self.0.ask(now);
+        granted || self.1 == Mistake::ArmsAgainAndAgain
+    }
+    fn trip(&mut self) {
+        CanDevice::trip(&mut self.0);
     }
     fn engage(&mut self, now: Instant) {
+        if self.1 == Mistake::ArmsAgainAndAgain {
+            _ = self.0.ask(now + Duration::from_millis(100));
+        }
         self.0.engage(now);
         if self.1 == Mistake::KeepsItsTarget && self.3 != 0.0 {
             _ = drive_own(&mut self.0, self.3);
         }
     }
     fn disarm(&mut self) {
-        self.0.disarm();
+        CanDevice::disarm(&mut self.0);
     }
     fn is_armed(&self) -> bool {
         self.0.is_armed()
     }
     fn emergency_stop(&mut self) {
-        self.0.emergency_stop();
+        CanDevice::emergency_stop(&mut self.0);
     }
     fn clear_emergency_stop(&mut self) {
-        self.0.clear_emergency_stop();
+        CanDevice::clear_emergency_stop(&mut self.0);
     }
     fn is_stopped(&self) -> bool {
         self.0.is_stopped()
+    }
+}
+
+impl Devices for Careless {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
     }
 }
 
@@ -232,7 +255,7 @@ impl CanDevice for Slipping {
             self.last = self.wheels.device().next_edge().or(self.last);
         }
     }
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         self.wheels.device().next_frame()
     }
     fn requeue(&mut self, frame: &CanFrame) -> bool {
@@ -274,6 +297,15 @@ impl CanDevice for Slipping {
             ..edge
         })
     }
+    fn superseded(&self) -> u32 {
+        self.wheels.bus().superseded()
+    }
+    fn ask(&mut self, now: Instant) -> bool {
+        self.wheels.device().ask(now)
+    }
+    fn trip(&mut self) {
+        CanDevice::trip(self.wheels.device());
+    }
     fn engage(&mut self, now: Instant) {
         self.wheels.device().engage(now);
     }
@@ -291,6 +323,12 @@ impl CanDevice for Slipping {
     }
     fn is_stopped(&self) -> bool {
         self.wheels.bus().is_stopped()
+    }
+}
+
+impl Devices for Slipping {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
     }
 }
 
@@ -327,7 +365,7 @@ fn the_check_finds_what_a_struct_of_devices_does_not_forward() {
     };
     assert_eq!(slipping(Slip::None), Ok(RULES));
     for (slip, rule) in [
-        (Slip::CountsItsOwnTime, Rule::StandingTimeIsZero),
+        (Slip::CountsItsOwnTime, Rule::LostTimeTrips),
         (Slip::ArmsFaulty, Rule::FaultIsNotArmed),
         (Slip::ArmsBesideAnother, Rule::SecondMasterIsNotArmed),
         (Slip::HasNoEdges, Rule::ChangeIsAnEdge),

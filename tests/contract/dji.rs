@@ -56,8 +56,12 @@ fn a_bus_of_each_model_keeps_the_contract() {
     assert_eq!(check_contract(|| OneModel::<M2006, 3>::new([1, 5, 8], |c| c)), Ok(RULES));
     assert_eq!(check_contract(|| OneModel::<Gm6020Voltage, 2>::new([1, 7], |c| c)), Ok(RULES));
     assert_eq!(check_contract(|| OneModel::<Gm6020Current, 2>::new([4, 5], |c| c)), Ok(RULES));
-    let ramp = Recovery::Ramp(Duration::from_millis(50));
-    let ramps = || OneModel::<M3508, 2>::new([1, 2], |config| config.with_recovery(ramp));
+    let opening = Duration::from_millis(50);
+    let ramps = || {
+        OneModel::<M3508, 2>::new([1, 2], |config| {
+            config.with_recovery(Recovery::Resume).with_opening(opening)
+        })
+    };
     assert_eq!(check_contract(ramps), Ok(RULES));
 }
 

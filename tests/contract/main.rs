@@ -1,4 +1,4 @@
-//! Every device keeps the contract of `CanDevice`: each model, tuples and arrays of buses, a motor of one's own, joints, and
+//! Every device keeps the contract of `Devices`: each model, tuples and arrays of buses, a motor of one's own, joints, and
 //! motors on pins; and the check finds devices that do not.
 
 #![cfg(test)]
@@ -12,7 +12,7 @@ mod pins;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Own, TargetError, VelocityDrive};
+use drivetrain::motor::{Devices, Own, TargetError, VelocityDrive};
 use drivetrain::sim::{Subject, check_contract};
 use drivetrain::units::AngularVelocity;
 use embedded_can::Frame;
@@ -23,7 +23,7 @@ mod custom_motor;
 use custom_motor::MyMotor;
 
 const SPEED: PidConfig = PidConfig::new(1.0, 4.0, 0.0);
-const RULES: usize = 27;
+const RULES: usize = 28;
 
 fn velocity(share: f32) -> AngularVelocity {
     AngularVelocity::from_rad_per_s(5.0 * share)
@@ -40,7 +40,7 @@ struct Mixed<D> {
     drive: fn(&mut D, f32) -> Result<(), TargetError>,
 }
 
-impl<D: CanDevice> Subject for Mixed<D> {
+impl<D: Devices> Subject for Mixed<D> {
     type Device = D;
     fn device(&mut self) -> &mut D {
         &mut self.device

@@ -1,7 +1,9 @@
 //! Motors that are not on CAN, behind an adapter as a program would write it for a bridge of its own.
 
 use super::*;
-use drivetrain::motor::{Claim, Edge, Ingest, Malformed, MotorName, Role};
+use drivetrain::motor::{
+    ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor,
+};
 use drivetrain::pwm::{Brushed, BrushedConfig, Idle, OnePin, RcConfig, RcPwm};
 use drivetrain::time::{Duration, Instant, Tick};
 use embedded_hal::{digital, pwm};
@@ -47,7 +49,7 @@ trait OnPins: VelocityDrive<()> {
     fn hear(&mut self, counter: u32, now: Instant);
     fn go_on(&mut self, tick: Tick);
     fn is_missing(&self, now: Instant) -> bool;
-    fn start(&mut self, now: Instant);
+    fn start(&mut self, now: Instant) -> Result<(), ArmError>;
     fn rest(&mut self);
     fn is_ready(&self) -> bool;
     fn stop(&mut self);
@@ -66,8 +68,8 @@ impl OnPins for Brushed<Pin, OnePin<Pin>> {
     fn is_missing(&self, now: Instant) -> bool {
         self.guard().is_missing(now)
     }
-    fn start(&mut self, now: Instant) {
-        _ = self.arm(now);
+    fn start(&mut self, now: Instant) -> Result<(), ArmError> {
+        self.arm(now)
     }
     fn rest(&mut self) {
         self.disarm();
@@ -98,9 +100,10 @@ impl OnPins for RcPwm<Pin> {
         self.guard().is_missing(now)
     }
     /// The ESC is one that wants no time: armed with its first pulse.
-    fn start(&mut self, now: Instant) {
-        self.arm();
-        self.go_on(Tick::new(now, 0.001));
+    fn start(&mut self, now: Instant) -> Result<(), ArmError> {
+        self.arm(now)?;
+        self.go_on(Tick::new(now + Duration::from_micros(1), 0.001));
+        Ok(())
     }
     fn rest(&mut self) {
         self.disarm();
@@ -152,7 +155,7 @@ impl<M: OnPins> CanDevice for Wired<M> {
         self.motor.go_on(tick);
         self.waits = true;
     }
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         let waits = std::mem::take(&mut self.waits);
         waits.then(|| CanFrame::new(id(COMMAND), &self.pulse.0.get().to_be_bytes())).flatten()
     }
@@ -168,11 +171,25 @@ impl<M: OnPins> CanDevice for Wired<M> {
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
         self.motor.is_missing(now).then(|| MotorName::new("brushed", 3)).into_iter()
     }
+    fn superseded(&self) -> u32 {
+        0
+    }
+    fn faulty(&self) -> impl Iterator<Item = MotorName> {
+        std::iter::empty()
+    }
+    fn second_master(&self) -> Option<Claim> {
+        None
+    }
     fn next_edge(&mut self) -> Option<Edge> {
         self.motor.edge()
     }
-    fn engage(&mut self, now: Instant) {
-        self.motor.start(now);
+    /// The motor asks and starts in one.
+    fn ask(&mut self, now: Instant) -> bool {
+        self.motor.start(now) != Err(ArmError::NotReleased)
+    }
+    fn engage(&mut self, _now: Instant) {}
+    fn trip(&mut self) {
+        CanDevice::disarm(self);
     }
     fn disarm(&mut self) {
         self.motor.rest();
@@ -192,6 +209,12 @@ impl<M: OnPins> CanDevice for Wired<M> {
     }
     fn is_stopped(&self) -> bool {
         self.motor.is_held()
+    }
+}
+
+impl<M: OnPins> Devices for Wired<M> {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
     }
 }
 

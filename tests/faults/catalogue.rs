@@ -1,13 +1,17 @@
 //! All cases, file by file.
 
 use crate::case::Case;
-use crate::{commands, health, plausibility, receive, registration, timing, transmit};
+use crate::{
+    arming, clocks, commands, health, plausibility, receive, registration, timing, transmit,
+};
 
-pub(crate) const CATALOGUE: [&[Case]; 7] = [
+pub(crate) const CATALOGUE: [&[Case]; 9] = [
     receive::CASES,
     plausibility::CASES,
     timing::CASES,
+    clocks::CASES,
     commands::CASES,
+    arming::CASES,
     registration::CASES,
     transmit::CASES,
     health::CASES,

@@ -1,11 +1,11 @@
 //! F34 to F43: what is asked for.
 
 use crate::case::{Case, cases, safe_after, saw};
-use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, words};
+use crate::rig::{Rig, SPEED, armed, at_ms, at_once, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, M2006, M3508};
 use drivetrain::encoder::{GearRatio, Position};
-use drivetrain::motor::{ArmError, CanDevice, TargetError};
+use drivetrain::motor::{ArmError, TargetError};
 use drivetrain::runner::EmergencyStop;
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::Tick;
@@ -122,7 +122,7 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
             last = value;
         }
         assert_eq!((last, raw(-0.0)), (16_384, 0));
-        for (ms, word, limited) in [(40, i16::MIN, -16_384), (41, i16::MAX, 16_384), (42, -1, -1)] {
+        for (ms, word, limited) in [(40, i16::MIN, -16_384), (42, i16::MAX, 16_384), (44, -1, -1)] {
             _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
             step(&mut bus, ms - 1);
             bus.set_raw(wheel, word).unwrap();
@@ -137,7 +137,7 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
 fn f37_each_model_has_its_own_scale() {
     fn raw_of<M: CurrentControlled>(base: u16) -> i16 {
         let mut bus = Bus::new();
-        let motor = bus.attach(Config::<M>::new(1)).unwrap();
+        let motor = bus.attach(at_once::<M>(1)).unwrap();
         _ = bus.ingest(&feedback(base + 1, 0, 0), at_ms(1));
         bus.arm(at_ms(1)).unwrap();
         bus.set_current(motor, Current::from_amperes(1.0)).unwrap();
@@ -271,12 +271,15 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
     assert_eq!(rig.runner.arm(tick), Err(ArmError::Stopped));
     rig.runner.clear_emergency_stop();
     rig.drive(20);
-    assert!(rig.words(0, 502, 520).iter().all(|word| *word == 0), "not before it is armed");
+    let tick = Tick::new(world.now(), 0.001);
+    assert_eq!(rig.runner.arm(tick), Err(ArmError::NotReleased), "20 ms after the stop");
+    rig.drive(100);
+    assert!(rig.words(0, 502, 620).iter().all(|word| *word == 0), "not before it is armed");
     rig.runner.arm(Tick::new(world.now(), 0.001)).unwrap();
     rig.drive(20);
-    assert!(rig.words(0, 530, 540).iter().all(|word| *word != 0));
+    assert!(rig.words(0, 630, 640).iter().all(|word| *word != 0));
     safe_after(ticks_since(300, rig.first_zero(0, 300)));
-    saw("zero until cleared and armed");
+    saw("zero until cleared, and armed 100 ms after that");
 }
 
 #[cfg_attr(test, test)]

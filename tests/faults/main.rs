@@ -5,8 +5,10 @@
 
 #![cfg(test)]
 
+mod arming;
 mod case;
 mod catalogue;
+mod clocks;
 mod commands;
 mod health;
 mod plausibility;

@@ -1,12 +1,12 @@
 //! F44 to F50: who is on the bus.
 
 use crate::case::{self, Case, cases, safe_after, saw};
-use crate::rig::{SPEED, armed, at_ms, feedback, rpm, step, words};
+use crate::rig::{SPEED, armed, at_ms, at_once, feedback, rpm, step, words};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Facts, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508,
     Model,
 };
-use drivetrain::motor::{ArmError, CanDevice, Claim, MotorName, Role, TargetError};
+use drivetrain::motor::{ArmError, CanDevice, Claim, Devices, MotorName, Role, TargetError};
 use drivetrain::time::Tick;
 use embedded_can::StandardId;
 use proptest::prelude::*;
@@ -111,7 +111,7 @@ fn f46_every_pair_that_shares_an_id_or_a_slot_is_refused_and_no_other() {
 fn f47_a_handle_of_a_motor_since_detached_finds_nothing() {
     let (mut bus, [old, other]) = armed([1, 2].map(|id| Config::new(id).speed_loop(SPEED)));
     bus.detach(old);
-    let new = bus.attach(Config::<M2006>::new(1)).unwrap();
+    let new = bus.attach(at_once::<M2006>(1)).unwrap();
     _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(2));
     bus.arm(at_ms(2)).unwrap();
     assert_eq!(bus.set_raw(old, 900), Err(TargetError::Detached));
@@ -145,8 +145,8 @@ fn f48_detaching_in_operation_sends_one_zero_and_frees_the_slot() {
 fn call(bus: &mut Bus, number: u8, id: u8, ms: u64) {
     let wheel = bus.motors().map(|(motor, _)| motor).nth(usize::from(id) % 3);
     match (number, wheel) {
-        (0, _) => _ = bus.attach(Config::<M3508>::new(id).speed_loop(SPEED)),
-        (1, _) => _ = bus.attach(Config::<Gm6020Voltage>::new(id)),
+        (0, _) => _ = bus.attach(at_once::<M3508>(id).speed_loop(SPEED)),
+        (1, _) => _ = bus.attach(at_once::<Gm6020Voltage>(id)),
         (2, Some(wheel)) => bus.detach(wheel),
         (3, Some(wheel)) => _ = bus.set_raw(wheel, i16::from(id) * 100),
         (4, Some(wheel)) => _ = bus.set_velocity(wheel, rpm(f32::from(id))),
@@ -158,7 +158,7 @@ fn call(bus: &mut Bus, number: u8, id: u8, ms: u64) {
         (10, _) => bus.clear_emergency_stop(),
         (11, _) => _ = bus.arm(at_ms(ms)),
         (12, _) => _ = bus.requeue(&feedback(0x200, 0, 0)),
-        _ => bus.engage(at_ms(ms)),
+        _ => CanDevice::engage(bus, at_ms(ms)),
     }
 }
 

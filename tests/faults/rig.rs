@@ -1,9 +1,9 @@
 //! A robot with M3508 wheels in speed loops on a simulated bus, and the invariants that hold whatever goes wrong.
 
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::dji::{self, Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Link};
+use drivetrain::motor::Link;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Controller, Line, Model, MotorConfig, MotorKey, Record, Sender, SimClock, World,
@@ -37,11 +37,17 @@ pub(crate) fn words(frame: &CanFrame) -> [i16; 4] {
     [[a, b], [c, d], [e, f], [g, h]].map(i16::from_be_bytes)
 }
 
-/// A bus with motors heard at 1 ms and armed, without a world.
+/// A motor whose output range opens at once: for the exact words after arming.
+pub(crate) fn at_once<M: dji::Model>(id: u8) -> Config<M> {
+    Config::new(id).with_opening(Duration::ZERO)
+}
+
+/// A bus with motors heard at 1 ms and armed, without a world. Their output ranges open at once.
 pub(crate) fn armed<const N: usize>(configs: [Config<M3508>; N]) -> (Bus, [Handle<M3508>; N]) {
     let mut bus = Bus::new();
     let ids = configs.map(|config| 0x200 + u16::from(config.id()));
-    let handles = bus.attach_all(configs).unwrap();
+    let at_once = |config: Config<M3508>| config.with_opening(Duration::ZERO);
+    let handles = bus.attach_all(configs.map(at_once)).unwrap();
     for id in ids {
         _ = bus.ingest(&feedback(id, 0, 0), at_ms(1));
     }
@@ -147,7 +153,7 @@ impl<'w> Rig<'w> {
     }
 
     /// I6: frames offered = taken + rejects; frames packed = sent + superseded + waiting.
-    fn add_up(&self) {
+    fn add_up(&mut self) {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         assert_eq!(s.received, s.taken + s.unrelated + s.malformed);
         assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total());

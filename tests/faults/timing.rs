@@ -1,10 +1,10 @@
 //! F24 to F33: time.
 
 use crate::case::{Case, cases, safe_after, saw};
-use crate::rig::{Rig, SPEED, armed, at_ms, feedback, rpm, step, ticks_since, words};
+use crate::rig::{Rig, SPEED, armed, at_ms, at_once, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
-use drivetrain::motor::{CanDevice, Link, Recovery, TargetError};
+use drivetrain::motor::{ArmError, Condition, Link, Recovery, TargetError};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, World};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
@@ -188,7 +188,7 @@ fn f28_nothing_notices_that_a_hardware_counter_wraps() {
         let mut read =
             |micros: u64| counter.extend(u32::try_from((start + micros) & mask).unwrap());
         let mut bus = Bus::new();
-        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let wheel = bus.attach(at_once::<M3508>(1)).unwrap();
         let first = read(0);
         _ = bus.ingest(&feedback(0x201, 0, 0), first);
         bus.arm(first).unwrap();
@@ -196,9 +196,9 @@ fn f28_nothing_notices_that_a_hardware_counter_wraps() {
             let now = read(ms * 1_000);
             assert_eq!(now.since(first), Duration::from_millis(ms));
             _ = bus.ingest(&feedback(0x201, 0, 0), now);
-            bus.set_raw(wheel, 7).unwrap();
+            bus.set_raw(wheel, 7_000).unwrap();
             bus.update(Tick::new(now, 0.001));
-            assert_eq!(words(&bus.next_frame().unwrap()), [7, 0, 0, 0]);
+            assert_eq!(words(&bus.next_frame().unwrap()), [7_000, 0, 0, 0]);
         }
     }
     saw("200 ticks across the wrap of 16 and of 32 bits: nothing");
@@ -206,34 +206,41 @@ fn f28_nothing_notices_that_a_hardware_counter_wraps() {
 
 #[cfg_attr(test, test)]
 fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
-    // Back by as much, together with the last feedback, while the loop goes on.
+    // Back by as much, while the loop goes on and sets a target in each round.
     for back in [1, 5, 9, 11, 1_000, 3_000_000] {
         let start = 4_000_000;
         let mut bus = Bus::new();
-        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let wheel = bus.attach(at_once::<M3508>(1)).unwrap();
         _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start));
         bus.arm(at_ms(start)).unwrap();
         step(&mut bus, start);
         bus.set_raw(wheel, 700).unwrap();
         assert_eq!(step(&mut bus, start + 1), Some([700, 0, 0, 0]));
-        let mut last_driven = 0;
-        for round in 0..200 {
+        bus.set_raw(wheel, 700).unwrap();
+        assert_eq!(step(&mut bus, start + 1 - back), Some([0; 4]), "back by {back} ms");
+        for round in 1..200 {
+            assert_eq!(bus.set_raw(wheel, 700), Err(TargetError::Relaxed));
             let sent = step(&mut bus, start + 1 - back + round);
-            _ = bus.set_raw(wheel, 700);
-            if sent.is_some_and(|words| words[0] != 0) {
-                last_driven = round;
-            }
+            assert!(sent.is_none_or(|words| words == [0; 4]), "back by {back} ms: {round}");
         }
-        assert!(last_driven <= 10 + back.min(10), "back by {back} ms: driven for {last_driven}");
-        safe_after(last_driven + 1);
-        // Heard again, it works on.
-        for round in 200..220 {
-            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(start + 1 - back + round));
-            step(&mut bus, start + 1 - back + round);
+        safe_after(1);
+        // Heard again, it is online, and takes targets when it is armed anew.
+        let now = start + 201 - back;
+        for round in 0..20 {
+            _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(now + round));
+            step(&mut bus, now + round);
         }
-        assert_eq!(bus.link(wheel), Some(Link::Online));
+        assert_eq!(bus.link(wheel), Some(Link::Online), "{back}");
+        assert_eq!(bus.set_raw(wheel, 700), Err(TargetError::Relaxed));
+        assert_eq!(bus.arm(at_ms(now + 19)), Ok(()));
+        bus.set_raw(wheel, 700).unwrap();
+        assert_eq!(step(&mut bus, now + 20), Some([700, 0, 0, 0]));
+        let told: Vec<_> = std::iter::from_fn(|| bus.next_edge()).collect();
+        let fault = told.iter().find(|edge| edge.condition == Condition::ClockFault).unwrap();
+        let off = at_ms(start + 1 - back).since(fault.at);
+        assert!(fault.began && off < Duration::from_micros(1_024), "{told:?}");
     }
-    // Standing: the runner has no tick, and a tick by hand holds once.
+    // Standing: the runner has no tick for as long as a clock may be coarse, and a tick by hand sends zeros.
     let clock = ManualClock::new(at_ms(10));
     let (bus, [wheel]) = armed([Config::new(1)]);
     let world = World::new(1);
@@ -244,15 +251,19 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     runner.tick(tick);
     assert!((0..1_000).all(|_| runner.due().is_none()));
     assert_eq!(runner.next_edge(), None, "a clock may be coarse");
+    assert!(runner.is_armed());
     for _ in 0..3 {
         runner.tick(Tick::new(at_ms(10), 0.0));
+        assert!(!runner.is_armed());
+        assert_eq!(runner.device_mut().set_raw(wheel, 700), Err(TargetError::Relaxed));
     }
     assert_eq!(runner.device().counters().bad_steps, 3);
     assert_eq!(runner.statistics().clock_standstills, 3);
     let edge = runner.next_edge().unwrap();
     assert_eq!((edge.condition, edge.at), (BusCondition::ClockStandstill, at_ms(10)));
+    // Back: a tick at once, for the zeros, and the ticks go on from there.
     clock.set(at_ms(3));
-    assert!(runner.due().is_none(), "no tick before the time comes again");
+    assert_eq!(runner.due(), Some(Tick::new(at_ms(3), 0.0)));
     assert!(runner.due().is_none());
     assert_eq!(runner.statistics().clock_reversals, 1);
     let edge = runner.next_edge().unwrap();
@@ -270,7 +281,9 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     assert_eq!(runner.statistics().clock_reversals, 2);
     let others: Vec<_> = runner.edges().map(|edge| edge.condition).collect();
     assert_eq!(others, [BusCondition::TickOverrun], "going back is one condition that lasts");
-    saw("no tick while time stands; back by up to 50 min: late, then online; both counted");
+    saw(
+        "zero in the same cycle, back by 1 ms to 50 min or standing; online again, relaxed until armed",
+    );
 }
 
 #[cfg_attr(test, test)]
@@ -302,17 +315,24 @@ fn f31_a_bad_time_step_holds_once_and_is_counted() {
             step(bus, ms).unwrap()[0]
         };
         let before = run(&mut bus, 2);
-        bus.update(Tick::new(at_ms(2), bad));
+        bus.update(Tick::new(at_us(2_500), bad));
         assert_eq!(words(&bus.next_frame().unwrap())[0], before, "held");
         let after = run(&mut bus, 3);
         assert!(after >= before && after - before < 100, "goes on: {before}, {after}");
-        for _ in 0..2 {
-            bus.update(Tick::new(at_ms(3), bad));
+        for us in [3_300, 3_600] {
+            bus.update(Tick::new(at_us(us), bad));
         }
         assert_eq!(words(&bus.next_frame().unwrap())[0], 0, "only once");
         assert_eq!(bus.counters().bad_steps, 3);
+        let again = run(&mut bus, 4);
+        assert!(again >= after && again - after < 100, "not latched: {after}, {again}");
+        // Where the time does not move on either, nothing is held: F29.
+        bus.update(Tick::new(at_ms(4), bad));
+        assert_eq!(words(&bus.next_frame().unwrap())[0], 0, "time stands");
+        assert_eq!(bus.set_velocity(wheel, rpm(100.0)), Err(TargetError::Relaxed));
+        assert_eq!(bus.counters().bad_steps, 4);
     }
-    saw("held once, then zero, 3 counted");
+    saw("held once where time moves on, then zero; zero at once where it stands; each counted");
 }
 
 #[cfg_attr(test, test)]
@@ -364,14 +384,22 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(194));
     assert_eq!(bus.link(wheel), Some(Link::Online));
     assert_eq!(bus.set_velocity(wheel, rpm(300.0)), Err(TargetError::Relaxed), "waits for arming");
-    bus.arm(at_ms(194)).unwrap();
+    assert_eq!(bus.arm(at_ms(194)), Err(ArmError::NotReleased), "54 ms after it was lost");
+    for ms in 195..295 {
+        _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
+        assert_eq!(bus.set_velocity(wheel, rpm(300.0)), Err(TargetError::Relaxed));
+        assert!(step(&mut bus, ms).is_none_or(|words| words[0] == 0), "{ms}");
+    }
+    bus.arm(at_ms(294)).unwrap();
     bus.set_velocity(wheel, rpm(300.0)).unwrap();
-    let first = step(&mut bus, 195).unwrap()[0];
+    let first = step(&mut bus, 295).unwrap()[0];
     assert!(first < 200, "the old integral is gone: {first}");
 
     let world = World::new(2);
-    let ramp = Recovery::Ramp(Duration::from_millis(200));
-    let mut rig = Rig::with(&world, Line::Can1, 1, |config| config.with_recovery(ramp));
+    let opening = Duration::from_millis(200);
+    let mut rig = Rig::with(&world, Line::Can1, 1, |config| {
+        config.with_recovery(Recovery::Resume).with_opening(opening)
+    });
     world.fault(Fault::Silent(rig.keys[0]), at_ms(300)..at_ms(500)).unwrap();
     rig.drive(800);
     let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();

@@ -1,8 +1,8 @@
-//! F51 to F56: what the driver does with frames.
+//! F51 to F56 and F70: what the driver does with frames.
 
 use crate::case::{Case, cases, safe_after, saw};
-use crate::rig::{Rig, armed, at_ms, feedback, words};
-use drivetrain::dji::Config;
+use crate::rig::{Rig, armed, at_ms, at_once, feedback, words};
+use drivetrain::dji::{Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Link};
 use drivetrain::runner::{BusCondition, Nb, Runner};
@@ -19,6 +19,7 @@ pub(crate) const CASES: &[Case] = cases![
     f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed,
     f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody,
     f56_two_buses_share_nothing,
+    f70_a_driver_that_gives_each_frame_back_is_a_bus_that_is_down,
 ];
 
 /// Answers as scripted, then takes everything.
@@ -247,4 +248,102 @@ fn f56_two_buses_share_nothing() {
     let (troubled, healthy) = (run(true), run(false));
     assert_eq!(troubled, healthy, "one bus fails, the other's frames are the same to the bit");
     saw(format!("{} frames of the other bus, the same to the bit", healthy.len()));
+}
+
+/// Mailboxes on a bus that takes nothing: a new frame takes the place of the one that has waited longest, which is given back.
+struct Mailboxes {
+    waiting: VecDeque<CanFrame>,
+    places: usize,
+    /// The bus takes what waits, before each frame that is offered.
+    sends: bool,
+    /// What it took.
+    sent: Vec<CanFrame>,
+}
+
+impl embedded_can::nb::Can for Mailboxes {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+        if self.sends {
+            self.sent.extend(self.waiting.drain(..));
+        }
+        self.waiting.push_back(*frame);
+        Ok((self.waiting.len() > self.places).then(|| self.waiting.pop_front().unwrap()))
+    }
+    fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+        Err(nb::Error::WouldBlock)
+    }
+}
+
+/// With no place at all each frame comes back at once. At 330c201: 100 000 sent, 100 000 evicted, `is_bus_down` false.
+#[cfg_attr(test, test)]
+fn f70_a_driver_that_gives_each_frame_back_is_a_bus_that_is_down() {
+    let mut down_after = Vec::new();
+    for (ids, places) in
+        [(&[1_u8][..], 0), (&[1], 1), (&[1], 3), (&[1, 5], 0), (&[1, 5], 1), (&[1, 5], 3)]
+    {
+        let clock = ManualClock::new(at_ms(1));
+        let mut bus = drivetrain::dji::Bus::new();
+        let wheels: Vec<_> =
+            ids.iter().map(|id| bus.attach(at_once::<M3508>(*id)).unwrap()).collect();
+        let port = Mailboxes { waiting: VecDeque::new(), places, sends: true, sent: Vec::new() };
+        let mut runner = Runner::new(Nb(port), &clock, bus);
+        let turn = |runner: &mut Runner<Nb<Mailboxes>, _, drivetrain::dji::Bus>| {
+            clock.advance(Duration::from_millis(1));
+            for id in [0x201, 0x205] {
+                _ = runner.ingest(&feedback(id, 0, 0), clock.now());
+            }
+            for wheel in &wheels {
+                _ = runner.device_mut().set_raw(*wheel, 700);
+            }
+            let tick = runner.due().unwrap();
+            runner.tick(tick);
+            tick
+        };
+        let what = format!("{} motors, {places} mailboxes", ids.len());
+        let tick = turn(&mut runner);
+        assert_eq!(runner.arm(tick), Ok(()));
+        // As long as the bus takes what waits, a frame may be given back for another, and nothing is wrong.
+        let is_well = places >= ids.len();
+        for _ in 0..if is_well { 500 } else { 0 } {
+            turn(&mut runner);
+            assert!(!runner.is_bus_down() && runner.is_armed(), "{what}");
+        }
+        let sent = runner.port_mut().0.sent.len();
+        assert_eq!(sent > 400, is_well, "{what}: {sent}");
+        // Then it takes nothing any more.
+        runner.port_mut().0.sends = false;
+        let begin = clock.now();
+        while !runner.is_bus_down() {
+            turn(&mut runner);
+            assert!(clock.now() < begin + Duration::from_millis(200), "{what}: never down");
+        }
+        down_after.push(clock.now().since(begin).as_micros() / 1_000);
+        assert!(!runner.is_armed(), "{what}");
+        assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Err(ArmError::BusDown), "{what}");
+        let down = runner.edges().find(|edge| edge.condition == BusCondition::Down).unwrap();
+        assert!(down.began && down.at == clock.now(), "{what}");
+        for _ in 0..1_000 {
+            turn(&mut runner);
+            assert!(runner.is_bus_down(), "{what}: as long as nothing leaves");
+        }
+        // What waits now is zero: the frames of the tick after it was found to be down.
+        let waiting = &runner.port_mut().0.waiting;
+        assert!(waiting.iter().all(|frame| *frame.bytes() == [0; 8]), "{what}");
+        let statistics = runner.statistics();
+        assert_eq!(statistics.bus_losses, 1, "{what}: {statistics:?}");
+        if is_well {
+            // It is up again with the frames that stay, and waits to be armed.
+            runner.port_mut().0.sends = true;
+            for _ in 0..100 {
+                turn(&mut runner);
+            }
+            assert!(!runner.is_bus_down() && !runner.is_armed(), "{what}");
+            assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()), "{what}");
+        }
+    }
+    let (first, last) = (down_after.iter().min().unwrap(), down_after.iter().max().unwrap());
+    assert!(*first >= 99 && *last <= 115, "{down_after:?}");
+    safe_after(*last);
+    saw(format!("down after {first} to {last} ms, disarmed, arming refused"));
 }

@@ -5,7 +5,7 @@ use super::{JOINTS, seconds};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, Bus, Gm6020Voltage, Handle, M2006};
 use drivetrain::encoder::Position;
-use drivetrain::motor::{BusLoad, CanDevice};
+use drivetrain::motor::{BusLoad, Devices};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{SimClock, World};
 use drivetrain::snake::{Config, Joint, Joints};

@@ -4,7 +4,7 @@ use super::host::{Action, Host, Operator};
 use super::plant::Plant;
 use super::robot::{Event, Output, Robot};
 use super::{JOINTS, at, degrees, seconds};
-use drivetrain::motor::{BusLoad, CanDevice};
+use drivetrain::motor::BusLoad;
 use drivetrain::sim::{Fault, Line, Noise, Record, SerialCounts, SerialLine, Traffic, World};
 use drivetrain::snake::{Counters, State};
 use drivetrain::wire::Counts;
@@ -183,7 +183,7 @@ impl Setup {
             if time_s < steady_until {
                 traffic = Some(world.traffic(Line::Can1));
             }
-            samples.push(observe(time_s, &host, &robot, &plant));
+            samples.push(observe(time_s, &host, &mut robot, &plant));
         }
         events.append(&mut robot.events);
         accepted.append(&mut robot.accepted);
@@ -237,8 +237,9 @@ impl Setup {
     }
 }
 
-fn observe(time_s: f32, host: &Host, robot: &Robot<'_>, plant: &Plant<'_>) -> Sample {
+fn observe(time_s: f32, host: &Host, robot: &mut Robot<'_>, plant: &Plant<'_>) -> Sample {
     let states = plant.states();
+    let armed = robot.runner.is_armed();
     let (joints, _) = robot.runner.device();
     let offsets = robot.joints.map(|joint| joints.offset(joint).unwrap_or_default());
     let mut true_deg = [0.0; JOINTS];
@@ -261,7 +262,7 @@ fn observe(time_s: f32, host: &Host, robot: &Robot<'_>, plant: &Plant<'_>) -> Sa
             (asked.c610_position.into(), finger),
             (asked.sts3032_degrees.into(), plant.servo.degrees()),
         ],
-        armed: robot.runner.device().is_armed(),
+        armed,
         enabled: states.map(|state| state.is_some_and(|state| state.is_enabled)),
         swings: host.operator.swings_for(time_s).is_some(),
     }

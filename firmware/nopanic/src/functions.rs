@@ -14,7 +14,7 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, CanDevice, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing,
+    BusLoad, Devices, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing,
     MotorName, Own, OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
 };
 use drivetrain::runner::{
@@ -246,8 +246,7 @@ fn motor() {
     Claim::role.call();
     Claim::motor.call();
     Timeouts::new.call();
-    Timeouts::with_late.call();
-    Timeouts::with_offline.call();
+    Timeouts::with_feedback.call();
     Timeouts::with_command.call();
     Timeouts::with_measured.call();
     Timeouts::measured.call();
@@ -317,20 +316,18 @@ fn motor() {
 }
 
 /// The trait that every device implements, and its combinations.
-fn device<D: CanDevice + 'static>() {
+fn device<D: Devices + 'static>() {
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
     (|device: &mut D, tick: Tick| device.update(tick)).call();
     (|device: &mut D, turn: u32| device.next_frame(turn)).call();
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
-    (|device: &D| device.claims().count()).call();
-    (|device: &D, now: Instant| device.missing(now).count()).call();
-    (|device: &D| (device.faulty().count(), device.second_master())).call();
+    (|device: &mut D| device.claims().count()).call();
     (|device: &mut D| device.next_edge()).call();
-    (|device: &mut D, now: Instant| device.engage(now)).call();
     (|device: &mut D, now: Instant| device.arm(now).is_ok()).call();
-    (|device: &D| device.clash()).call();
+    (|device: &mut D| device.clash()).call();
     (|device: &mut D| device.disarm()).call();
-    (|device: &D| (device.is_armed(), device.is_stopped())).call();
+    (|device: &mut D| (device.is_armed(), device.is_stopped())).call();
+    (|device: &mut D| device.trip()).call();
     (|device: &mut D| device.emergency_stop()).call();
     (|device: &mut D| device.clear_emergency_stop()).call();
 }

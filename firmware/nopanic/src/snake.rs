@@ -2,7 +2,7 @@
 
 use crate::opaque::{Function, any};
 use core::hint::black_box;
-use drivetrain::motor::CanDevice;
+use drivetrain::motor::Devices;
 use drivetrain::snake::*;
 
 pub fn call_all() {
@@ -67,11 +67,11 @@ pub fn call_all() {
     Joints::offset.call();
     Joints::read.call();
     Joints::answer.call();
-    <Joints as CanDevice>::arm.call();
-    <Joints as CanDevice>::disarm.call();
-    <Joints as CanDevice>::emergency_stop.call();
-    <Joints as CanDevice>::clear_emergency_stop.call();
-    <Joints as CanDevice>::is_armed.call();
+    <Joints as Devices>::arm.call();
+    <Joints as Devices>::disarm.call();
+    <Joints as Devices>::emergency_stop.call();
+    <Joints as Devices>::clear_emergency_stop.call();
+    <Joints as Devices>::is_armed.call();
 }
 
 /// `Command::decode` borrows its argument.

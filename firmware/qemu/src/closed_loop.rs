@@ -72,10 +72,13 @@ pub(crate) fn run() -> (u64, u32) {
         });
         runner.poll(16);
         let Some(tick) = runner.due() else { continue };
-        if !wheels.iter().all(|wheel| runner.device().is_motor_armed(*wheel)) {
+        let ms = tick.now().as_micros() / 1_000;
+        let is_armed = wheels.iter().all(|wheel| runner.device().is_motor_armed(*wheel));
+        // An operator presses the key each 110 ms.
+        if !is_armed && ms % 110 == 0 {
             _ = runner.arm(tick);
         }
-        let ms = (tick.now().as_micros() / 1_000) as f32;
+        let ms = ms as f32;
         for (index, wheel) in wheels.iter().enumerate() {
             let speed = AngularVelocity::from_rad_per_s((index as f32 - 1.5) * ms * 0.01);
             _ = runner.device_mut().set_velocity(*wheel, speed);

@@ -5,7 +5,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest};
+use drivetrain::motor::Ingest;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -43,7 +43,10 @@ impl Drive {
         let position = PidConfig::new(10.0, 0.5, 0.01);
         let ids: [u8; MOTORS] = core::array::from_fn(|index| index as u8 + 1);
         let configs =
-            ids.map(|id| Config::<M3508>::new(black_box(id)).position_loop(position, speed));
+            ids.map(|id| {
+            // The range is open from the first tick on, as it is in all but the first 200.
+            Config::<M3508>::new(black_box(id)).position_loop(position, speed).with_opening(Duration::ZERO)
+        });
         let mut bus = Bus::new();
         let motors = bus.attach_all(configs).unwrap();
         let mut drive =

@@ -5,8 +5,15 @@ impl Pid {
     /// size: an integral that alone asks for more than passes would be wound up. NaN counts as zero.
     pub(crate) const fn keep_integral_within(&mut self, passed: f32) {
         let most = if passed.is_nan() { 0.0 } else { passed.abs() };
-        if self.integral.abs() > most {
-            self.integral = most.copysign(self.integral);
+        self.keep_integral_between(-most, most);
+    }
+
+    /// Keeps the integral between the ends of a range of the output that contains zero.
+    pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
+        if self.integral > highest {
+            self.integral = highest;
+        } else if self.integral < lowest {
+            self.integral = lowest;
         }
     }
 }

@@ -1,7 +1,6 @@
 use super::{Slot, is_near};
-use crate::dji::command::to_raw;
 use crate::dji::range::Range;
-use crate::motor::{Link, Monitor, Timeouts};
+use crate::motor::{Condition, Link, Monitor, Timeouts};
 use core::num::NonZeroU16;
 
 /// Whether the motor takes targets.
@@ -35,9 +34,19 @@ impl Slot {
         }
         self.monitor = Monitor::NEW;
         self.arming = Arming::Armed;
-        self.ramp_started = None;
+        self.open(now);
         self.keep_inside(0);
         self.commanded = now;
+    }
+
+    /// Has the output range open from zero.
+    fn open(&mut self, now: u32) {
+        // The last unit does not count: it tells that the range opens.
+        self.opened = self.opening_ms.and(NonZeroU16::new(coarse(now) | 1));
+        if self.opened.is_some() {
+            self.range = Range::ZERO;
+            self.attend();
+        }
     }
 
     pub(in crate::dji) fn disarm(&mut self) {
@@ -64,42 +73,49 @@ impl Slot {
         self.relax();
     }
 
-    /// Starts again from zero output after a recovery, where that is configured.
-    pub(super) fn start_ramp(&mut self) {
-        if self.arming == Arming::Latched && self.ramp_ms.is_some() {
+    /// Time did not move on: trips the motor, and takes its feedback for late until the next one.
+    pub(in crate::dji) fn lose_time(&mut self) {
+        if self.facts.is_none() {
+            return;
+        }
+        self.begin(Condition::ClockFault);
+        if self.link == Link::Online {
+            self.set_late();
+        }
+        self.trip();
+    }
+
+    /// Takes targets again after a recovery, where that is configured; the output range opens from zero.
+    pub(super) fn resume(&mut self) {
+        if self.arming == Arming::Latched && self.resumes {
             self.arming = Arming::Armed;
-            self.range = Range::ZERO;
+            self.open(self.heard);
             self.settle();
-            self.attend();
-            // The last unit does not count: it tells that there is a ramp.
-            self.ramp_started = NonZeroU16::new(coarse(self.heard) | 1);
         }
     }
 
-    /// Returns the share of the output that a ramp leaves.
-    pub(super) fn ramp(&mut self, now: u32) -> f32 {
-        let Some(started) = self.ramp_started else { return 1.0 };
+    /// Returns the share of the output range that is open.
+    pub(super) fn open_share(&mut self, now: u32) -> f32 {
+        let Some(opened) = self.opened else { return 1.0 };
         // An interrupt may have stamped the frame just after the tick read its clock.
         const AHEAD: u16 = 64_500;
-        let elapsed = coarse(now).wrapping_sub(started.get());
+        let elapsed = coarse(now).wrapping_sub(opened.get());
         let elapsed_ms = if elapsed < AHEAD { f32::from(elapsed) * 1.024 } else { 0.0 };
-        match self.ramp_ms.map(|time| f32::from(time.get())) {
+        match self.opening_ms.map(|time| f32::from(time.get())) {
             Some(time_ms) if elapsed_ms < time_ms => elapsed_ms / time_ms,
             _ => {
-                self.ramp_started = None;
+                self.opened = None;
                 1.0
             }
         }
     }
 
-    /// Keeps the speed loop within what is left of the output: it knows only the full limit, and would wind up.
+    /// Keeps the integral of the speed loop within what is left of the output: the loop knows only the full limit, and would
+    /// wind up.
     pub(super) fn hold_back(&mut self) {
-        let output = self.loops.output();
-        let raw = to_raw(output, self.raw_per_unit, i16::MAX);
-        let nearest = self.range.nearest(raw.into());
-        if nearest != raw {
-            self.loops.speed_mut().reset_to(f32::from(nearest) / self.raw_per_unit);
-        }
+        let end = |raw: i16| f32::from(self.range.nearest(raw.into())) / self.raw_per_unit;
+        let (one, other) = (end(i16::MIN), end(i16::MAX));
+        self.loops.speed_mut().keep_integral_between(one.min(other), one.max(other));
     }
 }
 

@@ -69,7 +69,7 @@ impl Slot {
     pub(super) fn relent(&mut self, facts: &Facts) {
         let is_well = self.conditions.active().is_empty()
             && self.link == Link::Online
-            && self.ramp_started.is_none()
+            && self.opened.is_none()
             && self.error_code == 0
             && self.range == Range::within(self.full_limit)
             && self.health.soft_limits().is_none();
@@ -162,7 +162,7 @@ impl Slot {
 
     /// Narrows the output to the share that is left, in the directions that are left.
     fn narrow(&mut self, share: f32, elapsed: u8, now: u32) {
-        let share = share.min(self.ramp(now));
+        let share = share.min(self.open_share(now));
         let limit = to_raw(share, f32::from(self.full_limit), self.full_limit);
         self.range = Range::within(limit);
         self.keep_inside(elapsed);
@@ -223,6 +223,8 @@ impl Slot {
         if look.is_alone {
             self.conditions.set(Condition::SecondMaster, false);
         }
+        // An update that looks here has moved on.
+        self.conditions.set(Condition::ClockFault, false);
     }
 
     fn close_window(&mut self, window: u16, feedback_hz: u32) {

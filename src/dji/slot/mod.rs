@@ -19,6 +19,7 @@ use crate::encoder::{GearRatio, Homing, Position, Shaft};
 use crate::motor::{
     Condition, HealthConfig, Latch, Link, Monitor, MotorName, Recovery, TargetError, Traffic,
 };
+use crate::time::Duration;
 use crate::units::{AngularVelocity, Current};
 use arming::Arming;
 use core::f32::consts::TAU;
@@ -53,9 +54,9 @@ pub(super) struct Slot {
     loops: Cascade,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
-    /// While the output rises after a recovery.
-    ramp_started: Option<NonZeroU16>,
-    ramp_ms: Option<NonZeroU16>,
+    /// Since when the output range opens; `None` when it is open.
+    opened: Option<NonZeroU16>,
+    opening_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
     refused_targets: u16,
     forgotten_targets: u16,
@@ -63,6 +64,8 @@ pub(super) struct Slot {
     homing: Homing,
     good_frames: u8,
     generation: u8,
+    /// Whether the motor takes targets again after a recovery.
+    resumes: bool,
     error_code: u8,
     /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
     /// well when it was looked at last, and nothing has begun since.
@@ -101,8 +104,9 @@ impl Slot {
         nm_per_a: 0.0,
         range: Range::ZERO,
         full_limit: 0,
-        ramp_ms: None,
-        ramp_started: None,
+        opening_ms: None,
+        opened: None,
+        resumes: false,
         ambiguous_gaps: 0,
         refused_targets: 0,
         forgotten_targets: 0,
@@ -184,7 +188,8 @@ impl Slot {
             nm_per_a,
             range: Range::within(limit_raw),
             full_limit: limit_raw,
-            ramp_ms: ramp_time(config.recovery),
+            opening_ms: whole_ms(config.opening),
+            resumes: matches!(config.recovery, Recovery::Resume),
             loops,
             generation,
             place,
@@ -319,19 +324,11 @@ const fn age(now: u32, stamp: u32) -> u32 {
     if age.cast_signed() < 0 { 0 } else { age }
 }
 
-/// Whole milliseconds, at least one.
-const fn ramp_time(recovery: Recovery) -> Option<NonZeroU16> {
-    let Recovery::Ramp(time) = recovery else { return None };
-    let millis = match time.micros_u32() {
-        Some(micros) if micros <= 65_535_000 => micros / 1_000,
-        _ => 65_535,
-    };
-    #[expect(clippy::cast_possible_truncation, reason = "at most 65 535")]
-    let millis = NonZeroU16::new(millis as u16);
-    match millis {
-        None => Some(NonZeroU16::MIN),
-        some => some,
-    }
+/// Whole milliseconds, at most 65 s; `None` for less than one.
+const fn whole_ms(time: Duration) -> Option<NonZeroU16> {
+    let millis = time.as_micros() / 1_000;
+    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
+    NonZeroU16::new(if millis < 65_000 { millis as u16 } else { 65_000 })
 }
 
 /// The velocity of the output shaft without load: what a position loop may ask for.

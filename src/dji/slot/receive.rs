@@ -123,7 +123,7 @@ impl Slot {
     fn finish_recovery(&mut self, facts: &Facts, timeouts: &Timeouts) {
         if self.good_frames >= timeouts.good_frames() {
             self.set_online(facts);
-            self.start_ramp();
+            self.resume();
         }
     }
 

@@ -297,7 +297,7 @@ mod tests {
     use super::*;
     use crate::dji::{Bus, Config, M3508};
     use crate::frame::CanFrame;
-    use crate::motor::{CanDevice, Timeouts};
+    use crate::motor::Timeouts;
     use crate::time::{Instant, Tick};
     use crate::units::AngularVelocity;
 
@@ -312,7 +312,8 @@ mod tests {
             (plain, slow, [Duty::Other, Duty::Other]),
         ] {
             let mut bus: Bus = Bus::new();
-            let motor = bus.attach(Config::<M3508>::new(1).position_loop(position, speed)).unwrap();
+            let motor =
+                bus.attach(Config::<M3508>::at_once(1).position_loop(position, speed)).unwrap();
             let now = Instant::from_micros(1_000);
             _ = bus.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), now);
             bus.arm(now).unwrap();

@@ -92,7 +92,17 @@ impl Slot {
             Action::Rest => return 0,
         };
         let goal = self.loops.step_position(way, velocity, step);
-        self.follow_velocity(goal, velocity, step)
+        self.follow_velocity(goal * self.opened_part(), velocity, step)
+    }
+
+    /// Returns which part of its velocity a position loop may ask for: while the output range opens, that of the range.
+    fn opened_part(&self) -> f32 {
+        if self.opened.is_none() {
+            return 1.0;
+        }
+        f32::from(
+            self.range.nearest(i32::from(i16::MAX)).max(-self.range.nearest(i32::from(i16::MIN))),
+        ) / f32::from(self.full_limit)
     }
 
     /// Adds the ages of this motor's feedback and target, when it is heard.

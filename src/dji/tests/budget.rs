@@ -3,7 +3,7 @@ use super::*;
 /// Attaches M3508 until one is refused; returns how many there are, and the words of the refusal.
 fn filled(bus: &mut Bus) -> (u8, std::string::String) {
     let refused = (1..=8).find_map(|id| {
-        let refusal = bus.attach(Config::<M3508>::new(id)).err()?;
+        let refusal = bus.attach(Config::<M3508>::at_once(id)).err()?;
         Some((id - 1, refusal.to_string()))
     });
     refused.unwrap()
@@ -30,7 +30,7 @@ fn the_load_counts_the_motors_and_each_frame_of_commands_once() {
     assert_eq!(bus.load().to_string(), "0 % to 0 %");
     let mut seen = Vec::new();
     for id in 1..=5 {
-        bus.attach(Config::<M3508>::new(id)).unwrap();
+        bus.attach(Config::<M3508>::at_once(id)).unwrap();
         seen.push(bus.load().worst_percent());
     }
     // 500 times 135 bits for each motor; 250 times 135 for 0x200, and from the fifth on for 0x1FF.
@@ -44,7 +44,7 @@ fn a_hardware_filter_opens_the_bits_in_which_ids_differ() {
     let filter = |ids: &[u8]| {
         let mut bus: Bus = Bus::new();
         for id in ids {
-            bus.attach(Config::<M3508>::new(*id)).unwrap();
+            bus.attach(Config::<M3508>::at_once(*id)).unwrap();
         }
         bus.acceptance_filter()
     };

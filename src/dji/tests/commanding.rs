@@ -3,7 +3,7 @@ use super::*;
 #[test]
 fn one_ampere_is_the_raw_value_of_each_model() {
     fn raw_of<M: CurrentControlled>(amperes: f32) -> i16 {
-        let (mut bus, [motor]) = armed([Config::<M>::new(1)]);
+        let (mut bus, [motor]) = armed([Config::<M>::at_once(1)]);
         bus.set_current(motor, Current::from_amperes(amperes)).unwrap();
         step(&mut bus, 2);
         sent(&mut bus)[0].1[0]
@@ -22,9 +22,12 @@ fn one_ampere_is_the_raw_value_of_each_model() {
 #[test]
 fn full_voltage_is_25000_and_30000_on_old_motors() {
     for (config, raw) in [
-        (Config::<Gm6020Voltage>::new(5), 25_000),
-        (Config::<Gm6020Voltage>::new(5).with_legacy_full_scale(), 30_000),
-        (Config::<Gm6020Voltage>::new(5).with_nominal_voltage(Voltage::from_volts(25.2)), 23_810),
+        (Config::<Gm6020Voltage>::at_once(5), 25_000),
+        (Config::<Gm6020Voltage>::at_once(5).with_legacy_full_scale(), 30_000),
+        (
+            Config::<Gm6020Voltage>::at_once(5).with_nominal_voltage(Voltage::from_volts(25.2)),
+            23_810,
+        ),
     ] {
         let (mut bus, [yaw]) = armed([config]);
         bus.set_voltage(yaw, Voltage::from_volts(24.0)).unwrap();
@@ -35,7 +38,7 @@ fn full_voltage_is_25000_and_30000_on_old_motors() {
 
 #[test]
 fn extreme_requests_on_a_reversed_motor_saturate_and_keep_their_sign() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).reversed()]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).reversed()]);
     let mut ms = 1;
     let mut request = |amperes: f32| {
         ms += 1;
@@ -56,8 +59,8 @@ fn extreme_requests_on_a_reversed_motor_saturate_and_keep_their_sign() {
 #[test]
 fn m3508_and_m2006_on_one_bus_share_one_frame_a_cycle() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
-    let feeder = bus.attach(Config::<M2006>::new(2)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+    let feeder = bus.attach(Config::<M2006>::at_once(2)).unwrap();
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
     assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(1)), Ingest::Taken);
     bus.arm(at_ms(1)).unwrap();
@@ -69,7 +72,7 @@ fn m3508_and_m2006_on_one_bus_share_one_frame_a_cycle() {
 
 #[test]
 fn a_motor_that_is_never_commanded_does_not_hold_up_the_others() {
-    let (mut bus, [first, _, third]) = armed([1, 2, 3].map(Config::<M3508>::new));
+    let (mut bus, [first, _, third]) = armed([1, 2, 3].map(Config::<M3508>::at_once));
     bus.set_raw(first, 11).unwrap();
     bus.set_raw(third, 33).unwrap();
     step(&mut bus, 2);
@@ -79,7 +82,7 @@ fn a_motor_that_is_never_commanded_does_not_hold_up_the_others() {
 #[test]
 fn limits_hold_for_direct_commands_and_for_loops() {
     let limit = Current::from_amperes(2.0);
-    let config = Config::<M3508>::new(1)
+    let config = Config::<M3508>::at_once(1)
         .with_current_limit(limit)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0));
     let (mut bus, [wheel]) = armed([config]);
@@ -93,7 +96,7 @@ fn limits_hold_for_direct_commands_and_for_loops() {
 
 #[test]
 fn a_speed_loop_gives_amperes_for_rad_per_s_of_the_output_shaft() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
     bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(10.0)).unwrap();
     step(&mut bus, 2);
     assert_eq!(sent(&mut bus), [(0x200, [8192, 0, 0, 0])]); // 10 A of 20 A
@@ -109,7 +112,7 @@ fn a_speed_loop_gives_amperes_for_rad_per_s_of_the_output_shaft() {
 #[test]
 fn an_angle_goes_the_shortest_way() {
     let config =
-        Config::<Gm6020Voltage>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
+        Config::<Gm6020Voltage>::at_once(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
     let (mut bus, [yaw]) = armed([config]);
     let mut ms = 1;
     let mut towards = |from: f32, to: f32| {
@@ -125,7 +128,7 @@ fn an_angle_goes_the_shortest_way() {
 
 #[test]
 fn an_absolute_angle_of_a_geared_motor_needs_a_zero() {
-    let config = Config::<M3508>::new(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
+    let config = Config::<M3508>::at_once(1).position_loop(PidConfig::new(1.0, 0.0, 0.0), SPEED);
     let (mut bus, [joint]) = armed([config]);
     assert_eq!(bus.set_angle(joint, Angle::ZERO), Err(TargetError::NotHomed));
     assert_eq!(bus.set_position(joint, Position::from_turns(2)), Ok(()));
@@ -137,7 +140,7 @@ fn an_absolute_angle_of_a_geared_motor_needs_a_zero() {
 
 #[test]
 fn a_target_without_its_loop_is_an_error() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::NoLoop));
     assert_eq!(bus.set_position(wheel, Position::ZERO), Err(TargetError::NoLoop));
     assert_eq!(bus.set_speed_loop(wheel, SPEED), Err(LoopError::NoLoop));
@@ -145,7 +148,7 @@ fn a_target_without_its_loop_is_an_error() {
 
 #[test]
 fn gains_change_while_running() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
     bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();
     step(&mut bus, 2);
     assert_eq!(sent(&mut bus), [(0x200, [3277, 0, 0, 0])]);
@@ -165,7 +168,7 @@ fn gains_change_while_running() {
 fn the_angle_that_steers_is_known_while_the_motor_is_heard_and_homed() {
     use crate::motor::AngleDrive;
     let loops = |config: Config<Gm6020Voltage>| config.position_loop(SPEED, SPEED);
-    let (mut bus, [module]) = armed([loops(Config::new(1))]);
+    let (mut bus, [module]) = armed([loops(Config::at_once(1))]);
     assert_eq!(bus.ingest(&feedback(0x205, 2048, 0), at_ms(2)), Ingest::Taken);
     assert!(AngleDrive::angle(&bus, module).is_some_and(|a| (a.as_degrees() - 90.0).abs() < 1e-3));
     AngleDrive::set_angle(&mut bus, AnyHandle::from(module), Angle::from_degrees(91.0)).unwrap();
@@ -174,7 +177,7 @@ fn the_angle_that_steers_is_known_while_the_motor_is_heard_and_homed() {
     step(&mut bus, 500);
     assert_eq!(AngleDrive::angle(&bus, module), None); // silent
 
-    let (mut bus, [geared]) = armed([Config::<M2006>::new(1).position_loop(SPEED, SPEED)]);
+    let (mut bus, [geared]) = armed([Config::<M2006>::at_once(1).position_loop(SPEED, SPEED)]);
     assert_eq!(AngleDrive::angle(&bus, geared), None);
     let refused = AngleDrive::set_angle(&mut bus, geared, Angle::ZERO);
     assert_eq!(refused, Err(TargetError::NotHomed));
@@ -204,7 +207,7 @@ fn a_drive_tells_and_takes_velocities_and_angles_by_either_handle() {
         step(bus, ms + 1);
         assert_eq!(sent(bus)[0].1[0], 0);
     }
-    let config = Config::<Gm6020Voltage>::new(1).position_loop(SPEED, SPEED);
+    let config = Config::<Gm6020Voltage>::at_once(1).position_loop(SPEED, SPEED);
     let (mut bus, [yaw]) = armed([config]);
     check(&mut bus, yaw, 2);
     check(&mut bus, yaw.erase(), 4);
@@ -224,7 +227,8 @@ fn a_position_loop_asks_for_no_more_than_the_motor_runs_without_load_nor_than_it
         ((-20.0, 30.0), 30.0, -20.0),
     ] {
         let position = strong.with_output_range(range.0, range.1);
-        let (mut bus, [joint]) = armed([Config::<M3508>::new(1).position_loop(position, speed)]);
+        let (mut bus, [joint]) =
+            armed([Config::<M3508>::at_once(1).position_loop(position, speed)]);
         for again in [false, true] {
             for (ms, turns, rad_per_s) in [(2, 9, forward), (3, -9, backward)] {
                 bus.set_position(joint, Position::from_turns(turns)).unwrap();
@@ -240,7 +244,7 @@ fn a_position_loop_asks_for_no_more_than_the_motor_runs_without_load_nor_than_it
 #[test]
 fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     let loops = |kp| PidConfig::new(kp, 0.0, 0.0);
-    let (mut bus, [joint]) = armed([Config::<M3508>::new(1).position_loop(loops(1.0), SPEED)]);
+    let (mut bus, [joint]) = armed([Config::<M3508>::at_once(1).position_loop(loops(1.0), SPEED)]);
     let wrong = bus.set_position_loop(joint, loops(f32::NAN)).unwrap_err();
     assert_eq!(wrong.to_string(), "kp is not usable");
     bus.set_position(joint, Position::from_turns(1)).unwrap();
@@ -255,7 +259,7 @@ fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     bus.detach(joint);
     let detached = bus.set_position_loop(joint, loops(1.0)).unwrap_err();
     assert_eq!(detached.to_string(), "the motor was detached");
-    let wheel = bus.attach(Config::<M3508>::new(2).speed_loop(SPEED)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(2).speed_loop(SPEED)).unwrap();
     let without = bus.set_position_loop(wheel, loops(1.0)).unwrap_err();
     assert_eq!(without.to_string(), "the motor was attached without this loop");
 }

@@ -34,7 +34,7 @@ impl Case {
     /// Those of each model, and of the older scale of one.
     fn all() -> impl Iterator<Item = Self> {
         let usual = ALL_FACTS.iter().map(|facts| (facts.command_raw, facts.command_full_scale));
-        let legacy = Config::<Gm6020Voltage>::new(1).with_legacy_full_scale().plain;
+        let legacy = Config::<Gm6020Voltage>::at_once(1).with_legacy_full_scale().plain;
         let all = usual.chain([(legacy.command_raw, legacy.command_full_scale)]);
         all.map(|(limit, full_scale)| Self::new(limit, full_scale))
     }

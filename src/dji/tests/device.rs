@@ -3,7 +3,7 @@
 use super::*;
 use crate::motor::{Condition, MotorName};
 
-fn frames_of<D: CanDevice>(device: &mut D, ms: u64) -> Vec<CanFrame> {
+fn frames_of<D: Devices>(device: &mut D, ms: u64) -> Vec<CanFrame> {
     device.update(Tick::new(at_ms(ms), 0.001));
     core::iter::from_fn(|| device.next_frame(0)).collect()
 }
@@ -18,7 +18,7 @@ fn id_of(mut names: impl Iterator<Item = MotorName>) -> Option<u8> {
 
 #[test]
 fn a_device_sends_what_its_updates_give_and_takes_back_its_own_only() {
-    fn check<D: CanDevice>(device: &mut D) {
+    fn check<D: Devices>(device: &mut D) {
         let frames = frames_of(device, 2);
         assert_eq!(frames.len(), 1);
         assert_eq!(device.superseded(), 0);
@@ -28,24 +28,24 @@ fn a_device_sends_what_its_updates_give_and_takes_back_its_own_only() {
         assert_eq!(frames_of(device, 3).len(), 1);
         assert_eq!(device.superseded(), 1);
     }
-    let (mut bus, _) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, _) = armed([Config::<M3508>::at_once(1)]);
     check(&mut bus);
 }
 
 #[test]
 fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
-    fn check<D: CanDevice>(device: &mut D) {
+    fn check<D: Devices + CanDevice>(device: &mut D) {
         assert_eq!(id_of(device.faulty()), None);
-        assert_eq!((device.second_master(), device.next_edge()), (None, None));
-        assert_eq!(device.ingest(&with_error(0x202, 3), at_ms(1)), Ingest::Taken);
+        assert_eq!((device.second_master(), Devices::next_edge(device)), (None, None));
+        assert_eq!(Devices::ingest(device, &with_error(0x202, 3), at_ms(1)), Ingest::Taken);
         for ms in 2..20 {
             frames_of(device, ms);
         }
         assert_eq!(id_of(device.faulty()), Some(2));
-        let edge = device.next_edge().unwrap();
+        let edge = Devices::next_edge(device).unwrap();
         assert_eq!((edge.motor.id(), edge.condition, edge.began), (2, Condition::Fault, true));
         let command = CanFrame::standard(0x200, [1; 8]).unwrap();
-        assert_eq!(device.ingest(&command, at_ms(20)), Ingest::Unrelated);
+        assert_eq!(Devices::ingest(device, &command, at_ms(20)), Ingest::Unrelated);
         assert!(device.second_master().is_some());
         assert!(matches!(
             device.arm(at_ms(20)),
@@ -53,7 +53,7 @@ fn a_device_names_who_is_faulty_and_who_else_commands_and_tells_edges() {
         ));
     }
     let mut bus: Bus = Bus::new();
-    bus.attach(Config::<M3508>::new(2)).unwrap();
+    bus.attach(Config::<M3508>::at_once(2)).unwrap();
     check(&mut bus);
 }
 
@@ -64,11 +64,11 @@ fn each_command_frame_in_use_tells_of_a_second_master_and_no_other_does() {
         let heard = all.map(|id| {
             let mut bus: Bus = Bus::new();
             match used {
-                0x200 => bus.attach(Config::<M3508>::new(1)).map(Handle::erase),
-                0x1FF => bus.attach(Config::<M3508>::new(5)).map(Handle::erase),
-                0x2FF => bus.attach(Config::<Gm6020Voltage>::new(5)).map(Handle::erase),
-                0x1FE => bus.attach(Config::<Gm6020Current>::new(1)).map(Handle::erase),
-                _ => bus.attach(Config::<Gm6020Current>::new(5)).map(Handle::erase),
+                0x200 => bus.attach(Config::<M3508>::at_once(1)).map(Handle::erase),
+                0x1FF => bus.attach(Config::<M3508>::at_once(5)).map(Handle::erase),
+                0x2FF => bus.attach(Config::<Gm6020Voltage>::at_once(5)).map(Handle::erase),
+                0x1FE => bus.attach(Config::<Gm6020Current>::at_once(1)).map(Handle::erase),
+                _ => bus.attach(Config::<Gm6020Current>::at_once(5)).map(Handle::erase),
             }
             .unwrap();
             let frame = CanFrame::standard(id, [0; 8]).unwrap();

@@ -16,7 +16,7 @@ struct Crowd {
 impl Crowd {
     fn new(health: &'static HealthConfig) -> Self {
         let mut bus = Bus::new().with_feedback_rate(100);
-        let motor = bus.attach(Config::<M3508>::new(1).with_health(health)).unwrap();
+        let motor = bus.attach(Config::<M3508>::at_once(1).with_health(health)).unwrap();
         let mut crowd = Self { bus, motor, us: 1_000 };
         for _ in 0..800 {
             crowd.hear(0, 0, PERIOD_US);

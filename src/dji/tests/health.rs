@@ -17,7 +17,7 @@ fn the_rate_of_feedback_is_that_of_the_last_second() {
     for start in [1_u64, 300_000, 4_294_000] {
         for (period, hz) in [(1, 970..=1_020), (2, 485..=510)] {
             let mut bus = Bus::new();
-            let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+            let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
             let mut rates = Vec::new();
             for ms in start..start + 3_100 {
                 if ms % period == 0 {
@@ -40,7 +40,7 @@ fn a_second_master_is_forgotten_a_second_after_its_last_frame_and_not_earlier() 
     let command = CanFrame::standard(0x200, [0; 8]).unwrap();
     // Each motor is looked at in every twelfth tick: in one of these, just as the second ends.
     for offset in 0..12 {
-        let (mut bus, [wheel, _, _]) = armed([1, 2, 3].map(Config::<M3508>::new));
+        let (mut bus, [wheel, _, _]) = armed([1, 2, 3].map(Config::<M3508>::at_once));
         let last_ms = 100 + offset;
         let mut ended = Vec::new();
         for ms in 2..1_300 {
@@ -73,7 +73,7 @@ fn a_second_master_is_forgotten_a_second_after_its_last_frame_and_not_earlier() 
 fn a_driver_that_echoes_is_no_second_master() {
     for (bus, expected) in [(Bus::new(), true), (Bus::new().with_loopback(), false)] {
         let mut bus: Bus = bus;
-        let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+        let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
         hear(&mut bus, 0x201, 1);
         step(&mut bus, 1);
         let own = bus.next_frame().unwrap();
@@ -85,7 +85,7 @@ fn a_driver_that_echoes_is_no_second_master() {
 
 #[test]
 fn conditions_are_those_of_the_motor_and_none_of_one_that_is_gone() {
-    let (mut bus, [quiet, other]) = armed([1, 2].map(Config::<M3508>::new));
+    let (mut bus, [quiet, other]) = armed([1, 2].map(Config::<M3508>::at_once));
     for ms in 2..20 {
         hear(&mut bus, 0x202, ms);
         step(&mut bus, ms);
@@ -100,7 +100,7 @@ fn conditions_are_those_of_the_motor_and_none_of_one_that_is_gone() {
 #[test]
 fn a_motor_that_comes_while_all_is_quiet_is_watched_from_its_first_frame() {
     let mut bus: Bus = Bus::new().with_keep_alive(Duration::from_secs(10));
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     for ms in 1..100 {
         step(&mut bus, ms);
     }

@@ -52,7 +52,7 @@ struct Standing {
 
 impl Standing {
     fn new() -> Self {
-        let (bus, [motor]) = armed([Config::<M3508>::new(1).speed_loop(HOLDING)]);
+        let (bus, [motor]) = armed([Config::<M3508>::at_once(1).speed_loop(HOLDING)]);
         Self {
             bus,
             motor,
@@ -177,7 +177,7 @@ fn a_speed_loop_goes_on_from_nothing_but_what_was_sent() {
 
 #[test]
 fn a_position_loop_does_not_go_on_from_a_direct_command_that_was_not_sent() {
-    let loops = Config::<M3508>::new(1).position_loop(HOLDING, HOLDING);
+    let loops = Config::<M3508>::at_once(1).position_loop(HOLDING, HOLDING);
     let here = Position::ZERO;
     let measured = Measured { angle: Angle::ZERO, velocity: AngularVelocity::ZERO, at: at_ms(2) };
     type Ask = fn(&mut Bus, Handle<M3508>, Measured) -> Result<(), TargetError>;

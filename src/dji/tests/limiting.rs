@@ -9,7 +9,7 @@ fn amperes(bus: &Bus, motor: Handle<M3508>) -> f32 {
 
 #[test]
 fn the_commanded_current_is_what_goes_on_the_wire_in_the_direction_of_the_shaft() {
-    for (config, sign) in [(Config::<M3508>::new(1), 1), (Config::new(1).reversed(), -1)] {
+    for (config, sign) in [(Config::<M3508>::at_once(1), 1), (Config::at_once(1).reversed(), -1)] {
         let (mut bus, [wheel]) = armed([config]);
         assert!(amperes(&bus, wheel).abs() < 1e-9);
         bus.set_current(wheel, Current::from_amperes(-5.0)).unwrap();
@@ -23,7 +23,7 @@ fn the_commanded_current_is_what_goes_on_the_wire_in_the_direction_of_the_shaft(
 
 #[test]
 fn outputs_are_cut_by_one_factor_and_the_others_and_the_next_update_know_nothing_of_it() {
-    let (mut bus, [left, right, other]) = armed([1, 2, 3].map(Config::<M3508>::new));
+    let (mut bus, [left, right, other]) = armed([1, 2, 3].map(Config::<M3508>::at_once));
     for (motor, raw) in [(left, 1_000), (right, -301), (other, 77)] {
         bus.set_raw(motor, raw).unwrap();
     }
@@ -46,7 +46,7 @@ fn outputs_are_cut_by_one_factor_and_the_others_and_the_next_update_know_nothing
 #[test]
 fn the_speed_loop_of_a_motor_that_is_cut_does_not_wind_up() {
     let loops = PidConfig::new(0.0, 100.0, 0.0);
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(loops)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(loops)]);
     for ms in 2..=502 {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
         VelocityDrive::set_velocity(&mut bus, wheel, AngularVelocity::from_rad_per_s(1.0)).unwrap();

@@ -8,7 +8,7 @@ const RATE: PidConfig = PidConfig::new(2.0, 0.0, 0.0); // V per rad/s
 const RAW_PER_V: f32 = 25_000.0 / 24.0;
 
 fn yaw_config() -> Config<Gm6020Voltage> {
-    Config::new(1).position_loop(ANGLE, RATE)
+    Config::at_once(1).position_loop(ANGLE, RATE)
 }
 
 fn radians(radians: f32) -> Angle {
@@ -80,8 +80,8 @@ fn a_measurement_that_is_too_old_is_refused_and_takes_the_target_away() {
         (day, 0, false),
     ] {
         let (mut bus, [yaw]) = armed([yaw_config()]);
-        step(&mut bus, now - 1); // offline by now
-        for ms in (0..12).rev() {
+        step(&mut bus, now - 120); // offline by now
+        for ms in (0..119).rev() {
             _ = run(&mut bus, now - ms, 0, 0);
         }
         bus.arm(at_ms(now)).unwrap();
@@ -101,7 +101,7 @@ fn a_measurement_that_is_too_old_is_refused_and_takes_the_target_away() {
 #[test]
 fn without_new_ones_the_output_is_zero_within_a_tick_of_the_limit() {
     for (limit_ms, lead_us) in [(20, 0), (20, 700), (5, 300), (90, 0), (500, 0)] {
-        let timeouts = Timeouts::new().with_measured(Duration::from_millis(limit_ms));
+        let timeouts = Timeouts::new().with_measured(Duration::from_millis(limit_ms)).unwrap();
         let (bus, [yaw]) = armed([yaw_config()]);
         let mut bus = bus.with_timeouts(timeouts);
         for ms in 2..10 {
@@ -149,7 +149,7 @@ fn what_is_not_finite_or_has_no_loop_is_refused() {
             (bus, _) = armed([yaw_config()]);
         }
     }
-    let (mut bus, [bare]) = armed([Config::<Gm6020Voltage>::new(1)]);
+    let (mut bus, [bare]) = armed([Config::<Gm6020Voltage>::at_once(1)]);
     let outcome = bus.set_angle_measured(bare, radians(0.1), imu(0.0, 0.0, at_ms(1)));
     assert_eq!(outcome, Err(TargetError::NoLoop));
 }
@@ -169,7 +169,7 @@ fn lost_feedback_of_the_motor_counts_whatever_the_sensor_says() {
 #[test]
 fn from_one_sensor_to_the_other_there_is_no_kick() {
     let rate = PidConfig::new(2.0, 0.0, 0.01);
-    let config = || Config::<Gm6020Voltage>::new(1).position_loop(ANGLE, rate);
+    let config = || Config::<Gm6020Voltage>::at_once(1).position_loop(ANGLE, rate);
     let (mut bus, [yaw]) = armed([config()]);
     let encoder = |bus: &mut Bus, ms| {
         bus.set_angle(yaw, radians(0.0)).unwrap();
@@ -216,7 +216,7 @@ fn what_is_offered_is_what_is_taken() {
     fn each<M: Model>(
         cases: impl Fn(&mut Bus, AnyHandle) -> std::string::String,
     ) -> Vec<std::string::String> {
-        let bare = Config::<M>::new(1);
+        let bare = Config::<M>::at_once(1);
         [bare, bare.speed_loop(RATE), bare.position_loop(ANGLE, RATE)]
             .map(|config| {
                 let (mut bus, [motor]) = armed([config]);

@@ -2,6 +2,7 @@
 
 mod attaching;
 mod budget;
+mod clock;
 mod commanding;
 mod conversions;
 mod device;
@@ -22,12 +23,21 @@ use super::*;
 use crate::control::PidConfig;
 use crate::encoder::{Homing, Position};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Ingest, Link, Malformed, Recovery, TargetError, Timeouts};
+use crate::motor::{
+    ArmError, CanDevice, Devices, Ingest, Link, Malformed, Recovery, TargetError, Timeouts,
+};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::{ExtendedId, Frame, StandardId};
 use std::string::ToString;
 use std::vec::Vec;
+
+impl<M: Model> Config<M> {
+    /// A motor whose output range opens at once.
+    pub(crate) const fn at_once(id: u8) -> Self {
+        Self::new(id).with_opening(Duration::ZERO)
+    }
+}
 
 const SPEED: PidConfig = PidConfig::new(1.0, 0.0, 0.0);
 

@@ -3,7 +3,7 @@ use super::*;
 #[test]
 fn wrong_lengths_remote_and_extended_frames_are_ignored_and_counted() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let id = StandardId::new(0x201).unwrap();
     for length in 0..8 {
         let short = CanFrame::new(id, &[0; 8][..length]).unwrap();
@@ -27,8 +27,8 @@ fn wrong_lengths_remote_and_extended_frames_are_ignored_and_counted() {
 #[test]
 fn the_router_is_total_over_all_ids_and_lengths() {
     let mut bus = Bus::new();
-    bus.attach_all([1, 2, 3, 4, 5, 6, 7, 8].map(Config::<M3508>::new)).unwrap();
-    bus.attach_all([5, 6, 7].map(Config::<Gm6020Voltage>::new)).unwrap();
+    bus.attach_all([1, 2, 3, 4, 5, 6, 7, 8].map(Config::<M3508>::at_once)).unwrap();
+    bus.attach_all([5, 6, 7].map(Config::<Gm6020Voltage>::at_once)).unwrap();
     for raw in 0..=0x7FF {
         for length in 0..=8 {
             let frame = CanFrame::new(StandardId::new(raw).unwrap(), &[0; 8][..length]).unwrap();
@@ -45,7 +45,7 @@ fn the_router_is_total_over_all_ids_and_lengths() {
 #[test]
 fn state_is_at_the_output_shaft_in_physical_units() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(4)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(4)).unwrap();
     let frame =
         CanFrame::standard(0x204, [0x1F, 0xFF, 0x24, 0x28, 0xE0, 0x00, 0x3C, 0x00]).unwrap();
     assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
@@ -60,7 +60,7 @@ fn state_is_at_the_output_shaft_in_physical_units() {
 #[test]
 fn below_zero_it_is_cold_and_not_250_degrees() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(4)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(4)).unwrap();
     for (byte, celsius) in [(250, -6), (216, -40), (215, 215), (0, 0)] {
         let frame = CanFrame::standard(0x204, [0, 0, 0, 0, 0, 0, byte, 0]).unwrap();
         assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
@@ -72,7 +72,7 @@ fn below_zero_it_is_cold_and_not_250_degrees() {
 #[test]
 fn c610_has_no_temperature_and_its_own_error_list() {
     let mut bus = Bus::new();
-    let feeder = bus.attach(Config::<M2006>::new(5)).unwrap();
+    let feeder = bus.attach(Config::<M2006>::at_once(5)).unwrap();
     let frame =
         CanFrame::standard(0x205, [0x10, 0x00, 0xB9, 0xB0, 0x13, 0x88, 0x00, 0x03]).unwrap();
     assert_eq!(bus.ingest(&frame, at_ms(1)), Ingest::Taken);
@@ -85,7 +85,7 @@ fn c610_has_no_temperature_and_its_own_error_list() {
 #[test]
 fn a_reversed_motor_turns_everything_around() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1).reversed()).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1).reversed()).unwrap();
     for (ms, angle) in [(1, 0), (2, 1000)] {
         let frame = CanFrame::standard(0x201, {
             let [a, b] = u16::to_be_bytes(angle);
@@ -101,7 +101,7 @@ fn a_reversed_motor_turns_everything_around() {
 #[test]
 fn five_lost_frames_at_9000_rpm_are_resolved_with_the_speed() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let mut true_counts = 0_i64;
     for ms in 1..2_000_u64 {
         true_counts += 1229;
@@ -119,7 +119,7 @@ fn five_lost_frames_at_9000_rpm_are_resolved_with_the_speed() {
 #[test]
 fn a_gap_that_cannot_be_resolved_is_flagged_and_unhomes() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     assert_eq!(bus.ingest(&feedback(0x201, 0, 9000), at_ms(1)), Ingest::Taken);
     bus.zero(wheel).unwrap();
     assert_eq!(bus.state(wheel).unwrap().homing, Homing::Homed);
@@ -131,7 +131,7 @@ fn a_gap_that_cannot_be_resolved_is_flagged_and_unhomes() {
 #[test]
 fn frames_of_one_motor_are_handled_in_order() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     // 64 frames at once, after a stall of the loop: half a turn back and forth, and on.
     for step in 0..64_u16 {
         let angle = if step % 2 == 0 { step } else { step + 4000 };
@@ -143,8 +143,8 @@ fn frames_of_one_motor_are_handled_in_order() {
 
 #[test]
 fn two_buses_share_no_state() {
-    let (mut left, [wheel]) = armed([Config::<M3508>::new(1)]);
-    let (mut right, [other]) = armed([Config::<M3508>::new(1)]);
+    let (mut left, [wheel]) = armed([Config::<M3508>::at_once(1)]);
+    let (mut right, [other]) = armed([Config::<M3508>::at_once(1)]);
     left.set_raw(wheel, 500).unwrap();
     step(&mut left, 2);
     step(&mut right, 2);
@@ -164,7 +164,7 @@ fn a_gap_is_bridged_by_speeds_that_are_possible_and_the_shortest_way_where_one_i
         (18_512, -18_513, 20_221 - 2 * 8_192),
         (32_000, 300, 20_221 - 2 * 8_192),
     ] {
-        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
         step(&mut bus, 2);
         assert_eq!(bus.ingest(&feedback(0x201, 0, before), at_ms(2)), Ingest::Taken);
         let from = bus.state(wheel).unwrap().rotor_counts;
@@ -179,7 +179,7 @@ fn a_gap_is_bridged_by_speeds_that_are_possible_and_the_shortest_way_where_one_i
 #[test]
 fn a_frame_in_time_is_followed_the_shortest_way() {
     for running in [false, true] {
-        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
         if running {
             assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(2)), Ingest::Taken);
             step(&mut bus, 2);
@@ -199,7 +199,7 @@ fn a_frame_in_time_is_followed_the_shortest_way() {
 fn a_frame_is_in_time_for_as_long_as_half_a_turn_may_not_have_passed() {
     for running in [false, true] {
         for (gap_us, doubts) in [(2_740, 0), (2_741, 1)] {
-            let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+            let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
             if running {
                 step(&mut bus, 2);
             }

@@ -1,33 +1,8 @@
 use super::*;
 
 #[test]
-fn a_clock_that_goes_back_neither_latches_nor_revives_a_motor() {
-    let (mut bus, [heard, silent]) = armed([1, 2].map(Config::<M3508>::new));
-    let hear = |bus: &mut Bus, id, ms| {
-        assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(ms)), Ingest::Taken)
-    };
-    for ms in 2..2_005 {
-        hear(&mut bus, 0x201, ms);
-        hear(&mut bus, 0x202, ms);
-        step(&mut bus, ms);
-    }
-    // One second back: that step is held, and the old stamps lie ahead, which is not fresh.
-    step(&mut bus, 999);
-    step(&mut bus, 1_000);
-    assert_eq!((bus.link(heard), bus.link(silent)), (Some(Link::Late), Some(Link::Late)));
-    for ms in 1_001..1_300 {
-        hear(&mut bus, 0x201, ms);
-        bus.set_raw(heard, 300).unwrap();
-        assert_eq!(bus.set_raw(silent, 300), Err(TargetError::NoFeedback));
-        step(&mut bus, ms);
-        assert_eq!(sent(&mut bus).last(), Some(&(0x200, [300, 0, 0, 0])));
-    }
-    assert_eq!(bus.state(heard).unwrap().ambiguous_gaps, 0);
-}
-
-#[test]
 fn a_frame_stamped_after_the_tick_read_its_clock_is_fresh() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     let at = Instant::from_micros;
     for us in (2_000..50_000).step_by(1_000) {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(us + 300)), Ingest::Taken);
@@ -39,7 +14,7 @@ fn a_frame_stamped_after_the_tick_read_its_clock_is_fresh() {
 
 #[test]
 fn feedback_that_returns_after_being_late_makes_no_derivative_spike() {
-    let config = Config::<M3508>::new(1).speed_loop(PidConfig::new(0.0, 0.0, 0.05));
+    let config = Config::<M3508>::at_once(1).speed_loop(PidConfig::new(0.0, 0.0, 0.05));
     let (mut bus, [wheel]) = armed([config]);
     let turning = |ms: u64| feedback(0x201, 0, if ms < 40 { 0 } else { 9_000 });
     for ms in 2..60 {
@@ -54,19 +29,22 @@ fn feedback_that_returns_after_being_late_makes_no_derivative_spike() {
 
 #[test]
 fn arming_again_does_not_disturb_the_motors_that_run() {
-    let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::new));
+    let (mut bus, [first, second]) = armed([1, 2].map(Config::<M3508>::at_once));
     for ms in 2..150 {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
         bus.set_raw(first, 500).unwrap();
         step(&mut bus, ms);
     }
     assert!(!bus.is_armed() && bus.is_motor_armed(first) && !bus.is_motor_armed(second));
-    for ms in 150..160 {
+    for ms in 150..202 {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
         assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(ms)), Ingest::Taken);
+        bus.set_raw(first, 500).unwrap();
+        step(&mut bus, ms);
     }
-    bus.arm(at_ms(160)).unwrap();
-    step(&mut bus, 160);
+    bus.arm(at_ms(202)).unwrap();
+    _ = sent(&mut bus);
+    step(&mut bus, 203);
     assert_eq!(sent(&mut bus)[0], (0x200, [500, 0, 0, 0]), "the first keeps its target");
     assert!(bus.is_armed());
 }
@@ -74,19 +52,19 @@ fn arming_again_does_not_disturb_the_motors_that_run() {
 #[test]
 fn engaging_arms_neither_the_unheard_nor_under_an_emergency_stop() {
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
-    bus.engage(at_ms(1));
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+    CanDevice::engage(&mut bus, at_ms(1));
     assert!(!bus.is_motor_armed(wheel));
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
     bus.emergency_stop();
-    bus.engage(at_ms(1));
+    CanDevice::engage(&mut bus, at_ms(1));
     assert!(!bus.is_motor_armed(wheel));
 }
 
 #[test]
 fn a_position_is_zeroed_only_while_the_motor_is_heard() {
     let mut bus = Bus::new();
-    let joint = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let joint = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     assert_eq!(bus.zero(joint), Err(TargetError::NoFeedback));
     assert_eq!(bus.ingest(&feedback(0x201, 5000, 0), at_ms(1)), Ingest::Taken);
     assert_eq!(bus.zero(joint), Ok(()));
@@ -99,7 +77,7 @@ fn a_position_is_zeroed_only_while_the_motor_is_heard() {
 fn nothing_moves_before_it_is_armed_and_the_missing_are_named() {
     let mut bus = Bus::new();
     assert_eq!(bus.arm(at_ms(1)), Err(ArmError::NoMotors));
-    let [first, _] = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    let [first, _] = bus.attach_all([1, 2].map(Config::<M3508>::at_once)).unwrap();
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(1)), Ingest::Taken);
     assert_eq!(bus.set_raw(first, 1000), Err(TargetError::Disarmed));
     assert_eq!(bus.arm(at_ms(2)).unwrap_err().to_string(), "no feedback from M3508 #2");
@@ -113,7 +91,7 @@ fn nothing_moves_before_it_is_armed_and_the_missing_are_named() {
 #[test]
 fn late_feedback_is_zero_output_and_clears_itself() {
     let (mut bus, [quiet, other]) =
-        armed([1, 2].map(|id| Config::<M3508>::new(id).speed_loop(SPEED)));
+        armed([1, 2].map(|id| Config::<M3508>::at_once(id).speed_loop(SPEED)));
     let mut zero_since = None;
     for ms in 2..60 {
         assert_eq!(bus.ingest(&feedback(0x202, 0, 0), at_ms(ms)), Ingest::Taken);
@@ -139,7 +117,7 @@ fn late_feedback_is_zero_output_and_clears_itself() {
 
 #[test]
 fn an_offline_motor_is_latched_until_it_is_armed_again() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
     for ms in 2..150 {
         _ = bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(1.0));
         step(&mut bus, ms);
@@ -156,7 +134,9 @@ fn an_offline_motor_is_latched_until_it_is_armed_again() {
     assert_eq!(bus.ingest(&feedback(0x201, 4000, 0), at_ms(159)), Ingest::Taken);
     assert_eq!(bus.link(wheel), Some(Link::Online));
     assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::Relaxed));
-    bus.arm(at_ms(159)).unwrap();
+    assert_eq!(bus.arm(at_ms(159)), Err(ArmError::NotReleased), "asked for a millisecond before");
+    assert_eq!(bus.ingest(&feedback(0x201, 4000, 0), at_ms(259)), Ingest::Taken);
+    bus.arm(at_ms(259)).unwrap();
     assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Ok(()));
     let state = bus.state(wheel).unwrap();
     assert_eq!((state.position.turns(), state.rotor_counts), (0, 4000), "no turn was made up");
@@ -164,9 +144,10 @@ fn an_offline_motor_is_latched_until_it_is_armed_again() {
 
 #[test]
 fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
-    let config = Config::<M3508>::new(1)
+    let config = Config::<M3508>::at_once(1)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
-        .with_recovery(Recovery::Ramp(Duration::from_millis(100)));
+        .with_recovery(Recovery::Resume)
+        .with_opening(Duration::from_millis(100));
     let (mut bus, [wheel]) = armed([config]);
     for ms in 2..150 {
         step(&mut bus, ms);
@@ -187,7 +168,7 @@ fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
 
 #[test]
 fn an_application_that_stops_setting_targets_stops_the_motor() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     bus.set_raw(wheel, 700).unwrap();
     let mut last_driven = 0;
     for ms in 2..300 {
@@ -203,7 +184,7 @@ fn an_application_that_stops_setting_targets_stops_the_motor() {
 
 #[test]
 fn an_emergency_stop_is_zero_at_the_next_frame_until_cleared_and_armed() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     bus.set_raw(wheel, 700).unwrap();
     step(&mut bus, 2);
     bus.emergency_stop();
@@ -212,14 +193,16 @@ fn an_emergency_stop_is_zero_at_the_next_frame_until_cleared_and_armed() {
     assert_eq!(bus.arm(at_ms(3)), Err(ArmError::Stopped));
     bus.clear_emergency_stop();
     assert_eq!(bus.set_raw(wheel, 700), Err(TargetError::Disarmed));
-    assert_eq!(bus.arm(at_ms(3)), Ok(()));
+    assert_eq!(bus.arm(at_ms(4)), Err(ArmError::NotReleased), "the switch stays on");
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(104)), Ingest::Taken);
+    assert_eq!(bus.arm(at_ms(104)), Ok(()));
 }
 
 #[test]
 fn stamps_that_wrap_at_32_bits_change_nothing() {
     let wrap = 1 << 32;
     let mut bus = Bus::new();
-    let wheel = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let at = Instant::from_micros;
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at(wrap - 3_000)), Ingest::Taken);
     bus.update(Tick::new(at(wrap - 3_000), 0.001));
@@ -234,7 +217,7 @@ fn stamps_that_wrap_at_32_bits_change_nothing() {
 
 #[test]
 fn a_motor_unheard_for_longer_than_a_stamp_can_tell_is_not_revived() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     step(&mut bus, 2);
     bus.update(Tick::new(Instant::from_micros(1_000 + (1 << 32)), 0.001));
     assert_eq!(bus.link(wheel), Some(Link::Offline));
@@ -243,7 +226,7 @@ fn a_motor_unheard_for_longer_than_a_stamp_can_tell_is_not_revived() {
 
 #[test]
 fn a_bad_time_step_holds_the_output_once_and_then_stops() {
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     let at = Instant::from_micros;
     for (now, bad) in (1..).zip([0.0, -0.001, f32::NAN, f32::INFINITY]) {
         let now = 2_000 + 100 * now;
@@ -259,14 +242,25 @@ fn a_bad_time_step_holds_the_output_once_and_then_stops() {
 }
 
 #[test]
-fn timeouts_are_configured_within_ten_seconds() {
-    let timeouts = Timeouts::new()
-        .with_late(Duration::from_millis(3))
-        .with_offline(Duration::from_secs(9_999));
-    assert_eq!(
-        (timeouts.late(), timeouts.offline()),
-        (Duration::from_millis(3), Duration::from_secs(10))
-    );
+fn timeouts_that_would_drive_blindly_are_refused() {
+    let (ms, us) = (Duration::from_millis, Duration::from_micros);
+    let timeouts = Timeouts::new().with_feedback(ms(3), ms(10_000)).unwrap();
+    assert_eq!((timeouts.late(), timeouts.offline()), (ms(3), ms(10_000)));
+    assert_eq!(timeouts.with_command(ms(1_000)).unwrap().command(), ms(1_000));
+    assert_eq!(timeouts.with_measured(us(1_999)).unwrap().measured(), ms(1));
+    let refused =
+        |late, offline| Timeouts::new().with_feedback(late, offline).unwrap_err().parameter;
+    assert_eq!(refused(ms(10_000), ms(1)), "late");
+    assert_eq!(refused(us(1_000_001), ms(10_000)), "late");
+    assert_eq!(refused(us(0), ms(100)), "late");
+    assert_eq!(refused(ms(20), us(19_999)), "offline");
+    assert_eq!(refused(ms(20), us(10_000_001)), "offline");
+    for command in [us(0), us(1_000_001), ms(u64::MAX / 1_000)] {
+        assert_eq!(timeouts.with_command(command).unwrap_err().parameter, "command");
+    }
+    for measured in [us(999), us(1_000_001)] {
+        assert_eq!(timeouts.with_measured(measured).unwrap_err().parameter, "measurement");
+    }
 }
 
 /// What has to become of a motor's target, reckoned anew in every tick.
@@ -297,11 +291,9 @@ fn each_of_several_motors_stops_at_its_own_limit_however_the_ages_are_mixed() {
         seed ^= seed << 17;
         seed % below
     };
-    let (bus, wheels) = armed([1, 2, 3].map(Config::<M3508>::new));
-    let timeouts = Timeouts::new()
-        .with_late(Duration::from_micros(4_000))
-        .with_command(Duration::from_micros(6_000))
-        .with_offline(Duration::from_secs(10));
+    let (bus, wheels) = armed([1, 2, 3].map(Config::<M3508>::at_once));
+    let timeouts = Timeouts::new().with_feedback(Duration::from_millis(4), Duration::from_secs(10));
+    let timeouts = timeouts.unwrap().with_command(Duration::from_millis(6)).unwrap();
     let mut bus = bus.with_timeouts(timeouts);
     let mut watched = [Watched { heard: 1_000, ..Watched::default() }; 3];
     let (mut now, mut words, mut stops) = (1_000, [0; 4], 0);
@@ -350,19 +342,19 @@ fn each_of_several_motors_stops_at_its_own_limit_however_the_ages_are_mixed() {
 fn a_pause_of_a_whole_turn_of_the_stamps_revives_nobody() {
     let turn = Duration::from_micros(1 << 32);
     for dt_s in [0.001, 0.0] {
-        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
         assert!(bus.arm(at_ms(1) + turn).is_err(), "heard an hour ago");
         bus.update(Tick::new(at_ms(1) + turn, dt_s));
         assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
 
-        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
         step(&mut bus, 2);
         bus.update(Tick::new(at_ms(2) + turn, dt_s));
         assert_eq!((bus.link(wheel), bus.is_motor_armed(wheel)), (Some(Link::Offline), false));
     }
 
     // Updates without a usable step, however close to each other, do not end the pause.
-    let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
     step(&mut bus, 2);
     for seconds in 1..=4294 {
         bus.update(Tick::new(at_ms(seconds * 1_000), 0.0));

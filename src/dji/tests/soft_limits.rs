@@ -9,7 +9,7 @@ static LIMITS: HealthConfig =
 const STILL: Told = Told { rpm: 0, counts_per_ms: 0, ..CALM };
 
 fn config() -> Config<Gm6020Voltage> {
-    Config::new(1).with_health(&LIMITS)
+    Config::at_once(1).with_health(&LIMITS)
 }
 
 /// Moves the shaft to an angle, as one that is carried there, and tells what is left of both directions after a look, and
@@ -88,7 +88,7 @@ fn limits_are_those_of_the_shaft_however_the_motor_is_mounted_and_count_at_once(
 fn a_geared_motor_has_no_limits_before_somebody_has_told_where_it_is() {
     static AROUND: HealthConfig =
         HealthConfig::new().with_soft_limits(Angle::from_radians(-1.0), Angle::from_radians(-0.5));
-    let mut bench = Bench::new(Config::<M3508>::new(1).with_health(&AROUND));
+    let mut bench = Bench::new(Config::<M3508>::at_once(1).with_health(&AROUND));
     assert_eq!(bench.run(30, STILL, 5_000), SOUND);
     assert_eq!(bench.tick(STILL, 5_000), 5_000);
     bench.bus.zero(bench.motor).unwrap();

@@ -11,7 +11,7 @@ const RATE: f32 = core::f32::consts::TAU;
 const PI: PidConfig = PidConfig::new(2.0, 5.0, 0.0);
 
 fn yaw() -> Bench<Gm6020Voltage> {
-    Bench::new(Config::new(1).position_loop(PidConfig::new(10.0, 5.0, 0.0), PI))
+    Bench::new(Config::at_once(1).position_loop(PidConfig::new(10.0, 5.0, 0.0), PI))
 }
 
 fn volts(
@@ -105,7 +105,7 @@ fn a_speed_loop_that_is_changed_is_limited_as_the_one_it_was_attached_with() {
         })
     };
     for change in [false, true] {
-        let mut bench = Bench::new(Config::new(1).speed_loop(loops));
+        let mut bench = Bench::new(Config::at_once(1).speed_loop(loops));
         if change {
             bench.bus.set_speed_loop(bench.motor, loops).unwrap();
         }
@@ -130,7 +130,7 @@ fn a_speed_loop_that_is_changed_is_limited_as_the_one_it_was_attached_with() {
 fn a_motor_that_is_warm_keeps_to_its_share_in_a_position_loop_too() {
     let strong = PidConfig::new(1_000.0, 0.0, 0.0);
     for position in [strong, PidConfig::new(1_000.0, 0.0, 0.0).with_integral_limit(1.0)] {
-        let mut bench = Bench::new(Config::<M3508>::new(1).position_loop(position, strong));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1).position_loop(position, strong));
         let warm = Told { celsius: 154, ..CALM };
         let mut word = 0;
         for ms in 0..40 {

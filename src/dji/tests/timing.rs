@@ -3,7 +3,7 @@ use super::*;
 #[test]
 fn a_time_that_stands_or_goes_back_is_noticed_however_quiet_all_is() {
     for stray in [20, 19, 5] {
-        let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).speed_loop(SPEED)]);
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1).speed_loop(SPEED)]);
         for ms in 2..=20 {
             _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
             bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(5.0)).unwrap();
@@ -19,7 +19,7 @@ fn a_time_that_stands_or_goes_back_is_noticed_however_quiet_all_is() {
 fn a_frame_of_zeros_is_repeated_as_often_as_configured_and_at_least_each_ten_seconds() {
     for (period_ms, due_ms) in [(3, 3), (9_999, 9_999), (10_000, 10_000), (60_000, 10_000)] {
         let mut bus: Bus = Bus::new().with_keep_alive(Duration::from_millis(period_ms));
-        bus.attach(Config::<M3508>::new(1)).unwrap();
+        bus.attach(Config::<M3508>::at_once(1)).unwrap();
         let mut times = (100_000..=121_000).filter(|ms| {
             step(&mut bus, *ms);
             !sent(&mut bus).is_empty()
@@ -37,8 +37,10 @@ fn a_ramp_rises_for_as_long_as_it_is_to_whatever_the_clock_shows() {
         [(100, 100), (65_535, 65_535), (66_000, 65_535), (600_000, 65_535)]
     {
         for started_us in [TURN_US - 500, TURN_US + 500, TURN_US + 1_500, TURN_US + 2_500] {
-            let ramp = Recovery::Ramp(Duration::from_millis(ramp_ms));
-            let (mut bus, [wheel]) = armed([Config::<M3508>::new(1).with_recovery(ramp)]);
+            let opening = Duration::from_millis(ramp_ms);
+            let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)
+                .with_recovery(Recovery::Resume)
+                .with_opening(opening)]);
             // Offline, then heard ten times to the moment.
             let at = |ms: u64| Instant::from_micros(started_us + 1_000 * ms);
             bus.update(Tick::new(at(0), 0.001));

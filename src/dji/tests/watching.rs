@@ -31,7 +31,7 @@ impl<M: Model> Bench<M> {
     }
 
     fn with_health(health: &'static HealthConfig) -> Self {
-        Self::new(Config::new(1).with_health(health))
+        Self::new(Config::at_once(1).with_health(health))
     }
 
     pub(super) fn hear(&mut self, told: Told) {
@@ -76,7 +76,7 @@ pub(super) const SOUND: Conditions = Conditions::NONE;
 #[test]
 fn a_turning_motor_is_warm_from_the_degree_on_that_says_so() {
     for (celsius, expected) in [(124, SOUND), (125, SOUND.with(Condition::Warm))] {
-        let mut bench = Bench::new(Config::<M3508>::new(1));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
         assert_eq!(bench.run(30, Told { celsius, ..CALM }, 500), expected, "{celsius} °C");
         assert_eq!(bench.run(30, CALM, 500), SOUND);
     }
@@ -85,7 +85,7 @@ fn a_turning_motor_is_warm_from_the_degree_on_that_says_so() {
 #[test]
 fn a_motor_that_turns_too_fast_is_noticed_while_its_angle_changes_and_is_sound_again_after_it() {
     for rpm in [18_600, -18_600] {
-        let mut bench = Bench::new(Config::<M3508>::new(1));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
         bench.run(10, CALM, 0);
         assert_eq!(bench.run(30, Told { rpm: rpm / 20 * 19, ..CALM }, 0), SOUND, "17670 rpm");
         let fast = bench.run(13, Told { rpm, ..CALM }, 0);
@@ -104,13 +104,13 @@ fn a_motor_that_drives_itself_and_one_that_turns_against_its_command_run_away() 
         (-7_000, 0, SOUND),
         (5_000, 4_000, SOUND),
     ] {
-        let mut bench = Bench::new(Config::<M3508>::new(1));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
         bench.run(50, CALM, 0);
         assert_eq!(bench.speed_up(300, 15, current, raw), expected, "{raw} and {current}");
     }
     // A fifth of a C610's current is the least that counts.
     for (current, expected) in [(2_000, runaway), (1_999, SOUND)] {
-        let mut bench = Bench::new(Config::<M2006>::new(1));
+        let mut bench = Bench::new(Config::<M2006>::at_once(1));
         bench.run(50, CALM, 0);
         assert_eq!(bench.speed_up(300, 30, current, 0), expected, "{current}");
     }
@@ -136,7 +136,7 @@ fn a_motor_that_crawls_is_stalled_from_the_effort_on_that_says_so() {
 #[test]
 fn an_angle_that_stands_still_while_the_speed_says_otherwise_is_frozen() {
     let stuck = Told { rpm: 600, counts_per_ms: 0, ..CALM };
-    let mut bench = Bench::new(Config::<M3508>::new(1));
+    let mut bench = Bench::new(Config::<M3508>::at_once(1));
     assert_eq!(bench.run(90, stuck, 0), SOUND);
     assert_eq!(bench.run(40, stuck, 0), SOUND.with(Condition::Frozen));
     assert_eq!(bench.run(13, Told { rpm: 600, ..CALM }, 0), SOUND);
@@ -154,7 +154,7 @@ fn feedback_that_does_not_answer_a_command_is_frozen_and_one_whose_current_answe
         (-3_400, 0, SOUND.with(Condition::Frozen)),
         (3_100, 3_000, SOUND),
     ] {
-        let mut bench = Bench::new(Config::<M3508>::new(1));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
         bench.run(60, still, 0);
         for tick in 0..200 {
             // A current that is measured is never quiet.
@@ -183,7 +183,7 @@ fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
         (8_192, 0, false),
     ];
     for (raw, current, expected) in cases {
-        let mut bench = Bench::new(Config::<M3508>::new(1));
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
         bench.run(40, CALM, 500);
         bench.hear(Told { current, ..CALM });
         let motor = bench.motor.erase();
@@ -201,7 +201,7 @@ fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
 
 #[test]
 fn looks_at_the_limit_are_counted_and_others_are_not() {
-    let limited = Config::<M3508>::new(1).with_current_limit(Current::from_amperes(5.0));
+    let limited = Config::<M3508>::at_once(1).with_current_limit(Current::from_amperes(5.0));
     for (raw, range) in [(4_095, 0..=0), (4_096, 9..=11), (i16::MIN, 9..=11), (0, 0..=0)] {
         let mut bench = Bench::new(limited);
         // Each twelfth tick is a look.
@@ -213,7 +213,7 @@ fn looks_at_the_limit_are_counted_and_others_are_not() {
 
 #[test]
 fn codes_of_one_weight_that_take_turns_are_told_by_the_looks_and_not_by_the_frames() {
-    let mut bench = Bench::new(Config::<M3508>::new(1));
+    let mut bench = Bench::new(Config::<M3508>::at_once(1));
     let mut told = 0;
     for tick in 0..1_200_u16 {
         bench.tick(Told { code: if tick % 2 == 0 { 3 } else { 4 }, ..CALM }, 0);
@@ -225,12 +225,12 @@ fn codes_of_one_weight_that_take_turns_are_told_by_the_looks_and_not_by_the_fram
 #[test]
 fn a_temperature_is_told_by_a_motor_that_is_heard_and_has_one() {
     let mut bus: Bus = Bus::new();
-    let unheard = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let unheard = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     assert_eq!(bus.health(unheard).unwrap().temperature_c, None);
-    let mut without = Bench::new(Config::<M2006>::new(1));
+    let mut without = Bench::new(Config::<M2006>::at_once(1));
     without.run(1, CALM, 0);
     assert_eq!(without.bus.health(without.motor).unwrap().temperature_c, None);
-    let mut with = Bench::new(Config::<M3508>::new(1));
+    let mut with = Bench::new(Config::<M3508>::at_once(1));
     with.run(1, CALM, 0);
     assert_eq!(with.bus.health(with.motor).unwrap().temperature_c, Some(30));
 }
@@ -249,7 +249,7 @@ fn a_short_silence_hides_nothing_from_the_looks_after_it() {
         assert_eq!(bench.bus.link(bench.motor), Some(Link::Online));
     };
     // Silent just before a second master is forgotten: the window of a second, with which all is looked at, is over.
-    let mut bench = Bench::new(Config::<M3508>::new(1));
+    let mut bench = Bench::new(Config::<M3508>::at_once(1));
     bench.run(40, CALM, 0);
     let command = CanFrame::standard(0x200, [0; 8]).unwrap();
     assert_eq!(bench.bus.ingest(&command, at_ms(bench.ms)), Ingest::Unrelated);
@@ -277,9 +277,11 @@ fn a_short_silence_hides_nothing_from_the_looks_after_it() {
 /// The position is set during the ramp, so that nothing is wrong with the motor, and still it is not left to itself.
 #[test]
 fn a_ramp_of_a_motor_with_which_nothing_is_wrong_comes_to_its_end() {
-    for (ramp_ms, ticks) in [(2_000, 2_100), (65_535, 80_000)] {
-        let ramp = Recovery::Ramp(Duration::from_millis(ramp_ms));
-        let mut bench = Bench::new(Config::<M3508>::new(1).with_recovery(ramp));
+    for (ramp_ms, ticks) in [(2_000, 2_100), (65_000, 80_000)] {
+        let opening = Duration::from_millis(ramp_ms);
+        let mut bench = Bench::new(
+            Config::<M3508>::at_once(1).with_recovery(Recovery::Resume).with_opening(opening),
+        );
         bench.run(30, CALM, 0);
         bench.ms += 150;
         step(&mut bench.bus, bench.ms);
@@ -308,7 +310,7 @@ fn a_ramp_of_a_motor_with_which_nothing_is_wrong_comes_to_its_end() {
 
 #[test]
 fn the_longest_gap_is_that_of_frames_that_were_lost() {
-    let mut bench = Bench::new(Config::<M3508>::new(1));
+    let mut bench = Bench::new(Config::<M3508>::at_once(1));
     let gap = |bench: &Bench<M3508>| bench.bus.health(bench.motor).unwrap().longest_gap.as_micros();
     // Before the first update every frame counts.
     bench.run(2_100, CALM, 0);
@@ -325,7 +327,7 @@ fn the_longest_gap_is_that_of_frames_that_were_lost() {
     assert_eq!(gap(&bench), 0, "that was in a window of long ago");
     // The time before the first frame is no gap.
     let mut bus: Bus = Bus::new();
-    let late = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let late = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     step(&mut bus, 100_000);
     assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(100_000)), Ingest::Taken);
     assert_eq!(bus.health(late).unwrap().longest_gap.as_micros(), 0);
@@ -335,7 +337,7 @@ fn the_longest_gap_is_that_of_frames_that_were_lost() {
 #[test]
 fn a_gap_counts_from_half_a_turn_on_or_when_the_motor_was_late() {
     fn longest<M: Model>(gap_us: u64, is_updated: bool) -> u64 {
-        let mut bench = Bench::new(Config::<M>::new(1));
+        let mut bench = Bench::new(Config::<M>::at_once(1));
         bench.run(2_100, CALM, 0);
         let now = Instant::from_micros(1_000 * bench.ms - 300 + gap_us);
         if is_updated {
@@ -357,7 +359,7 @@ fn a_gap_counts_from_half_a_turn_on_or_when_the_motor_was_late() {
 #[test]
 fn every_gap_counts_before_the_first_update_and_while_too_many_frames_come() {
     let mut bus: Bus = Bus::new().with_feedback_rate(100);
-    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    let motor = bus.attach(Config::<M3508>::at_once(1)).unwrap();
     let gap = |bus: &Bus| bus.health(motor).unwrap().longest_gap.as_micros();
     let hear = |bus: &mut Bus, ms| _ = bus.ingest(&feedback(0x201, 0, 0), at_ms(ms));
     (0..3).for_each(|ms| hear(&mut bus, ms));

@@ -53,11 +53,13 @@ pub enum Condition {
     CommandLost,
     /// Another node sends the command frame.
     SecondMaster,
+    /// The last update did not lie after the one before: the clock stands or went back. The motor trips.
+    ClockFault,
 }
 
 impl Condition {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Late,
         Self::Offline,
         Self::PositionUncertain,
@@ -73,6 +75,7 @@ impl Condition {
         Self::SoftLimit,
         Self::CommandLost,
         Self::SecondMaster,
+        Self::ClockFault,
     ];
 
     /// Returns it in the words of a log line.
@@ -94,6 +97,7 @@ impl Condition {
             Self::SoftLimit => "soft limit",
             Self::CommandLost => "command lost",
             Self::SecondMaster => "second master",
+            Self::ClockFault => "clock fault",
         }
     }
 
@@ -211,7 +215,7 @@ mod tests {
         assert_eq!(all.iter().count(), Condition::ALL.len());
         for condition in Condition::ALL {
             let others = all.without(condition);
-            assert!(!others.contains(condition) && others.iter().count() == 14);
+            assert!(!others.contains(condition) && others.iter().count() == 15);
             assert!(!others.to_string().contains(condition.as_str()), "{condition}");
         }
     }

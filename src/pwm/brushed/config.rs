@@ -1,6 +1,7 @@
 use crate::control::{ConfigError, Pid, PidConfig};
-use crate::motor::{HealthConfig, MotorName, Timeouts};
+use crate::motor::{HealthConfig, MotorName, OPENING, Timeouts};
 use crate::pwm::PwmError;
+use crate::time::Duration;
 use crate::units::AngularVelocity;
 
 /// What a brushed motor needs to be known of.
@@ -27,6 +28,7 @@ pub struct BrushedConfig {
     pub(super) limit: f32,
     pub(super) reversed: bool,
     pub(super) timeouts: Timeouts,
+    pub(super) opening: Duration,
     pub(super) no_load: Option<AngularVelocity>,
     pub(super) health: &'static HealthConfig,
 }
@@ -44,6 +46,7 @@ impl BrushedConfig {
             limit: 1.0,
             reversed: false,
             timeouts: Timeouts::new(),
+            opening: OPENING,
             no_load: None,
             health: &super::health::USUAL,
         }
@@ -77,6 +80,12 @@ impl BrushedConfig {
     #[must_use]
     pub const fn reversed(self) -> Self {
         Self { reversed: !self.reversed, ..self }
+    }
+
+    /// Sets the time in which the output range opens after arming, from zero to the whole; 0.2 s at first.
+    #[must_use]
+    pub const fn with_opening(self, time: Duration) -> Self {
+        Self { opening: time, ..self }
     }
 
     /// Sets when counts and targets count as lost.
@@ -129,7 +138,9 @@ impl BrushedConfig {
     pub(super) fn make_loop(&self) -> Result<Option<Pid>, ConfigError> {
         let Some(speed) = self.speed else { return Ok(None) };
         let (lower, upper) = speed.output_range();
-        let limited = speed.with_output_range(lower.max(-self.limit), upper.min(self.limit));
-        Pid::new(limited).map(Some)
+        // Written so that NaN stays, and is refused.
+        let lower = if lower < -self.limit { -self.limit } else { lower };
+        let upper = if upper > self.limit { self.limit } else { upper };
+        Pid::new(speed.with_output_range(lower, upper)).map(Some)
     }
 }

@@ -3,7 +3,8 @@
 use super::*;
 
 const SPEED: PidConfig = PidConfig::new(0.02, 0.4, 0.0);
-const WHEEL: BrushedConfig = BrushedConfig::new(3).with_encoder(1_320.0, 16).with_speed_loop(SPEED);
+const WHEEL: BrushedConfig =
+    BrushedConfig::at_once(3).with_encoder(1_320.0, 16).with_speed_loop(SPEED);
 
 type Motor<'a> = Brushed<Pin<'a>, TwoPins<Pin<'a>, Pin<'a>>>;
 
@@ -52,7 +53,7 @@ fn a_velocity_is_followed_in_both_directions_over_the_wrap_of_the_counter() {
 #[test]
 fn the_pulse_is_off_while_the_direction_changes_and_both_pins_are_never_high() {
     let log = Log::default();
-    let mut motor = motor(&log, BrushedConfig::new(1));
+    let mut motor = motor(&log, BrushedConfig::at_once(1));
     motor.arm(at_ms(1)).unwrap();
     for (ms, share) in [(1, 0.5), (2, -0.25), (3, -0.5), (4, 0.0)] {
         motor.set_duty(share).unwrap();
@@ -97,7 +98,7 @@ fn without_counts_it_is_not_armed_and_without_new_ones_it_stops() {
 
 #[test]
 fn what_it_offers_is_what_it_takes() {
-    let bare = BrushedConfig::new(1);
+    let bare = BrushedConfig::at_once(1);
     let heard = bare.with_encoder(1_320.0, 16);
     for (config, text) in [
         (bare, "raw"),
@@ -120,7 +121,7 @@ fn what_it_offers_is_what_it_takes() {
 #[test]
 fn old_targets_nan_bad_steps_and_stops_give_zero() {
     let log = Log::default();
-    let mut motor = motor(&log, BrushedConfig::new(1));
+    let mut motor = motor(&log, BrushedConfig::at_once(1));
     assert_eq!(motor.set_duty(1.0), Err(TargetError::Disarmed));
     motor.arm(at_ms(0)).unwrap();
     let run = |motor: &mut Motor<'_>, ms, dt_s| {
@@ -135,22 +136,27 @@ fn old_targets_nan_bad_steps_and_stops_give_zero() {
     assert_eq!(motor.set_duty(f32::INFINITY), Err(TargetError::NotFinite));
     assert_eq!(run(&mut motor, 102, 0.001), 0);
     motor.set_duty(1.0).unwrap();
-    assert_eq!((run(&mut motor, 103, 0.001), run(&mut motor, 103, f32::NAN)), (20_000, 20_000));
-    assert_eq!(run(&mut motor, 103, f32::NAN), 0);
+    assert_eq!((run(&mut motor, 103, 0.001), run(&mut motor, 104, f32::NAN)), (20_000, 20_000));
+    assert_eq!(run(&mut motor, 105, f32::NAN), 0);
     motor.set_duty(1.0).unwrap();
-    assert_eq!(run(&mut motor, 104, 0.001), 20_000);
+    assert_eq!(run(&mut motor, 106, 0.001), 20_000);
     motor.emergency_stop();
-    assert_eq!((run(&mut motor, 105, 0.001), motor.arm(at_ms(105))), (0, Err(ArmError::Stopped)));
+    assert_eq!((run(&mut motor, 107, 0.001), motor.arm(at_ms(107))), (0, Err(ArmError::Stopped)));
     motor.clear_emergency_stop();
     assert_eq!(motor.set_duty(1.0), Err(TargetError::Disarmed));
-    motor.arm(at_ms(106)).unwrap();
-    assert_eq!(run(&mut motor, 106, 0.001), 0, "starts from zero");
+    assert_eq!(motor.arm(at_ms(108)), Err(ArmError::NotReleased));
+    motor.arm(at_ms(208)).unwrap();
+    assert_eq!(run(&mut motor, 208, 0.001), 0, "starts from zero");
+    motor.set_duty(1.0).unwrap();
+    assert_eq!(run(&mut motor, 209, 0.001), 20_000);
+    motor.set_duty(1.0).unwrap();
+    assert_eq!((run(&mut motor, 209, 0.001), motor.is_armed()), (0, false), "time stands");
 }
 
 #[test]
 fn a_pin_that_fails_is_named_and_tried_again() {
     let log = Log::default();
-    let mut motor = motor(&log, BrushedConfig::new(1));
+    let mut motor = motor(&log, BrushedConfig::at_once(1));
     motor.arm(at_ms(1)).unwrap();
     motor.set_duty(0.5).unwrap();
     log.broken.set("in1");
@@ -171,7 +177,7 @@ fn level(log: &Log, pin: &str) -> u16 {
 #[test]
 fn a_stop_opens_the_bridge_where_the_pulse_cannot_be_taken_away() {
     let log = Log::default();
-    let mut motor = motor(&log, BrushedConfig::new(1));
+    let mut motor = motor(&log, BrushedConfig::at_once(1));
     motor.arm(at_ms(1)).unwrap();
     motor.set_duty(0.5).unwrap();
     motor.update(tick(1)).unwrap();
@@ -186,7 +192,7 @@ fn a_stop_opens_the_bridge_where_the_pulse_cannot_be_taken_away() {
 fn pins_of_which_one_failed_are_set_again_whatever_comes_next() {
     for next in [0.5, -0.5] {
         let log = Log::default();
-        let mut motor = motor(&log, BrushedConfig::new(1));
+        let mut motor = motor(&log, BrushedConfig::at_once(1));
         motor.arm(at_ms(1)).unwrap();
         motor.set_duty(0.5).unwrap();
         motor.update(tick(1)).unwrap();
@@ -205,27 +211,9 @@ fn pins_of_which_one_failed_are_set_again_whatever_comes_next() {
     }
 }
 
-/// A program may arm in each tick: a blocked motor is relaxed again after each window all the same.
-#[test]
-fn a_blocked_motor_that_is_armed_again_at_once_is_relaxed_again_and_again() {
-    let log = Log::default();
-    let mut motor = motor(&log, WHEEL);
-    let mut stalls = 0;
-    for ms in 1..4_000 {
-        motor.ingest_counts(0, at_ms(ms));
-        motor.arm(at_ms(ms)).unwrap();
-        motor.set_velocity((), AngularVelocity::from_rad_per_s(15.0)).unwrap();
-        motor.update(tick(ms)).unwrap();
-        while let Some(edge) = motor.next_edge() {
-            stalls += u32::from(edge.condition == Condition::Stalled && edge.began);
-        }
-    }
-    assert!(stalls >= 4, "{stalls} stalls in 4 s");
-}
-
 #[test]
 fn parameters_that_make_no_sense_are_named() {
-    let config = BrushedConfig::new(1);
+    let config = BrushedConfig::at_once(1);
     let bad_gain = PidConfig::new(f32::NAN, 0.0, 0.0);
     for (config, name) in [
         (config.with_encoder(0.0, 16), "counts per turn"),
@@ -353,14 +341,14 @@ fn health_is_a_line_with_rate_and_gap() {
     assert_eq!((health.link, health.longest_gap.as_micros()), (Link::Online, 992));
     assert!(health.to_string().starts_with("brushed #3: online, disarmed, healthy; "));
     let log = Log::default();
-    let bare = self::motor(&log, BrushedConfig::new(3));
+    let bare = self::motor(&log, BrushedConfig::at_once(3));
     assert_eq!((bare.health().feedback_hz, bare.conditions().is_empty()), (0, true));
 }
 
 #[test]
 fn without_an_encoder_a_stall_is_not_known() {
     let log = Log::default();
-    let mut motor = motor(&log, BrushedConfig::new(3));
+    let mut motor = motor(&log, BrushedConfig::at_once(3));
     motor.arm(at_ms(0)).unwrap();
     for ms in 1..2_000 {
         motor.set_duty(1.0).unwrap();

@@ -9,7 +9,7 @@ type Work = fn(&mut Motor<'_>);
 fn integrator(log: &Log) -> Motor<'_> {
     let pins = TwoPins(pin("in1", log), pin("in2", log));
     let integral = PidConfig::new(0.0, 0.001, 0.0);
-    let config = BrushedConfig::new(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
+    let config = BrushedConfig::at_once(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
     let mut motor = Brushed::new(pin("pwm", log), pins, config).unwrap();
     motor.ingest_counts(0, at_ms(0));
     motor.arm(at_ms(0)).unwrap();
@@ -30,21 +30,22 @@ fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
     for rest in resting {
         let log = Log::default();
         let pins = TwoPins(pin("in1", &log), pin("in2", &log));
-        let mut motor = Brushed::new(pin("pwm", &log), pins, BrushedConfig::new(1)).unwrap();
+        let mut motor = Brushed::new(pin("pwm", &log), pins, BrushedConfig::at_once(1)).unwrap();
         motor.arm(at_ms(0)).unwrap();
         motor.set_duty(1.0).unwrap();
         motor.update(tick(1)).unwrap();
         assert_eq!(last(&log), 20_000);
         rest(&mut motor);
-        motor.arm(at_ms(1)).unwrap();
+        motor.update(tick(100)).unwrap();
+        motor.arm(at_ms(101)).unwrap();
         motor.set_duty(0.1).unwrap();
-        motor.update(Tick::new(at_ms(2), 0.0)).unwrap();
+        motor.update(Tick::new(at_ms(102), 0.0)).unwrap();
         assert_eq!(last(&log), 0);
-        motor.update(tick(3)).unwrap();
+        motor.update(tick(103)).unwrap();
         assert_eq!(last(&log), 2_000);
-        motor.update(Tick::new(at_ms(4), 0.0)).unwrap();
+        motor.update(Tick::new(at_ms(104), 0.0)).unwrap();
         assert_eq!(last(&log), 2_000, "once");
-        motor.update(Tick::new(at_ms(5), 0.0)).unwrap();
+        motor.update(Tick::new(at_ms(105), 0.0)).unwrap();
         assert_eq!(last(&log), 0);
     }
 }
@@ -124,4 +125,25 @@ fn a_speed_loop_does_not_go_on_from_before_a_duty_or_a_rest() {
     motor.ingest_counts(0, at_ms(30));
     motor.update(tick(30)).unwrap();
     assert_eq!(last(&log), 0);
+}
+
+/// A program that arms in each tick drives a blocked motor once.
+#[test]
+fn a_blocked_motor_stays_relaxed_however_often_it_is_armed() {
+    let log = Log::default();
+    let pins = TwoPins(pin("in1", &log), pin("in2", &log));
+    let speed = PidConfig::new(0.02, 0.4, 0.0);
+    let wheel = BrushedConfig::at_once(3).with_encoder(1_320.0, 16).with_speed_loop(speed);
+    let mut motor = Brushed::new(pin("pwm", &log), pins, wheel).unwrap();
+    let mut stalls = 0;
+    for ms in 1..4_000 {
+        motor.ingest_counts(0, at_ms(ms));
+        assert_eq!(motor.arm(at_ms(ms)).is_ok(), stalls == 0, "{ms}");
+        _ = motor.set_velocity((), AngularVelocity::from_rad_per_s(15.0));
+        motor.update(tick(ms)).unwrap();
+        while let Some(edge) = motor.next_edge() {
+            stalls += u32::from(edge.condition == Condition::Stalled && edge.began);
+        }
+    }
+    assert_eq!(stalls, 1);
 }

@@ -79,6 +79,20 @@ fn pin<'a>(name: &'static str, log: &'a Log) -> Pin<'a> {
     Pin { name, log }
 }
 
+impl BrushedConfig {
+    /// A motor whose output range opens at once.
+    const fn at_once(id: u8) -> Self {
+        Self::new(id).with_opening(Duration::ZERO)
+    }
+}
+
+impl RcConfig {
+    /// An ESC whose output range opens at once.
+    const fn at_once() -> Self {
+        Self::new().with_opening(Duration::ZERO)
+    }
+}
+
 fn at_ms(ms: u64) -> Instant {
     Instant::from_micros(ms * 1_000)
 }

@@ -5,7 +5,7 @@ use super::*;
 fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
     let config = config.with_arming_time(Duration::from_millis(5));
     let mut esc = RcPwm::new(pin("esc", log), config).unwrap();
-    esc.arm();
+    esc.arm(at_ms(0)).unwrap();
     for ms in 0..=5 {
         esc.update(tick(ms)).unwrap();
     }
@@ -16,12 +16,12 @@ fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
 #[test]
 fn it_takes_targets_only_after_neutral_for_its_arming_time() {
     let log = Log::default();
-    let mut esc = RcPwm::new(pin("esc", &log), RcConfig::new()).unwrap();
+    let mut esc = RcPwm::new(pin("esc", &log), RcConfig::at_once()).unwrap();
     esc.update(tick(0)).unwrap();
     assert_eq!((last(&log), esc.set_throttle(1.0)), (1_500, Err(TargetError::Disarmed)));
-    esc.arm();
+    esc.arm(at_ms(0)).unwrap();
     for ms in 1..=2_000 {
-        esc.arm(); // again and again does not begin anew
+        esc.arm(at_ms(0)).unwrap(); // again and again does not begin anew
         esc.update(tick(ms)).unwrap();
         assert_eq!((last(&log), esc.set_throttle(1.0)), (1_500, Err(TargetError::Disarmed)));
     }
@@ -34,7 +34,7 @@ fn it_takes_targets_only_after_neutral_for_its_arming_time() {
 #[test]
 fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
     let log = Log::default();
-    let config = RcConfig::new().with_pulses_us(1_100, 1_480, 1_940);
+    let config = RcConfig::at_once().with_pulses_us(1_100, 1_480, 1_940);
     let mut esc = armed(&log, config);
     for (ms, (throttle, pulse)) in (6..).zip([
         (0.0, 1_480),
@@ -50,7 +50,7 @@ fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
         assert_eq!(last(&log), pulse, "{throttle}");
     }
     let log = Log::default();
-    let mut fan = armed(&log, RcConfig::new().with_pulses_us(1_000, 1_000, 2_000));
+    let mut fan = armed(&log, RcConfig::at_once().with_pulses_us(1_000, 1_000, 2_000));
     fan.set_throttle(-0.7).unwrap();
     fan.update(tick(6)).unwrap();
     assert_eq!(last(&log), 1_000, "it turns one way");
@@ -59,9 +59,9 @@ fn throttle_is_linear_on_both_sides_of_neutral_and_saturates() {
 #[test]
 fn the_arming_time_begins_with_the_first_neutral_pulse_that_the_channel_took() {
     let log = Log::default();
-    let config = RcConfig::new().with_arming_time(Duration::from_millis(100));
+    let config = RcConfig::at_once().with_arming_time(Duration::from_millis(100));
     let mut esc = RcPwm::new(pin("esc", &log), config).unwrap();
-    esc.arm();
+    esc.arm(at_ms(0)).unwrap();
     log.broken.set("esc");
     for ms in 0..500 {
         assert_eq!(esc.update(tick(ms)), Err(Broken));
@@ -79,7 +79,7 @@ fn the_arming_time_begins_with_the_first_neutral_pulse_that_the_channel_took() {
 #[test]
 fn old_targets_nan_and_stops_give_neutral() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::new());
+    let mut esc = armed(&log, RcConfig::at_once());
     esc.set_throttle(0.4).unwrap();
     esc.update(tick(105)).unwrap();
     assert_eq!(last(&log), 1_700);
@@ -91,7 +91,7 @@ fn old_targets_nan_and_stops_give_neutral() {
     assert_eq!((last(&log), esc.is_armed()), (1_500, true));
     esc.set_throttle(0.4).unwrap();
     esc.emergency_stop();
-    esc.arm();
+    assert_eq!(esc.arm(at_ms(108)), Err(ArmError::Stopped));
     esc.update(tick(108)).unwrap();
     assert_eq!((last(&log), esc.is_armed()), (1_500, false));
 }
@@ -99,7 +99,7 @@ fn old_targets_nan_and_stops_give_neutral() {
 #[test]
 fn a_servo_without_a_pulse_when_idle_goes_limp_and_never_to_its_centre() {
     let log = Log::default();
-    let mut servo = armed(&log, RcConfig::new().with_idle(Idle::Off));
+    let mut servo = armed(&log, RcConfig::at_once().with_idle(Idle::Off));
     servo.set_throttle(0.4).unwrap();
     for (ms, pulse) in [(105, 1_700), (106, 0)] {
         servo.update(tick(ms)).unwrap();
@@ -117,23 +117,41 @@ fn a_servo_without_a_pulse_when_idle_goes_limp_and_never_to_its_centre() {
 
 #[test]
 fn a_clock_that_stands_or_goes_back_gives_neutral() {
+    for next_ms in [50, 49, 6] {
+        let log = Log::default();
+        let mut esc = armed(&log, RcConfig::at_once());
+        esc.set_throttle(1.0).unwrap();
+        esc.update(tick(50)).unwrap();
+        assert_eq!(last(&log), 2_000);
+        for ms in next_ms..100 {
+            esc.update(tick(ms)).unwrap();
+            assert_eq!((last(&log), esc.is_armed()), (1_500, false), "{ms}");
+            assert_eq!(esc.set_throttle(1.0), Err(TargetError::Relaxed));
+        }
+        assert_eq!(
+            esc.arm(at_ms(100)),
+            Err(ArmError::NotReleased),
+            "94 ms, or less, after the trip"
+        );
+        assert_eq!(esc.arm(at_ms(200)), Ok(()));
+    }
+}
+
+#[test]
+fn the_throttle_opens_after_arming() {
     let log = Log::default();
     let mut esc = armed(&log, RcConfig::new());
-    esc.set_throttle(1.0).unwrap();
-    for pulse in [2_000, 2_000, 1_500, 1_500] {
-        esc.update(tick(50)).unwrap();
-        assert_eq!(last(&log), pulse);
+    for (ms, pulse) in [(6, 1_503), (55, 1_625), (105, 1_750), (204, 1_998), (205, 2_000)] {
+        esc.set_throttle(1.0).unwrap();
+        esc.update(tick(ms)).unwrap();
+        assert_eq!(last(&log), pulse, "{ms} ms");
     }
-    esc.update(tick(51)).unwrap();
-    assert_eq!(last(&log), 2_000);
-    esc.update(tick(50)).unwrap();
-    assert_eq!((last(&log), esc.is_armed()), (1_500, false));
 }
 
 #[test]
 fn a_lost_command_is_one_edge_with_its_time_however_often_it_happens() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::new().with_id(7));
+    let mut esc = armed(&log, RcConfig::at_once().with_id(7));
     for round in 0..1_000 {
         esc.set_throttle(0.1).unwrap();
         for ms in [6, 60, 120] {
@@ -153,11 +171,11 @@ fn a_lost_command_is_one_edge_with_its_time_however_often_it_happens() {
 #[test]
 fn velocities_need_a_full_speed_and_are_not_measured() {
     let log = Log::default();
-    let mut esc = armed(&log, RcConfig::new());
+    let mut esc = armed(&log, RcConfig::at_once());
     let rpm = AngularVelocity::from_rpm;
     assert_eq!(esc.set_velocity((), rpm(10.0)), Err(TargetError::Unsupported));
     assert_eq!(esc.capabilities(()).to_string(), "raw");
-    let mut esc = armed(&log, RcConfig::new().with_full_speed(rpm(1_000.0)));
+    let mut esc = armed(&log, RcConfig::at_once().with_full_speed(rpm(1_000.0)));
     esc.set_velocity((), rpm(-250.0)).unwrap();
     esc.update(tick(6)).unwrap();
     assert_eq!((last(&log), esc.velocity(())), (1_375, None));
@@ -166,7 +184,7 @@ fn velocities_need_a_full_speed_and_are_not_measured() {
 
 #[test]
 fn parameters_that_make_no_sense_are_named() {
-    let config = RcConfig::new();
+    let config = RcConfig::at_once();
     for (config, name) in [
         (config.with_pulses_us(2_000, 1_500, 1_000), "low pulse"),
         (config.with_pulses_us(1_000, 2_100, 2_000), "neutral pulse"),

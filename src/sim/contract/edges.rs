@@ -3,7 +3,7 @@
 use super::run::Run;
 use super::{Outcome, Rule, Subject};
 use crate::motor::{
-    ArmError, CanDevice, Claim, Condition, Conditions, Edge, Ingest, MotorName, Role,
+    ArmError, Claim, Condition, Conditions, Devices, Edge, Ingest, MotorName, Role,
 };
 use crate::time::{Duration, Instant};
 use embedded_can::Frame;

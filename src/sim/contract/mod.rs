@@ -1,16 +1,16 @@
-//! Whether a device keeps what `CanDevice` promises.
+//! Whether a device keeps what `Devices` promises.
 
 mod edges;
 mod rules;
 mod run;
 
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, TargetError};
+use crate::motor::{Claim, Devices, TargetError};
 
 /// What [`check_contract`] has to know of a device.
 pub trait Subject {
     /// The device.
-    type Device: CanDevice;
+    type Device: Devices;
 
     /// Returns the device.
     fn device(&mut self) -> &mut Self::Device;
@@ -65,6 +65,11 @@ pub trait Subject {
         0
     }
 
+    /// Returns the milliseconds after arming until the output range is open.
+    fn opening_ms(&self) -> u64 {
+        220
+    }
+
     /// Returns the milliseconds after which a target no longer counts, one tick included.
     fn command_ms(&self) -> u64 {
         101
@@ -73,7 +78,7 @@ pub trait Subject {
 
 /// What a device has to do.
 ///
-/// Each rule is the invariant of that name in `docs/faults.md`, or a sentence of [`CanDevice`].
+/// Each rule is the invariant of that name in `docs/faults.md`, or a sentence of [`Devices`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -110,8 +115,10 @@ pub enum Rule {
     UnsupportedIsAnError,
     /// A second bad time step in a row gives zero.
     BadStepsAreZero,
-    /// A third update in a row with the same time gives zero.
-    StandingTimeIsZero,
+    /// An update that does not lie after the one before gives zero in that cycle, and until the device is armed again.
+    LostTimeTrips,
+    /// After a trip, a request to arm that is repeated in each tick is never granted, and one after a pause is.
+    ArmingIsAGesture,
     /// A frame that is given back is taken, waits for the next update, and comes again with the newest values (I7).
     RequeuedComesAgain,
     /// A frame that is not its own is not taken back.
@@ -152,7 +159,7 @@ impl core::fmt::Display for Violation {
 
 impl core::error::Error for Violation {}
 
-/// Checks a device against what [`CanDevice`] promises, yours too: makes fresh ones, plays their motors, and watches
+/// Checks a device against what [`Devices`] promises, yours too: makes fresh ones, plays their motors, and watches
 /// what they send.
 ///
 /// # Examples
@@ -180,7 +187,7 @@ impl core::error::Error for Violation {}
 ///     let wheel = bus.attach(Config::new(1)).expect("a free id");
 ///     OneWheel(bus, wheel)
 /// };
-/// assert_eq!(check_contract(make), Ok(27)); // rules
+/// assert_eq!(check_contract(make), Ok(28)); // rules
 /// ```
 ///
 /// # Errors

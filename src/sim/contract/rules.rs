@@ -1,7 +1,7 @@
 use super::run::{Output, Run};
 use super::{Outcome, Rule, Subject, Violation, edges};
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, CanDevice, Claim, Ingest, Role, TargetError};
+use crate::motor::{ArmError, Claim, Devices, Ingest, Role, TargetError};
 use crate::time::Tick;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
@@ -22,7 +22,7 @@ pub(super) fn check<S: Subject>(make: &impl Fn() -> S) -> Result<usize, Violatio
     nan(Run::driving(make())?)?;
     unsupported(Run::driving(make())?, Run::driving(make())?)?;
     bad_steps(make)?;
-    standing_time(Run::driving(make())?)?;
+    lost_time(make)?;
     requeue(Run::driving(make())?)?;
     emergency_stop(Run::driving(make())?)?;
     from_zero(Run::driving(make())?)?;
@@ -227,16 +227,39 @@ fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     Ok(())
 }
 
-fn standing_time<S: Subject>(mut run: Run<S>) -> Outcome {
-    run.step()?;
-    for update in 0..10 {
-        _ = run.subject.drive(1.0);
-        let output = run.update(0.001)?;
-        run.expect(output.driving == 0 || update < 2, Rule::StandingTimeIsZero)?;
+/// Updates that do not lie after the one before: zero in that cycle, and until the device is armed by a new request.
+fn lost_time<S: Subject>(make: &impl Fn() -> S) -> Outcome {
+    for back_ms in [0, 1, 5, 100, 350] {
+        let mut run = Run::driving(make())?;
+        run.step()?;
+        run.ms = run.ms.saturating_sub(back_ms).max(1);
+        for round in 0..50 {
+            _ = run.subject.drive(1.0);
+            let output = if round == 0 { run.update(0.001)? } else { run.step()? };
+            let armed = run.subject.device().is_armed();
+            run.expect(output.driving == 0 && !armed, Rule::LostTimeTrips)?;
+        }
+        gesture(run)?;
     }
-    run.step()?;
-    let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
-    run.expect(again, Rule::ArmedDrives)
+    Ok(())
+}
+
+/// After a trip: a request that is repeated is never granted, and one after a pause is.
+fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
+    let rule = Rule::ArmingIsAGesture;
+    for _ in 0..150 {
+        let now = run.now();
+        let refused = run.subject.device().arm(now) == Err(ArmError::NotReleased);
+        _ = run.subject.drive(1.0);
+        let output = run.step()?;
+        run.expect(refused && output.driving == 0, rule)?;
+    }
+    for _ in 0..100 {
+        run.step()?;
+    }
+    run.arm_and_open(rule)?;
+    let driven = run.step()?.driving > 0;
+    run.expect(driven, rule)
 }
 
 fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
@@ -285,9 +308,7 @@ fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
     let zero = run.step()?.driving == 0;
     let disarmed = !run.subject.device().is_armed();
     run.expect(zero && disarmed, rule)?;
-    let now = run.now();
-    let armed = run.subject.device().arm(now).is_ok();
-    run.expect(armed, rule)
+    gesture(run)
 }
 
 fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
@@ -338,11 +359,11 @@ fn shorter(frame: &CanFrame) -> impl Iterator<Item = CanFrame> + '_ {
 }
 
 /// A frame with an id that no motor has.
-fn unclaimed(device: &impl CanDevice) -> Option<CanFrame> {
-    let free = |id: &StandardId| {
+fn unclaimed(device: &mut impl Devices) -> Option<CanFrame> {
+    let mut free = |id: &StandardId| {
         let probe = Claim::new(*id, Role::Feedback, crate::motor::MotorName::new("foreign", 0));
         !device.claims().any(|claim| claim.clashes_with(&probe))
     };
-    let id = (1..0x7FF).filter_map(StandardId::new).find(free)?;
+    let id = (1..0x7FF).filter_map(StandardId::new).find(|id| free(id))?;
     CanFrame::new(id, &[0xFF; 8])
 }

@@ -1,6 +1,6 @@
 use super::{Rule, Subject, Violation};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Ingest, Role};
+use crate::motor::{Devices, Ingest, Role};
 use crate::time::{Instant, Tick};
 
 /// More frames than a device may offer between two updates.
@@ -30,15 +30,27 @@ impl<S: Subject> Run<S> {
         Self { subject, ms: 1, turn: 0 }
     }
 
-    /// Starts with all motors heard, armed and driven.
+    /// Starts with all motors heard, armed and driven, with the output range open.
     pub(super) fn driving(subject: S) -> Result<Self, Violation> {
         let mut run = Self::new(subject);
         run.step()?;
-        let now = run.now();
-        let armed = run.subject.device().arm(now).is_ok();
-        let driven = run.subject.drive(1.0).is_ok();
-        run.expect(armed && driven, Rule::ArmedDrives)?;
+        run.arm_and_open(Rule::ArmedDrives)?;
         Ok(run)
+    }
+
+    /// Arms, waits until the output range is open, and drives.
+    pub(super) fn arm_and_open(&mut self, rule: Rule) -> Result<(), Violation> {
+        let now = self.now();
+        let armed = self.subject.device().arm(now).is_ok();
+        self.expect(armed, rule)?;
+        for _ in 0..self.subject.opening_ms() {
+            // Feedback that stands still while the command changes would be frozen.
+            let driven = self.subject.drive(0.0).is_ok();
+            self.step()?;
+            self.expect(driven, rule)?;
+        }
+        let driven = self.subject.drive(1.0).is_ok();
+        self.expect(driven, rule)
     }
 
     pub(super) fn now(&self) -> Instant {

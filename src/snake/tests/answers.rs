@@ -184,6 +184,8 @@ fn a_clock_that_is_set_back_ends_the_wait() {
     bench.ms = 5_000;
     _ = ask(&mut bench);
     bench.ms = 1_000;
+    bench.joints.update(Tick::new(at_ms(bench.ms), 0.001));
+    assert_eq!(bench.joints.counters().bad_steps, 1);
     _ = ask(&mut bench);
     assert_eq!((bench.joints.counters().unanswered, bench.joints.counters().requests), (1, 2));
 }

@@ -152,8 +152,8 @@ fn take_some(bench: &mut Bench, room: usize, all_come_back: bool) -> Vec<(u8, Co
 #[test]
 fn a_driver_with_less_room_than_an_update_has_frames_starves_no_joint() {
     // Some of them ask seldom.
-    let patient = Timeouts::new().with_late(Duration::from_millis(400));
-    let patient = patient.with_offline(Duration::from_millis(500));
+    let (late, offline) = (Duration::from_millis(400), Duration::from_millis(500));
+    let patient = Timeouts::new().with_feedback(late, offline).unwrap();
     let budgets = (1..=5).flat_map(|reads| (1..=5).map(move |writes| (reads, writes)));
     let drivers = || (1..=3).flat_map(|room| [(room, false), (room, true)]);
     for ((reads, writes), (room, all_come_back)) in

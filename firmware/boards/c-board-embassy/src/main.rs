@@ -15,7 +15,7 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
-use drivetrain::motor::CanDevice;
+use drivetrain::motor::Devices;
 use drivetrain::runner::Runner;
 use embassy_executor::Spawner;
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};

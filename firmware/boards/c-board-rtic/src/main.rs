@@ -45,7 +45,7 @@ mod app {
     use bxcan::{Fifo, Interrupt, Rx0};
     use core::sync::atomic::{AtomicU32, Ordering};
     use drivetrain::dji::Bus;
-    use drivetrain::motor::CanDevice;
+    use drivetrain::motor::Devices;
     use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, Runner};
     use drivetrain::time::{Instant, Tick};
     use pilot::{Pilot, Wish};

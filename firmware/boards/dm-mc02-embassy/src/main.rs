@@ -15,7 +15,7 @@
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
-use drivetrain::motor::CanDevice;
+use drivetrain::motor::Devices;
 use drivetrain::time::{Instant, Tick};
 use embassy_executor::Spawner;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};

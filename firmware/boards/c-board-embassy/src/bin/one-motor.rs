@@ -16,7 +16,7 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use defmt_rtt as _;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
-use drivetrain::motor::CanDevice;
+use drivetrain::motor::Devices;
 use drivetrain::runner::Runner;
 use drivetrain::units::{AngularVelocity, Current};
 use embassy_executor::Spawner;

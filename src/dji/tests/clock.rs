@@ -1,0 +1,58 @@
+//! Updates that do not lie after the one before.
+
+use super::*;
+use crate::motor::Condition;
+
+#[test]
+fn a_clock_that_goes_back_trips_every_motor_and_leaves_no_feedback_fresh() {
+    let (mut bus, [heard, silent]) = armed([1, 2].map(Config::<M3508>::at_once));
+    let hear = |bus: &mut Bus, id, ms| {
+        assert_eq!(bus.ingest(&feedback(id, 0, 0), at_ms(ms)), Ingest::Taken)
+    };
+    for ms in 2..2_005 {
+        hear(&mut bus, 0x201, ms);
+        hear(&mut bus, 0x202, ms);
+        step(&mut bus, ms);
+    }
+    bus.set_raw(heard, 300).unwrap();
+    _ = sent(&mut bus);
+    // One second back: zeros in that cycle, and the old stamps lie ahead, which is not fresh.
+    step(&mut bus, 999);
+    assert_eq!(sent(&mut bus), [(0x200, [0; 4])]);
+    assert_eq!((bus.link(heard), bus.link(silent)), (Some(Link::Late), Some(Link::Late)));
+    for ms in 1_001..1_300 {
+        hear(&mut bus, 0x201, ms);
+        assert_eq!(bus.set_raw(heard, 300), Err(TargetError::Relaxed));
+        assert_eq!(bus.set_raw(silent, 300), Err(TargetError::Relaxed));
+        step(&mut bus, ms);
+        assert!(sent(&mut bus).iter().all(|frame| frame.1 == [0; 4]));
+    }
+    bus.arm_only(&[heard.erase()], at_ms(1_300)).unwrap();
+    bus.set_raw(heard, 300).unwrap();
+    step(&mut bus, 1_300);
+    assert_eq!(sent(&mut bus).last(), Some(&(0x200, [300, 0, 0, 0])));
+    assert_eq!(bus.state(heard).unwrap().ambiguous_gaps, 0);
+}
+
+/// A 16-bit timer passed on as it is, with an application that stopped after one target.
+#[test]
+fn a_clock_that_wraps_early_or_swings_drives_no_longer_than_the_deadline() {
+    let wrap = |period_us: u64| move |tick: u64| 1_000 * tick % period_us;
+    let swing = |tick: u64| 10_000 + 1_000 * (tick % 2);
+    let clocks: [&dyn Fn(u64) -> u64; 4] = [&wrap(65_536), &wrap(20_000), &wrap(2_000), &swing];
+    for (index, clock) in clocks.into_iter().enumerate() {
+        let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
+        bus.set_raw(wheel, 4_096).unwrap();
+        let mut driven = 0;
+        for tick in 2..10_000 {
+            let now = Instant::from_micros(clock(tick));
+            assert_eq!(bus.ingest(&feedback(0x201, 0, 0), now), Ingest::Taken);
+            bus.update(Tick::new(now, 0.001));
+            driven += u32::from(sent(&mut bus).iter().any(|frame| frame.1 != [0; 4]));
+        }
+        assert!(driven <= 101, "clock {index}: {driven} ticks");
+        let told = core::iter::from_fn(|| bus.next_edge())
+            .any(|edge| edge.condition == Condition::ClockFault && edge.began);
+        assert!(told && !bus.is_armed(), "clock {index}");
+    }
+}

@@ -1,0 +1,324 @@
+//! One device or several, as their caller sees them.
+
+use super::visitor::{
+    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Search, Standing,
+    Stop, Superseded, Trip, Update, Visitor,
+};
+use super::{ArmError, Claim, Edge, Ingest, Missing};
+use crate::frame::CanFrame;
+use crate::time::{Instant, Tick};
+
+/// One [`CanDevice`](super::CanDevice) or several: what a runner, an async task or a test drives.
+///
+/// The caller pushes received frames in and *pulls* frames to send out; a device never does I/O. In each cycle:
+///
+/// 1. `ingest` every received frame, with the time of its arrival;
+/// 2. `update` once: all loops run, all commands are encoded;
+/// 3. `next_frame` until it returns `None`, sending each; give a frame that was not sent, or was sent and
+///    evicted again, back to `requeue`. It is offered again after the next update, with the newest values.
+///
+/// A tuple or array of devices and `&mut D` are devices. A struct of devices names its parts in one method; everything else,
+/// from routing to arming, follows from it.
+///
+/// # Examples
+/// ```
+/// use drivetrain::dji::{Bus, Config, M3508};
+/// use drivetrain::motor::{ArmError, Devices, Visitor};
+/// use drivetrain::time::Instant;
+///
+/// struct Robot { chassis: Bus, gimbal: Bus }
+///
+/// impl Devices for Robot {
+///     fn visit(&mut self, visitor: &mut impl Visitor) {
+///         self.chassis.visit(visitor);
+///         self.gimbal.visit(visitor);
+///     }
+/// }
+///
+/// let mut robot = Robot { chassis: Bus::new(), gimbal: Bus::new() };
+/// robot.gimbal.attach(Config::<M3508>::new(4))?;
+/// let refused = robot.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
+/// assert_eq!(refused, Err("no feedback from M3508 #4".into()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Devices {
+    /// Has the visitor visit every device, in an order that stays the same.
+    fn visit(&mut self, visitor: &mut impl Visitor);
+
+    /// Takes a received frame that arrived at `now`. Constant time, no I/O, no control.
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let mut offer = Offer { frame, now, outcome: Ingest::Unrelated };
+        self.visit(&mut offer);
+        offer.outcome
+    }
+
+    /// Takes a received frame of any driver's own type. A frame of more than 8 bytes is unrelated.
+    fn ingest_any(&mut self, frame: &impl embedded_can::Frame, now: Instant) -> Ingest {
+        CanFrame::copy_of(frame).map_or(Ingest::Unrelated, |frame| self.ingest(&frame, now))
+    }
+
+    /// Runs every control loop once and encodes the commands.
+    #[inline]
+    fn update(&mut self, tick: Tick) {
+        self.visit(&mut Update(tick));
+    }
+
+    /// Returns a frame that waits to be sent, and takes it off the list.
+    ///
+    /// `turn` is any number that grows by one a cycle: the search starts with another device each time, so that none starves
+    /// on a full bus.
+    #[inline]
+    fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
+        let mut parts = Parts(0);
+        self.visit(&mut parts);
+        let first = turn.checked_rem(parts.0)?;
+        let mut search = Search::among(first..u32::MAX);
+        self.visit(&mut search);
+        if search.frame.is_none() && first > 0 {
+            search = Search::among(0..first);
+            self.visit(&mut search);
+        }
+        search.frame
+    }
+
+    /// Takes back a frame that was not sent, or was evicted; `false` when no device owns it.
+    ///
+    /// The frame is not offered again before the next update, and then with the newest values.
+    fn requeue(&mut self, frame: &CanFrame) -> bool {
+        let mut back = Back { frame, to_owner: true, taken: false };
+        self.visit(&mut back);
+        // The last frame of a motor that was detached is claimed by nobody.
+        back.to_owner = false;
+        self.visit(&mut back);
+        back.taken
+    }
+
+    /// Returns how many frames were replaced by newer ones before they were taken, wrapping.
+    fn superseded(&mut self) -> u32 {
+        let mut superseded = Superseded(0);
+        self.visit(&mut superseded);
+        superseded.0
+    }
+
+    /// Lists the CAN ids that the devices send and expect.
+    fn claims(&mut self) -> impl Iterator<Item = Claim> {
+        (0..).map_while(move |index| {
+            let mut nth = Nth { left: index, claim: None };
+            self.visit(&mut nth);
+            nth.claim
+        })
+    }
+
+    /// Returns two motors that use one CAN id, if any: on a bus with several families, say.
+    fn clash(&mut self) -> Option<(Claim, Claim)> {
+        for index in 0.. {
+            let claim = self.claims().nth(index)?;
+            let other = self.claims().skip(index + 1).find(|other| other.clashes_with(&claim));
+            if let Some(other) = other {
+                return Some((claim, other));
+            }
+        }
+        None
+    }
+
+    /// Returns the oldest change of a motor's condition that was not read yet; of several devices, that of the first one with
+    /// a change.
+    fn next_edge(&mut self) -> Option<Edge> {
+        let mut read = Read(None);
+        self.visit(&mut read);
+        read.0
+    }
+
+    /// Arms every device: nothing moves before.
+    ///
+    /// Arming is a gesture. After a trip it is granted only when nobody asked for 100 ms, so a program that calls this in each
+    /// tick never re-arms. A refused call counts as asking.
+    ///
+    /// # Errors
+    /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a set emergency stop, a
+    /// request that was not released since a trip.
+    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
+    fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        let granted = Ask::of(self, now);
+        if self.is_stopped() {
+            return Err(ArmError::Stopped);
+        }
+        if self.claims().next().is_none() {
+            return Err(ArmError::NoMotors);
+        }
+        if let Some((one, other)) = self.clash() {
+            return Err(ArmError::Clash(one, other));
+        }
+        let (missing, faulty) = (Missing::NONE, Missing::NONE);
+        let mut obstacles = Obstacles { now, missing, second_master: None, faulty };
+        self.visit(&mut obstacles);
+        if obstacles.missing.total() > 0 {
+            return Err(ArmError::Missing(obstacles.missing));
+        }
+        if let Some(claim) = obstacles.second_master {
+            return Err(ArmError::SecondMaster(claim));
+        }
+        if obstacles.faulty.total() > 0 {
+            return Err(ArmError::Faulty(obstacles.faulty));
+        }
+        if !granted {
+            return Err(ArmError::NotReleased);
+        }
+        self.visit(&mut Engage(now));
+        Ok(())
+    }
+
+    /// Relaxes every motor and refuses targets until armed again.
+    fn disarm(&mut self) {
+        self.visit(&mut Disarm);
+    }
+
+    /// Disarms because of a fault around the motors: arming again needs a new request.
+    fn trip(&mut self) {
+        self.visit(&mut Trip);
+    }
+
+    /// Tells whether there is a device and every motor takes targets.
+    fn is_armed(&mut self) -> bool {
+        let mut standing = Standing::NONE;
+        self.visit(&mut standing);
+        standing.any && standing.all_armed
+    }
+
+    /// Trips every motor at once; the runner repeats it in each tick while the stop is set. From the next frame on, all
+    /// commands are zero until the stop is cleared and the devices armed.
+    fn emergency_stop(&mut self) {
+        self.visit(&mut Stop);
+    }
+
+    /// Clears the emergency stop. The devices stay disarmed.
+    fn clear_emergency_stop(&mut self) {
+        self.visit(&mut ClearStop);
+    }
+
+    /// Tells whether the emergency stop of any device is set.
+    fn is_stopped(&mut self) -> bool {
+        let mut standing = Standing::NONE;
+        self.visit(&mut standing);
+        standing.stopped
+    }
+}
+
+impl<D: Devices> Devices for &mut D {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        (**self).visit(visitor);
+    }
+}
+
+impl<D: Devices, const N: usize> Devices for [D; N] {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        self.iter_mut().for_each(|device| device.visit(visitor));
+    }
+}
+
+macro_rules! tuple {
+    ($($device:ident $index:tt),+) => {
+        impl<$($device: Devices),+> Devices for ($($device,)+) {
+            #[inline]
+            fn visit(&mut self, visitor: &mut impl Visitor) {
+                $(self.$index.visit(visitor);)+
+            }
+        }
+    };
+}
+
+tuple!(A 0, B 1);
+tuple!(A 0, B 1, C 2);
+tuple!(A 0, B 1, C 2, D 3);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dji::{Bus, Config, Gm6020Voltage, M2006, M3508};
+    use crate::motor::ArmError;
+    use std::vec::Vec;
+
+    fn bus<M: crate::dji::Model>(id: u8) -> Bus {
+        let mut bus = Bus::new();
+        bus.attach(Config::<M>::new(id)).unwrap();
+        bus
+    }
+
+    fn at(micros: u64) -> Instant {
+        Instant::from_micros(micros)
+    }
+
+    fn hear(device: &mut impl Devices, id: u16, now: Instant) -> Ingest {
+        Devices::ingest(device, &CanFrame::standard(id, [0; 8]).unwrap(), now)
+    }
+
+    fn drain(device: &mut impl Devices, turn: u32) -> Vec<u32> {
+        core::iter::from_fn(|| Devices::next_frame(device, turn))
+            .map(|frame| frame.header())
+            .collect()
+    }
+
+    #[test]
+    fn a_frame_goes_to_the_part_that_knows_it() {
+        let mut both = (bus::<M3508>(1), bus::<Gm6020Voltage>(7));
+        assert_eq!(hear(&mut both, 0x201, at(1)), Ingest::Taken);
+        assert_eq!(hear(&mut both, 0x20B, at(1)), Ingest::Taken);
+        assert_eq!(hear(&mut both, 0x205, at(1)), Ingest::Unrelated);
+        assert!(both.requeue(&CanFrame::standard(0x2FF, [0; 8]).unwrap()));
+        assert!(!both.requeue(&CanFrame::standard(0x1FE, [0; 8]).unwrap()));
+    }
+
+    #[test]
+    fn each_turn_another_part_sends_first() {
+        let mut tuple = (bus::<M3508>(1), bus::<M3508>(5), bus::<Gm6020Voltage>(7));
+        let mut array = [bus::<M3508>(1), bus::<M3508>(5), bus::<Gm6020Voltage>(7)];
+        for turn in 0..6 {
+            let tick = Tick::new(at(u64::from(turn) * 20_000), 0.001);
+            tuple.update(tick);
+            array.update(tick);
+            let mut expected = std::vec![0x200, 0x1FF, 0x2FF];
+            expected.rotate_left(turn as usize % 3);
+            assert_eq!(drain(&mut tuple, turn), expected);
+            assert_eq!(drain(&mut array, turn), expected);
+        }
+    }
+
+    #[test]
+    fn two_parts_that_claim_one_id_are_not_armed() {
+        let mut both = [bus::<M3508>(5), bus::<M2006>(5)];
+        for device in &mut both {
+            assert_eq!(hear(device, 0x205, at(1)), Ingest::Taken);
+        }
+        let Err(ArmError::Clash(one, other)) = both.arm(at(1)) else {
+            panic!("armed in spite of a clash")
+        };
+        assert_eq!((one.motor().model(), other.motor().model()), ("M3508", "M2006"));
+        assert!(!both.is_armed());
+    }
+
+    #[test]
+    fn all_parts_are_armed_or_none() {
+        let (mut first, mut second) = (bus::<M3508>(1), bus::<Gm6020Voltage>(7));
+        let mut both = (&mut first, &mut second);
+        assert_eq!(hear(&mut both, 0x201, at(1)), Ingest::Taken);
+        let missing = both.arm(at(1)).unwrap_err();
+        assert!(
+            std::format!("{missing}") == "no feedback from GM6020 (voltage) #7"
+                && !both.0.is_armed()
+        );
+        assert_eq!(hear(&mut both, 0x20B, at(1)), Ingest::Taken);
+        assert_eq!(both.arm(at(1)), Ok(()));
+        both.emergency_stop();
+        assert!(first.is_stopped() && second.is_stopped());
+    }
+
+    #[test]
+    fn an_array_of_nothing_is_never_armed() {
+        let mut none: [Bus; 0] = [];
+        assert_eq!(none.arm(at(1)), Err(ArmError::NoMotors));
+        assert!(!none.is_armed() && none.next_frame(3).is_none());
+    }
+}

@@ -1,0 +1,47 @@
+//! Whether time moves on from update to update.
+
+use crate::time::{Duration, Instant};
+
+/// The rule of time of every device: an update has to lie after the update before it, and not before the arming.
+///
+/// Ages mean nothing where it does not: the device sends zeros in that cycle, and is to be armed again.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Progress {
+    earliest: Instant,
+}
+
+impl Progress {
+    pub(crate) const NEW: Self = Self { earliest: Instant::START };
+
+    /// Takes the time of an update; `false` if time did not move on. The next update has to lie after it in either case.
+    #[inline]
+    pub(crate) fn advance(&mut self, now: Instant) -> bool {
+        let moved_on = now >= self.earliest;
+        self.earliest = now + Duration::from_micros(1);
+        moved_on
+    }
+
+    /// Takes the time of arming: targets are stamped with it, so that no update may lie before it.
+    pub(crate) fn begin(&mut self, now: Instant) {
+        self.earliest = self.earliest.max(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_update_lies_after_the_one_before_and_not_before_the_arming() {
+        let mut progress = Progress::NEW;
+        let mut advance = |micros| progress.advance(Instant::from_micros(micros));
+        assert_eq!(
+            [0, 5, 5, 6, 4, 4, 5].map(&mut advance),
+            [true, true, false, true, false, false, true]
+        );
+        progress.begin(Instant::from_micros(9));
+        progress.begin(Instant::from_micros(3));
+        let mut advance = |micros| progress.advance(Instant::from_micros(micros));
+        assert_eq!([8, 9, 9].map(&mut advance), [false, true, false]);
+    }
+}
