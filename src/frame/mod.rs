@@ -41,6 +41,33 @@ impl CanFrame {
         if id <= 0x7FF { Some(Self { header: id as u32, data, missing: 0 }) } else { None }
     }
 
+    /// Builds a data frame of up to 8 bytes. An array of more than 8 bytes does not compile.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::frame::CanFrame;
+    /// use embedded_can::StandardId;
+    ///
+    /// let id = StandardId::new(0x141).ok_or("not an 11-bit id")?;
+    /// assert_eq!(format!("{:?}", CanFrame::of(id, [0x9A, 0x00])), "141 [2] 9A 00");
+    /// # Ok::<(), &str>(())
+    /// ```
+    /// ```compile_fail
+    /// # use drivetrain::frame::CanFrame;
+    /// let frame = CanFrame::of(embedded_can::StandardId::ZERO, [0; 9]);
+    /// ```
+    #[must_use]
+    pub fn of<const N: usize>(id: impl Into<Id>, data: [u8; N]) -> Self {
+        const { assert!(N <= 8, "a classic CAN frame has at most 8 bytes") };
+        let mut frame = Self { header: header_of(id.into()), data: [0; 8], missing: 0 };
+        for (place, byte) in frame.data.iter_mut().zip(data) {
+            *place = byte;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        let missing = const { (8 - N) as u8 };
+        Self { missing, ..frame }
+    }
+
     /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
     #[must_use]
     pub fn copy_of(frame: &impl Frame) -> Option<Self> {
