@@ -7,6 +7,7 @@ use drivetrain::wire::host_link::{
     ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
     Telemetry, TelemetryFormat, TelemetryHeader,
 };
+use drivetrain::wire::mit;
 use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
 use drivetrain::wire::{BufferTooSmall, Deframer, Protocol};
 use proptest::prelude::*;
@@ -168,4 +169,167 @@ fn three_servos_are_asked_in_one_frame() {
     let mut buffer = [0; 16];
     let frame = feetech::sync_read(&servos, 0x38, 8, &mut buffer).unwrap();
     assert_eq!(frame, [0xFF, 0xFF, 0xFE, 7, 0x82, 0x38, 8, 1, 2, 3, 0x32]);
+}
+
+/// The five fields of a command for a drive in MIT mode, by their place: bits, whether the range begins at zero, and the range
+/// of a Damiao DM-J4310.
+const FIELDS: [(u32, bool, f32); 5] =
+    [(16, false, 12.5), (12, false, 30.0), (12, true, 500.0), (12, true, 5.0), (12, false, 10.0)];
+
+fn ranges() -> mit::Ranges {
+    mit::Ranges::new(12.5, 30.0, 10.0).unwrap()
+}
+
+fn command(fields: [f32; 5]) -> mit::Command {
+    let [position_rad, velocity_rad_per_s, kp, kd, torque_nm] = fields;
+    mit::Command { position_rad, velocity_rad_per_s, kp, kd, torque_nm }
+}
+
+fn fields(command: mit::Command) -> [f32; 5] {
+    let mit::Command { position_rad, velocity_rad_per_s, kp, kd, torque_nm } = command;
+    [position_rad, velocity_rad_per_s, kp, kd, torque_nm]
+}
+
+/// A command frame as the numbers that stand in it.
+fn counts(data: [u8; 8]) -> [u64; 5] {
+    let mut bits = u64::from_be_bytes(data);
+    FIELDS.map(|(width, ..)| {
+        let field = bits >> (64 - width);
+        bits <<= width;
+        field
+    })
+}
+
+/// The frame that these numbers make.
+fn frame(counts: [u64; 5]) -> [u8; 8] {
+    let fields = FIELDS.iter().zip(counts);
+    fields.fold(0, |bits, ((width, ..), count)| bits << width | count).to_be_bytes()
+}
+
+#[test]
+fn each_count_of_a_drive_in_mit_mode_is_read_in_order_and_written_as_itself_or_the_next_lower() {
+    for (place, (bits, from_zero, range)) in FIELDS.into_iter().enumerate() {
+        let mut before = f64::NEG_INFINITY;
+        let top = (1 << bits) - 1;
+        for count in 0..=top {
+            let mut sent = [0; 5];
+            sent[place] = count;
+            let value = fields(ranges().decode(&frame(sent)))[place];
+            let (range, share) = (f64::from(range), count as f64 / top as f64);
+            let exact = if from_zero { range * share } else { range * (2.0 * share - 1.0) };
+            assert!((f64::from(value) - exact).abs() < 1e-6 * range, "{place}: {count}");
+            assert!(f64::from(value) > before, "{place}: {count}");
+            before = value.into();
+            let mut command = [0.0; 5];
+            command[place] = value;
+            let again = counts(ranges().encode(&self::command(command)))[place];
+            assert!(again == count || again + 1 == count, "{place}: {count} {again}");
+        }
+        assert!((before - f64::from(range)).abs() < 1e-6 * before, "{place}");
+    }
+}
+
+#[test]
+fn a_full_command_in_mit_mode_is_no_special_frame() {
+    let ends = fields(ranges().decode(&[0xFF; 8]));
+    let count = 20.0 / 4_095.0;
+    for below in 0..8_u8 {
+        let torque_nm = 10.0 - (f32::from(below) - 0.5).max(0.0) * count;
+        let data = ranges().encode(&mit::Command { torque_nm, ..command(ends) });
+        let expected = match 0xFF - below {
+            0xFB..=0xFE => 0xFA,
+            last => last,
+        };
+        assert_eq!(data, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, expected], "{below}");
+    }
+    let specials = [mit::ENABLE, mit::DISABLE, mit::SET_ZERO].map(|[.., last]| last);
+    assert_eq!(specials, [0xFC, 0xFD, 0xFE]);
+}
+
+#[test]
+fn a_range_that_no_drive_has_is_named() {
+    for wrong in [0.0, -12.5, 9e-4, 1.1e6, f32::NAN, f32::INFINITY] {
+        let named = |outcome: Result<mit::Ranges, mit::RangeError>| {
+            let error = outcome.unwrap_err().to_string();
+            error.split(' ').next().unwrap().to_string()
+        };
+        assert_eq!(named(mit::Ranges::new(wrong, 1.0, wrong)), "position");
+        assert_eq!(named(mit::Ranges::new(1.0, wrong, wrong)), "velocity");
+        assert_eq!(named(mit::Ranges::new(1.0, 1.0, wrong)), "torque");
+        assert_eq!(named(ranges().with_gains(wrong, wrong)), "kp");
+        assert_eq!(named(ranges().with_gains(1.0, wrong)), "kd");
+    }
+    let ends = mit::Ranges::new(1e-3, 1e6, 1e6).unwrap();
+    assert_eq!((ends.velocity_rad_per_s(), ends.torque_nm()), (1e6, 1e6));
+}
+
+#[test]
+fn gains_of_a_drive_in_mit_mode_have_their_own_ranges() {
+    let ranges = ranges().with_gains(5_000.0, 100.0).unwrap();
+    let full = command([0.0, 0.0, 5_000.0, 100.0, 0.0]);
+    assert_eq!(counts(ranges.encode(&full))[2..4], [0xFFF, 0xFFF]);
+    assert_eq!(
+        counts(ranges.encode(&command([0.0, 0.0, 2_500.0, 25.0, 0.0])))[2..4],
+        [2_047, 1_023]
+    );
+}
+
+proptest! {
+    /// Law: what is sent lies at most a count below what is wanted, or at the end of the range.
+    #[test]
+    fn a_command_in_mit_mode_is_a_count_off_at_most(
+        wanted in proptest::array::uniform5(-2.0_f32..2.0),
+    ) {
+        let wanted: [f32; 5] = std::array::from_fn(|place| wanted[place] * FIELDS[place].2);
+        let data = ranges().encode(&command(wanted));
+        let sent = fields(ranges().decode(&data));
+        for (place, (bits, from_zero, range)) in FIELDS.into_iter().enumerate() {
+            let lower = if from_zero { 0.0 } else { -range };
+            let count = (range - lower) / ((1 << bits) - 1) as f32;
+            let reached = wanted[place].clamp(lower, range);
+            let rounding = 1e-2 * count;
+            let off = reached - sent[place];
+            prop_assert!(off > -rounding && off < count + rounding, "{place}: {wanted:?} {sent:?}");
+        }
+    }
+
+    /// Law: a command with a field that is NaN is rest, as is one of nothing, whatever the ranges.
+    #[test]
+    fn a_command_that_is_not_a_number_is_rest(
+        place in 0_usize..5,
+        position_rad in 1e-3_f32..1e6,
+        velocity_rad_per_s in 1e-3_f32..1e6,
+        torque_nm in 1e-3_f32..1e6,
+    ) {
+        let ranges = mit::Ranges::new(position_rad, velocity_rad_per_s, torque_nm).unwrap();
+        let rest = ranges.encode(&mit::Command::REST);
+        let mut broken = [position_rad, velocity_rad_per_s, 500.0, 5.0, torque_nm];
+        prop_assert_eq!(counts(ranges.encode(&command(broken))), [0xFFFF, 0xFFF, 0xFFF, 0xFFF, 0xFFF]);
+        broken[place] = f32::NAN;
+        prop_assert_eq!(ranges.encode(&command(broken)), rest);
+        prop_assert_eq!(counts(rest), [0x7FFF, 0x7FF, 0, 0, 0x7FF]);
+        let sent = ranges.decode(&rest);
+        prop_assert!(sent.kp == 0.0 && sent.kd == 0.0);
+        prop_assert!(sent.torque_nm.abs() <= torque_nm / 4_095.0 * 1.001); // half a count
+    }
+
+    #[test]
+    fn feedback_of_a_drive_in_mit_mode_comes_back_as_it_was(
+        shares in proptest::array::uniform3(-1.0_f32..1.0),
+    ) {
+        let [position_rad, velocity_rad_per_s, torque_nm] = [shares[0] * 12.5, shares[1] * 30.0, shares[2] * 10.0];
+        let feedback = mit::Feedback { position_rad, velocity_rad_per_s, torque_nm };
+        let found = ranges().decode_feedback(&ranges().encode_feedback(&feedback));
+        prop_assert!((found.position_rad - position_rad).abs() < 1.01 * 25.0 / 65_535.0);
+        prop_assert!((found.velocity_rad_per_s - velocity_rad_per_s).abs() < 1.01 * 60.0 / 4_095.0);
+        prop_assert!((found.torque_nm - torque_nm).abs() < 1.01 * 20.0 / 4_095.0);
+    }
+}
+
+#[test]
+fn feedback_that_is_not_a_number_is_zero() {
+    let nan =
+        mit::Feedback { position_rad: f32::NAN, velocity_rad_per_s: f32::NAN, torque_nm: f32::NAN };
+    let zero = ranges().encode_feedback(&mit::Feedback::default());
+    assert_eq!((ranges().encode_feedback(&nan), zero), (zero, [0x7F, 0xFF, 0x7F, 0xF7, 0xFF]));
 }

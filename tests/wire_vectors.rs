@@ -11,6 +11,7 @@ use drivetrain::wire::host_link::{
     ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
     Telemetry, TelemetryFormat, TelemetryHeader,
 };
+use drivetrain::wire::mit;
 use drivetrain::wire::{Counts, Deframer, Protocol};
 use serde_json::Value;
 
@@ -295,6 +296,76 @@ fn dbus_frames() {
     let expect = &vector("dbus.capture")["expect"];
     assert_eq!([rest.mouse.x, rest.mouse.y, rest.mouse.z][..], integers::<i16>(&expect["mouse"]));
     assert_eq!(i64::from(rest.keys.0), expect["keys"]);
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounds")]
+fn number(value: &Value) -> f32 {
+    value.as_f64().unwrap() as f32
+}
+
+#[test]
+fn mit_commands() {
+    for id in ["damiao.mit.zero", "damiao.mit.min"] {
+        let vector = vector(id);
+        let (input, limits) = (&vector["input"], &vector["input"]["limits"]);
+        let [p, v, t] = ["p", "v", "t"].map(|name| number(&limits[name]));
+        let ranges = mit::Ranges::new(p, v, t).unwrap();
+        let field = |name: &str| number(&input[name]);
+        let command = mit::Command {
+            position_rad: field("p"),
+            velocity_rad_per_s: field("v"),
+            kp: field("kp"),
+            kd: field("kd"),
+            torque_nm: field("t"),
+        };
+        assert_eq!(ranges.encode(&command)[..], hex(&vector["expect"]["data"])[..], "{id}");
+    }
+    assert_eq!(mit::ENABLE[..], hex(&vector("damiao.special.enable")["expect"]["data"])[..]);
+}
+
+/// A field alone, in a command whose range is that of the vector.
+#[test]
+fn mit_fields() {
+    for id in ["12.5_16", "-12.5_16", "0_12", "600_12"] {
+        let vector = vector(&format!("damiao.f2u.{id}"));
+        let (input, expected) = (&vector["input"], vector["expect"]["u"].as_u64().unwrap());
+        let (value, range) = (number(&input["x"]), number(&input["max"]));
+        let ranges = |p, v| mit::Ranges::new(p, v, 1.0).unwrap();
+        let mut command = mit::Command::REST;
+        let (ranges, field) = if input["bits"] == 16 {
+            (ranges(range, 1.0), &mut command.position_rad)
+        } else if input["min"] == 0 {
+            (ranges(1.0, 1.0).with_gains(range, 1.0).unwrap(), &mut command.kp)
+        } else {
+            (ranges(1.0, range), &mut command.velocity_rad_per_s)
+        };
+        *field = value;
+        let bits = u64::from_be_bytes(ranges.encode(&command));
+        let sent = match (input["bits"].as_u64(), input["min"].as_f64()) {
+            (Some(16), _) => bits >> 48,
+            (_, Some(0.0)) => bits >> 24 & 0xFFF,
+            _ => bits >> 36 & 0xFFF,
+        };
+        assert_eq!(sent, expected, "{id}");
+    }
+}
+
+#[test]
+fn mit_feedback() {
+    let ranges = mit::Ranges::new(12.5, 30.0, 10.0).unwrap();
+    for id in ["damiao.fb.zero", "damiao.fb.mid"] {
+        let vector = vector(id);
+        let [_, a, b, c, d, e, _, _] = hex(&vector["input"]["data"])[..] else { panic!("{id}") };
+        let feedback = ranges.decode_feedback(&[a, b, c, d, e]);
+        let expect = &vector["expect"];
+        for (found, name, count) in [
+            (feedback.position_rad, "p", 25.0 / 65_535.0),
+            (feedback.velocity_rad_per_s, "v", 60.0 / 4_095.0),
+            (feedback.torque_nm, "t", 20.0 / 4_095.0),
+        ] {
+            close(&[found], &expect[name], 1e-2 * count);
+        }
+    }
 }
 
 #[test]

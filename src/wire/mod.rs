@@ -1,4 +1,4 @@
-//! Byte protocols that are not CAN: host link, IMU, servo, remote control, plotting, and the text of `candump`.
+//! Byte protocols: host link, IMU, servo, remote control, plotting, the text of `candump`, and the payload of MIT-mode drives.
 //!
 //! | module | other side | frame | check | decoder | encoder |
 //! |---|---|---|---|:-:|:-:|
@@ -8,6 +8,7 @@
 //! | [`dbus`] | DR16 receiver of a remote control | 18 bytes between pauses | none: plausibility | x | |
 //! | [`vofa`] | plotting tool on a computer | 4 bytes a channel + tail | none | x | x |
 //! | [`candump`] | SocketCAN's log | a line of text | none | x | x |
+//! | [`mit`] | motors in MIT mode | the 8 bytes of a CAN frame | that of CAN | x | x |
 //!
 //! All of them are sans-I/O: bytes in, values out, and back; who moves the bytes (interrupt, DMA, async task, file) is
 //! no concern of theirs. The framed protocols share one decoder, [`Deframer`], and with it one law: **the frames
@@ -43,6 +44,7 @@ pub mod dbus;
 pub mod feetech;
 pub mod hipnuc;
 pub mod host_link;
+pub mod mit;
 pub mod vofa;
 
 mod deadline;

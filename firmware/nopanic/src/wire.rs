@@ -1,4 +1,4 @@
-//! Byte protocols that are not CAN.
+//! Byte protocols.
 
 use crate::opaque::Function;
 use drivetrain::wire::candump::*;
@@ -6,6 +6,7 @@ use drivetrain::wire::dbus::*;
 use drivetrain::wire::feetech::*;
 use drivetrain::wire::hipnuc::*;
 use drivetrain::wire::host_link::*;
+use drivetrain::wire::mit;
 use drivetrain::wire::vofa::*;
 use drivetrain::wire::{Deadline, Deframer, Link};
 
@@ -82,4 +83,16 @@ pub fn call_all() {
     Link::<Sts, 64>::counts.call();
     Link::<Sts, 64>::read.call();
     justfloat.call();
+    mit::Ranges::new.call();
+    mit::Ranges::with_gains.call();
+    mit::Ranges::torque_nm.call();
+    mit::Ranges::velocity_rad_per_s.call();
+    (|ranges: &mit::Ranges, command: &mit::Command| mit::Ranges::encode(ranges, command)).call();
+    (|ranges: &mit::Ranges, data: &[u8; 8]| mit::Ranges::decode(ranges, data)).call();
+    (|ranges: &mit::Ranges, data: &[u8; 5]| mit::Ranges::decode_feedback(ranges, data)).call();
+    (|ranges: &mit::Ranges, feedback: &mit::Feedback| {
+        mit::Ranges::encode_feedback(ranges, feedback)
+    })
+    .call();
+    mit::Command::torque.call();
 }

@@ -1,0 +1,303 @@
+//! The payload of drives in MIT mode: Damiao, CubeMars AK, and others after the MIT Mini Cheetah.
+//!
+//! The drive applies the torque `kp * (position - measured) + kd * (velocity - measured) + torque`, all of it at the output
+//! shaft. Each field of a frame is an unsigned number that spans a range; the range is a setting of the drive.
+//!
+//! ```text
+//! command   byte 0 ..  1  position 16 | velocity 12 | kp 12 | kd 12 | torque 12 bits   byte 7
+//! feedback                position 16 | velocity 12 | torque 12 bits                   5 bytes
+//! ```
+//!
+//! **Eight zero bytes are not rest.** A signed field has its zero in the middle of its range, so eight zero bytes are the
+//! largest negative torque. [`Command::REST`] is rest: no gains, and a torque within half a count of zero.
+//!
+//! ```
+//! use drivetrain::wire::mit::{Command, Ranges};
+//!
+//! const J4310: Ranges = match Ranges::new(12.5, 30.0, 10.0) {
+//!     Ok(ranges) => ranges,
+//!     Err(_) => panic!("the ranges of a DM-J4310 are not valid"),
+//! };
+//! assert_eq!(J4310.encode(&Command::REST), [0x7F, 0xFF, 0x7F, 0xF0, 0x00, 0x00, 0x07, 0xFF]);
+//! assert_eq!(J4310.decode(&[0; 8]).torque_nm, -10.0);
+//! # Ok::<(), drivetrain::wire::mit::RangeError>(())
+//! ```
+//!
+//! Sources: Damiao's protocol as python-damiao-driver documents it; frames of public tests, see `tests/data/wire`.
+
+/// The data that enables a drive.
+pub const ENABLE: [u8; 8] = special(0xFC);
+
+/// The data that disables a drive.
+pub const DISABLE: [u8; 8] = special(0xFD);
+
+/// The data that makes the present position zero.
+pub const SET_ZERO: [u8; 8] = special(0xFE);
+
+/// The last byte of the largest command below the special frames, which end with 0xFB to 0xFE.
+const HIGHEST_LAST: u8 = 0xFA;
+
+const TOP_16: u16 = 0xFFFF;
+const TOP_12: u16 = 0x0FFF;
+
+const fn special(last: u8) -> [u8; 8] {
+    [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last]
+}
+
+/// A command to the drive, in units of the output shaft.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Command {
+    /// The position in rad to hold with `kp`.
+    pub position_rad: f32,
+    /// The velocity in rad/s to hold with `kd`.
+    pub velocity_rad_per_s: f32,
+    /// The stiffness in Nm/rad.
+    pub kp: f32,
+    /// The damping in Nm s/rad.
+    pub kd: f32,
+    /// The torque in Nm on top of both.
+    pub torque_nm: f32,
+}
+
+impl Command {
+    /// Asks for nothing: no gains and no torque.
+    pub const REST: Self =
+        Self { position_rad: 0.0, velocity_rad_per_s: 0.0, kp: 0.0, kd: 0.0, torque_nm: 0.0 };
+
+    /// Returns a command of a torque alone, in Nm.
+    #[must_use]
+    pub const fn torque(torque_nm: f32) -> Self {
+        Self { torque_nm, ..Self::REST }
+    }
+
+    /// Tells whether no field is NaN.
+    const fn is_number(&self) -> bool {
+        !(self.position_rad.is_nan()
+            || self.velocity_rad_per_s.is_nan()
+            || self.kp.is_nan()
+            || self.kd.is_nan()
+            || self.torque_nm.is_nan())
+    }
+}
+
+/// Measurements of the drive at the output shaft.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Feedback {
+    /// The position in rad.
+    pub position_rad: f32,
+    /// The velocity in rad/s.
+    pub velocity_rad_per_s: f32,
+    /// The torque in Nm.
+    pub torque_nm: f32,
+}
+
+/// The ranges of the fields, as they are set in the drive.
+///
+/// Position, velocity and torque go from minus to plus their range; the gains from zero. A number outside saturates. The
+/// drives truncate to the next lower count and so does this, so zero is sent as half a count below zero.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::mit::{Command, Ranges};
+///
+/// let ranges = Ranges::new(12.5, 30.0, 10.0)?; // a Damiao DM-J4310
+/// let data = ranges.encode(&Command { kd: 1.0, velocity_rad_per_s: 6.0, ..Command::REST });
+/// let sent = ranges.decode(&data);
+/// assert!((sent.velocity_rad_per_s - 6.0).abs() < 60.0 / 4095.0); // a count
+/// assert!((sent.kd - 1.0).abs() < 5.0 / 4095.0);
+/// let refused = Ranges::new(12.5, 30.0, -10.0).map_err(|error| error.to_string());
+/// assert_eq!(refused, Err("torque range -10: 0.001 to 1000000 are allowed".into()));
+/// # Ok::<(), drivetrain::wire::mit::RangeError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Ranges {
+    position: Range,
+    velocity: Range,
+    kp: Range,
+    kd: Range,
+    torque: Range,
+}
+
+impl Ranges {
+    /// Takes the ranges of position in rad, velocity in rad/s and torque in Nm. `kp` goes to 500 Nm/rad and `kd` to
+    /// 5 Nm s/rad.
+    ///
+    /// # Errors
+    /// Names the first range that is not between 0.001 and 1000000.
+    pub const fn new(
+        position_rad: f32,
+        velocity_rad_per_s: f32,
+        torque_nm: f32,
+    ) -> Result<Self, RangeError> {
+        let position = Range::around_zero("position", position_rad);
+        let velocity = Range::around_zero("velocity", velocity_rad_per_s);
+        let torque = Range::around_zero("torque", torque_nm);
+        match (position, velocity, torque) {
+            (Ok(position), Ok(velocity), Ok(torque)) => {
+                let (kp, kd) = (Range::KP, Range::KD);
+                Ok(Self { position, velocity, kp, kd, torque })
+            }
+            (Err(error), ..) | (_, Err(error), _) | (_, _, Err(error)) => Err(error),
+        }
+    }
+
+    /// Sets the largest gains, in Nm/rad and Nm s/rad.
+    ///
+    /// # Errors
+    /// Names the first range that is not between 0.001 and 1000000.
+    pub const fn with_gains(self, kp: f32, kd: f32) -> Result<Self, RangeError> {
+        match (Range::from_zero("kp", kp), Range::from_zero("kd", kd)) {
+            (Ok(kp), Ok(kd)) => Ok(Self { kp, kd, ..self }),
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// Returns the range of the torque, in Nm.
+    #[must_use]
+    pub const fn torque_nm(&self) -> f32 {
+        self.torque.upper
+    }
+
+    /// Returns the range of the velocity, in rad/s.
+    #[must_use]
+    pub const fn velocity_rad_per_s(&self) -> f32 {
+        self.velocity.upper
+    }
+
+    /// Writes a command. A field outside its range saturates; if any field is NaN, the whole command is rest.
+    ///
+    /// The result is never one of the special frames. The command that would be, with every field at its end, gets up to four
+    /// counts less torque.
+    #[must_use]
+    pub const fn encode(&self, command: &Command) -> [u8; 8] {
+        let wanted = if command.is_number() { *command } else { Command::REST };
+        let [a, b] = self.position.counts(wanted.position_rad, TOP_16).to_be_bytes();
+        let [c, d, e] = pair(
+            self.velocity.counts(wanted.velocity_rad_per_s, TOP_12),
+            self.kp.counts(wanted.kp, TOP_12),
+        );
+        let [f, g, h] =
+            pair(self.kd.counts(wanted.kd, TOP_12), self.torque.counts(wanted.torque_nm, TOP_12));
+        match [a, b, c, d, e, f, g, h] {
+            [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFB..=0xFE] => special(HIGHEST_LAST),
+            data => data,
+        }
+    }
+
+    /// Reads a command, as a drive does.
+    #[must_use]
+    pub const fn decode(&self, data: &[u8; 8]) -> Command {
+        let [a, b, c, d, e, f, g, h] = *data;
+        let ((velocity, kp), (kd, torque)) = (unpair([c, d, e]), unpair([f, g, h]));
+        Command {
+            position_rad: self.position.value(u16::from_be_bytes([a, b]), TOP_16),
+            velocity_rad_per_s: self.velocity.value(velocity, TOP_12),
+            kp: self.kp.value(kp, TOP_12),
+            kd: self.kd.value(kd, TOP_12),
+            torque_nm: self.torque.value(torque, TOP_12),
+        }
+    }
+
+    /// Reads the five bytes of a feedback frame: in those of Damiao, all but the first byte and the last two.
+    #[must_use]
+    pub const fn decode_feedback(&self, data: &[u8; 5]) -> Feedback {
+        let [a, b, c, d, e] = *data;
+        let (velocity, torque) = unpair([c, d, e]);
+        Feedback {
+            position_rad: self.position.value(u16::from_be_bytes([a, b]), TOP_16),
+            velocity_rad_per_s: self.velocity.value(velocity, TOP_12),
+            torque_nm: self.torque.value(torque, TOP_12),
+        }
+    }
+
+    /// Writes the five bytes of a feedback frame, as a drive does. A field outside its range saturates, NaN is zero.
+    #[must_use]
+    pub const fn encode_feedback(&self, feedback: &Feedback) -> [u8; 5] {
+        let [a, b] = self.position.counts(feedback.position_rad, TOP_16).to_be_bytes();
+        let [c, d, e] = pair(
+            self.velocity.counts(feedback.velocity_rad_per_s, TOP_12),
+            self.torque.counts(feedback.torque_nm, TOP_12),
+        );
+        [a, b, c, d, e]
+    }
+}
+
+/// Packs two numbers of 12 bits.
+const fn pair(first: u16, second: u16) -> [u8; 3] {
+    let [_, a, b, c] = (((first as u32) << 12) | second as u32).to_be_bytes();
+    [a, b, c]
+}
+
+const fn unpair([a, b, c]: [u8; 3]) -> (u16, u16) {
+    let (a, b, c) = (a as u16, b as u16, c as u16);
+    (a << 4 | b >> 4, (b & 0xF) << 8 | c)
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Range {
+    lower: f32,
+    upper: f32,
+}
+
+impl Range {
+    /// Of every model of Damiao.
+    const KP: Self = Self { lower: 0.0, upper: 500.0 };
+    const KD: Self = Self { lower: 0.0, upper: 5.0 };
+
+    const fn around_zero(range: &'static str, upper: f32) -> Result<Self, RangeError> {
+        match Self::from_zero(range, upper) {
+            Ok(range) => Ok(Self { lower: -upper, ..range }),
+            Err(error) => Err(error),
+        }
+    }
+
+    const fn from_zero(range: &'static str, upper: f32) -> Result<Self, RangeError> {
+        if upper >= RangeError::LOWEST && upper <= RangeError::HIGHEST {
+            Ok(Self { lower: 0.0, upper })
+        } else {
+            Err(RangeError { range, value: upper })
+        }
+    }
+
+    /// Truncates to counts of 0 to `top`. NaN is zero.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    const fn counts(self, value: f32, top: u16) -> u16 {
+        let value = if value.is_nan() { 0.0 } else { value };
+        if value >= self.upper {
+            return top;
+        }
+        ((value - self.lower) * top as f32 / (self.upper - self.lower)) as u16
+    }
+
+    const fn value(self, counts: u16, top: u16) -> f32 {
+        self.lower + counts as f32 * (self.upper - self.lower) / top as f32
+    }
+}
+
+/// A range that no drive has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RangeError {
+    range: &'static str,
+    value: f32,
+}
+
+impl RangeError {
+    const LOWEST: f32 = 1e-3;
+    const HIGHEST: f32 = 1e6;
+}
+
+impl core::fmt::Display for RangeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let (lowest, highest) = (Self::LOWEST, Self::HIGHEST);
+        write!(f, "{} range {}: {lowest} to {highest} are allowed", self.range, self.value)
+    }
+}
+
+impl core::error::Error for RangeError {}
