@@ -10,6 +10,8 @@ pub enum Capability {
     Current,
     /// It takes a voltage.
     Voltage,
+    /// It takes a torque of the output shaft.
+    Torque,
     /// It takes a velocity of the output shaft.
     Velocity,
     /// It takes an angle within a turn, and goes there by the shortest way.
@@ -28,10 +30,11 @@ pub enum Capability {
 
 impl Capability {
     /// All of them: the targets first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Raw,
         Self::Current,
         Self::Voltage,
+        Self::Torque,
         Self::Velocity,
         Self::Angle,
         Self::Position,
@@ -54,6 +57,7 @@ impl core::fmt::Display for Capability {
             Self::Raw => "raw",
             Self::Current => "current",
             Self::Voltage => "voltage",
+            Self::Torque => "torque",
             Self::Velocity => "velocity",
             Self::Angle => "angle",
             Self::Position => "position",
@@ -146,6 +150,6 @@ mod tests {
             assert_eq!(set.to_string(), one.to_string());
         }
         assert_eq!(Capabilities::default().to_string(), "nothing");
-        assert_eq!(Capability::ALL.iter().filter(|it| it.is_target()).count(), 6);
+        assert_eq!(Capability::ALL.iter().filter(|it| it.is_target()).count(), 7);
     }
 }

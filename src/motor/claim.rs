@@ -30,6 +30,7 @@ pub struct Claim {
     id: Id,
     mask: u32,
     role: Role,
+    is_shared: bool,
     motor: MotorName,
 }
 
@@ -37,7 +38,7 @@ impl Claim {
     /// Claims one id.
     #[must_use]
     pub fn new(id: impl Into<Id>, role: Role, motor: MotorName) -> Self {
-        Self { id: id.into(), mask: u32::MAX, role, motor }
+        Self { id: id.into(), mask: u32::MAX, role, is_shared: false, motor }
     }
 
     /// Claims every id that is equal under `mask`.
@@ -46,11 +47,55 @@ impl Claim {
         Self { mask, ..self }
     }
 
-    /// Tells whether some id belongs to both claims, and they are not the two directions of one motor: some protocols
-    /// send command and feedback with one id.
+    /// Allows other motors to claim the same id in the same direction: their frames differ in their data.
+    ///
+    /// Two claims share an id only if both of them allow it.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::{Claim, MotorName, Role};
+    /// use embedded_can::StandardId;
+    ///
+    /// // Damiao drives that all answer to one master id, each with its own number in the first byte.
+    /// let answer = |id, role| Claim::new(StandardId::ZERO, role, MotorName::new("DM-J4310", id));
+    /// let (first, second) = (answer(1, Role::Feedback), answer(2, Role::Feedback));
+    /// assert!(first.clashes_with(&second) && first.shared().clashes_with(&second));
+    /// assert!(!first.shared().clashes_with(&second.shared()));
+    /// assert!(first.shared().clashes_with(&answer(2, Role::Command).shared()));
+    /// ```
+    #[must_use]
+    pub const fn shared(self) -> Self {
+        Self { is_shared: true, ..self }
+    }
+
+    /// Tells whether an id belongs to the claim.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::motor::{Claim, MotorName, Role};
+    /// use embedded_can::{ExtendedId, StandardId};
+    ///
+    /// // A CyberGear answers with its state within the id: type 2, motor 0x7F, host 0xFD.
+    /// let id = |raw| ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO);
+    /// let answer = Claim::new(id(0x0200_7FFD), Role::Feedback, MotorName::new("CyberGear", 127))
+    ///     .with_mask(0x1F00_FFFF);
+    /// assert!(answer.covers(id(0x0280_7FFD)) && !answer.covers(id(0x0280_7EFD)));
+    /// assert!(!answer.covers(StandardId::ZERO));
+    /// ```
+    #[must_use]
+    pub fn covers(&self, id: impl Into<Id>) -> bool {
+        let ((extended, own), (other_extended, other)) = (raw(self.id), raw(id.into()));
+        extended == other_extended && (own ^ other) & self.mask == 0
+    }
+
+    /// Tells whether some id belongs to both claims, unless both [share](Self::shared) it in one direction, or they are the two
+    /// directions of one motor: some protocols send command and feedback with one id.
     #[must_use]
     pub fn clashes_with(&self, other: &Self) -> bool {
         if self.motor == other.motor && self.role != other.role {
+            return false;
+        }
+        if self.is_shared && other.is_shared && self.role == other.role {
             return false;
         }
         let (extended, raw) = raw(self.id);
@@ -113,6 +158,7 @@ mod tests {
         let command = claim(Role::Command, "joint");
         assert!(!command.clashes_with(&claim(Role::Feedback, "joint")));
         assert!(command.clashes_with(&command)); // attached twice
+        assert!(command.covers(id) && !command.covers(StandardId::ZERO));
         assert!(command.clashes_with(&claim(Role::Feedback, "another")));
     }
 }
