@@ -3,10 +3,11 @@
 //! Its motor has a gear of 27, an id of its own and frames of its own; everything else, from arming to the command
 //! deadline and the look-out for stalls, it has from the crate. `cargo run --example custom_motor`
 
-use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Malformed, MotorName, Own, OwnMotor, Vitals};
+use drivetrain::motor::{Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor};
+use drivetrain::motor::{Role, Target, Vitals};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -30,6 +31,10 @@ impl MyMotor {
     pub(crate) fn new(id: u8) -> Result<Self, drivetrain::control::ConfigError> {
         Ok(Self { id, rotor_rpm: 0, temperature_c: 0, effort: 0.0, speed: Pid::new(SPEED)? })
     }
+
+    fn command(&self, amperes: f32) -> CanFrame {
+        CanFrame::of(standard(0x120 + u16::from(self.id)), amperes.to_le_bytes())
+    }
 }
 
 impl OwnMotor for MyMotor {
@@ -37,32 +42,39 @@ impl OwnMotor for MyMotor {
         MotorName::new("MyMotor", self.id)
     }
 
-    fn command_id(&self) -> Id {
-        standard(0x120 + u16::from(self.id))
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |base, role| Claim::new(standard(base + u16::from(self.id)), role, self.name());
+        [claim(0x120, Role::Command), claim(0x140, Role::Feedback)]
     }
 
-    fn feedback_id(&self) -> Id {
-        standard(0x140 + u16::from(self.id))
-    }
-
-    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [low, high, temperature_c] = *frame.data() else {
-            return Err(Malformed::Length(frame.length()));
+            return Ingest::Malformed(Malformed::Length(frame.length()));
         };
         (self.rotor_rpm, self.temperature_c) = (i16::from_le_bytes([low, high]), temperature_c);
-        Ok(())
+        Ingest::Taken
     }
 
     fn velocity(&self) -> AngularVelocity {
         AngularVelocity::from_rpm(f32::from(self.rotor_rpm) / GEAR)
     }
 
-    fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
+    fn rest(&mut self) -> CanFrame {
+        self.command(0.0)
+    }
+
+    fn control(&mut self, order: Order) -> CanFrame {
+        let Order { target: Target::Velocity(target), share, step } = order else {
+            return self.rest();
+        };
+        // Within the limit of now the loop does not wind up.
+        if self.speed.set_config(SPEED.with_output_limit(share * LIMIT_A)).is_err() {
+            return self.rest();
+        }
         let measured = self.velocity().as_rad_per_s();
-        let amperes = self.speed.step(target.as_rad_per_s(), measured, step);
+        let amperes = self.speed.step(target.as_rad_per_s(), measured, &step);
         self.effort = amperes / LIMIT_A;
-        let [a, b, c, d] = amperes.to_le_bytes();
-        [a, b, c, d, 0, 0, 0, 0]
+        self.command(amperes)
     }
 
     fn reset(&mut self) {
@@ -92,10 +104,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 mod simulation {
     use super::*;
-    use drivetrain::motor::{ArmError, Claim, Condition, Devices, Role, VelocityDrive};
+    use drivetrain::motor::{ArmError, Condition, Devices, VelocityDrive};
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::sim::{Line, Model, MotorConfig, World};
     use drivetrain::time::{Duration, Instant};
+    use drivetrain::wire::mit;
     use std::error::Error;
 
     /// The ESC and the shaft of `MyMotor`: 0.2 Nm for each ampere, 0.004 kg m² and some friction at the output.
@@ -187,21 +200,27 @@ mod simulation {
         fn name(&self) -> MotorName {
             MotorName::new("DM4310 (velocity)", self.0.id)
         }
-        fn command_id(&self) -> Id {
-            standard(0x200 + u16::from(self.0.id))
+        fn claims(&self) -> impl IntoIterator<Item = Claim> {
+            let id = u16::from(self.0.id);
+            let command = Claim::new(standard(0x200 + id), Role::Command, self.name());
+            [command, Claim::new(standard(0x010 + id), Role::Feedback, self.name())]
         }
-        fn feedback_id(&self) -> Id {
-            standard(0x010 + u16::from(self.0.id))
-        }
-        fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+        fn decode(&mut self, frame: &CanFrame) -> Ingest {
             self.0.decode(frame)
         }
         fn velocity(&self) -> AngularVelocity {
             self.0.velocity()
         }
-        fn control(&mut self, target: AngularVelocity, _step: &TimeStep) -> [u8; 8] {
-            let [a, b, c, d] = target.as_rad_per_s().to_le_bytes();
-            [a, b, c, d, 0, 0, 0, 0]
+        fn rest(&mut self) -> CanFrame {
+            CanFrame::of(standard(0x200 + u16::from(self.0.id)), mit::DISABLE)
+        }
+        fn control(&mut self, order: Order) -> CanFrame {
+            let Target::Velocity(target) = order.target else { return self.rest() };
+            let rad_per_s = target.as_rad_per_s() * order.share;
+            CanFrame::of(standard(0x200 + u16::from(self.0.id)), rad_per_s.to_le_bytes())
+        }
+        fn enable(&mut self) -> Option<CanFrame> {
+            Some(CanFrame::of(standard(0x200 + u16::from(self.0.id)), mit::ENABLE))
         }
         fn reset(&mut self) {}
     }

@@ -2,17 +2,16 @@
 
 #![cfg(test)]
 
-use drivetrain::control::TimeStep;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, Condition, Devices, HealthConfig, Ingest, Malformed, MotorName, Own, OwnMotor,
-    Reaction, Severity, TargetError, VelocityDrive, Vitals,
+    ArmError, Claim, Condition, Devices, HealthConfig, Ingest, Malformed, MotorName, Order, Own,
+    OwnMotor, Reaction, Role, Severity, TargetError, VelocityDrive, Vitals,
 };
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
-/// Reports what the last frame said: temperature, error code, effort and speed in percent.
+/// Reports what the last frame said: temperature, error code, effort and speed in percent. Keeps the share of its last frame.
 struct Talker {
     vitals: Vitals,
     share: f32,
@@ -26,15 +25,13 @@ impl OwnMotor for Talker {
     fn name(&self) -> MotorName {
         MotorName::new("talker", 1)
     }
-    fn command_id(&self) -> Id {
-        id(0x123)
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |raw, role| Claim::new(id(raw), role, self.name());
+        [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
     }
-    fn feedback_id(&self) -> Id {
-        id(0x124)
-    }
-    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [celsius, code, effort, speed] = *frame.data() else {
-            return Err(Malformed::Length(frame.length()));
+            return Ingest::Malformed(Malformed::Length(frame.length()));
         };
         self.vitals = Vitals {
             temperature_c: Some(celsius.into()),
@@ -48,20 +45,22 @@ impl OwnMotor for Talker {
             speed: f32::from(speed.cast_signed()) / 100.0,
             current: 0.0,
         };
-        Ok(())
+        Ingest::Taken
     }
     fn velocity(&self) -> AngularVelocity {
         AngularVelocity::ZERO
     }
-    fn control(&mut self, _: AngularVelocity, _: &TimeStep) -> [u8; 8] {
-        [100; 8]
+    fn rest(&mut self) -> CanFrame {
+        self.share = 0.0;
+        CanFrame::of(id(0x123), [0; 8])
+    }
+    fn control(&mut self, order: Order) -> CanFrame {
+        self.share = order.share;
+        CanFrame::of(id(0x123), [100; 8])
     }
     fn reset(&mut self) {}
     fn vitals(&self) -> Vitals {
         self.vitals
-    }
-    fn limit(&mut self, share: f32) {
-        self.share = share;
     }
 }
 
@@ -73,7 +72,8 @@ struct Bench {
 impl Bench {
     fn new(config: &'static HealthConfig) -> Self {
         let talker = Talker { vitals: Vitals::default(), share: 1.0 };
-        let mut bench = Self { own: Own::new(talker).with_health(config).unwrap(), ms: 0 };
+        let own = Own::new(talker).with_health(config).unwrap().with_opening(Duration::ZERO);
+        let mut bench = Self { own, ms: 0 };
         bench.step([30, 0, 0, 0]);
         bench.own.arm(bench.now()).unwrap();
         bench
@@ -135,6 +135,10 @@ fn a_fault_relaxes_until_it_is_gone_and_armed_and_a_warning_does_not() {
     assert!(matches!(bench.own.arm(bench.now()), Err(ArmError::Faulty(_))));
     assert!(!bench.step([30, 0, 0, 0]), "latched");
     assert_eq!(bench.own.set_velocity((), AngularVelocity::ZERO), Err(TargetError::Relaxed));
+    assert_eq!(bench.own.arm(bench.now()), Err(ArmError::NotReleased));
+    for _ in 0..100 {
+        assert!(!bench.step([30, 0, 0, 0]));
+    }
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
     assert!(bench.step([30, 0, 0, 0]));
     let edges = bench.edges();

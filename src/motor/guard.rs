@@ -173,6 +173,11 @@ impl Guard {
         self.opening.share(self.now)
     }
 
+    /// Closes the output range, which opens from now on: the drive did not follow before.
+    pub(super) const fn reopen(&mut self) {
+        self.opening.begin(self.now);
+    }
+
     /// Time did not move on, so that no age is known: feedback counts as late until the next one, and the motor trips.
     pub(crate) fn lose_time(&mut self, now: Instant) {
         self.note(Condition::ClockFault, true, now);

@@ -18,13 +18,13 @@
 //! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
-//! | [`OwnMotor`], [`Own`], [`Guard`], [`Vitals`] | a motor of your own, and the rules that make it safe |
+//! | [`OwnMotor`], [`Order`], [`Own`], [`Guard`], [`Vitals`] | a motor of your own, and the rules that make it safe |
 //! | [`StopHoming`] | finds the zero of a shaft at a mechanical stop |
 //! | [`Condition`], [`Edge`], [`Health`] | what is wrong with a motor, each change of it, and all of it in a line |
 //! | [`HealthConfig`] | what is looked for, and what follows |
 //! | [`BusLoad`] | how full the bus is |
 //!
-//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and nothing about safety. A
+//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and of safety only what rest is. A
 //! motor that does not fit implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays of devices are
 //! [`Devices`]; a struct of devices names its parts in one method.
 
@@ -65,7 +65,7 @@ pub use load::BusLoad;
 pub use measured::Measured;
 pub use name::MotorName;
 pub use opening::OPENING;
-pub use own::{Own, OwnMotor};
+pub use own::{Order, Own, OwnMotor, Target};
 pub(crate) use progress::Progress;
 pub(crate) use visitor::Ask;
 pub use visitor::Visitor;

@@ -1,8 +1,9 @@
 //! A motor of one's own: its feedback says how it is, and it notes whether it was driven.
 
-use drivetrain::control::TimeStep;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Malformed, MotorName, Own, OwnMotor, Severity, Vitals};
+use drivetrain::motor::{
+    Claim, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Severity, Target, Vitals,
+};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -49,15 +50,13 @@ impl OwnMotor for Mine {
     fn name(&self) -> MotorName {
         MotorName::new("mine", self.id)
     }
-    fn command_id(&self) -> Id {
-        standard(0x100 + u16::from(self.id))
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |base, role| Claim::new(standard(base + u16::from(self.id)), role, self.name());
+        [claim(0x180, Role::Feedback), claim(0x100, Role::Command)]
     }
-    fn feedback_id(&self) -> Id {
-        standard(0x180 + u16::from(self.id))
-    }
-    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
         let [code, current, speed] = *frame.data() else {
-            return Err(Malformed::Length(frame.length()));
+            return Ingest::Malformed(Malformed::Length(frame.length()));
         };
         let share = |byte: u8| f32::from(byte.cast_signed()) / 100.0;
         self.vitals = Vitals {
@@ -67,14 +66,18 @@ impl OwnMotor for Mine {
             speed: share(speed),
             ..self.vitals
         };
-        Ok(())
+        Ingest::Taken
     }
     fn velocity(&self) -> AngularVelocity {
         AngularVelocity::ZERO
     }
-    fn control(&mut self, target: AngularVelocity, _: &TimeStep) -> [u8; 8] {
+    fn rest(&mut self) -> CanFrame {
+        CanFrame::of(standard(0x100 + u16::from(self.id)), [0; 8])
+    }
+    fn control(&mut self, order: Order) -> CanFrame {
         self.runs += 1;
-        [if target > AngularVelocity::ZERO { 1 } else { 0xFF }; 8]
+        let forward = matches!(order.target, Target::Velocity(it) if it > AngularVelocity::ZERO);
+        CanFrame::of(standard(0x100 + u16::from(self.id)), [if forward { 1 } else { 0xFF }; 8])
     }
     fn reset(&mut self) {
         self.resets += 1;

@@ -14,8 +14,9 @@ use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    BusLoad, Devices, Capabilities, Capability, Claim, Guard, Malformed, Measured, Missing,
-    MotorName, Own, OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts, VelocityDrive,
+    AngleDrive, BusLoad, Capabilities, Capability, Claim, Devices, Guard, Ingest, Measured,
+    Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts,
+    VelocityDrive, Vitals,
 };
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, MeasuredLoad,
@@ -127,6 +128,7 @@ fn math() {
 
 fn frame() {
     CanFrame::standard.call();
+    (|id: Id, data: [u8; 3]| CanFrame::of(id, data)).call();
     (|frame: &CanFrame| CanFrame::copy_of(frame)).call();
     (|frame: &CanFrame| CanFrame::convert::<CanFrame>(frame)).call();
     CanFrame::header.call();
@@ -245,6 +247,8 @@ fn motor() {
     Claim::id.call();
     Claim::role.call();
     Claim::motor.call();
+    Claim::shared.call();
+    (|claim: &Claim, id: Id| Claim::covers(claim, id)).call();
     Timeouts::new.call();
     Timeouts::with_feedback.call();
     Timeouts::with_command.call();
@@ -306,6 +310,11 @@ fn motor() {
     Own::<AnyMotor>::guard.call();
     Own::<AnyMotor>::with_health.call();
     Own::<AnyMotor>::health.call();
+    Own::<AnyMotor>::with_opening.call();
+    Own::<AnyMotor>::set_torque.call();
+    (|own: &mut Own<AnyMotor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<AnyMotor>, target| own.set_angle((), target)).call();
+    (|own: &Own<AnyMotor>| (own.velocity(()), own.angle(()))).call();
     device::<Own<AnyMotor>>();
     MotorName::new.call();
     MotorName::model.call();
@@ -426,24 +435,42 @@ impl OwnMotor for AnyMotor {
     fn name(&self) -> MotorName {
         any()
     }
-    fn command_id(&self) -> Id {
-        any()
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        any::<[Claim; 3]>()
     }
-    fn feedback_id(&self) -> Id {
-        any()
-    }
-    fn decode(&mut self, frame: &CanFrame) -> Result<(), Malformed> {
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
         black_box(frame);
         any()
     }
     fn velocity(&self) -> AngularVelocity {
         any()
     }
-    fn control(&mut self, target: AngularVelocity, step: &TimeStep) -> [u8; 8] {
-        black_box((target, step));
+    fn angle(&self) -> Option<Angle> {
+        any()
+    }
+    fn rest(&mut self) -> CanFrame {
+        any()
+    }
+    fn control(&mut self, order: Order) -> CanFrame {
+        black_box(order);
         any()
     }
     fn reset(&mut self) {}
+    fn enable(&mut self) -> Option<CanFrame> {
+        any()
+    }
+    fn disable(&mut self) -> Option<CanFrame> {
+        any()
+    }
+    fn is_enabled(&self) -> Option<bool> {
+        any()
+    }
+    fn capabilities(&self) -> Capabilities {
+        any()
+    }
+    fn vitals(&self) -> Vitals {
+        any()
+    }
 }
 
 /// A driver that may answer anything.

@@ -1,0 +1,358 @@
+//! A motor of your own as a device.
+
+mod device;
+mod motor;
+mod order;
+mod power;
+
+pub use motor::OwnMotor;
+pub use order::{Order, Target};
+
+use super::{
+    AngleDrive, Capabilities, Capability, Claim, Guard, Health, HealthConfig, Link, Severity,
+    TargetError, Timeouts, VelocityDrive, Vitals, Watch,
+};
+use crate::control::TimeStep;
+use crate::frame::CanFrame;
+use crate::math::wrap_pi;
+use crate::time::{Duration, Instant};
+use crate::units::{Angle, AngularVelocity};
+use power::Power;
+
+/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
+const LONGEST_STEP_S: f32 = 0.02;
+
+/// A motor of your own as a device of the runner, beside all others.
+///
+/// Disarmed at start. Late and lost feedback, an old target, a target that is not finite, a second bad time step, a clock that
+/// does not move on and an emergency stop send the [frame of rest](OwnMotor::rest) in the same cycle: [`Guard`] has the rules.
+/// Each update offers a command or that frame. If the drive is to be enabled or disabled, the frame for that comes first.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Pid, PidConfig};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::{
+///     Claim, Devices, Ingest, Malformed, MotorName, Order, Own, OwnMotor, Role, Target, VelocityDrive,
+/// };
+/// use drivetrain::time::{Duration, Instant, Tick};
+/// use drivetrain::units::AngularVelocity;
+/// use embedded_can::{Frame, Id, StandardId};
+///
+/// struct Mine { rpm: i16, speed: Pid }
+///
+/// fn id(raw: u16) -> Id { StandardId::new(raw).unwrap_or(StandardId::ZERO).into() }
+///
+/// impl OwnMotor for Mine {
+///     fn name(&self) -> MotorName { MotorName::new("mine", 1) }
+///     fn claims(&self) -> impl IntoIterator<Item = Claim> {
+///         let claim = |raw, role| Claim::new(id(raw), role, self.name());
+///         [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+///     }
+///     fn decode(&mut self, frame: &CanFrame) -> Ingest {
+///         let [high, low] = *frame.data() else {
+///             return Ingest::Malformed(Malformed::Length(frame.length()));
+///         };
+///         self.rpm = i16::from_be_bytes([high, low]);
+///         Ingest::Taken
+///     }
+///     fn velocity(&self) -> AngularVelocity { AngularVelocity::from_rpm(self.rpm.into()) }
+///     fn rest(&mut self) -> CanFrame { CanFrame::of(id(0x123), [0, 0]) }
+///     fn control(&mut self, order: Order) -> CanFrame {
+///         let Order { target: Target::Velocity(target), share, step } = order else {
+///             return self.rest();
+///         };
+///         let output = self.speed.step(target.as_rpm(), self.velocity().as_rpm(), &step);
+///         let limit = 1_000.0 * share;
+///         CanFrame::of(id(0x123), (output.clamp(-limit, limit) as i16).to_be_bytes())
+///     }
+///     fn reset(&mut self) { self.speed.reset() }
+/// }
+///
+/// let mine = Mine { rpm: 0, speed: Pid::new(PidConfig::new(2.0, 0.0, 0.0))? };
+/// let mut motor = Own::new(mine).with_opening(Duration::ZERO); // all of the output at once
+/// let now = Instant::from_micros(1_000);
+/// let feedback = CanFrame::of(id(0x124), [0, 50]); // 50 rpm
+/// assert_eq!(motor.ingest(&feedback, now), Ingest::Taken);
+/// motor.arm(now)?;
+/// motor.set_velocity((), AngularVelocity::from_rpm(150.0))?;
+/// motor.update(Tick::new(now, 0.001));
+/// let frame = motor.next_frame(0).ok_or("nothing to send")?;
+/// assert_eq!(format!("{frame:?}"), "123 [2] 00 C8"); // 2 * (150 - 50)
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Own<M> {
+    motor: M,
+    guard: Guard,
+    watch: Watch,
+    power: Power,
+    target: Target,
+    /// The angle of the shaft when an angle target was followed first.
+    start: Option<Angle>,
+    is_resting: bool,
+    /// The last command, which an update without a step may send once more.
+    held: Option<CanFrame>,
+    /// The frames that wait to be sent: one for the drive's power, and the command.
+    switching: Option<CanFrame>,
+    command: Option<CanFrame>,
+    /// The last frame for the drive's power, sent or not.
+    switched: Option<CanFrame>,
+    /// The drive has no frame of its own to disable it.
+    rest_disables: bool,
+    superseded: u32,
+    /// The command that another node sent last.
+    rival: Option<Claim>,
+}
+
+impl<M: OwnMotor> Own<M> {
+    /// Takes the motor: disarmed.
+    #[must_use]
+    pub const fn new(motor: M) -> Self {
+        Self {
+            motor,
+            guard: Guard::new(),
+            watch: Watch::new(),
+            power: Power::NEW,
+            target: Target::Torque(0.0),
+            start: None,
+            is_resting: true,
+            held: None,
+            switching: None,
+            command: None,
+            switched: None,
+            rest_disables: false,
+            superseded: 0,
+            rival: None,
+        }
+    }
+
+    /// Sets what is looked for and what follows, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
+    ///
+    /// # Errors
+    /// Names the parameter that makes no sense.
+    pub fn with_health(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
+        let watch = self.watch.with_config(config)?;
+        Ok(Self { watch, ..self })
+    }
+
+    /// Returns how the motor is.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.watch.health(self.motor.name(), &self.guard, &self.motor.vitals())
+    }
+
+    /// Sets when feedback and commands count as lost.
+    #[must_use]
+    pub fn with_timeouts(self, timeouts: Timeouts) -> Self {
+        Self { guard: self.guard.with_timeouts(timeouts), ..self }
+    }
+
+    /// Sets the time in which the [share](Order::share) of the output rises from 0 to 1 after arming; 0.2 s at first.
+    #[must_use]
+    pub fn with_opening(self, time: Duration) -> Self {
+        Self { guard: self.guard.with_opening(time), ..self }
+    }
+
+    /// Returns the motor.
+    #[must_use]
+    pub const fn motor(&self) -> &M {
+        &self.motor
+    }
+
+    /// Returns what decides whether it may be driven.
+    #[must_use]
+    pub const fn guard(&self) -> &Guard {
+        &self.guard
+    }
+
+    /// Sets the torque of the output shaft in Nm; positive is counter-clockwise.
+    ///
+    /// # Errors
+    /// Says why the motor cannot take the target now. The value is then not kept for later.
+    pub fn set_torque(&mut self, torque_nm: f32) -> Result<(), TargetError> {
+        self.set(Capability::Torque, Target::Torque(torque_nm), torque_nm.is_finite())
+    }
+
+    fn set(
+        &mut self,
+        kind: Capability,
+        target: Target,
+        is_finite: bool,
+    ) -> Result<(), TargetError> {
+        if !self.motor.capabilities().has(kind) {
+            return Err(TargetError::Unsupported);
+        }
+        // Where there was no target, the command is of one before.
+        self.held = self.held.filter(|_| self.guard.has_target());
+        self.guard.admit(is_finite)?;
+        self.target = target;
+        Ok(())
+    }
+
+    fn is_online(&self) -> bool {
+        self.guard.link() == Link::Online
+    }
+
+    /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
+    fn look(&mut self, now: Instant) -> f32 {
+        let share = self.watch.look(&mut self.guard, &self.motor.vitals(), now);
+        if share <= 0.0 {
+            self.guard.relax();
+        }
+        share
+    }
+
+    /// Takes what the drive reports of its power.
+    fn hear_power(&mut self, now: Instant) {
+        if !self.power.hear(self.motor.is_enabled(), now) {
+            return;
+        }
+        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
+        _ = self.watch.look(&mut self.guard, &vitals, now);
+        self.guard.relax_until_armed();
+    }
+
+    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
+    fn switch(&mut self, may_drive: bool, now: Instant) {
+        if self.power.begin(now) {
+            self.disable();
+            if self.switched.is_some() {
+                return;
+            }
+        }
+        // A motor that is only late stays enabled, and nothing enables it meanwhile, not even a frame that still waits.
+        let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
+        if stays && !may_drive {
+            if self.switching.is_some() {
+                self.power.give_back();
+                self.replace(|own| &mut own.switching, None);
+            }
+            return;
+        }
+        match self.power.step(may_drive, now) {
+            Some(true) => self.enable(),
+            Some(false) => self.disable(),
+            None => {}
+        }
+        if may_drive && !self.power.is_ready() {
+            self.reopen();
+        }
+    }
+
+    fn enable(&mut self) {
+        let frame = self.motor.enable();
+        if frame.is_some() {
+            self.reopen();
+        }
+        self.post(frame);
+    }
+
+    fn disable(&mut self) {
+        let frame = self.motor.disable();
+        self.rest_disables = frame.is_none();
+        self.post(frame);
+    }
+
+    /// Offers a frame for the drive's power, instead of the one before.
+    fn post(&mut self, frame: Option<CanFrame>) {
+        self.switched = frame;
+        self.replace(|own| &mut own.switching, frame);
+    }
+
+    /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
+    fn reopen(&mut self) {
+        self.guard.reopen();
+        self.start = None;
+    }
+
+    /// Returns the command that this step asks for, or rest; `None` if either would disable a drive that is being enabled.
+    fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
+        if !may_drive || !self.power.is_ready() {
+            // A late motor keeps its integral, one without a target starts afresh.
+            if !self.guard.has_target() {
+                self.relax();
+            }
+            self.held = None;
+            let is_enabling = may_drive && self.switched.is_some();
+            return (!is_enabling || !self.rest_disables).then(|| self.motor.rest());
+        }
+        if step.is_hold() {
+            return self.held.take();
+        }
+        self.is_resting = false;
+        let opened = self.guard.share();
+        let order = Order { target: self.goal(opened), share: left.min(opened), step };
+        self.held = Some(self.motor.control(order));
+        self.held
+    }
+
+    /// Returns the target; an angle on its way from where the shaft was, as far as the output range is open.
+    fn goal(&mut self, opened: f32) -> Target {
+        let measured = self.motor.angle().filter(|angle| angle.is_finite());
+        match (self.target, measured) {
+            (Target::Angle(target), Some(measured)) if opened < 1.0 => {
+                let start = *self.start.get_or_insert(measured);
+                let way = wrap_pi((target - start).as_radians());
+                Target::Angle(start + Angle::from_radians(way * opened))
+            }
+            (target, _) => target,
+        }
+    }
+
+    fn relax(&mut self) {
+        self.start = None;
+        if !self.is_resting {
+            self.motor.reset();
+            self.is_resting = true;
+        }
+    }
+
+    /// Rests at once, between two updates.
+    fn stop(&mut self) {
+        self.relax();
+        if self.power.stop() {
+            self.disable();
+        }
+        let rest = self.motor.rest();
+        self.offer(Some(rest));
+    }
+
+    fn offer(&mut self, command: Option<CanFrame>) {
+        self.replace(|own| &mut own.command, command);
+    }
+
+    fn replace(
+        &mut self,
+        place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>,
+        frame: Option<CanFrame>,
+    ) {
+        let before = core::mem::replace(place(self), frame);
+        self.superseded = self.superseded.wrapping_add(u32::from(before.is_some()));
+    }
+}
+
+/// There is one motor, so its handle is `()`.
+impl<M: OwnMotor> VelocityDrive<()> for Own<M> {
+    fn velocity(&self, (): ()) -> Option<AngularVelocity> {
+        self.is_online().then(|| self.motor.velocity())
+    }
+
+    fn capabilities(&self, (): ()) -> Capabilities {
+        self.motor.capabilities()
+    }
+
+    fn set_velocity(&mut self, (): (), target: AngularVelocity) -> Result<(), TargetError> {
+        self.set(Capability::Velocity, Target::Velocity(target), target.is_finite())
+    }
+}
+
+impl<M: OwnMotor> AngleDrive<()> for Own<M> {
+    fn angle(&self, (): ()) -> Option<Angle> {
+        if self.is_online() { self.motor.angle() } else { None }
+    }
+
+    fn set_angle(&mut self, (): (), target: Angle) -> Result<(), TargetError> {
+        self.set(Capability::Angle, Target::Angle(target), target.is_finite())
+    }
+}

@@ -1,0 +1,85 @@
+//! The part of a motor of your own that differs from every other motor.
+
+use super::Order;
+use crate::frame::CanFrame;
+use crate::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Vitals};
+use crate::units::{Angle, AngularVelocity};
+
+/// A motor of your own: its ids, its frames and its loop.
+///
+/// [`Own`](super::Own) makes a device of it, with everything that all motors have in common. The example `custom_motor` is a
+/// whole one, and `mit_motor` one whose drive is enabled first.
+pub trait OwnMotor {
+    /// Returns how the motor is called in errors.
+    fn name(&self) -> MotorName;
+
+    /// Lists the CAN ids of the motor's commands and of its feedback: any number of each.
+    ///
+    /// An id with the feedback of several motors is [shared](Claim::shared), and [`decode`](Self::decode) tells them apart.
+    fn claims(&self) -> impl IntoIterator<Item = Claim>;
+
+    /// Takes a data frame with an id of the motor's feedback.
+    ///
+    /// Returns [`Ingest::Unrelated`] if the frame is another motor's or no feedback: other devices are asked then. Returns
+    /// [`Ingest::Malformed`] if the frame is this motor's and damaged. In both cases it must have changed nothing.
+    fn decode(&mut self, frame: &CanFrame) -> Ingest;
+
+    /// Returns the measured velocity of the output shaft.
+    fn velocity(&self) -> AngularVelocity;
+
+    /// Returns the measured angle of the output shaft; `None` if it is not known, as is assumed unless said otherwise.
+    fn angle(&self) -> Option<Angle> {
+        None
+    }
+
+    /// Returns the frame that the drive reads as rest: no torque, whatever the shaft does.
+    ///
+    /// Each update in which the motor is not driven sends it. The manual of the drive says which frame it is: eight zero bytes
+    /// are the full negative torque of a drive in MIT mode, and a velocity of zero is a brake. A drive without such a command
+    /// rests when it is disabled: return that frame here, and `None` from [`disable`](Self::disable).
+    fn rest(&mut self) -> CanFrame;
+
+    /// Runs the loop for one step and returns the command: a data frame of up to 8 bytes with an id of its commands.
+    ///
+    /// If the order is of a kind that the motor does not offer, return [`rest`](Self::rest).
+    fn control(&mut self, order: Order) -> CanFrame;
+
+    /// Brings the loop to rest: called before the motor is driven, and when it stops.
+    fn reset(&mut self);
+
+    /// Returns the next frame that enables the drive; `None`, unless said otherwise, for a drive that needs none.
+    ///
+    /// [`Own`](super::Own) calls this when the motor may be driven and was not before. If [`is_enabled`](Self::is_enabled)
+    /// reports, the call is repeated each 10 ms until the drive is enabled. Until then the drive gets [`rest`](Self::rest)
+    /// only, or nothing if `rest` would disable the drive. The output [opens](Order::share) from zero afterwards.
+    ///
+    /// If a drive needs several frames, return one after the other. If a drive goes on to its last target when enabled, replace
+    /// that target first. If a drive resets while driven, the motor trips and the drive is not enabled again.
+    fn enable(&mut self) -> Option<CanFrame> {
+        None
+    }
+
+    /// Returns the next frame that disables the drive; `None`, unless said otherwise, for a drive that needs none, or that
+    /// [`rest`](Self::rest) disables.
+    ///
+    /// [`Own`](super::Own) calls this at the start, on disarm, trip and emergency stop, and when the motor has no target. The
+    /// call is repeated each 100 ms, or each 10 ms while the drive reports that it is enabled.
+    fn disable(&mut self) -> Option<CanFrame> {
+        None
+    }
+
+    /// Returns whether the drive is enabled, by its last feedback; `None`, unless said otherwise, if it does not say.
+    fn is_enabled(&self) -> Option<bool> {
+        None
+    }
+
+    /// Returns what the motor offers: velocities and feedback, unless said otherwise.
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::of(&[Capability::Velocity, Capability::Feedback])
+    }
+
+    /// Returns what else it knows of itself. Nothing unless said otherwise.
+    fn vitals(&self) -> Vitals {
+        Vitals::default()
+    }
+}

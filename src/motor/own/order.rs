@@ -1,0 +1,32 @@
+//! The input of an own motor for one step.
+
+use crate::control::TimeStep;
+use crate::units::{Angle, AngularVelocity};
+
+/// A target of the output shaft. It is finite, and of a kind that the motor's capabilities have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Target {
+    /// A torque in Nm; positive is counter-clockwise.
+    Torque(f32),
+    /// A velocity.
+    Velocity(AngularVelocity),
+    /// An angle, by the shortest way; how many turns it has does not matter.
+    Angle(Angle),
+}
+
+/// A target with its limits, for one step: see [`OwnMotor::control`](super::OwnMotor::control).
+///
+/// Destructure it, `let Order { target, share, step } = order;`: the compiler then warns if a field is not used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Order {
+    /// The target. While the output range opens, an angle moves from the measured angle to the one that was set.
+    pub target: Target,
+    /// The share of the full output that is allowed, 0 to 1: it rises from 0 after arming, and falls while the motor is warm
+    /// or stalled. Keep the command within this share of its range, or multiply the gains of the drive by it.
+    pub share: f32,
+    /// The time since the step before. Never on hold.
+    pub step: TimeStep,
+}

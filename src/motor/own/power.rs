@@ -1,0 +1,142 @@
+//! Whether the drive of an own motor is enabled.
+
+use crate::time::{Duration, Instant};
+
+/// A drive that reports the opposite of what it was told is told again after this time.
+const INSIST: Duration = Duration::from_millis(10);
+
+/// A drive that was disabled is told again after this time: it may have missed the frame.
+const REMIND: Duration = Duration::from_millis(100);
+
+/// For this long after a change, reports of the state before may still arrive.
+const SETTLING: Duration = Duration::from_millis(20);
+
+/// Decides when a frame that enables or disables the drive is due.
+///
+/// | wanted | the drive reports | the frame is sent |
+/// |---|---|---|
+/// | disabled | enabled | at once, and again each 10 ms |
+/// | disabled | disabled, or nothing | at once, and again each 100 ms |
+/// | enabled | disabled | at once, and again each 10 ms; if it was enabled before, never again: it has reset |
+/// | enabled | enabled, or nothing | at once |
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Power {
+    /// The state that is wanted.
+    on: bool,
+    /// The state that the drive reported since then; the opposite until it reports.
+    seen: Option<bool>,
+    /// The drive followed.
+    is_confirmed: bool,
+    /// The time at which the state was wanted first.
+    since: Instant,
+    /// The time at which the frame was sent last.
+    told: Instant,
+    is_due: bool,
+    /// The drive was never told.
+    is_new: bool,
+    /// The time of the last update.
+    now: Instant,
+}
+
+impl Power {
+    /// Wants a drive of which nothing is known to be disabled.
+    pub(super) const NEW: Self = Self {
+        on: false,
+        seen: None,
+        is_confirmed: false,
+        since: Instant::START,
+        told: Instant::START,
+        is_due: false,
+        is_new: true,
+        now: Instant::START,
+    };
+
+    /// Takes the state that the drive reports with a feedback frame; `None` if it reports none. Returns whether the drive has
+    /// reset: it was enabled, and no longer is.
+    pub(super) fn hear(&mut self, report: Option<bool>, now: Instant) -> bool {
+        self.seen = report;
+        let has_reset = self.on
+            && self.is_confirmed
+            && report == Some(false)
+            && now.since(self.since) > SETTLING;
+        self.is_confirmed |= report == Some(self.on);
+        has_reset
+    }
+
+    /// Moves on to the first update; returns whether it is, as the drive is to be disabled then.
+    pub(super) const fn begin(&mut self, now: Instant) -> bool {
+        let is_new = self.is_new;
+        if is_new {
+            self.now = now;
+            self.tell();
+        }
+        is_new
+    }
+
+    /// Moves on to an update and takes the state that is wanted from now on. Returns the state that the drive is to be told,
+    /// if a frame is due.
+    pub(super) fn step(&mut self, on: bool, now: Instant) -> Option<bool> {
+        self.now = now;
+        if on != self.on {
+            self.turn(on);
+        }
+        // The clock may have gone back.
+        let is_over = |pause| now < self.told || now.since(self.told) >= pause;
+        if !self.is_due && !self.pause().is_some_and(is_over) {
+            return None;
+        }
+        self.tell();
+        Some(on)
+    }
+
+    /// Wants the drive to be disabled; returns whether it is to be told now.
+    pub(super) fn stop(&mut self) -> bool {
+        let stops = self.on || self.is_new;
+        if stops {
+            self.turn(false);
+            self.tell();
+        }
+        stops
+    }
+
+    /// The frame was not sent: it is due with the next update.
+    pub(super) const fn give_back(&mut self) {
+        self.is_due = true;
+    }
+
+    /// Tells whether the drive is to be enabled.
+    pub(super) const fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// Tells whether the drive is enabled, as far as it says.
+    pub(super) fn is_ready(&self) -> bool {
+        self.on && self.seen != Some(false)
+    }
+
+    fn turn(&mut self, on: bool) {
+        *self = Self {
+            on,
+            seen: self.seen.map(|_| !on),
+            is_confirmed: false,
+            since: self.now,
+            is_due: true,
+            ..*self
+        };
+    }
+
+    const fn tell(&mut self) {
+        self.is_due = false;
+        self.is_new = false;
+        self.told = self.now;
+    }
+
+    fn pause(&self) -> Option<Duration> {
+        match (self.on, self.seen) {
+            (false, Some(true)) => Some(INSIST),
+            (true, Some(false)) if !self.is_confirmed => Some(INSIST),
+            (false, _) => Some(REMIND),
+            (true, _) => None,
+        }
+    }
+}
