@@ -6,6 +6,7 @@
 mod careless;
 mod dji;
 mod joints;
+mod mit;
 #[cfg(feature = "hal")]
 mod pins;
 
