@@ -481,24 +481,26 @@ def word_of(model):
     return cases
 
 
-LATE_US, DEADLINE_US = 10_000_000, 100_000
-ASKED = 1_000
+LATE_US, DEADLINE_US = 1_000_000, 100_000
+ASKED, REFUSED = 1_000, 2**31 - 1
 
 
 def word_at(image, function):
-    """The word is what was asked for exactly while the last frame is not late, the target not too old, and time moves
-    on; otherwise zero: for three times of 64 bits."""
+    """The target is refused exactly when the update before it lies before the arming, or so long after it that the feedback is
+    late. The word is what was asked for exactly while the last frame is not late, the target not too old, and time moves on;
+    otherwise zero: for three times of 64 bits."""
     heard, set_at, updated = times = [claripy.BVS(name, 64) for name in ("heard", "set", "updated")]
     state = image.blank()
     for index, at in enumerate(times):
         state.memory.store(INPUT + 8 * index, at, endness="Iend_LE")
-    # Time that can be added to without an overflow, and a target that was accepted: its motor was heard by then.
+    # Time that can be added to without an overflow. The motor is heard and armed at the first of the three.
     assume = [claripy.ULT(at, claripy.BVV(2**62, 64)) for at in times]
-    assume += [claripy.ULE(set_at - heard + LATE_US, 2 * LATE_US)]
-    fresh = claripy.ULE(updated - heard + LATE_US, 2 * LATE_US)
+    accepted = claripy.And(claripy.UGE(set_at, heard), claripy.ULE(set_at - heard, LATE_US))
+    fresh = claripy.ULE(updated - heard, LATE_US)
     moves_on = claripy.UGT(updated, set_at)
     in_time = claripy.ULE(updated - set_at, DEADLINE_US)
-    expected = claripy.If(claripy.And(fresh, moves_on, in_time), constant(ASKED), constant(0))
+    word = claripy.If(claripy.And(fresh, moves_on, in_time), constant(ASKED), constant(0))
+    expected = claripy.If(accepted, word, constant(REFUSED))
     ends = image.call(function, constant(INPUT), state=state, assume=assume)
     yield [(end, end.regs.r0 == expected) for end in ends], dict(zip(("heard", "set", "updated"), times)), assume
 
@@ -518,7 +520,7 @@ PROOFS = [
     ("m3508", [word_of((16_384, 20.0))], "word_m3508", "all 2^32 f32", "word_m3508_faulty"),
     ("gm6020-voltage", [word_of((25_000, 24.0))], "word_gm6020_voltage", "all 2^32 f32", "word_gm6020_voltage_faulty"),
     ("gm6020-current", [word_of((16_384, 3.0))], "word_gm6020_current", "all 2^32 f32", "word_gm6020_current_faulty"),
-    ("timeouts", [word_at], "word_at", "any three times below 2^62 us, the target accepted", "word_at_faulty"),
+    ("timeouts", [word_at], "word_at", "any three times below 2^62 us", "word_at_faulty", "word_at_near"),
     ("operation", [family(in_operation)], "route", "all data frames of the family, a bus that heard them", "route_masked", "route_aside"),
 ]
 

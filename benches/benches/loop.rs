@@ -28,7 +28,10 @@ impl Eight {
         let mut bus = Bus::new();
         let ids = [1_u8, 2, 3, 4, 5, 6, 7, 8];
         let motors = bus
-            .attach_all(ids.map(|id| Config::new(id).speed_loop(SPEED)))
+            .attach_all(ids.map(|id| {
+                // As in all ticks but the first 200 after arming.
+                Config::new(id).speed_loop(SPEED).with_opening(drivetrain::time::Duration::ZERO)
+            }))
             .expect("eight free ids");
         let frames = ids.map(|id| {
             CanFrame::standard(0x200 + u16::from(id), [0x0E, 0x16, 0x03, 0xE8, 0, 40, 30, 0])

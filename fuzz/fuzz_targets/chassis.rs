@@ -11,7 +11,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain_fuzz::Input;
+use drivetrain_fuzz::{Clock, Input};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
@@ -72,7 +72,7 @@ fn drive<K: Kinematics>(
     Chassis<K>: Copy,
 {
     let mut chassis = Chassis::new(layout);
-    let mut now = 1_000;
+    let mut clock = Clock::new(1_000);
     let mut limit = f32::MAX;
     // Seconds since the command was renewed.
     let mut age_s = f64::MAX;
@@ -111,7 +111,7 @@ fn drive<K: Kinematics>(
                 }
             }
             lost => {
-                now = input.time(now);
+                let now = clock.pass(&mut input);
                 let wheels = K::map(layout_wheels(&chassis), |_: K::Speed| {
                     (lost < 240 || input.coin()).then(|| measured(&mut input))
                 });

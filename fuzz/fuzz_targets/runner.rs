@@ -2,10 +2,10 @@
 #![no_main]
 
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{ArmError, CanDevice};
+use drivetrain::motor::{ArmError, CanDevice, Devices};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::{Instant, ManualClock, Tick};
-use drivetrain_fuzz::{Input, Watched};
+use drivetrain_fuzz::{Clock, Gesture, Input, Watched};
 use embedded_can::ErrorKind;
 use libfuzzer_sys::fuzz_target;
 
@@ -96,13 +96,56 @@ impl embedded_can::nb::Can for Scripted {
 
 static STOP: EmergencyStop = EmergencyStop::new();
 
+/// From the documentation: a clock stands when so many readings show no later time; a received frame counts as 125.
+const STANDS_AFTER: u64 = 200_000;
+const READINGS_OF_A_FRAME: u64 = 125;
+
+/// What is known of the clock and the bus apart from the runner.
+#[derive(Debug, Default)]
+struct Known {
+    furthest: Option<u64>,
+    /// Readings since then, no fewer than there were.
+    readings: u64,
+    /// The last step that was due.
+    stepped: Option<u64>,
+    /// Who may arm after the bus was lost, and how often it was.
+    gesture: Gesture,
+    losses: u32,
+}
+
+impl Known {
+    fn show(&mut self, now: u64, readings: u64) {
+        if self.furthest < Some(now) {
+            (self.furthest, self.readings) = (Some(now), 0);
+        }
+        self.readings += readings;
+    }
+
+    /// A step is due at once when the clock lies before the last one. It has no length only then and when the clock stands, and
+    /// does not lie after the last one.
+    fn check(&mut self, now: u64, tick: Option<Tick>) {
+        self.show(now, 1);
+        let is_back = self.stepped.is_some_and(|stepped| now < stepped);
+        let Some(tick) = tick else {
+            return assert!(!is_back, "I4: back at {now}, and nothing is due: {self:?}");
+        };
+        let at = tick.now().as_micros();
+        if tick.dt_s() == 0.0 && Some(at) == self.stepped {
+            return assert!(self.readings >= STANDS_AFTER, "no step at {now}: {self:?}");
+        }
+        assert!(at == now && is_back == (tick.dt_s() == 0.0), "I4: {tick:?} at {now}: {self:?}");
+        (self.stepped, self.furthest, self.readings) = (Some(now), Some(now), 0);
+    }
+}
+
 fuzz_target!(|data: &[u8]| {
     STOP.clear();
     let mut input = Input(data);
     let clock = ManualClock::new(Instant::from_micros(1_000));
-    let runner = Runner::new(Nb(Scripted::default()), &clock, Watched::new());
+    let (mut time, mut known, mut has_stood) = (Clock::new(1_000), Known::default(), false);
+    let runner = Runner::new(Nb(Scripted::default()), &clock, Watched::new(input.good_frames()));
     let mut runner = runner.with_emergency_stop(&STOP);
-    let mut direct = 0;
+    let (mut direct, mut left_ms) = (0, 1_000);
     while !input.is_empty() {
         match input.byte() {
             0..=39 => {
@@ -115,18 +158,15 @@ fuzz_target!(|data: &[u8]| {
                 runner.port_mut().0.received.push(Err(kind));
             }
             48..=63 => {
-                for id in [0x201, 0x202, 0x203, 0x209, 0x20B] {
-                    if let Some(frame) = CanFrame::standard(id, [0, 0, 0, 9, 0, 0, 25, 0]) {
-                        direct += 1;
-                        _ = runner.ingest(&frame, clock.now());
-                    }
-                }
+                hear_all(&mut runner, &mut known, clock.now().as_micros());
+                direct += 5;
             }
             64..=89 => {
                 let budget = usize::from(input.byte() % 20);
                 let asked = runner.port_mut().0.asked;
                 let came = runner.poll(budget);
                 let asked = runner.port_mut().0.asked - asked;
+                known.show(clock.now().as_micros(), u64::from(asked) * (1 + READINGS_OF_A_FRAME));
                 assert!(asked as usize <= budget && came <= budget, "I1");
             }
             90..=119 => {
@@ -137,36 +177,55 @@ fuzz_target!(|data: &[u8]| {
                 let motor = input.byte();
                 runner.device_mut().set(motor.into(), input.target());
             }
-            150..=159 => {
-                let down = runner.is_bus_down();
-                let armed = runner.arm(Tick::new(clock.now(), 0.001));
-                assert!(armed.is_err() || !STOP.is_set() && !down);
-                assert!(!STOP.is_set() || armed == Err(ArmError::Stopped));
+            150..=159 => arm(&mut runner, &mut known, clock.now().as_micros()),
+            160..=161 => STOP.set(),
+            162 if !has_stood => {
+                has_stood = true;
+                let now = clock.now().as_micros();
+                direct += stand(&mut runner, &mut known, now, input.coin());
             }
-            160..=162 => STOP.set(),
-            163..=167 => runner.clear_emergency_stop(),
+            162..=167 => runner.clear_emergency_stop(),
             168 => runner.device_mut().plug(input.byte().into()),
+            // All is well for a fraction of a second, but for what the driver still has to answer.
+            172..=175 => {
+                let (how, target) = (input.byte(), input.target());
+                for _ in 0..u16::from(input.byte()).min(left_ms) {
+                    left_ms -= 1;
+                    let now = time.go_well();
+                    clock.set(Instant::from_micros(now));
+                    hear_all(&mut runner, &mut known, now);
+                    direct += 5;
+                    if how & 0x40 != 0 {
+                        arm(&mut runner, &mut known, now);
+                    }
+                    runner.device_mut().set((how & 0x1F).into(), target);
+                    let tick = runner.due();
+                    known.check(now, tick);
+                    if let Some(tick) = tick {
+                        step(&mut runner, &mut known, tick);
+                    }
+                }
+            }
             169..=171 => {
-                while runner.device_mut().next_edge().is_some() {}
+                while Devices::next_edge(runner.device_mut()).is_some() {}
                 assert!(runner.edges().count() <= 32, "an edge is told again and again");
             }
             kind => {
-                clock.set(Instant::from_micros(input.time(clock.now().as_micros())));
+                let now = time.pass(&mut input);
+                clock.set(Instant::from_micros(now));
                 let tick = if kind < 180 {
                     Some(Tick::new(clock.now(), input.step_s()))
                 } else {
-                    runner.due()
+                    let tick = runner.due();
+                    known.check(now, tick);
+                    tick
                 };
                 let Some(tick) = tick else { continue };
-                let offered = runner.port_mut().0.offered;
-                runner.tick(tick);
-                assert!(runner.port_mut().0.offered - offered <= 5, "I1");
-                assert!(!STOP.is_set() || runner.device().is_stopped());
-                assert!(!runner.is_bus_down() || !runner.is_armed());
+                step(&mut runner, &mut known, tick);
             }
         }
     }
-    let (s, superseded) = (runner.statistics(), runner.device().superseded());
+    let (s, superseded) = (runner.statistics(), CanDevice::superseded(runner.device()));
     let left = runner.device().left_for_good();
     let can = &runner.port_mut().0;
     assert_eq!(s.received, can.delivered + direct, "I6");
@@ -179,3 +238,60 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(left, can.accepted - can.evicted_own, "I6: what came back is offered again");
     assert_eq!(s.superseded, superseded);
 });
+
+type Shell<'a> = Runner<Nb<Scripted>, &'a ManualClock, Watched>;
+
+fn step(runner: &mut Shell, known: &mut Known, tick: Tick) {
+    let offered = runner.port_mut().0.offered;
+    runner.tick(tick);
+    assert!(runner.port_mut().0.offered - offered <= 5, "I1");
+    assert!(!STOP.is_set() || CanDevice::is_stopped(runner.device()));
+    assert!(!runner.is_bus_down() || !runner.is_armed());
+    let losses = runner.statistics().bus_losses;
+    if core::mem::replace(&mut known.losses, losses) != losses {
+        known.gesture.trip(tick.now().as_micros());
+    }
+}
+
+fn hear_all(runner: &mut Shell, known: &mut Known, now: u64) {
+    for id in [0x201, 0x202, 0x203, 0x209, 0x20B] {
+        if let Some(frame) = CanFrame::standard(id, [0, 0, 0, 9, 0, 0, 25, 0]) {
+            known.show(now, READINGS_OF_A_FRAME);
+            _ = runner.ingest(&frame, Instant::from_micros(now));
+        }
+    }
+}
+
+fn arm(runner: &mut Shell, known: &mut Known, now: u64) {
+    let (down, granted) = (runner.is_bus_down(), known.gesture.ask(now));
+    let armed = runner.arm(Tick::new(Instant::from_micros(now), 0.001));
+    assert!(armed.is_err() || !STOP.is_set() && !down);
+    if armed.is_ok() {
+        assert!(granted, "armed without a new request since the bus was lost: {known:?}");
+        known.gesture.grant();
+    }
+    assert!(!STOP.is_set() || armed == Err(ArmError::Stopped));
+}
+
+/// The clock stands, and is read on, or frames go on: the first step without a length is one that holds, the second is none.
+/// Returns how many frames came.
+fn stand(runner: &mut Shell, known: &mut Known, now: u64, hears: bool) -> u32 {
+    let (mut frames, mut steps) = (0, 0);
+    for _ in 0..2 * STANDS_AFTER + 3 {
+        if let (true, Some(frame)) = (hears, CanFrame::standard(0x300, [0; 8])) {
+            frames += 1;
+            known.show(now, READINGS_OF_A_FRAME);
+            _ = runner.ingest(&frame, Instant::from_micros(now));
+        }
+        let tick = runner.due();
+        known.check(now, tick);
+        let Some(tick) = tick else { continue };
+        step(runner, known, tick);
+        steps += u32::from(tick.dt_s() == 0.0);
+        if steps == 3 {
+            break;
+        }
+    }
+    assert!(steps > 0 && !runner.is_armed(), "I4: the clock stands at {now}, {steps} steps");
+    frames
+}

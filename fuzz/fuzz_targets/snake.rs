@@ -3,10 +3,11 @@
 
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{CanDevice, Ingest};
+use drivetrain::motor::{Devices, Ingest, Link};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply, Settings};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain_fuzz::Gesture;
 use embedded_can::{ExtendedId, Frame, StandardId};
 use libfuzzer_sys::fuzz_target;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -42,6 +43,16 @@ fuzz_target!(|data: &[u8]| {
 struct Known {
     heard: Option<u64>,
     asked: Option<u64>,
+    /// The sum of all forward steps since the target was set, and from where the next one counts.
+    led_us: u64,
+    counted: u64,
+    /// The time that a new target gets: of the last good update, or of arming after it.
+    stamp: u64,
+    /// No update may lie before it.
+    armed_at: u64,
+    /// Time did not move on since it was armed.
+    lost_time: bool,
+    gesture: Gesture,
     /// Heard, and asked, since the last good update, which does not know of it yet.
     news: [bool; 2],
     /// The target and the speed that count, where they can be told exactly, and the current.
@@ -70,6 +81,26 @@ impl Known {
     fn end(&mut self) {
         self.stop_due |= self.moves;
     }
+
+    /// A target was taken.
+    fn follow(&mut self, target: Option<i32>) {
+        (self.asked, self.target) = (Some(self.stamp), target);
+        (self.led_us, self.counted) = (0, self.stamp);
+        self.news[1] = true;
+    }
+
+    /// An update lies at `now`. Whatever the clock shows, a target leads for no longer than its deadline.
+    fn count_time(&mut self, now: u64) {
+        self.led_us += now.saturating_sub(self.counted);
+        self.counted = now;
+    }
+
+    /// Time did not move on: nothing is fresh, and nothing is asked for.
+    fn lose_time(&mut self) {
+        self.end();
+        (self.heard, self.asked, self.news) = (None, None, [false; 2]);
+        self.lost_time = true;
+    }
 }
 
 struct Story {
@@ -77,11 +108,15 @@ struct Story {
     handles: Vec<Joint>,
     known: [Known; 3],
     now: u64,
-    /// The time of the last good update, and of arming after it: what new targets get.
+    /// The time of the last good update.
     tick: u64,
-    updated: u64,
-    /// The time of the last update, good or not.
+    /// The greatest time of an update since the last good one.
     clock: u64,
+    updated: Option<u64>,
+    /// What was done was to disarm, which is no trip.
+    disarms: bool,
+    /// Of the time that goes on by itself.
+    left_ms: u16,
     held: u32,
     /// Frames that wait in the driver, which may still give them back.
     kept: Vec<(CanFrame, u32)>,
@@ -106,8 +141,10 @@ impl Story {
             known: Default::default(),
             now: 0,
             tick: 0,
-            updated: 0,
             clock: 0,
+            updated: None,
+            disarms: false,
+            left_ms: 600,
             held: 0,
             kept: Vec::new(),
             handed_out: 0,
@@ -140,7 +177,10 @@ impl Story {
                 frames += 1;
             };
             if op >= 250 {
-                self.go_well(id, register % 24, &mut hear);
+                let span_ms = u16::from(if register < 192 { register % 24 } else { register });
+                let span_ms = span_ms.min(self.left_ms);
+                self.left_ms -= span_ms;
+                self.go_on(Going { op, id, how: time }, span_ms, &mut hear);
                 continue;
             }
             let index = usize::from(id) % 3;
@@ -169,10 +209,26 @@ impl Story {
         self.sent.finish()
     }
 
-    /// Some milliseconds as they should be: who was asked answers, but for one that may be silent.
-    fn go_well(&mut self, id: u8, ms: u8, mut hear: impl FnMut(&mut Self, &CanFrame)) {
-        for _ in 0..ms {
-            self.now = self.now.wrapping_add(1_000);
+    /// Some milliseconds as they should be: who was asked answers, but for one that may be silent. The clock is a good one as a
+    /// rule.
+    fn go_on(&mut self, going: Going, span_ms: u16, mut hear: impl FnMut(&mut Self, &CanFrame)) {
+        let Going { op, id, how } = going;
+        for ms in 0..span_ms {
+            let next = self.now.wrapping_add(1_000);
+            self.now = match op {
+                // A timer of 8 to 23 bits that is passed on as it is; one that swings; one that stands.
+                253 => next & ((1 << (8 + how % 16)) - 1),
+                254 if ms % 2 == 0 => self.now.saturating_sub(1_000 * u64::from(how)),
+                254 => self.now + 1_000 * u64::from(how) + 1_000,
+                255 => self.now,
+                _ => next,
+            };
+            if how & 1 != 0 && ms % 8 == 0 {
+                self.watch(|story| story.call(5, 0, usize::from(how >> 4) % 3, [how; 8]));
+            }
+            if how & 2 != 0 && ms % 8 == 0 {
+                self.watch(|story| story.call(6, 0, 0, [0; 8]));
+            }
             for (index, raw_id) in IDS.into_iter().enumerate() {
                 let known = &self.known[index];
                 let Some((register, ..)) = known.due else { continue };
@@ -198,9 +254,14 @@ impl Story {
     fn watch(&mut self, act: impl FnOnce(&mut Self)) {
         let armed = self.are_armed();
         act(self);
+        let disarms = core::mem::take(&mut self.disarms);
         for (index, (before, after)) in armed.into_iter().zip(self.are_armed()).enumerate() {
             if before && !after {
                 self.known[index].end();
+                if !disarms {
+                    let stamp = self.known[index].stamp;
+                    self.known[index].gesture.trip(stamp);
+                }
             }
         }
     }
@@ -265,8 +326,7 @@ impl Story {
             4 => {
                 let position = Position::from_angle(Angle::from_turns(value));
                 if joints.set_position(joint, position).is_ok() {
-                    (known.asked, known.target) = (Some(self.updated), None);
-                    known.news[1] = true;
+                    known.follow(None);
                 } else {
                     known.end();
                 }
@@ -275,9 +335,7 @@ impl Story {
                 let pulses = bits.cast_signed();
                 let offset = joints.offset(joint);
                 if joints.set_pulses(joint, pulses).is_ok() {
-                    let target = offset.map(|offset| offset.target(pulses));
-                    (known.asked, known.target) = (Some(self.updated), target);
-                    known.news[1] = true;
+                    known.follow(offset.map(|offset| offset.target(pulses)));
                 }
                 match joints.set_speed(joint, AngularVelocity::from_rad_per_s(value)) {
                     // Nearly: the last bit is the crate's own affair.
@@ -289,16 +347,24 @@ impl Story {
                 }
             }
             6 => {
-                let at = Instant::from_micros(self.now);
-                if joints.arm(at).is_ok() {
-                    assert!(!joints.is_stopped() && joints.is_armed());
-                    self.updated = self.updated.max(self.now);
+                let before = self.are_armed();
+                let asked = self.known.iter_mut().zip(&self.handles);
+                let granted = asked
+                    .filter(|(_, handle)| self.joints.link(**handle).is_some())
+                    .fold(true, |granted, (known, _)| known.gesture.ask(self.now) && granted);
+                if self.joints.arm(Instant::from_micros(self.now)).is_ok() {
+                    assert!(!self.joints.is_stopped() && self.joints.is_armed());
+                    assert!(granted, "armed without a new request");
+                    self.engaged(before);
                 }
             }
             7 => match flags & 3 {
                 0 => joints.emergency_stop(),
                 1 => joints.clear_emergency_stop(),
-                2 => joints.disarm(),
+                2 => {
+                    joints.disarm();
+                    self.disarms = true;
+                }
                 _ => {
                     joints.relax(joint);
                     known.end();
@@ -322,6 +388,34 @@ impl Story {
         }
     }
 
+    /// The joints were armed: those that were not before begin.
+    fn engaged(&mut self, before: [bool; 3]) {
+        for (index, known) in self.known.iter_mut().enumerate().filter(|(it, _)| !before[*it]) {
+            if self.joints.is_joint_armed(self.handles[index]) {
+                known.gesture.grant();
+                known.stamp = known.stamp.max(self.now);
+                known.armed_at = known.armed_at.max(self.now);
+                known.lost_time = false;
+            }
+        }
+    }
+
+    /// I4: where time did not move on, nothing moves, no joint is armed, and no feedback is fresh.
+    fn lose_time(&mut self, is_lost: impl Fn(&Known) -> bool) {
+        for (known, handle) in self.known.iter_mut().zip(&self.handles) {
+            if !is_lost(known) || self.joints.link(*handle).is_none() {
+                continue;
+            }
+            known.lose_time();
+            known.stamp = self.now;
+            assert!(!self.joints.is_joint_armed(*handle), "I4: armed without time: {known:?}");
+            let is_fresh = self.joints.link(*handle) == Some(Link::Online);
+            assert!(!is_fresh, "I4: fresh without time: {known:?}");
+            let is_driven = self.joints.state(*handle).is_some_and(|state| state.is_driven);
+            assert!(!is_driven, "I4: driven without time: {known:?}");
+        }
+    }
+
     fn update(&mut self, flags: u8, payload: [u8; 8]) {
         let dt_s = if flags & 1 == 0 {
             0.001
@@ -331,6 +425,12 @@ impl Story {
         let bad_steps = self.joints.counters().bad_steps;
         self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
         let holds = self.joints.counters().bad_steps != bad_steps;
+        let is_lost = self.updated.is_some_and(|updated| self.now <= updated);
+        self.updated = Some(self.now);
+        assert!(holds || !is_lost, "time does not move on at {}", self.now);
+        if is_lost {
+            self.lose_time(|_| true);
+        }
         let stands = self.now <= self.clock;
         let is_late = self.now.saturating_sub(self.clock) > LATE_US;
         assert!(holds || dt_s > 0.0 && dt_s.is_finite(), "no time: {dt_s}");
@@ -353,13 +453,17 @@ impl Story {
             }
         }
         if !holds {
-            (self.tick, self.updated) = (self.now, self.now);
+            self.tick = self.now;
+            let now = self.now;
+            self.lose_time(|known| now < known.armed_at);
             for (known, handle) in self.known.iter_mut().zip(&self.handles) {
                 // Its feedback or its target is too old, say.
                 if !self.joints.state(*handle).is_some_and(|state| state.is_driven) {
                     known.end();
                 }
                 known.news = [false; 2];
+                (known.stamp, known.armed_at) = (now, 0);
+                known.count_time(now);
             }
         }
     }
@@ -431,11 +535,13 @@ impl Story {
         }
         assert!(self.joints.is_joint_armed(self.handles[index]), "moves while disarmed: {frame:?}");
         assert!(!self.joints.is_stopped() && self.held < 2, "moves while stopped: {frame:?}");
+        assert!(!known.lost_time, "moves after time was lost: {frame:?}: {known:?}");
         let [heard, asked] = known.news;
-        let fresh = |at: Option<u64>, limit| at.is_some_and(|at| self.tick.abs_diff(at) <= limit);
-        let fresh =
-            (heard || fresh(known.heard, LATE_US)) && (asked || fresh(known.asked, COMMAND_US));
-        assert!(fresh, "I4: {frame:?} at {}: {known:?}", self.tick);
+        // A reply may be stamped a little ahead of the update.
+        let heard = heard || known.heard.is_some_and(|at| self.tick.abs_diff(at) <= LATE_US);
+        let in_time = |at: u64| self.tick.checked_sub(at).is_some_and(|age| age <= COMMAND_US);
+        let asked = asked || known.asked.is_some_and(in_time) && known.led_us <= COMMAND_US;
+        assert!(heard && asked, "I4: {frame:?} at {}: {known:?}", self.tick);
     }
 
     fn give_back(&mut self, frame: &CanFrame, number: u32) {
@@ -470,6 +576,14 @@ impl Story {
         let waiting = counters.packed.checked_sub(counters.superseded + sent);
         assert!(waiting.is_some_and(|waiting| waiting <= 9), "I6: {counters:?}, {sent} sent");
     }
+}
+
+/// How time goes on by itself.
+#[derive(Debug, Clone, Copy)]
+struct Going {
+    op: u8,
+    id: u8,
+    how: u8,
 }
 
 /// Whose frame it is, by its id.

@@ -1,9 +1,9 @@
 //! One motor alone on a bus of its own: what the same motor has to do among others.
 
-use crate::motors::{COUNT, FACTS, Motor, Target};
+use crate::motors::{COUNT, FACTS, Motor, OPENING_US, Target};
 use drivetrain::dji::Bus;
-use drivetrain::motor::{Condition, Conditions, Edge, Link, Timeouts};
-use drivetrain::time::Tick;
+use drivetrain::motor::{CanDevice, Condition, Conditions, Edge, Link, Timeouts};
+use drivetrain::time::{Instant, Tick};
 
 /// Feedback is late above this age, and targets are old above the other: the values of the documentation.
 pub const LATE_US: u64 = 10_000;
@@ -15,12 +15,20 @@ pub const PAUSE_US: u64 = 60_000_000;
 /// A motor alone, and what is known of it.
 pub struct Alone {
     pub bus: Bus,
+    timeouts: Timeouts,
     pub motor: Option<Motor>,
     /// What it sent last.
     pub word: i16,
     pub heard: Option<u64>,
     /// When the target that counts was set, by the clock of the bus.
     pub commanded: Option<u64>,
+    /// The sum of all forward steps of time since then, and from where the next one counts.
+    driven_us: u64,
+    counted: u64,
+    /// Since when its output range opens.
+    pub opened: Option<u64>,
+    /// Time did not move on since it was armed.
+    pub lost_time: bool,
     /// It was driven by a target since it was last at rest.
     pub moved: bool,
     /// The target that counts is a velocity, and the first one since the motor was at rest.
@@ -35,24 +43,32 @@ pub struct Alone {
 
 impl core::fmt::Debug for Alone {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { word, heard, commanded, moved, first_velocity, doubted, .. } = self;
+        let Self { word, heard, commanded, driven_us, opened, lost_time, .. } = self;
+        let Self { moved, first_velocity, doubted, .. } = self;
         write!(
             f,
-            "word {word}, heard {heard:?}, commanded {commanded:?}, moved {moved}, first {first_velocity}, in doubt {doubted:?}"
-        )
+            "word {word}, heard {heard:?}, commanded {commanded:?}, driven {driven_us} us, "
+        )?;
+        write!(f, "opened {opened:?}, lost time {lost_time}, ")?;
+        write!(f, "moved {moved}, first {first_velocity}, in doubt {doubted:?}")
     }
 }
 
 impl Alone {
-    pub fn new(index: usize) -> Self {
-        let mut bus = Bus::new();
+    pub fn new(index: usize, timeouts: Timeouts) -> Self {
+        let mut bus = Bus::new().with_timeouts(timeouts);
         let motor = Motor::attach(&mut bus, index).ok();
         Self {
             bus,
+            timeouts,
             motor,
             word: 0,
             heard: None,
             commanded: None,
+            driven_us: 0,
+            counted: 0,
+            opened: None,
+            lost_time: false,
             moved: false,
             first_velocity: false,
             is_way: false,
@@ -83,12 +99,50 @@ impl Alone {
         self.first_velocity =
             velocity && !self.moved && (self.first_velocity || self.commanded.is_none());
         self.commanded = Some(now);
+        (self.driven_us, self.counted) = (0, now);
+    }
+
+    /// Arms it where the whole bus was armed. The gesture belongs to the whole bus, so here it is made.
+    pub fn engage(&mut self, now: Instant) {
+        let before = self.is_armed();
+        _ = self.bus.ask(Instant::START);
+        _ = self.bus.ask(Instant::from_micros(u64::MAX));
+        self.bus.engage(now);
+        if !before && self.is_armed() {
+            self.rest();
+            (self.opened, self.lost_time) = (Some(now.as_micros()), false);
+        }
+    }
+
+    /// Time did not move on: no age is known, and nothing is fresh.
+    pub fn lose_time(&mut self) {
+        self.rest();
+        self.heard = None;
+        self.lost_time = true;
+    }
+
+    /// I4: whatever the clock shows, a target drives for no longer than its deadline, and a step that is held.
+    pub fn count_time(&mut self, now: u64, holds: bool) {
+        let before = self.driven_us;
+        self.driven_us += now.saturating_sub(self.counted);
+        self.counted = now;
+        let driven_us = if holds { before } else { self.driven_us };
+        assert!(self.word == 0 || driven_us <= COMMAND_US, "I4: an old target at {now}: {self:?}");
+    }
+
+    /// I2: from arming on the output range opens in proportion to time, in steps of 1.024 ms.
+    pub fn check_range(&self, index: usize, now: u64) {
+        let (Some(opened), opening_us @ 1..) = (self.opened, OPENING_US[index]) else { return };
+        let open_us = (now.saturating_sub(opened) + 2 * 1_024).min(opening_us);
+        let range = u64::from(FACTS[index].limit) * open_us / opening_us + 1;
+        let word = u64::from(self.word.unsigned_abs());
+        assert!(word <= range, "I2: motor {index} beyond its opening at {now}: {self:?}");
     }
 
     /// Updates, and has the bus compare every age: setting the timeouts, to what they are, makes it look. The whole bus
     /// looks when it must, so that what it leaves out shows as a difference.
     pub fn update(&mut self, tick: Tick) {
-        self.bus = core::mem::take(&mut self.bus).with_timeouts(Timeouts::new());
+        self.bus = core::mem::take(&mut self.bus).with_timeouts(self.timeouts);
         self.bus.update(tick);
     }
 

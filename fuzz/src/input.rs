@@ -11,6 +11,11 @@ impl Input<'_> {
         self.0.is_empty()
     }
 
+    /// How many good frames bring a motor back: the usual ten, or one. The last byte tells, which is also read in its turn.
+    pub fn good_frames(&self) -> u8 {
+        if self.0.last().is_some_and(|last| last % 2 == 1) { 1 } else { 10 }
+    }
+
     /// The next byte; 0 after the last.
     pub fn byte(&mut self) -> u8 {
         let Some((first, rest)) = self.0.split_first() else { return 0 };
@@ -58,18 +63,6 @@ impl Input<'_> {
             0..=191 => 0.001,
             192..=223 => f32::from(self.byte()) * 0.001,
             _ => self.float(),
-        }
-    }
-
-    /// Forward as a rule, by up to half an hour or by exactly 2^32 us, and sometimes back.
-    pub fn time(&mut self, now: u64) -> u64 {
-        match self.byte() {
-            jump @ 0..=191 => now + u64::from(jump) * 100,
-            jump @ 192..=235 => now + (u64::from(self.byte()) << (jump - 192).min(31)),
-            // Once around for who keeps 32 bits of it.
-            236..=239 => now + (1 << 32),
-            // Not to 0, where a bus that has no frame and no update yet stands.
-            jump => now.saturating_sub(u64::from(self.byte()) << ((jump - 240) * 2)).max(1),
         }
     }
 

@@ -21,6 +21,9 @@ pub struct Facts {
 
 pub const COUNT: usize = 5;
 
+/// In what time the output range of each motor opens after arming, in µs: at once, shorter than usual, and as it comes.
+pub const OPENING_US: [u64; COUNT] = [0, 50_000, 0, 0, 200_000];
+
 /// The motor whose loop integrates and does nothing else: it shows what an integral keeps.
 pub const INTEGRATOR: usize = 2;
 
@@ -53,17 +56,24 @@ pub enum Target {
 impl Motor {
     pub fn attach(bus: &mut Bus, index: usize) -> Result<Self, AttachError> {
         let speed = PidConfig::new(2.0, 5.0, 0.01);
+        let opening = Duration::from_micros(OPENING_US[index]);
         match index {
-            0 => bus.attach(Config::new(1).speed_loop(speed)).map(Self::M3508),
+            0 => {
+                bus.attach(Config::new(1).speed_loop(speed).with_opening(opening)).map(Self::M3508)
+            }
             1 => {
-                let opening = Duration::from_millis(50);
-                bus.attach(Config::new(2).reversed().with_recovery(Recovery::Resume).with_opening(opening)).map(Self::M2006)
+                let config = Config::new(2).reversed().with_recovery(Recovery::Resume);
+                bus.attach(config.with_opening(opening)).map(Self::M2006)
             }
             INTEGRATOR => {
                 let config = Config::new(3).speed_loop(PidConfig::new(0.0, 50.0, 0.0));
-                bus.attach(config.with_current_limit(Current::from_amperes(5.0))).map(Self::M3508)
+                let config = config.with_current_limit(Current::from_amperes(5.0));
+                bus.attach(config.with_opening(opening)).map(Self::M3508)
             }
-            3 => bus.attach(Config::new(7).position_loop(speed, speed)).map(Self::Voltage),
+            3 => {
+                let config = Config::new(7).position_loop(speed, speed);
+                bus.attach(config.with_opening(opening)).map(Self::Voltage)
+            }
             _ => {
                 let config = Config::new(5).reversed();
                 bus.attach(config.position_loop(PidConfig::new(8.0, 0.5, 0.1), speed))

@@ -7,6 +7,11 @@
 //! comparison; states, conditions and edges are compared too. I2, I4, I6 and I9 are asserted from what is counted and
 //! timed here. I1 is what the fuzzer itself looks for.
 //!
+//! Time is what the caller says, and need not be one. An update that lies not after the one before, or before the arming, gives
+//! zeros in that cycle and until the motor is armed again; and the forward steps that a target drives for add up to its
+//! deadline and one held step at most, whatever the clock shows. When an arming may be granted is reckoned here, too: the
+//! gesture belongs to the whole bus, and a motor alone is armed with it.
+//!
 //! Feedback stamped in the future is the one thing that the whole bus may notice later than a motor alone: `Bus::ingest`
 //! promises twice the time after which it is late. Until then, or until the time has caught up, either answer is right,
 //! for that motor only; then both start anew from a motor that is attached again.
@@ -19,12 +24,14 @@ use crate::alone::{
     Alone, COMMAND_US, LATE_US, PAUSE_US, as_stamped, is_old, lies_ahead, sorted, stamped_age,
     words,
 };
+use crate::gesture::Gesture;
 use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
 use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Condition, Edge, Ingest, Link, MotorName, TargetError,
+    ArmError, CanDevice, Claim, Condition, Devices, Edge, Ingest, Link, MotorName, TargetError,
+    Timeouts, Visitor,
 };
 use drivetrain::time::{Instant, Tick};
 use std::collections::VecDeque;
@@ -40,6 +47,9 @@ pub struct Watched {
     updated: Option<u64>,
     /// The time of the last update; before the first one, that of the last good frame.
     clock: u64,
+    /// No update may lie before it: the time of the last arming, until time is lost.
+    armed_at: u64,
+    gesture: Gesture,
     held: u32,
     stopped: bool,
     /// Frames by what became of them.
@@ -47,37 +57,37 @@ pub struct Watched {
     unattached: u32,
     taken_out: u32,
     given_back: u32,
+    wire: [Wire; COUNT],
     edges: VecDeque<Edge>,
     /// The times of the edges that wait need not be those of the motors alone: one left, and the room of its edges is
     /// not free yet; or there was no update that told the time.
     untimed: bool,
 }
 
-impl Default for Watched {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Watched {
-    pub fn new() -> Self {
-        let mut bus = Bus::new();
+    /// Motors that come back after so many good frames.
+    pub fn new(good_frames: u8) -> Self {
+        let timeouts = Timeouts::new().with_good_frames(good_frames);
+        let mut bus = Bus::new().with_timeouts(timeouts);
         let motors = core::array::from_fn(|index| Motor::attach(&mut bus, index).ok());
         let all = motors.iter().all(Option::is_some);
         assert!(all, "the motors do not collide");
         Self {
             bus,
             motors,
-            alone: core::array::from_fn(Alone::new),
+            alone: core::array::from_fn(|index| Alone::new(index, timeouts)),
             now: 0,
             updated: None,
             clock: 0,
+            armed_at: 0,
+            gesture: Gesture::default(),
             held: 0,
             stopped: false,
             malformed: 0,
             unattached: 0,
             taken_out: 0,
             given_back: 0,
+            wire: [Wire::Shows(0); COUNT],
             edges: VecDeque::new(),
             untimed: true,
         }
@@ -101,6 +111,7 @@ impl Watched {
         match outcome {
             Ok(()) => {
                 assert!(self.bus.is_motor_armed(motor.handle()) && !self.stopped, "disarmed");
+                assert!(!alone.lost_time, "a target without an arming: {alone:?}");
                 alone.follow(target, self.now);
             }
             // A target that cannot be followed takes the one before away: no older one acts in its place.
@@ -134,6 +145,7 @@ impl Watched {
     /// Detaches a motor, or attaches it again.
     pub fn plug(&mut self, index: usize) {
         let index = index % COUNT;
+        self.wire[index] = Wire::Unknown;
         let alone = &mut self.alone[index];
         match (self.motors[index], alone.motor) {
             (Some(motor), Some(same)) => {
@@ -154,6 +166,40 @@ impl Watched {
                 assert_eq!(self.motors[index].is_some(), alone.motor.is_some(), "I8");
             }
         }
+    }
+
+    /// Arms some motors, by the bits of their numbers, at the time of the last update.
+    pub fn arm_only(&mut self, chosen: u8) {
+        // A motor that is left out alone does not know of another time.
+        if self.updated != Some(self.now) {
+            return;
+        }
+        let chosen: Vec<usize> = (0..COUNT).filter(|index| chosen & 1 << index != 0).collect();
+        chosen.iter().for_each(|index| _ = self.settled(*index));
+        let handles = |index: &usize| self.motors[*index].map(Motor::handle);
+        let handles: Vec<_> = chosen.iter().filter_map(handles).collect();
+        let now = Instant::from_micros(self.clock);
+        let granted = self.gesture.ask(self.clock);
+        let outcome = self.bus.arm_only(&handles, now);
+        assert!(granted || outcome.is_err(), "armed without a new request");
+        assert!(!granted || outcome != Err(ArmError::NotReleased), "a new request is refused");
+        if outcome.is_ok() {
+            self.engaged(now, &chosen);
+        }
+    }
+
+    /// Has the bus do something at `now`, and notes whether it relaxed a motor until it is armed.
+    fn noting_trips<T>(&mut self, now: u64, act: impl FnOnce(&mut Bus) -> T) -> T {
+        let armed = |bus: &Bus, motors: &[Option<Motor>; COUNT]| {
+            motors.map(|motor| motor.is_some_and(|motor| bus.is_motor_armed(motor.handle())))
+        };
+        let before = armed(&self.bus, &self.motors);
+        let outcome = act(&mut self.bus);
+        let after = armed(&self.bus, &self.motors);
+        if before.iter().zip(after).any(|(before, after)| *before && !after) {
+            self.gesture.trip(now);
+        }
+        outcome
     }
 
     /// A motor that may be called and compared: one in doubt starts anew before.
@@ -228,9 +274,22 @@ impl Watched {
         }
     }
 
+    /// I4: where time did not move on, everything is zero in that cycle, no motor is armed, and no feedback is fresh.
+    fn check_lost_time(&mut self) {
+        for (index, alone) in self.alone.iter_mut().enumerate() {
+            alone.lose_time();
+            assert!(alone.word == 0 && !alone.is_armed(), "I4: {index} without time: {alone:?}");
+            let Some(motor) = self.motors[index] else { continue };
+            let link = self.bus.link(motor.handle());
+            assert!(link != Some(Link::Online), "I4: {index} is fresh without time: {alone:?}");
+            assert!(!self.bus.is_motor_armed(motor.handle()), "armed without time: {alone:?}");
+        }
+    }
+
     /// I4 and I9, after an update whose time moved on.
     fn check_motors(&mut self, now: u64) {
         for (index, alone) in self.alone.iter_mut().enumerate() {
+            alone.check_range(index, now);
             let Some(motor) = alone.motor else { continue };
             let old = is_old(now, alone.heard, LATE_US) || is_old(now, alone.commanded, COMMAND_US);
             assert!(!old || alone.word == 0, "I4: motor {index} at {now}: {alone:?}");
@@ -239,8 +298,7 @@ impl Watched {
             // A loop that has run since it was at rest may integrate from now on.
             alone.moved |= alone.commanded.is_some() && !old;
             alone.first_velocity &= old;
-            // While the feedback is late nobody looks at the target: where time goes back, it may be young again.
-            if is_old(now, alone.commanded, COMMAND_US) && !is_old(now, alone.heard, LATE_US) {
+            if is_old(now, alone.commanded, COMMAND_US) {
                 alone.commanded = None;
             }
             if !alone.is_armed() || alone.bus.link(motor.handle()) == Some(Link::Offline) {
@@ -284,8 +342,10 @@ impl Watched {
             let is_own = owner == Some(index);
             if link != alone.link() || conditions != alone.conditions() {
                 let is_bygone = |at: u64| is_pause || stamped_age(now, at) > PAUSE_US;
-                let expected = if is_own { Link::Recovering } else { Link::Offline };
-                let lost = alone.heard.is_some_and(is_bygone) && link == Some(expected);
+                // Its own frame may be enough to bring it back.
+                let gone =
+                    if is_own { link != Some(Link::Late) } else { link == Some(Link::Offline) };
+                let lost = alone.heard.is_some_and(is_bygone) && gone;
                 let forgotten = alone.commanded.is_some_and(is_bygone)
                     && conditions.contains(Condition::CommandLost);
                 assert!(lost || forgotten, "I8: {index} is {link:?} at {now}: {alone:?}");
@@ -354,6 +414,19 @@ impl Watched {
     }
 }
 
+/// What is known of a motor's word on the wire.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Wire {
+    /// It was sent last.
+    Shows(i16),
+    /// Its frame was given back, and waits for the next update.
+    Waits,
+    /// Its frame has to be offered.
+    Due,
+    /// The motor came or left.
+    Unknown,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Verdict {
     Taken,
@@ -368,7 +441,7 @@ impl CanDevice for Watched {
         if let (Verdict::Taken, Some(owner)) = (expected, owner) {
             self.settled(owner);
         }
-        let outcome = self.bus.ingest(frame, now);
+        let outcome = self.noting_trips(now.as_micros(), |bus| bus.ingest(frame, now));
         let verdict = match outcome {
             Ingest::Taken => Verdict::Taken,
             Ingest::Malformed(_) => Verdict::Malformed,
@@ -379,7 +452,12 @@ impl CanDevice for Watched {
         match (expected, owner) {
             (Verdict::Taken, Some(owner)) => {
                 let alone = &mut self.alone[owner];
+                let was_armed = alone.is_armed();
                 assert_eq!(alone.bus.ingest(frame, now), Ingest::Taken, "I8");
+                if !was_armed && alone.is_armed() {
+                    assert!(!alone.lost_time, "resumes after time was lost: {alone:?}");
+                    alone.opened = Some(now.as_micros());
+                }
                 if self.updated.is_none() {
                     self.pass(now.as_micros(), Some(owner));
                 }
@@ -394,38 +472,60 @@ impl CanDevice for Watched {
 
     fn update(&mut self, tick: Tick) {
         let now = tick.now().as_micros();
-        let stands = self.updated.is_some_and(|updated| now <= updated);
-        let holds = stands || TimeStep::new(tick.dt_s(), 0.02).is_hold();
-        self.bus.update(tick);
+        let lost = self.updated.is_some_and(|updated| now <= updated) || now < self.armed_at;
+        let holds = !lost && TimeStep::new(tick.dt_s(), 0.02).is_hold();
+        let is_long = self.updated.is_some_and(|updated| now > updated + LATE_US);
+        self.noting_trips(now, |bus| bus.update(tick));
         self.each_alone(|alone| alone.update(tick));
         if self.updated.is_none() {
             self.pass(now, None);
         }
         (self.updated, self.clock) = (Some(now), now);
         self.now = now;
-        self.held = if holds { self.held + 1 } else { 0 };
-        if holds {
-            let zero = self.held < 2 || self.alone.iter().all(|alone| alone.word == 0);
+        if lost {
+            self.armed_at = 0;
+            self.check_lost_time();
+        } else if holds {
+            self.held += 1;
+            let zero = self.held < 2 && !is_long || self.alone.iter().all(|alone| alone.word == 0);
             assert!(zero, "driven without time: {:?}", self.alone);
             let is_new = |alone: &&Alone| alone.has_rested || alone.first_velocity;
             let kept = self.alone.iter().filter(is_new).find(|alone| alone.word != 0);
             assert!(kept.is_none(), "I9: a command outlived its rest: {kept:?}");
         } else {
+            self.held = 0;
             self.check_motors(now);
             self.alone.iter_mut().for_each(|alone| alone.has_rested = false);
             self.look_at_what_lies_ahead(now);
+        }
+        for alone in &mut self.alone {
+            alone.count_time(now, holds);
+            assert!(alone.word == 0 || !alone.lost_time, "driven after time was lost: {alone:?}");
+        }
+        for wire in self.wire.iter_mut().filter(|wire| **wire == Wire::Waits) {
+            *wire = Wire::Due;
         }
         self.compare();
         self.add_up();
     }
 
-    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+    fn next_frame(&mut self) -> Option<CanFrame> {
         let Some(frame) = self.bus.next_frame() else {
             assert_eq!(self.add_up(), 0, "I6: nothing waits, and something is missing");
+            for (wire, alone) in self.wire.iter().zip(&self.alone) {
+                let same = match *wire {
+                    Wire::Shows(word) => word == alone.word || alone.doubted.is_some(),
+                    Wire::Due => false,
+                    Wire::Waits | Wire::Unknown => true,
+                };
+                assert!(same, "I7: {wire:?} is what is left on the wire: {alone:?}");
+            }
             return None;
         };
         self.taken_out += 1;
         self.check_frame(&frame);
+        let words = words(&frame);
+        self.note_wire(&frame, |place| Wire::Shows(words[place]));
         Some(frame)
     }
 
@@ -434,11 +534,12 @@ impl CanDevice for Watched {
         let known = FACTS.iter().any(|facts| u32::from(facts.command_id) == frame.header());
         assert_eq!(own, known, "{frame:?}");
         self.given_back += u32::from(own);
+        self.note_wire(frame, |_| Wire::Waits);
         own
     }
 
     fn superseded(&self) -> u32 {
-        self.bus.superseded()
+        CanDevice::superseded(&self.bus)
     }
 
     fn claims(&self) -> impl Iterator<Item = Claim> {
@@ -464,27 +565,28 @@ impl CanDevice for Watched {
         self.edges.pop_front()
     }
 
-    fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let outcome = self.bus.arm(now);
-        if outcome.is_ok() {
-            assert!(!self.stopped, "armed while stopped");
-            // Of one in doubt the bus may not know yet that it is late.
-            let missing =
-                |alone: &&Alone| alone.doubted.is_none() && alone.bus.missing(now).next().is_some();
-            let missing = self.alone.iter().find(missing);
-            assert!(missing.is_none(), "armed without all motors: {missing:?}");
-            let unfit = self.alone.iter().any(|alone| {
-                alone.has(Condition::SecondMaster) || alone.bus.faulty().next().is_some()
-            });
-            assert!(!unfit, "armed beside a second master, or with a fault: {:?}", self.alone);
-            self.engaged(now);
-        }
-        outcome
+    fn ask(&mut self, now: Instant) -> bool {
+        let granted = self.gesture.ask(now.as_micros());
+        assert_eq!(self.bus.ask(now), granted, "a request counts: {:?}", self.gesture);
+        granted
     }
 
+    /// All conditions hold, says [`Devices::arm`].
     fn engage(&mut self, now: Instant) {
-        self.bus.engage(now);
-        self.engaged(now);
+        assert!(!self.stopped, "armed while stopped");
+        // Of one in doubt the bus may not know yet that it is late.
+        let missing =
+            |alone: &&Alone| alone.doubted.is_none() && alone.bus.missing(now).next().is_some();
+        let missing = self.alone.iter().find(missing);
+        assert!(missing.is_none(), "armed without all motors: {missing:?}");
+        let unfit = self
+            .alone
+            .iter()
+            .any(|alone| alone.has(Condition::SecondMaster) || alone.bus.faulty().next().is_some());
+        assert!(!unfit, "armed beside a second master, or with a fault: {:?}", self.alone);
+        CanDevice::engage(&mut self.bus, now);
+        assert!(self.bus.is_armed(), "granted, and not armed");
+        self.engaged(now, &[0, 1, 2, 3, 4]);
     }
 
     fn disarm(&mut self) {
@@ -497,11 +599,25 @@ impl CanDevice for Watched {
         assert!(!self.bus.is_armed());
     }
 
+    fn trip(&mut self) {
+        CanDevice::trip(&mut self.bus);
+        self.gesture.trip(self.clock);
+        self.each_alone(|alone| {
+            CanDevice::trip(&mut alone.bus);
+            alone.rest();
+        });
+        assert!(self.alone.iter().all(|alone| alone.word == 0), "tripped is zero at once");
+        assert!(!self.bus.is_armed());
+    }
+
     fn is_armed(&self) -> bool {
         self.bus.is_armed()
     }
 
     fn emergency_stop(&mut self) {
+        if !self.stopped {
+            self.gesture.trip(self.clock);
+        }
         self.bus.emergency_stop();
         self.each_alone(|alone| {
             alone.bus.emergency_stop();
@@ -512,6 +628,9 @@ impl CanDevice for Watched {
     }
 
     fn clear_emergency_stop(&mut self) {
+        if self.stopped {
+            self.gesture.trip(self.clock);
+        }
         self.bus.clear_emergency_stop();
         self.alone.iter_mut().for_each(|alone| alone.bus.clear_emergency_stop());
         self.stopped = false;
@@ -523,17 +642,29 @@ impl CanDevice for Watched {
     }
 }
 
+impl Devices for Watched {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+
+    // No two of the five do, and to look at every pair of ids would take most of the time of the fuzzer.
+    fn clash(&mut self) -> Option<(Claim, Claim)> {
+        None
+    }
+}
+
 impl Watched {
-    fn engaged(&mut self, now: Instant) {
-        if self.stopped {
-            return;
-        }
+    fn engaged(&mut self, now: Instant, chosen: &[usize]) {
+        self.gesture.grant();
         self.now = now.as_micros();
-        for alone in &mut self.alone {
-            let before = alone.is_armed();
-            alone.bus.engage(now);
-            if !before && alone.is_armed() {
-                alone.rest();
+        self.armed_at = self.armed_at.max(self.now);
+        chosen.iter().for_each(|index| self.alone[*index].engage(now));
+    }
+
+    fn note_wire(&mut self, frame: &CanFrame, shows: impl Fn(usize) -> Wire) {
+        for (wire, facts) in self.wire.iter_mut().zip(&FACTS) {
+            if u32::from(facts.command_id) == frame.header() {
+                *wire = shows(facts.place);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The same functions, each with an error that is found in the field. No proof may hold here.
 
 use crate::frames::{Wire, frame, route};
+use crate::timeouts::REFUSED;
 use drivetrain::dji::Bus;
 use drivetrain::frame::CanFrame;
 
@@ -107,12 +108,27 @@ truncated!(word_m3508_faulty, 16_384, 20.0);
 truncated!(word_gm6020_voltage_faulty, 25_000, 24.0);
 truncated!(word_gm6020_current_faulty, 16_384, 3.0);
 
-/// Compares stamps of 32 bits and nothing else: after 71 minutes the old ones are new again.
+/// Compares stamps of 32 bits: after 71 minutes the old ones are new again.
 #[unsafe(no_mangle)]
 extern "C" fn word_at_faulty(times: &[u64; 3]) -> i32 {
-    let [heard, set, updated] = times.map(|time| time as u32);
-    let near = |stamp: u32, limit: u32| {
-        updated.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
-    };
-    if near(heard, 10_000_000) && near(set, 100_000) { 1_000 } else { 0 }
+    let [heard, set, updated] = *times;
+    let near = |stamp: u64, limit: u32| (updated as u32).wrapping_sub(stamp as u32) <= limit;
+    match set.checked_sub(heard) {
+        Some(age) if age <= 1_000_000 => {
+            let drives = updated > set && near(heard, 1_000_000) && near(set, 100_000);
+            if drives { 1_000 } else { 0 }
+        }
+        _ => REFUSED,
+    }
+}
+
+/// Takes what is near for fresh, before and after: a clock that swings drives for ever.
+#[unsafe(no_mangle)]
+extern "C" fn word_at_near(times: &[u64; 3]) -> i32 {
+    let [heard, set, updated] = *times;
+    let near = |one: u64, other: u64, limit: u64| one.abs_diff(other) <= limit;
+    if !near(set, heard, 1_000_000) {
+        return REFUSED;
+    }
+    if near(updated, heard, 1_000_000) && near(updated, set, 100_000) { 1_000 } else { 0 }
 }

@@ -3,21 +3,25 @@
 use crate::Shared;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Timeouts};
+use drivetrain::motor::Timeouts;
 use drivetrain::time::{Duration, Instant, Tick};
 
 /// What a motor is asked for, on the wire's scale.
 const ASKED: i16 = 1_000;
 
+/// What stands for a word where the target was refused.
+pub const REFUSED: i32 = i32::MAX;
+
 const fn armed_with(timeouts: Timeouts) -> (Bus, Handle<M3508>) {
     let mut bus = Bus::new().with_timeouts(timeouts);
-    match bus.attach(Config::new(1)) {
+    match bus.attach(Config::new(1).with_opening(Duration::ZERO)) {
         Ok(motor) => (bus, motor),
         Err(_) => panic!("not attached"),
     }
 }
 
-/// Hears a motor, arms it, sets a target and updates, each at its time in µs: the word that is sent then.
+/// Hears a motor and arms it, updates and sets a target, and updates again, each at its time in µs: the word that is sent then,
+/// or [`REFUSED`] when the target was.
 fn word((bus, motor): &mut (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
     let [heard, set, updated] = times.map(Instant::from_micros);
     if let Some(rest) = CanFrame::standard(0x201, [0; 8]) {
@@ -29,7 +33,7 @@ fn word((bus, motor): &mut (Bus, Handle<M3508>), times: &[u64; 3]) -> i32 {
     bus.update(Tick::new(set, 0.001));
     while bus.next_frame().is_some() {}
     if bus.set_raw(*motor, ASKED).is_err() {
-        return i32::MAX;
+        return REFUSED;
     }
     bus.update(Tick::new(updated, 0.001));
     bus.next_frame().map_or(0, |frame| {

@@ -5,8 +5,8 @@ use drivetrain::dji::{
     Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, TargetError};
-use drivetrain::time::{Instant, Tick};
+use drivetrain::motor::TargetError;
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Current, Voltage};
 
 /// A motor in the first slot of its command frame.
@@ -18,7 +18,7 @@ pub struct Motor<M: Model> {
 impl<M: Model> Motor<M> {
     pub const fn new() -> Self {
         let mut bus = Bus::new();
-        match bus.attach(Config::new(1)) {
+        match bus.attach(Config::new(1).with_opening(Duration::ZERO)) {
             Ok(handle) => Self { bus, handle },
             Err(_) => panic!("not attached"),
         }

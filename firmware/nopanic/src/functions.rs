@@ -4,19 +4,19 @@ use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{
     ConfigError, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, OptimalDifferentiator,
-    Pid, PidConfig, TimeStep, fhan,
+    Pid, PidConfig, TimeStep, WheelTuning, fhan,
 };
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
-    Gm6020Voltage, Handle, M2006, M3508, Message,
+    Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
-    AngleDrive, BusLoad, Capabilities, Capability, Claim, Devices, Guard, Ingest, Measured,
-    Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, StopHomingConfig, Timeouts,
-    VelocityDrive, Vitals,
+    AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Ingest,
+    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, StopHomingConfig,
+    Timeouts, VelocityDrive, Visitor, Vitals,
 };
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, MeasuredLoad,
@@ -205,6 +205,7 @@ fn control() {
     OptimalDifferentiator::value.call();
     OptimalDifferentiator::rate.call();
     fhan.call();
+    WheelTuning::speed_loop.call();
 }
 
 fn encoder() {
@@ -272,14 +273,18 @@ fn motor() {
     Guard::new.call();
     Guard::without_feedback.call();
     Guard::with_timeouts.call();
+    Guard::with_opening.call();
     Guard::hear.call();
     Guard::admit.call();
     Guard::drives.call();
     Guard::has_target.call();
     Guard::relax.call();
     Guard::is_missing.call();
+    Guard::ask.call();
     Guard::engage.call();
+    Guard::share.call();
     Guard::disarm.call();
+    Guard::trip.call();
     Guard::emergency_stop.call();
     Guard::clear_emergency_stop.call();
     Guard::is_armed.call();
@@ -315,21 +320,60 @@ fn motor() {
     (|own: &mut Own<AnyMotor>, target| own.set_velocity((), target)).call();
     (|own: &mut Own<AnyMotor>, target| own.set_angle((), target)).call();
     (|own: &Own<AnyMotor>| (own.velocity(()), own.angle(()))).call();
+    family::<Own<AnyMotor>>();
     device::<Own<AnyMotor>>();
     MotorName::new.call();
     MotorName::model.call();
     MotorName::id.call();
     device::<[Bus; 3]>();
     device::<(Bus, Bus)>();
+    device::<(Bus, Bus, Bus)>();
     device::<(Bus, Bus, Bus, Bus)>();
+    device::<&'static mut Bus>();
+    device::<Robot>();
 }
 
-/// The trait that every device implements, and its combinations.
-fn device<D: Devices + 'static>() {
+/// Devices of a user that name their parts.
+struct Robot {
+    chassis: [Bus; 2],
+    arm: Own<AnyMotor>,
+}
+
+impl Devices for Robot {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        self.chassis.visit(visitor);
+        self.arm.visit(visitor);
+    }
+}
+
+/// The trait of each family.
+pub fn family<D: CanDevice + 'static>() {
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
+    (|device: &mut D, tick: Tick| device.update(tick)).call();
+    (|device: &mut D| device.next_frame()).call();
+    (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
+    (|device: &D| device.superseded()).call();
+    (|device: &D| device.claims().count()).call();
+    (|device: &D, now: Instant| device.missing(now).count()).call();
+    (|device: &D| (device.faulty().count(), device.second_master())).call();
+    (|device: &mut D| device.next_edge()).call();
+    (|device: &mut D, now: Instant| device.ask(now)).call();
+    (|device: &mut D, now: Instant| device.engage(now)).call();
+    (|device: &mut D| device.disarm()).call();
+    (|device: &mut D| device.trip()).call();
+    (|device: &D| (device.is_armed(), device.is_stopped())).call();
+    (|device: &mut D| device.emergency_stop()).call();
+    (|device: &mut D| device.clear_emergency_stop()).call();
+}
+
+/// What every caller has of devices and their combinations.
+pub fn device<D: Devices + 'static>() {
+    (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
+    (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest_any(frame, now)).call();
     (|device: &mut D, tick: Tick| device.update(tick)).call();
     (|device: &mut D, turn: u32| device.next_frame(turn)).call();
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();
+    (|device: &mut D| device.superseded()).call();
     (|device: &mut D| device.claims().count()).call();
     (|device: &mut D| device.next_edge()).call();
     (|device: &mut D, now: Instant| device.arm(now).is_ok()).call();
@@ -361,6 +405,7 @@ fn dji() {
     Config::<M3508>::with_gear.call();
     Config::<M3508>::with_torque_constant.call();
     Config::<M3508>::with_recovery.call();
+    Config::<M3508>::with_opening.call();
     Config::<M3508>::id.call();
     Config::<M2006>::with_current_limit.call();
     Config::<Gm6020Voltage>::with_voltage_limit.call();
@@ -382,6 +427,12 @@ fn dji() {
     Bus::<()>::with_tick_rate.call();
     (|bus: &mut Bus, motors: &[AnyHandle], now: Instant| Bus::arm_only(bus, motors, now).is_ok())
         .call();
+    (|bus: &mut Bus, now: Instant| Bus::arm(bus, now).is_ok()).call();
+    Bus::<()>::disarm.call();
+    Bus::<()>::is_armed.call();
+    Bus::<()>::emergency_stop.call();
+    Bus::<()>::clear_emergency_stop.call();
+    Bus::<()>::is_stopped.call();
     Bus::<()>::ingest.call();
     Bus::<()>::ingest_raw.call();
     Bus::<()>::update.call();
@@ -425,6 +476,11 @@ fn dji() {
     .call();
     Measured::<Angle>::way_to.call();
     Measured::<Position>::way_to.call();
+    WordGains::per_rotor_rpm.call();
+    WordGains::per_output_rpm.call();
+    WordGains::each_step.call();
+    WordGains::speed_loop::<M3508>.call();
+    family::<Bus>();
     device::<Bus>();
 }
 

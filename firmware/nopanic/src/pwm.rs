@@ -49,6 +49,7 @@ pub fn call_all() {
     BrushedConfig::with_limit.call();
     BrushedConfig::reversed.call();
     BrushedConfig::with_timeouts.call();
+    BrushedConfig::with_opening.call();
     BrushedConfig::with_no_load_speed.call();
     BrushedConfig::with_health.call();
     BrushedConfig::validate.call();
@@ -60,6 +61,7 @@ pub fn call_all() {
     RcConfig::with_arming_time.call();
     RcConfig::with_full_speed.call();
     RcConfig::with_timeouts.call();
+    RcConfig::with_opening.call();
     RcConfig::validate.call();
     RcPwm::<Channel>::new.call();
     RcPwm::<Channel>::arm.call();

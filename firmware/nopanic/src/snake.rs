@@ -1,8 +1,8 @@
 //! Joints that hold their own position loop.
 
+use crate::functions::{device, family};
 use crate::opaque::{Function, any};
 use core::hint::black_box;
-use drivetrain::motor::Devices;
 use drivetrain::snake::*;
 
 pub fn call_all() {
@@ -67,11 +67,8 @@ pub fn call_all() {
     Joints::offset.call();
     Joints::read.call();
     Joints::answer.call();
-    <Joints as Devices>::arm.call();
-    <Joints as Devices>::disarm.call();
-    <Joints as Devices>::emergency_stop.call();
-    <Joints as Devices>::clear_emergency_stop.call();
-    <Joints as Devices>::is_armed.call();
+    family::<Joints>();
+    device::<Joints>();
 }
 
 /// `Command::decode` borrows its argument.

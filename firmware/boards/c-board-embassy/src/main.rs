@@ -15,7 +15,6 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
-use drivetrain::motor::Devices;
 use drivetrain::runner::Runner;
 use embassy_executor::Spawner;
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
@@ -81,10 +80,11 @@ async fn main(spawner: Spawner) {
     let mut runner = Runner::new(can, now, bus);
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
     let mut beat = runner.heartbeat();
-    let mut millisecond = Ticker::every(Duration::from_millis(1));
+    // Four times a step: at the pace of the steps, one that wakes a microsecond early would be left out.
+    let mut wake = Ticker::every(Duration::from_micros(250));
     watchdog.unleash();
     loop {
-        millisecond.next().await;
+        wake.next().await;
         runner.poll(32);
         let Some(tick) = runner.due() else { continue };
         pilot.lock(|pilot| {

@@ -1,4 +1,5 @@
-//! A mecanum chassis on a DM-MC02 (STM32H723VG): embassy without the runner. One task receives, one ticks and sends.
+//! A mecanum chassis on a DM-MC02 (STM32H723VG): embassy without the runner. One task receives, one ticks and sends. What the
+//! runner does beside that is done by hand there: it watches the clock and the bus, and trips the motors when the bus is down.
 //!
 //! | plug | pins | what |
 //! |---|---|---|
@@ -16,7 +17,7 @@ use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
 use drivetrain::motor::Devices;
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use embassy_executor::Spawner;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -24,7 +25,6 @@ use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
 use embassy_stm32::{Config, Peri, bind_interrupts, peripherals, rcc, time::Hertz};
 use embassy_stm32::{peripherals::IWDG1, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
-use embassy_time::{Duration, Ticker};
 use embedded_io_async::Read;
 use panic_probe as _;
 use pilot::{Pilot, Wish};
@@ -62,18 +62,26 @@ async fn receive(can: BufferedCanReceiver, robot: &'static Shared) {
 
 #[embassy_executor::task]
 async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<'static, IWDG1>) {
-    const PERIOD_S: f32 = 0.001;
     // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
     const WATCHDOG_US: u32 = 20_000;
     // A bus that takes nothing for so long is down: what it would do when it comes back is nobody's wish any more.
-    const BUS_DOWN_TICKS: u32 = 100;
+    const BUS_DOWN_AFTER: Duration = Duration::from_millis(100);
     let mut watchdog = IndependentWatchdog::new(iwdg, WATCHDOG_US);
-    let mut refused_ticks: u32 = 0;
-    let mut millisecond = Ticker::every(Duration::from_millis(1));
+    let mut refused_since: Option<Instant> = None;
+    let mut was_down = false;
+    let mut millisecond = embassy_time::Ticker::every(embassy_time::Duration::from_millis(1));
+    let mut before = micros(embassy_time::Instant::now());
     watchdog.unleash();
     loop {
         millisecond.next().await;
-        let tick = Tick::new(micros(embassy_time::Instant::now()), PERIOD_S);
+        let now = micros(embassy_time::Instant::now());
+        if now == before {
+            // Two wakes within a microsecond, after a pause. When the clock stands, the watchdog bites.
+            continue;
+        }
+        // The time that passed; zero when the clock goes back, and then the bus sends zeros and trips.
+        let tick = Tick::new(now, now.since(before).as_secs_f32());
+        before = now;
         robot.lock(|robot| {
             let Robot { bus, pilot } = &mut *robot.borrow_mut();
             match pilot.wish(tick.now()) {
@@ -97,12 +105,16 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
                     bus.requeue(&frame);
                 }
             }
-            refused_ticks = if is_refused { refused_ticks.saturating_add(1) } else { 0 };
-            if refused_ticks >= BUS_DOWN_TICKS {
-                if refused_ticks == BUS_DOWN_TICKS {
-                    defmt::warn!("the bus takes nothing: disarmed");
-                }
-                bus.disarm();
+            refused_since = is_refused.then(|| refused_since.unwrap_or(tick.now()).min(tick.now()));
+            let is_down =
+                refused_since.is_some_and(|since| tick.now().since(since) >= BUS_DOWN_AFTER);
+            if is_down && !was_down {
+                defmt::warn!("the bus takes nothing: every motor is tripped");
+            }
+            was_down = is_down;
+            if is_down {
+                // In each tick: arming is refused until the bus is back, and then needs a new turn of the switch.
+                bus.trip();
             }
             while let Some(edge) = bus.next_edge() {
                 defmt::info!("{}", edge);

@@ -3,7 +3,7 @@
 //! | plug | pins | what |
 //! |---|---|---|
 //! | CAN1 | PD0 receive, PD1 transmit | a C620 with id 1, 1 Mbit/s |
-//! | key | PA0, low while it is held down | arms, and disarms when it is let go |
+//! | key | PA0, low while it is held down | arms when it is pressed, and disarms when it is let go; after a fault, press it again |
 //! | LED | PH11 green, PH12 red | armed; not armed, though the key is held down |
 //!
 //! Pins: DJI's own examples for this board. Lift the motor, and flash with a probe on the SWD plug; why it does not arm, what
@@ -16,7 +16,6 @@ use c_board_embassy::{WATCHDOG_US, can1, clocks, now};
 use defmt_rtt as _;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
-use drivetrain::motor::Devices;
 use drivetrain::runner::Runner;
 use drivetrain::units::{AngularVelocity, Current};
 use embassy_executor::Spawner;
@@ -45,16 +44,18 @@ async fn main(_spawner: Spawner) {
 
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
     let mut beat = runner.heartbeat();
-    let mut millisecond = Ticker::every(Duration::from_millis(1));
+    // Four times a step: at the pace of the steps, one that wakes a microsecond early would be left out.
+    let mut wake = Ticker::every(Duration::from_micros(250));
     // A key that is held down at power-on starts nothing.
     let mut was_down = true;
     let mut ticks = 0_u32;
     watchdog.unleash();
     loop {
-        millisecond.next().await;
+        wake.next().await;
         runner.poll(32);
         let Some(tick) = runner.due() else { continue };
         let is_down = key.is_low();
+        // The press, not the key that stays down: after a fault the motor rests until it is pressed anew.
         if is_down && !was_down {
             if let Err(why) = runner.arm(tick) {
                 defmt::warn!("{}", why);
