@@ -67,12 +67,8 @@ impl OwnMotor for MyMotor {
         let Order { target: Target::Velocity(target), share, step } = order else {
             return self.rest();
         };
-        // Within the limit of now the loop does not wind up.
-        if self.speed.set_config(SPEED.with_output_limit(share * LIMIT_A)).is_err() {
-            return self.rest();
-        }
         let measured = self.velocity().as_rad_per_s();
-        let amperes = self.speed.step(target.as_rad_per_s(), measured, &step);
+        let amperes = share * self.speed.step(target.as_rad_per_s(), measured, &step);
         self.effort = amperes / LIMIT_A;
         self.command(amperes)
     }

@@ -182,10 +182,10 @@ mod pins {
     impl Subject for RcPwm<Pin> {
         fn hear(&mut self, _now: Instant) {}
         fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-            RcPwm::arm(self, now)
+            Self::arm(self, now)
         }
         fn is_armed(&mut self) -> bool {
-            RcPwm::is_armed(self)
+            Self::is_armed(self)
         }
         fn set(&mut self) -> Result<(), TargetError> {
             self.set_throttle(1.0)
@@ -206,10 +206,10 @@ mod pins {
             self.ingest_counts(0, now);
         }
         fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-            Brushed::arm(self, now)
+            Self::arm(self, now)
         }
         fn is_armed(&mut self) -> bool {
-            Brushed::is_armed(self)
+            Self::is_armed(self)
         }
         fn set(&mut self) -> Result<(), TargetError> {
             self.set_duty(1.0)

@@ -681,3 +681,16 @@ fn a_frame_goes_back_to_the_part_that_sends_it_now() {
         }
     }
 }
+
+/// A frame of an own motor that was refused, failed or evicted is replaced by a newer one, and was not counted: 0 of 10.
+#[test]
+fn a_frame_of_an_own_motor_that_comes_back_counts_as_superseded() {
+    let at_ms = |ms: u64| Instant::from_micros(1_000 * ms);
+    let mut motor = own(1);
+    for ms in 1..=10 {
+        motor.update(Tick::new(at_ms(ms), 0.001));
+        let frame = motor.next_frame(0).unwrap();
+        assert!(motor.requeue(&frame));
+    }
+    assert_eq!(motor.superseded(), 10);
+}

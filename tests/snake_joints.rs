@@ -58,11 +58,10 @@ impl<'w> Robot<'w> {
             });
             self.runner.poll(16);
             let Some(tick) = self.runner.due() else { continue };
-            if self.is_eager && !self.runner.is_armed() && tick.now() >= self.asks_at {
-                if self.runner.arm(tick) == Err(ArmError::NotReleased) {
-                    self.released += 1;
-                    self.asks_at = tick.now() + Duration::from_millis(100);
-                }
+            let asks = self.is_eager && !self.runner.is_armed() && tick.now() >= self.asks_at;
+            if asks && self.runner.arm(tick) == Err(ArmError::NotReleased) {
+                self.released += 1;
+                self.asks_at = tick.now() + Duration::from_millis(100);
             }
             if let Some(degrees) = self.wanted {
                 let position = Position::from_angle(Angle::from_degrees(degrees));

@@ -11,10 +11,14 @@
 
 #[path = "../arguments/mod.rs"]
 mod arguments;
+#[path = "../../tests/faults/arming.rs"]
+mod arming;
 #[path = "../../tests/faults/case.rs"]
 mod case;
 #[path = "../../tests/faults/catalogue.rs"]
 mod catalogue;
+#[path = "../../tests/faults/clocks.rs"]
+mod clocks;
 #[path = "../../tests/faults/commands.rs"]
 mod commands;
 #[path = "../../tests/faults/health.rs"]

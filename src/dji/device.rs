@@ -111,9 +111,10 @@ impl<B> Devices for Bus<B> {
 impl<B> Bus<B> {
     /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms.
     ///
+    /// `now` is the time of the present tick: an update before it counts as a clock that went back.
+    ///
     /// # Errors
     /// As [`Devices::arm`].
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         Devices::arm(self, now)
     }
@@ -176,7 +177,6 @@ impl<B> Bus<B> {
     /// assert!(!bus.is_armed()); // not all of them
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
         let granted = self.gesture.ask(now);
         if self.stopped {
@@ -221,7 +221,8 @@ impl<B> Bus<B> {
 
     fn engage_all(&mut self, motors: core::ops::Range<u8>, now: Instant) {
         self.now = now.stamp();
-        self.armed_at = now;
+        // An arming at an earlier time takes nothing back: motors that run may have targets of the later one.
+        self.armed_at = self.armed_at.max(now);
         self.disturb();
         let timeouts = self.timeouts;
         for motor in motors {

@@ -138,7 +138,6 @@ pub trait Devices {
     /// # Errors
     /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a set emergency stop, a
     /// request that was not released since a trip.
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let granted = Ask::of(self, now);
         if self.is_stopped() {

@@ -44,7 +44,7 @@ mod tests {
         assert_eq!(opening.share(at_ms(5)).to_bits(), 1.0_f32.to_bits(), "never closed");
         opening.begin(at_ms(1_000));
         let shares = [990, 1_000, 1_100, 1_200, 1_000].map(|ms| opening.share(at_ms(ms)));
-        assert_eq!(shares.map(|share| (share * 100.0) as i32), [0, 0, 50, 100, 100]);
+        assert_eq!(shares.map(f32::to_bits), [0.0, 0.0, 0.5, 1.0, 1.0].map(f32::to_bits));
         let mut at_once = Opening::new(Duration::ZERO);
         at_once.begin(at_ms(1));
         assert_eq!(at_once.share(at_ms(1)).to_bits(), 1.0_f32.to_bits());

@@ -147,7 +147,6 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     ///
     /// # Errors
     /// When the emergency stop is set, or no counts came.
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let granted = self.guard.ask(now);
         if self.guard.is_stopped() {

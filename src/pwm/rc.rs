@@ -225,7 +225,6 @@ impl<P: SetDutyCycle> RcPwm<P> {
     ///
     /// # Errors
     /// The emergency stop is set, or, after a trip, another request lies less than 100 ms back.
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let granted = self.guard.ask(now);
         if self.guard.is_stopped() {
@@ -318,7 +317,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         let RcConfig { low_us, neutral_us, high_us, .. } = self.config;
         let [low, neutral, high] = [low_us, neutral_us, high_us].map(f32::from);
         let reach = if self.throttle < 0.0 { neutral - low } else { high - neutral };
-        neutral + self.throttle.clamp(-open, open) * reach
+        neutral + self.throttle.max(-open).min(open) * reach
     }
 
     fn send(&mut self, pulse_us: f32) -> Result<(), P::Error> {

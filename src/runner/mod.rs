@@ -182,7 +182,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// # Errors
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. A refused call
     /// counts as asking.
-    #[expect(clippy::result_large_err, reason = "no heap, and arming is rare")]
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
         let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
             ArmError::Stopped

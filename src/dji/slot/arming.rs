@@ -86,10 +86,10 @@ impl Slot {
     }
 
     /// Takes targets again after a recovery, where that is configured; the output range opens from zero.
-    pub(super) fn resume(&mut self) {
+    pub(super) fn resume(&mut self, now: u32) {
         if self.arming == Arming::Latched && self.resumes {
             self.arming = Arming::Armed;
-            self.open(self.heard);
+            self.open(now);
             self.settle();
         }
     }

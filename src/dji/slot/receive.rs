@@ -52,13 +52,13 @@ impl Slot {
                 self.doubt_position();
                 self.good_frames = 1;
                 self.link = Link::Recovering;
-                self.finish_recovery(facts, timeouts);
+                self.finish_recovery(facts, timeouts, now);
             }
             Link::Recovering => {
                 self.move_shortest(feedback);
                 let in_a_row = is_near(now, self.heard, timeouts.late_us());
                 self.good_frames = if in_a_row { self.good_frames.saturating_add(1) } else { 1 };
-                self.finish_recovery(facts, timeouts);
+                self.finish_recovery(facts, timeouts, now);
             }
         }
         self.feedback = feedback;
@@ -120,10 +120,10 @@ impl Slot {
         }
     }
 
-    fn finish_recovery(&mut self, facts: &Facts, timeouts: &Timeouts) {
+    fn finish_recovery(&mut self, facts: &Facts, timeouts: &Timeouts, now: u32) {
         if self.good_frames >= timeouts.good_frames() {
             self.set_online(facts);
-            self.resume();
+            self.resume(now);
         }
     }
 

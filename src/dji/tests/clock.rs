@@ -56,3 +56,16 @@ fn a_clock_that_wraps_early_or_swings_drives_no_longer_than_the_deadline() {
         assert!(told && !bus.is_armed(), "clock {index}");
     }
 }
+
+/// The task of a button may read the clock before the tick does.
+#[test]
+fn an_arming_at_an_earlier_time_makes_no_target_younger() {
+    let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
+    assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(10)), Ingest::Taken);
+    bus.arm(at_ms(10)).unwrap();
+    bus.set_raw(wheel, 300).unwrap();
+    // The motor runs on, and its target is one of 10 ms.
+    bus.arm(at_ms(2)).unwrap();
+    step(&mut bus, 3);
+    assert_eq!((sent(&mut bus), bus.is_armed()), (std::vec![(0x200, [0; 4])], false));
+}

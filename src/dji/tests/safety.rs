@@ -167,6 +167,26 @@ fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
 }
 
 #[test]
+fn a_motor_that_one_frame_brings_back_comes_from_zero_as_well() {
+    let opening = Duration::from_millis(100);
+    let config = Config::<M3508>::new(1).with_recovery(Recovery::Resume).with_opening(opening);
+    let (bus, [wheel]) = armed([config]);
+    let mut bus = bus.with_timeouts(Timeouts::new().with_good_frames(1));
+    for ms in 2..150 {
+        step(&mut bus, ms);
+    }
+    let mut last = 0;
+    for ms in 150..260 {
+        assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
+        bus.set_raw(wheel, 10_000).unwrap();
+        step(&mut bus, ms);
+        last = sent(&mut bus).last().map_or(last, |(_, words)| words[0]);
+        assert!(u64::from(last.unsigned_abs()) <= 164 * (ms - 148), "{last} at {ms} ms");
+    }
+    assert_eq!(last, 10_000);
+}
+
+#[test]
 fn an_application_that_stops_setting_targets_stops_the_motor() {
     let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     bus.set_raw(wheel, 700).unwrap();

@@ -52,7 +52,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         }
         let mut commands =
             self.motor.claims().into_iter().filter(|claim| claim.role() == Role::Command);
-        !frame.is_remote() && commands.any(|claim| claim.covers(frame.id()))
+        let is_own = !frame.is_remote() && commands.any(|claim| claim.covers(frame.id()));
+        self.superseded = self.superseded.wrapping_add(u32::from(is_own));
+        is_own
     }
 
     fn superseded(&self) -> u32 {
