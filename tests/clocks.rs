@@ -321,8 +321,9 @@ impl Clock {
         match self {
             Self::Wraps(period) => real % period,
             Self::Swings(by) => 1_000_000 + real % 2 * by,
+            Self::Jumps if random.below(64) == 0 => u64::MAX - random.below(2),
             Self::Jumps if random.below(8) == 0 => random.of_any_size(4, 36),
-            Self::Jumps => before + random.below(30_000),
+            Self::Jumps => before.saturating_add(random.below(30_000)),
             Self::Stands if random.below(4) == 0 => before,
             Self::Stands => before + random.below(20_000),
             Self::Right => real,

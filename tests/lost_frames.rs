@@ -694,3 +694,43 @@ fn a_frame_of_an_own_motor_that_comes_back_counts_as_superseded() {
     }
     assert_eq!(motor.superseded(), 10);
 }
+
+/// A controller that is off the bus, with one mailbox: each frame takes the place of the one before, and none leaves.
+struct Dead(Option<CanFrame>);
+
+impl embedded_can::nb::Can for Dead {
+    type Frame = CanFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+        Ok(self.0.replace(*frame))
+    }
+
+    fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+        Err(nb::Error::WouldBlock)
+    }
+}
+
+/// The parts of a device take turns in sending first, so the frame that was evicted last is taken first.
+#[test]
+fn frames_of_several_parts_that_evict_each_other_are_a_bus_that_is_down() {
+    fn losses<D: Devices>(device: D) -> u32 {
+        let clock = ManualClock::new(Instant::START);
+        let mut runner = Runner::new(Nb(Dead(None)), &clock, device);
+        for _ in 0..150 {
+            clock.advance(Duration::from_millis(1));
+            runner.tick(Tick::new(clock.now(), 0.001));
+        }
+        assert!(runner.is_bus_down());
+        runner.statistics().bus_losses
+    }
+    let bus = |id| {
+        let mut bus: Bus = Bus::new().with_keep_alive(Duration::ZERO);
+        bus.attach(Config::<M3508>::new(id)).unwrap();
+        bus
+    };
+    assert_eq!(losses(bus(1)), 1);
+    assert_eq!(losses([bus(1), bus(5)]), 1);
+    assert_eq!(losses((bus(1), own(1))), 1);
+    assert_eq!(losses((bus(1), bus(5), own(1))), 1);
+}

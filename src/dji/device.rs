@@ -206,6 +206,9 @@ impl<B> Bus<B> {
                 self.engage_all(place..place + 1, now);
             }
         }
+        if self.slots.iter().any(Slot::is_tripped) {
+            self.gesture.keep();
+        }
         Ok(())
     }
 

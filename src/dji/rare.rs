@@ -4,7 +4,7 @@ use super::Feedback;
 use super::bus::{Bus, FIRST_FEEDBACK_ID, LONGEST_PAUSE};
 use super::slot::{Ages, Slot};
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Malformed};
+use crate::motor::{Ingest, Malformed, Progress};
 use crate::time::{Duration, Instant};
 
 impl<B> Bus<B> {
@@ -109,7 +109,7 @@ impl<B> Bus<B> {
 
     /// Tells whether the present update lies after the one before, and not before the arming.
     fn moves_on(&self, before: Instant) -> bool {
-        (!self.running || before < self.updated) && self.armed_at <= self.updated
+        Progress::moves_on(self.running.then_some(before), self.armed_at, self.updated)
     }
 
     /// Ends an update whose time or time step is not usable.

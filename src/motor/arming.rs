@@ -72,7 +72,7 @@ pub enum ArmError {
     /// The driver takes no frames.
     BusDown,
     /// A motor was relaxed since it was armed, and the last request to arm, or that moment, lies less than 100 ms back. A
-    /// request that is repeated in each tick is one request: it is never granted.
+    /// request that is repeated in each tick is one request, and is not granted.
     NotReleased,
 }
 

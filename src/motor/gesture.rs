@@ -5,7 +5,8 @@ use crate::time::{Duration, Instant};
 /// Tells a deliberate request to arm from a request that a program repeats.
 ///
 /// After a trip, a request counts only if neither a trip nor another request lies within [`PAUSE`](Self::PAUSE) before
-/// it. A switch that stays on, read in each tick, never re-arms.
+/// it. A switch that stays on, read in each tick, does not re-arm. A program that reads its switch more slowly than that has to
+/// detect its edge.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gesture {
     /// The time of the last request or trip.
@@ -34,6 +35,12 @@ impl Gesture {
         self.granted = !self.tripped || now.since(self.last) >= Self::PAUSE;
         self.last = now;
         self.granted
+    }
+
+    /// Keeps the trip: another motor of the device still waits to be armed.
+    pub(crate) const fn keep(&mut self) {
+        self.tripped = true;
+        self.granted = false;
     }
 
     /// Tells whether the device may be armed, and takes the trip back if so.
@@ -70,6 +77,15 @@ mod tests {
         assert!(gesture.ask(at_ms(200)));
         gesture.trip(at_ms(200));
         assert!(!gesture.take());
+    }
+
+    #[test]
+    fn a_trip_that_is_kept_needs_a_pause_of_its_own() {
+        let mut gesture = Gesture::NEW;
+        gesture.trip(at_ms(100));
+        assert!(gesture.ask(at_ms(200)) && gesture.take());
+        gesture.keep();
+        assert!(!gesture.take() && !gesture.ask(at_ms(201)) && gesture.ask(at_ms(301)));
     }
 
     #[test]

@@ -1,29 +1,37 @@
 //! Whether time moves on from update to update.
 
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 
 /// The rule of time of every device: an update has to lie after the update before it, and not before the arming.
 ///
 /// Ages mean nothing where it does not: the device sends zeros in that cycle, and is to be armed again.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Progress {
-    earliest: Instant,
+    last: Option<Instant>,
+    begun: Instant,
 }
 
 impl Progress {
-    pub(crate) const NEW: Self = Self { earliest: Instant::START };
+    pub(crate) const NEW: Self = Self { last: None, begun: Instant::START };
 
     /// Takes the time of an update; `false` if time did not move on. The next update has to lie after it in either case.
-    #[inline]
     pub(crate) fn advance(&mut self, now: Instant) -> bool {
-        let moved_on = now >= self.earliest;
-        self.earliest = now + Duration::from_micros(1);
+        let moved_on = Self::moves_on(self.last, self.begun, now);
+        self.last = Some(now);
+        // No target is left that an update before the arming could make younger.
+        self.begun = self.begun.min(now);
         moved_on
     }
 
     /// Takes the time of arming: targets are stamped with it, so that no update may lie before it.
     pub(crate) fn begin(&mut self, now: Instant) {
-        self.earliest = self.earliest.max(now);
+        self.begun = self.begun.max(now);
+    }
+
+    /// The rule itself.
+    #[inline]
+    pub(crate) fn moves_on(last: Option<Instant>, begun: Instant, now: Instant) -> bool {
+        last.is_none_or(|last| last < now) && begun <= now
     }
 }
 
@@ -43,5 +51,12 @@ mod tests {
         progress.begin(Instant::from_micros(3));
         let mut advance = |micros| progress.advance(Instant::from_micros(micros));
         assert_eq!([8, 9, 9].map(&mut advance), [false, true, false]);
+    }
+
+    #[test]
+    fn the_end_of_all_time_stands() {
+        let mut progress = Progress::NEW;
+        let end = Instant::from_micros(u64::MAX);
+        assert_eq!([end; 3].map(|now| progress.advance(now)), [true, false, false]);
     }
 }

@@ -226,6 +226,9 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// # Errors
     /// The emergency stop is set, or, after a trip, another request lies less than 100 ms back.
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        if self.arming != Arming::Idle {
+            return Ok(());
+        }
         let granted = self.guard.ask(now);
         if self.guard.is_stopped() {
             return Err(ArmError::Stopped);
@@ -233,7 +236,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if !granted {
             return Err(ArmError::NotReleased);
         }
-        if !self.guard.is_armed() && self.arming == Arming::Idle {
+        if !self.guard.is_armed() {
             self.arming = Arming::Asked;
         }
         Ok(())

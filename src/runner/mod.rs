@@ -163,8 +163,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.take_standstill() {
-            // At the time of the last step, so that it does not count as time that moved on.
-            return Some(Tick::new(self.ticker.last(), 0.0));
+            // Not after the last step that was run, so that it does not count as time that moved on.
+            let last = self.ticker.last();
+            return Some(Tick::new(
+                self.watch.ticked().map_or(last, |ticked| ticked.min(last)),
+                0.0,
+            ));
         }
         let before = self.ticker.overruns();
         let tick = self.ticker.due(now);

@@ -37,16 +37,23 @@ impl<P: Port, K, D: Devices> Runner<P, K, D> {
             };
             increment(&mut self.statistics.offered);
             match self.port.try_send(&frame) {
-                Sent::Accepted => self.count_sent(&frame, now),
+                Sent::Accepted => {
+                    self.count_sent(&frame);
+                    self.watch.accepted(frame.header(), now);
+                }
                 Sent::Evicted(other) => {
-                    self.count_sent(&frame, now);
+                    self.count_sent(&frame);
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
+                        // Before the frame that took its place: they may be of one id.
                         self.watch.evicted(other.header(), now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
                         evicted(&other);
+                    }
+                    if other.header() != frame.header() {
+                        self.watch.accepted(frame.header(), now);
                     }
                 }
                 Sent::Full => {
@@ -76,9 +83,8 @@ impl<P: Port, K, D: Devices> Runner<P, K, D> {
         }
     }
 
-    fn count_sent(&mut self, frame: &CanFrame, now: Instant) {
+    fn count_sent(&mut self, frame: &CanFrame) {
         increment(&mut self.statistics.sent);
         self.meter.count(frame);
-        self.watch.accepted(frame.header(), now);
     }
 }

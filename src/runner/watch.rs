@@ -95,6 +95,11 @@ impl Watch {
         self.reading = now;
     }
 
+    /// Returns the time of the last step that was run.
+    pub(super) const fn ticked(&self) -> Option<Instant> {
+        self.ticked
+    }
+
     /// Notes a step: the clock may have gone back to it.
     pub(super) const fn begin_step(&mut self, now: Instant) {
         self.furthest = now;

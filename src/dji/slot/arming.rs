@@ -54,6 +54,11 @@ impl Slot {
         self.arming = Arming::Disarmed;
     }
 
+    /// Tells whether the motor was relaxed since it was armed, and waits to be armed again.
+    pub(in crate::dji) const fn is_tripped(&self) -> bool {
+        matches!(self.arming, Arming::Latched | Arming::Tripped)
+    }
+
     pub(in crate::dji) const fn is_armed(&self) -> bool {
         matches!(self.arming, Arming::Armed)
     }
