@@ -42,10 +42,11 @@ impl Drive {
         let speed = PidConfig::new(0.8, 4.0, 0.001);
         let position = PidConfig::new(10.0, 0.5, 0.01);
         let ids: [u8; MOTORS] = core::array::from_fn(|index| index as u8 + 1);
-        let configs =
-            ids.map(|id| {
+        let configs = ids.map(|id| {
             // The range is open from the first tick on, as it is in all but the first 200.
-            Config::<M3508>::new(black_box(id)).position_loop(position, speed).with_opening(Duration::ZERO)
+            Config::<M3508>::new(black_box(id))
+                .position_loop(position, speed)
+                .with_opening(Duration::ZERO)
         });
         let mut bus = Bus::new();
         let motors = bus.attach_all(configs).unwrap();
