@@ -1,8 +1,8 @@
 //! One device or several, as their caller sees them.
 
 use super::visitor::{
-    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Search, Standing,
-    Stop, Superseded, Trip, Update, Visitor,
+    Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Rival, Search,
+    Standing, Stop, Superseded, Trip, Update, Visitor,
 };
 use super::{ArmError, Claim, Edge, Ingest, Missing};
 use crate::frame::CanFrame;
@@ -113,9 +113,10 @@ pub trait Devices {
     /// Returns two motors that use one CAN id, if any: on a bus with several families, say.
     fn clash(&mut self) -> Option<(Claim, Claim)> {
         for index in 0.. {
-            let claim = self.claims().nth(index)?;
-            let other = self.claims().skip(index + 1).find(|other| other.clashes_with(&claim));
-            if let Some(other) = other {
+            let mut rival = Rival { left: index, claim: None, other: None };
+            self.visit(&mut rival);
+            let claim = rival.claim?;
+            if let Some(other) = rival.other {
                 return Some((claim, other));
             }
         }
@@ -296,6 +297,30 @@ mod tests {
         };
         assert_eq!((one.motor().model(), other.motor().model()), ("M3508", "M2006"));
         assert!(!both.is_armed());
+    }
+
+    /// Counts how often its parts are visited.
+    struct Counted([Bus; 2], usize);
+
+    impl Devices for Counted {
+        fn visit(&mut self, visitor: &mut impl Visitor) {
+            self.1 += 1;
+            self.0.visit(visitor);
+        }
+    }
+
+    /// Each visit lists all ids. With one for each pair of them, arming took longer than a watchdog waits.
+    #[test]
+    fn clashes_are_found_in_one_visit_for_each_id() {
+        let mut parts = [Bus::new(), Bus::new()];
+        for id in 1..=4 {
+            parts[0].attach(Config::<M3508>::new(id)).unwrap();
+            parts[1].attach(Config::<Gm6020Voltage>::new(id + 3)).unwrap();
+        }
+        let mut counted = Counted(parts, 0);
+        assert_eq!(counted.clash(), None);
+        let visits = counted.1;
+        assert_eq!((visits, counted.claims().count()), (12, 11), "8 of feedback, 3 commands");
     }
 
     #[test]

@@ -111,6 +111,29 @@ impl Visitor for Nth {
     }
 }
 
+/// Looks for a claim that clashes with the one that has so many before it.
+pub(super) struct Rival {
+    pub(super) left: usize,
+    pub(super) claim: Option<Claim>,
+    pub(super) other: Option<Claim>,
+}
+
+impl Visitor for Rival {
+    #[inline]
+    fn visit(&mut self, device: &mut impl CanDevice) {
+        for other in device.claims() {
+            match (self.claim, self.left.checked_sub(1)) {
+                (Some(claim), _) => {
+                    let clashes = self.other.is_none() && other.clashes_with(&claim);
+                    self.other = if clashes { Some(other) } else { self.other };
+                }
+                (None, Some(left)) => self.left = left,
+                (None, None) => self.claim = Some(other),
+            }
+        }
+    }
+}
+
 pub(super) struct Obstacles {
     pub(super) now: Instant,
     pub(super) missing: Missing,
