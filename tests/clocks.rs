@@ -22,6 +22,8 @@ use custom_motor::MyMotor;
 
 const DEADLINE_US: u64 = 100_000;
 const PAUSE_US: u64 = 100_000;
+/// A program that stalls did not release its switch.
+const LONGEST_STEP_US: u64 = 20_000;
 
 /// A device with one motor, or several that do the same.
 trait Subject {
@@ -181,8 +183,8 @@ mod pins {
 
     impl Subject for RcPwm<Pin> {
         fn hear(&mut self, _now: Instant) {}
-        fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-            Self::arm(self, now)
+        fn arm(&mut self, _now: Instant) -> Result<(), ArmError> {
+            Self::arm(self)
         }
         fn is_armed(&mut self) -> bool {
             Self::is_armed(self)
@@ -234,15 +236,15 @@ struct Reference {
     is_new: bool,
     /// A trip that no arming has taken back.
     tripped: bool,
-    /// The last request to arm, or the last trip.
-    asked: u64,
+    /// The updates since the last request to arm, the last trip and the last update without time.
+    quiet_us: u64,
 }
 
 impl Reference {
     fn arm(&mut self, now: u64, outcome: Result<(), ArmError>, is_armed: bool) {
-        let paused = now.saturating_sub(self.asked) >= PAUSE_US;
+        let paused = self.quiet_us >= PAUSE_US;
         assert!(outcome.is_err() || paused || !self.tripped, "armed at {now}: {self:?}");
-        self.asked = now;
+        self.quiet_us = 0;
         if outcome.is_ok() {
             (self.tripped, self.is_armed, self.armed_at) = (false, is_armed, now);
         }
@@ -259,13 +261,15 @@ impl Reference {
         let step = self.updated.map_or(Some(0), |updated| now.checked_sub(updated));
         let moved_on = now >= self.armed_at && (self.updated.is_none() || step > Some(0));
         self.updated = Some(now);
+        self.quiet_us += step.unwrap_or(0).min(LONGEST_STEP_US);
         if !moved_on {
-            self.driven_us = None;
+            (self.driven_us, self.quiet_us) = (None, 0);
+            self.armed_at = self.armed_at.min(now);
             assert!(!is_armed, "armed without time at {now}: {self:?}");
         }
         // The application never disarms.
         if core::mem::replace(&mut self.is_armed, is_armed) && !is_armed {
-            (self.tripped, self.asked) = (true, now);
+            (self.tripped, self.quiet_us) = (true, 0);
         }
         let Some(driven_us) = &mut self.driven_us else {
             assert!(!drives, "driven without a target at {now}: {self:?}");

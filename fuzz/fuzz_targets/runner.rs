@@ -110,6 +110,7 @@ struct Known {
     stepped: Option<u64>,
     /// Who may arm after the bus was lost, and how often it was.
     gesture: Gesture,
+    updated: Option<u64>,
     losses: u32,
 }
 
@@ -250,12 +251,14 @@ type Shell<'a> = Runner<Nb<Scripted>, &'a ManualClock, Watched>;
 fn step(runner: &mut Shell, known: &mut Known, tick: Tick) {
     let offered = runner.port_mut().0.offered;
     runner.tick(tick);
+    let (now, before) = (tick.now().as_micros(), known.updated.replace(tick.now().as_micros()));
+    known.gesture.update(now.checked_sub(before.unwrap_or(now)));
     assert!(runner.port_mut().0.offered - offered <= 5, "I1");
     assert!(!STOP.is_set() || CanDevice::is_stopped(runner.device()));
     assert!(!runner.is_bus_down() || !runner.is_armed());
     let losses = runner.statistics().bus_losses;
     if core::mem::replace(&mut known.losses, losses) != losses {
-        known.gesture.trip(tick.now().as_micros());
+        known.gesture.trip();
     }
 }
 
@@ -269,12 +272,12 @@ fn hear_all(runner: &mut Shell, known: &mut Known, now: u64) {
 }
 
 fn arm(runner: &mut Shell, known: &mut Known, now: u64) {
-    let (down, granted) = (runner.is_bus_down(), known.gesture.ask(now));
+    let (down, granted) = (runner.is_bus_down(), known.gesture.ask());
     let armed = runner.arm(Tick::new(Instant::from_micros(now), 0.001));
     assert!(armed.is_err() || !STOP.is_set() && !down);
     if armed.is_ok() {
         assert!(granted, "armed without a new request since the bus was lost: {known:?}");
-        known.gesture.grant();
+        known.gesture.grant(false);
     }
     assert!(!STOP.is_set() || armed == Err(ArmError::Stopped));
 }

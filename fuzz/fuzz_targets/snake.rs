@@ -259,8 +259,7 @@ impl Story {
             if before && !after {
                 self.known[index].end();
                 if !disarms {
-                    let stamp = self.known[index].stamp;
-                    self.known[index].gesture.trip(stamp);
+                    self.known[index].gesture.trip();
                 }
             }
         }
@@ -351,7 +350,7 @@ impl Story {
                 let asked = self.known.iter_mut().zip(&self.handles);
                 let granted = asked
                     .filter(|(_, handle)| self.joints.link(**handle).is_some())
-                    .fold(true, |granted, (known, _)| known.gesture.ask(self.now) && granted);
+                    .fold(true, |granted, (known, _)| known.gesture.ask() && granted);
                 if self.joints.arm(Instant::from_micros(self.now)).is_ok() {
                     assert!(!self.joints.is_stopped() && self.joints.is_armed());
                     assert!(granted, "armed without a new request");
@@ -392,7 +391,7 @@ impl Story {
     fn engaged(&mut self, before: [bool; 3]) {
         for (index, known) in self.known.iter_mut().enumerate().filter(|(it, _)| !before[*it]) {
             if self.joints.is_joint_armed(self.handles[index]) {
-                known.gesture.grant();
+                known.gesture.grant(false);
                 known.stamp = known.stamp.max(self.now);
                 known.armed_at = known.armed_at.max(self.now);
                 known.lost_time = false;
@@ -426,7 +425,11 @@ impl Story {
         self.joints.update(Tick::new(Instant::from_micros(self.now), dt_s));
         let holds = self.joints.counters().bad_steps != bad_steps;
         let is_lost = self.updated.is_some_and(|updated| self.now <= updated);
+        let step = self.updated.map_or(0, |updated| self.now.saturating_sub(updated));
         self.updated = Some(self.now);
+        for known in &mut self.known {
+            known.gesture.update((!is_lost).then_some(step));
+        }
         assert!(holds || !is_lost, "time does not move on at {}", self.now);
         if is_lost {
             self.lose_time(|_| true);

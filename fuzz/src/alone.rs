@@ -102,16 +102,16 @@ impl Alone {
         (self.driven_us, self.counted) = (0, now);
     }
 
-    /// Arms it where the whole bus was armed. The gesture belongs to the whole bus, so here it is made.
-    pub fn engage(&mut self, now: Instant) {
+    /// Arms it where the whole bus was armed; `false` when a trip that left the whole bus with its motor is still known here.
+    pub fn engage(&mut self, now: Instant) -> bool {
         let before = self.is_armed();
-        _ = self.bus.ask(Instant::START);
-        _ = self.bus.ask(Instant::from_micros(u64::MAX));
+        let granted = self.bus.ask();
         self.bus.engage(now);
         if !before && self.is_armed() {
             self.rest();
             (self.opened, self.lost_time) = (Some(now.as_micros()), false);
         }
+        granted
     }
 
     /// Time did not move on: no age is known, and nothing is fresh.

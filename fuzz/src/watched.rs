@@ -50,6 +50,8 @@ pub struct Watched {
     /// No update may lie before it: the time of the last arming, until time is lost.
     armed_at: u64,
     gesture: Gesture,
+    /// Motors that were relaxed since they were armed, and wait to be armed again.
+    tripped: [bool; COUNT],
     held: u32,
     stopped: bool,
     /// Frames by what became of them.
@@ -81,6 +83,7 @@ impl Watched {
             clock: 0,
             armed_at: 0,
             gesture: Gesture::default(),
+            tripped: [false; COUNT],
             held: 0,
             stopped: false,
             malformed: 0,
@@ -150,6 +153,7 @@ impl Watched {
         match (self.motors[index], alone.motor) {
             (Some(motor), Some(same)) => {
                 self.bus.detach(motor.handle());
+                self.tripped[index] = false;
                 self.untimed = true;
                 alone.bus.detach(same.handle());
                 (self.motors[index], alone.motor) = (None, None);
@@ -179,7 +183,7 @@ impl Watched {
         let handles = |index: &usize| self.motors[*index].map(Motor::handle);
         let handles: Vec<_> = chosen.iter().filter_map(handles).collect();
         let now = Instant::from_micros(self.clock);
-        let granted = self.gesture.ask(self.clock);
+        let granted = self.gesture.ask();
         let outcome = self.bus.arm_only(&handles, now);
         assert!(granted || outcome.is_err(), "armed without a new request");
         assert!(!granted || outcome != Err(ArmError::NotReleased), "a new request is refused");
@@ -188,16 +192,20 @@ impl Watched {
         }
     }
 
-    /// Has the bus do something at `now`, and notes whether it relaxed a motor until it is armed.
-    fn noting_trips<T>(&mut self, now: u64, act: impl FnOnce(&mut Bus) -> T) -> T {
+    /// Has the bus do something, and notes whether it relaxed a motor until it is armed.
+    fn noting_trips<T>(&mut self, act: impl FnOnce(&mut Bus) -> T) -> T {
         let armed = |bus: &Bus, motors: &[Option<Motor>; COUNT]| {
             motors.map(|motor| motor.is_some_and(|motor| bus.is_motor_armed(motor.handle())))
         };
         let before = armed(&self.bus, &self.motors);
         let outcome = act(&mut self.bus);
         let after = armed(&self.bus, &self.motors);
-        if before.iter().zip(after).any(|(before, after)| *before && !after) {
-            self.gesture.trip(now);
+        for (tripped, (before, after)) in self.tripped.iter_mut().zip(before.into_iter().zip(after))
+        {
+            if before && !after {
+                *tripped = true;
+                self.gesture.trip();
+            }
         }
         outcome
     }
@@ -441,7 +449,7 @@ impl CanDevice for Watched {
         if let (Verdict::Taken, Some(owner)) = (expected, owner) {
             self.settled(owner);
         }
-        let outcome = self.noting_trips(now.as_micros(), |bus| bus.ingest(frame, now));
+        let outcome = self.noting_trips(|bus| bus.ingest(frame, now));
         let verdict = match outcome {
             Ingest::Taken => Verdict::Taken,
             Ingest::Malformed(_) => Verdict::Malformed,
@@ -475,7 +483,9 @@ impl CanDevice for Watched {
         let lost = self.updated.is_some_and(|updated| now <= updated) || now < self.armed_at;
         let holds = !lost && TimeStep::new(tick.dt_s(), 0.02).is_hold();
         let is_long = self.updated.is_some_and(|updated| now > updated + LATE_US);
-        self.noting_trips(now, |bus| bus.update(tick));
+        let step = (!lost).then(|| self.updated.map_or(0, |updated| now - updated));
+        self.gesture.update(step);
+        self.noting_trips(|bus| bus.update(tick));
         self.each_alone(|alone| alone.update(tick));
         if self.updated.is_none() {
             self.pass(now, None);
@@ -565,9 +575,9 @@ impl CanDevice for Watched {
         self.edges.pop_front()
     }
 
-    fn ask(&mut self, now: Instant) -> bool {
-        let granted = self.gesture.ask(now.as_micros());
-        assert_eq!(self.bus.ask(now), granted, "a request counts: {:?}", self.gesture);
+    fn ask(&mut self) -> bool {
+        let granted = self.gesture.ask();
+        assert_eq!(self.bus.ask(), granted, "a request counts: {:?}", self.gesture);
         granted
     }
 
@@ -591,6 +601,7 @@ impl CanDevice for Watched {
 
     fn disarm(&mut self) {
         self.bus.disarm();
+        self.tripped = [false; COUNT];
         self.each_alone(|alone| {
             alone.bus.disarm();
             alone.rest();
@@ -601,7 +612,8 @@ impl CanDevice for Watched {
 
     fn trip(&mut self) {
         CanDevice::trip(&mut self.bus);
-        self.gesture.trip(self.clock);
+        self.gesture.trip();
+        self.tripped = [false; COUNT];
         self.each_alone(|alone| {
             CanDevice::trip(&mut alone.bus);
             alone.rest();
@@ -616,7 +628,8 @@ impl CanDevice for Watched {
 
     fn emergency_stop(&mut self) {
         if !self.stopped {
-            self.gesture.trip(self.clock);
+            self.gesture.trip();
+            self.tripped = [false; COUNT];
         }
         self.bus.emergency_stop();
         self.each_alone(|alone| {
@@ -629,7 +642,7 @@ impl CanDevice for Watched {
 
     fn clear_emergency_stop(&mut self) {
         if self.stopped {
-            self.gesture.trip(self.clock);
+            self.gesture.trip();
         }
         self.bus.clear_emergency_stop();
         self.alone.iter_mut().for_each(|alone| alone.bus.clear_emergency_stop());
@@ -655,10 +668,16 @@ impl Devices for Watched {
 
 impl Watched {
     fn engaged(&mut self, now: Instant, chosen: &[usize]) {
-        self.gesture.grant();
+        chosen.iter().for_each(|index| self.tripped[*index] = false);
+        self.gesture.grant(self.tripped.contains(&true));
         self.now = now.as_micros();
         self.armed_at = self.armed_at.max(self.now);
-        chosen.iter().for_each(|index| self.alone[*index].engage(now));
+        for index in chosen {
+            if !self.alone[*index].engage(now) {
+                self.plug(*index);
+                self.plug(*index);
+            }
+        }
     }
 
     fn note_wire(&mut self, frame: &CanFrame, shows: impl Fn(usize) -> Wire) {

@@ -360,9 +360,15 @@ impl<B> Bus<B> {
         let outcome = change(slot);
         self.journal.note(motor, &conditions, &slot.conditions, now);
         if was_armed && !slot.is_armed() {
-            self.gesture.trip(now);
+            self.note_trip();
         }
         Some(outcome)
+    }
+
+    /// Begins the pause after a trip, of which each update is a part.
+    pub(super) const fn note_trip(&mut self) {
+        self.gesture.trip();
+        self.quiet_until = Instant::START;
     }
 
     pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {

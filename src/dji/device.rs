@@ -64,8 +64,8 @@ impl<B> CanDevice for Bus<B> {
         Self::next_edge(self)
     }
 
-    fn ask(&mut self, now: Instant) -> bool {
-        self.gesture.ask(now)
+    fn ask(&mut self) -> bool {
+        self.gesture.ask()
     }
 
     fn engage(&mut self, now: Instant) {
@@ -80,7 +80,7 @@ impl<B> CanDevice for Bus<B> {
 
     fn trip(&mut self) {
         Self::disarm(self);
-        self.gesture.trip(self.updated);
+        self.note_trip();
     }
 
     fn is_armed(&self) -> bool {
@@ -109,7 +109,7 @@ impl<B> Devices for Bus<B> {
 
 /// Arming and stopping, as of [`Devices`].
 impl<B> Bus<B> {
-    /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms.
+    /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms of updates.
     ///
     /// `now` is the time of the present tick: an update before it counts as a clock that went back.
     ///
@@ -143,7 +143,7 @@ impl<B> Bus<B> {
     /// Clears the emergency stop. The bus stays disarmed, and arming needs a new request.
     pub const fn clear_emergency_stop(&mut self) {
         if self.stopped {
-            self.gesture.trip(self.updated);
+            self.note_trip();
             self.stopped = false;
         }
     }
@@ -178,7 +178,7 @@ impl<B> Bus<B> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
-        let granted = self.gesture.ask(now);
+        let granted = self.gesture.ask();
         if self.stopped {
             return Err(ArmError::Stopped);
         }

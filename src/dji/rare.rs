@@ -67,6 +67,8 @@ impl<B> Bus<B> {
         let ages = if self.is_disturbed { None } else { self.ages().within_limits_us() };
         if let Some(micros) = ages {
             let quiet = Duration::from_micros(micros.min(keep_alive_us).into());
+            // After a trip each update is part of the pause before a request to arm.
+            let quiet = if self.gesture.is_tripped() { Duration::ZERO } else { quiet };
             self.quiet_until = self.updated + quiet;
         } else {
             self.see_to_motors();
@@ -108,8 +110,10 @@ impl<B> Bus<B> {
     }
 
     /// Tells whether the present update lies after the one before, and not before the arming.
-    fn moves_on(&self, before: Instant) -> bool {
-        Progress::moves_on(self.running.then_some(before), self.armed_at, self.updated)
+    fn moves_on(&mut self, before: Instant) -> bool {
+        let step = Progress::step(self.running.then_some(before), self.armed_at, self.updated);
+        self.gesture.pass(step);
+        step.is_some()
     }
 
     /// Ends an update whose time or time step is not usable.

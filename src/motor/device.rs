@@ -23,7 +23,7 @@ use crate::time::{Instant, Tick};
 ///     // fn faulty(&self) -> impl Iterator<Item = MotorName>
 ///     fn second_master(&self) -> Option<Claim> { None }
 ///     fn next_edge(&mut self) -> Option<Edge> { None }
-///     fn ask(&mut self, now: Instant) -> bool { true }
+///     fn ask(&mut self) -> bool { true }
 ///     fn engage(&mut self, now: Instant) {}
 ///     fn disarm(&mut self) {}
 ///     fn trip(&mut self) {}
@@ -72,8 +72,8 @@ pub trait CanDevice {
     fn next_edge(&mut self) -> Option<Edge>;
 
     /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
-    /// 100 ms back.
-    fn ask(&mut self, now: Instant) -> bool;
+    /// 100 ms of updates back.
+    fn ask(&mut self) -> bool;
 
     /// Lets targets through from now on, for the motors that are heard; a motor that takes them already goes on
     /// undisturbed. Called by [`arm`](super::Devices::arm) when all of its conditions hold; without effect while the emergency

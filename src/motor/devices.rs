@@ -133,14 +133,14 @@ pub trait Devices {
 
     /// Arms every device: nothing moves before.
     ///
-    /// Arming is a gesture. After a trip it is granted only when nobody asked for 100 ms, so a program that calls this in each
+    /// Arming is a gesture. After a trip it is granted only when nobody asked for 100 ms of updates, so a program that calls this in each
     /// tick never re-arms. A refused call counts as asking.
     ///
     /// # Errors
     /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a set emergency stop, a
     /// request that was not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let granted = Ask::of(self, now);
+        let granted = Ask::of(self);
         if self.is_stopped() {
             return Err(ArmError::Stopped);
         }

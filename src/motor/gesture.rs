@@ -1,16 +1,19 @@
 //! Arming as a deliberate act.
 
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 
 /// Tells a deliberate request to arm from a request that a program repeats.
 ///
-/// After a trip, a request counts only if neither a trip nor another request lies within [`PAUSE`](Self::PAUSE) before
+/// After a trip, a request counts only if neither a trip nor another request lies within [`PAUSE_US`](Self::PAUSE_US) before
 /// it. A switch that stays on, read in each tick, does not re-arm. A program that reads its switch more slowly than that has to
 /// detect its edge.
+///
+/// The pause consists of updates whose time moved on. A gap between two updates counts for no more than
+/// [`LONGEST_STEP_US`](Self::LONGEST_STEP_US): a program that stalls, or whose clock jumps, did not release its switch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gesture {
-    /// The time of the last request or trip.
-    last: Instant,
+    /// The updates since the last request or trip.
+    quiet_us: u32,
     /// Whether something was relaxed since it was armed, and waits to be armed again.
     tripped: bool,
     /// Whether the last request counts.
@@ -19,21 +22,28 @@ pub(crate) struct Gesture {
 
 impl Gesture {
     /// The pause in which nothing may ask for arming.
-    pub(crate) const PAUSE: Duration = Duration::from_millis(100);
+    const PAUSE_US: u32 = 100_000;
+    const LONGEST_STEP_US: u32 = 20_000;
 
-    pub(crate) const NEW: Self = Self { last: Instant::START, tripped: false, granted: false };
+    pub(crate) const NEW: Self = Self { quiet_us: 0, tripped: false, granted: false };
+
+    /// Notes an update that lies `step` after the one before; `None` when its time did not move on, which begins the pause
+    /// anew.
+    pub(crate) fn pass(&mut self, step: Option<Duration>) {
+        let step_us = step.map(|step| step.micros_u32().unwrap_or(u32::MAX));
+        self.quiet_us = step_us
+            .map_or(0, |step_us| self.quiet_us.saturating_add(step_us.min(Self::LONGEST_STEP_US)));
+    }
 
     /// Notes a trip: a motor was relaxed until it is armed again.
-    pub(crate) const fn trip(&mut self, now: Instant) {
-        self.last = now;
-        self.tripped = true;
-        self.granted = false;
+    pub(crate) const fn trip(&mut self) {
+        *self = Self { quiet_us: 0, tripped: true, granted: false };
     }
 
     /// Takes a request to arm; `false` if it does not count.
-    pub(crate) fn ask(&mut self, now: Instant) -> bool {
-        self.granted = !self.tripped || now.since(self.last) >= Self::PAUSE;
-        self.last = now;
+    pub(crate) const fn ask(&mut self) -> bool {
+        self.granted = !self.tripped || self.quiet_us >= Self::PAUSE_US;
+        self.quiet_us = 0;
         self.granted
     }
 
@@ -49,52 +59,80 @@ impl Gesture {
         self.tripped = self.tripped && !is_free;
         is_free
     }
+
+    /// Tells whether updates have to be [noted](Self::pass): a request counts only after a pause.
+    pub(crate) const fn is_tripped(&self) -> bool {
+        self.tripped
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn at_ms(ms: u64) -> Instant {
-        Instant::START + Duration::from_millis(ms)
+    fn pass_ms(gesture: &mut Gesture, ms: u64, steps: usize) {
+        (0..steps).for_each(|_| gesture.pass(Some(Duration::from_millis(ms))));
     }
 
     #[test]
     fn a_request_that_is_repeated_is_one_request() {
         let mut gesture = Gesture::NEW;
-        assert!(gesture.ask(at_ms(1)) && gesture.ask(at_ms(2)) && gesture.take(), "no trip yet");
-        gesture.trip(at_ms(500));
-        for ms in 501..5_000 {
-            assert!(!gesture.ask(at_ms(ms)) && !gesture.take(), "{ms}");
+        assert!(gesture.ask() && gesture.ask() && gesture.take(), "no trip yet");
+        gesture.trip();
+        for update in 0..5_000 {
+            pass_ms(&mut gesture, 1, 1);
+            assert!(!gesture.ask() && !gesture.take(), "{update}");
         }
-        assert!(!gesture.ask(at_ms(5_098)) && gesture.ask(at_ms(5_198)) && gesture.take());
-        assert!(gesture.ask(at_ms(5_199)) && gesture.take());
+        pass_ms(&mut gesture, 1, 99);
+        assert!(!gesture.ask());
+        pass_ms(&mut gesture, 1, 100);
+        assert!(gesture.ask() && gesture.take());
+        assert!(gesture.ask() && gesture.take());
     }
 
     #[test]
     fn a_trip_after_the_request_takes_it_back() {
         let mut gesture = Gesture::NEW;
-        assert!(gesture.ask(at_ms(200)));
-        gesture.trip(at_ms(200));
+        assert!(gesture.ask());
+        gesture.trip();
         assert!(!gesture.take());
     }
 
     #[test]
     fn a_trip_that_is_kept_needs_a_pause_of_its_own() {
         let mut gesture = Gesture::NEW;
-        gesture.trip(at_ms(100));
-        assert!(gesture.ask(at_ms(200)) && gesture.take());
+        gesture.trip();
+        pass_ms(&mut gesture, 10, 10);
+        assert!(gesture.ask() && gesture.take());
         gesture.keep();
-        assert!(!gesture.take() && !gesture.ask(at_ms(201)) && gesture.ask(at_ms(301)));
+        pass_ms(&mut gesture, 10, 1);
+        assert!(!gesture.take() && !gesture.ask());
+        pass_ms(&mut gesture, 10, 10);
+        assert!(gesture.ask());
+    }
+
+    #[test]
+    fn a_stall_makes_no_pause() {
+        let mut gesture = Gesture::NEW;
+        gesture.trip();
+        for _ in 0..1_000 {
+            pass_ms(&mut gesture, 3_600_000, 1);
+            assert!(!gesture.ask());
+        }
+        pass_ms(&mut gesture, u64::MAX / 1_000, 4);
+        assert!(!gesture.ask());
+        pass_ms(&mut gesture, 3_600_000, 5);
+        assert!(gesture.ask());
     }
 
     #[test]
     fn a_clock_that_swings_makes_no_pause() {
         let mut gesture = Gesture::NEW;
-        gesture.trip(at_ms(10));
-        assert!((0..1_000).all(|turn| !gesture.ask(at_ms(10 + 90 * (turn % 2)))));
-        gesture.trip(at_ms(1_000_000));
-        assert!(!gesture.ask(at_ms(5)), "the clock was set back");
-        assert!(gesture.ask(at_ms(105)));
+        gesture.trip();
+        for _ in 0..1_000 {
+            pass_ms(&mut gesture, 200, 4);
+            gesture.pass(None);
+            assert!(!gesture.ask());
+        }
     }
 }

@@ -151,7 +151,8 @@ impl Guard {
     /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
     #[must_use]
     pub fn drives(&mut self, now: Instant) -> bool {
-        if self.progress.advance(now) {
+        if let Some(step) = self.progress.advance(now) {
+            self.gesture.pass(Some(step));
             self.note(Condition::ClockFault, false, now);
         } else {
             self.lose_time(now);
@@ -181,6 +182,7 @@ impl Guard {
     /// Time did not move on, so that no age is known: feedback counts as late until the next one, and the motor trips.
     pub(crate) fn lose_time(&mut self, now: Instant) {
         self.note(Condition::ClockFault, true, now);
+        self.gesture.pass(None);
         self.reversals = self.reversals.saturating_add(1);
         self.heard = self.heard.map(|heard| heard.min(now));
         self.now = now;
@@ -222,7 +224,7 @@ impl Guard {
     /// Trips: takes the target away and refuses others until the motor is armed again.
     pub const fn relax_until_armed(&mut self) {
         if self.is_armed() {
-            self.gesture.trip(self.now);
+            self.gesture.trip();
         }
         self.latched = true;
         self.commanded = None;
@@ -248,7 +250,8 @@ impl Guard {
     }
 
     /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
-    /// 100 ms back. A request that is repeated in each tick never counts.
+    /// 100 ms back. A request that is repeated in each tick never counts. The 100 ms are those of [updates](Self::drives); one
+    /// counts for no more than 20 ms.
     ///
     /// # Examples
     /// ```
@@ -258,15 +261,19 @@ impl Guard {
     /// let at_ms = |ms: u64| Instant::from_micros(ms * 1_000);
     /// let mut guard = Guard::new();
     /// guard.hear(at_ms(1));
-    /// assert!(guard.ask(at_ms(1)) && guard.engage(at_ms(1)));
+    /// assert!(guard.ask() && guard.engage(at_ms(1)));
     /// guard.relax_until_armed(); // a fault
-    /// guard.hear(at_ms(50));
-    /// assert!(!guard.ask(at_ms(50)) && !guard.engage(at_ms(50))); // too soon: ask again 100 ms later
-    /// guard.hear(at_ms(150));
-    /// assert!(guard.ask(at_ms(150)) && guard.engage(at_ms(150)));
+    /// for ms in 1..=150 {
+    ///     guard.hear(at_ms(ms));
+    ///     assert!(!guard.drives(at_ms(ms)));
+    ///     if ms == 50 {
+    ///         assert!(!guard.ask() && !guard.engage(at_ms(ms))); // too soon: ask again 100 ms later
+    ///     }
+    /// }
+    /// assert!(guard.ask() && guard.engage(at_ms(150)));
     /// ```
-    pub fn ask(&mut self, now: Instant) -> bool {
-        self.gesture.ask(now)
+    pub const fn ask(&mut self) -> bool {
+        self.gesture.ask()
     }
 
     /// Lets targets through from now on, starting from none, if the motor is heard and, after a trip, the last request
@@ -295,7 +302,7 @@ impl Guard {
     /// Disarms, and requires a new request to arm.
     pub const fn trip(&mut self) {
         self.disarm();
-        self.gesture.trip(self.now);
+        self.gesture.trip();
     }
 
     /// Trips, and stays so until it is cleared and armed.
@@ -309,7 +316,7 @@ impl Guard {
     /// Takes the emergency stop back; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
         if self.stopped {
-            self.gesture.trip(self.now);
+            self.gesture.trip();
         }
         self.stopped = false;
     }
@@ -385,9 +392,12 @@ mod tests {
         }
         guard.hear(at_ms(139));
         assert_eq!((guard.link(), guard.admit(true)), (Link::Online, Err(TargetError::Relaxed)));
-        assert!(!guard.ask(at_ms(139)) && !guard.engage(at_ms(139)), "37 ms after the trip");
-        guard.hear(at_ms(239));
-        assert!(guard.ask(at_ms(239)) && guard.engage(at_ms(239)));
+        assert!(!guard.ask() && !guard.engage(at_ms(139)), "no update since the trip");
+        for ms in 140..240 {
+            guard.hear(at_ms(ms));
+            assert!(!guard.drives(at_ms(ms)));
+        }
+        assert!(guard.ask() && guard.engage(at_ms(239)));
         assert_eq!(guard.admit(true), Ok(()));
         assert!(guard.drives(at_ms(240)));
     }
@@ -419,7 +429,7 @@ mod tests {
             assert!(guard.drives(at_ms(1)), "the tick in which it was armed");
             assert!(!guard.drives(at_ms(1)) && !guard.is_armed() && !guard.has_target());
             guard.hear(at_ms(2));
-            assert!(!guard.ask(at_ms(2)) && !guard.engage(at_ms(2)) && !guard.drives(at_ms(2)));
+            assert!(!guard.ask() && !guard.engage(at_ms(2)) && !guard.drives(at_ms(2)));
         }
     }
 

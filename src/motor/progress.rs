@@ -1,6 +1,6 @@
 //! Whether time moves on from update to update.
 
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// The rule of time of every device: an update has to lie after the update before it, and not before the arming.
 ///
@@ -14,13 +14,14 @@ pub(crate) struct Progress {
 impl Progress {
     pub(crate) const NEW: Self = Self { last: None, begun: Instant::START };
 
-    /// Takes the time of an update; `false` if time did not move on. The next update has to lie after it in either case.
-    pub(crate) fn advance(&mut self, now: Instant) -> bool {
-        let moved_on = Self::moves_on(self.last, self.begun, now);
+    /// Takes the time of an update; returns by how much time moved on, `None` if it did not. The next update has to lie after
+    /// it in either case.
+    pub(crate) fn advance(&mut self, now: Instant) -> Option<Duration> {
+        let step = Self::step(self.last, self.begun, now);
         self.last = Some(now);
         // No target is left that an update before the arming could make younger.
         self.begun = self.begun.min(now);
-        moved_on
+        step
     }
 
     /// Takes the time of arming: targets are stamped with it, so that no update may lie before it.
@@ -28,10 +29,11 @@ impl Progress {
         self.begun = self.begun.max(now);
     }
 
-    /// The rule itself.
+    /// The rule itself; the first update has a step of zero.
     #[inline]
-    pub(crate) fn moves_on(last: Option<Instant>, begun: Instant, now: Instant) -> bool {
-        last.is_none_or(|last| last < now) && begun <= now
+    pub(crate) fn step(last: Option<Instant>, begun: Instant, now: Instant) -> Option<Duration> {
+        let moves_on = last.is_none_or(|last| last < now) && begun <= now;
+        moves_on.then(|| now.since(last.unwrap_or(now)))
     }
 }
 
@@ -42,14 +44,14 @@ mod tests {
     #[test]
     fn an_update_lies_after_the_one_before_and_not_before_the_arming() {
         let mut progress = Progress::NEW;
-        let mut advance = |micros| progress.advance(Instant::from_micros(micros));
+        let mut advance = |micros| progress.advance(Instant::from_micros(micros)).is_some();
         assert_eq!(
             [0, 5, 5, 6, 4, 4, 5].map(&mut advance),
             [true, true, false, true, false, false, true]
         );
         progress.begin(Instant::from_micros(9));
         progress.begin(Instant::from_micros(3));
-        let mut advance = |micros| progress.advance(Instant::from_micros(micros));
+        let mut advance = |micros| progress.advance(Instant::from_micros(micros)).is_some();
         assert_eq!([8, 9, 9].map(&mut advance), [false, true, false]);
     }
 
@@ -57,6 +59,6 @@ mod tests {
     fn the_end_of_all_time_stands() {
         let mut progress = Progress::NEW;
         let end = Instant::from_micros(u64::MAX);
-        assert_eq!([end; 3].map(|now| progress.advance(now)), [true, false, false]);
+        assert_eq!([end; 3].map(|now| progress.advance(now).is_some()), [true, false, false]);
     }
 }

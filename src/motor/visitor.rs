@@ -152,14 +152,13 @@ impl Visitor for Obstacles {
 
 /// Hands a request to arm to every device.
 pub(crate) struct Ask {
-    pub(super) now: Instant,
     pub(super) granted: bool,
 }
 
 impl Ask {
     /// Returns whether the request counts for all of them. A caller that refuses on its own hands it on too.
-    pub(crate) fn of(devices: &mut (impl Devices + ?Sized), now: Instant) -> bool {
-        let mut ask = Self { now, granted: true };
+    pub(crate) fn of(devices: &mut (impl Devices + ?Sized)) -> bool {
+        let mut ask = Self { granted: true };
         devices.visit(&mut ask);
         ask.granted
     }
@@ -168,7 +167,7 @@ impl Ask {
 impl Visitor for Ask {
     #[inline]
     fn visit(&mut self, device: &mut impl CanDevice) {
-        self.granted &= device.ask(self.now);
+        self.granted &= device.ask();
     }
 }
 

@@ -148,7 +148,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// When the emergency stop is set, or no counts came.
     pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
-        let granted = self.guard.ask(now);
+        let granted = self.guard.ask();
         if self.guard.is_stopped() {
             return Err(ArmError::Stopped);
         }

@@ -176,7 +176,7 @@ impl core::error::Error for PwmError {}
 ///
 /// let mut esc = RcPwm::new(channel, RcConfig::new())?;
 /// let at_ms = |ms: u64| Tick::new(Instant::from_micros(ms * 1_000), 0.001);
-/// esc.arm(Instant::START)?;
+/// esc.arm()?;
 /// for ms in 0..=2_000 {
 ///     esc.update(at_ms(ms))?; // neutral for 2 s
 /// }
@@ -224,12 +224,12 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// armed or arming.
     ///
     /// # Errors
-    /// The emergency stop is set, or, after a trip, another request lies less than 100 ms back.
-    pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+    /// The emergency stop is set, or, after a trip, another request lies less than 100 ms of updates back.
+    pub fn arm(&mut self) -> Result<(), ArmError> {
         if self.arming != Arming::Idle {
             return Ok(());
         }
-        let granted = self.guard.ask(now);
+        let granted = self.guard.ask();
         if self.guard.is_stopped() {
             return Err(ArmError::Stopped);
         }

@@ -195,7 +195,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             return self.device.arm(tick.now());
         };
         // A refused request is a request.
-        Ask::of(&mut self.device, tick.now());
+        Ask::of(&mut self.device);
         Err(refusal)
     }
 

@@ -233,7 +233,7 @@ impl Joints {
     /// zero, infinite or NaN chooses no joint for one update; a second one in a row relaxes all joints. Frames that disable
     /// a joint are sent all the same.
     pub fn update(&mut self, tick: Tick) {
-        if !self.progress.advance(tick.now()) {
+        if self.progress.advance(tick.now()).is_none() {
             self.lose_time(tick.now());
             return self.hold(tick.now());
         }

@@ -57,10 +57,10 @@ impl CanDevice for Joints {
         Self::next_edge(self)
     }
 
-    fn ask(&mut self, now: Instant) -> bool {
+    fn ask(&mut self) -> bool {
         let mut granted = true;
         for slot in self.slots.iter_mut().filter(|slot| slot.id.is_some()) {
-            granted &= slot.guard.ask(now);
+            granted &= slot.guard.ask();
         }
         granted
     }

@@ -90,7 +90,7 @@ struct Esc {
 
 impl Esc {
     fn arm(&mut self) {
-        _ = self.esc.arm(at_ms(self.ms));
+        _ = self.esc.arm();
     }
 
     /// Some milliseconds at full throttle; whether it is armed then, and its duty.

@@ -105,16 +105,18 @@ impl CanDevice for Careless {
     fn next_edge(&mut self) -> Option<Edge> {
         CanDevice::next_edge(&mut self.0)
     }
-    fn ask(&mut self, now: Instant) -> bool {
-        let granted = self.0.ask(now);
+    fn ask(&mut self) -> bool {
+        let granted = self.0.ask();
         granted || self.1 == Mistake::ArmsAgainAndAgain
     }
     fn trip(&mut self) {
         CanDevice::trip(&mut self.0);
     }
     fn engage(&mut self, now: Instant) {
-        if self.1 == Mistake::ArmsAgainAndAgain {
-            _ = self.0.ask(now + Duration::from_millis(100));
+        if self.1 == Mistake::ArmsAgainAndAgain && !self.0.is_armed() {
+            self.0 = Own::new(MyMotor::new(3).unwrap());
+            let heard = CanFrame::new(id(0x143), &[0, 0, 30]).unwrap();
+            _ = CanDevice::ingest(&mut self.0, &heard, now);
         }
         self.0.engage(now);
         if self.1 == Mistake::KeepsItsTarget && self.3 != 0.0 {
@@ -300,8 +302,8 @@ impl CanDevice for Slipping {
     fn superseded(&self) -> u32 {
         self.wheels.bus().superseded()
     }
-    fn ask(&mut self, now: Instant) -> bool {
-        self.wheels.device().ask(now)
+    fn ask(&mut self) -> bool {
+        self.wheels.device().ask()
     }
     fn trip(&mut self) {
         CanDevice::trip(self.wheels.device());

@@ -101,7 +101,7 @@ impl OnPins for RcPwm<Pin> {
     }
     /// The ESC is one that wants no time: armed with its first pulse.
     fn start(&mut self, now: Instant) -> Result<(), ArmError> {
-        self.arm(now)?;
+        self.arm()?;
         self.go_on(Tick::new(now + Duration::from_micros(1), 0.001));
         Ok(())
     }
@@ -147,6 +147,7 @@ impl<M: OnPins> CanDevice for Wired<M> {
         let Ok(counter) = <[u8; 4]>::try_from(frame.data()) else {
             return Ingest::Malformed(Malformed::Length(frame.length()));
         };
+        self.now = self.now.max(now);
         self.motor.hear(u32::from_be_bytes(counter), now);
         Ingest::Taken
     }
@@ -184,8 +185,8 @@ impl<M: OnPins> CanDevice for Wired<M> {
         self.motor.edge()
     }
     /// The motor asks and starts in one.
-    fn ask(&mut self, now: Instant) -> bool {
-        self.motor.start(now) != Err(ArmError::NotReleased)
+    fn ask(&mut self) -> bool {
+        self.motor.start(self.now) != Err(ArmError::NotReleased)
     }
     fn engage(&mut self, _now: Instant) {}
     fn trip(&mut self) {

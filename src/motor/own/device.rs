@@ -81,8 +81,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.guard.next_edge(self.motor.name())
     }
 
-    fn ask(&mut self, now: Instant) -> bool {
-        self.guard.ask(now)
+    fn ask(&mut self) -> bool {
+        self.guard.ask()
     }
 
     fn engage(&mut self, now: Instant) {

@@ -145,6 +145,9 @@ fn old_targets_nan_bad_steps_and_stops_give_zero() {
     motor.clear_emergency_stop();
     assert_eq!(motor.set_duty(1.0), Err(TargetError::Disarmed));
     assert_eq!(motor.arm(at_ms(108)), Err(ArmError::NotReleased));
+    for ms in 108..208 {
+        assert_eq!(run(&mut motor, ms, 0.001), 0);
+    }
     motor.arm(at_ms(208)).unwrap();
     assert_eq!(run(&mut motor, 208, 0.001), 0, "starts from zero");
     motor.set_duty(1.0).unwrap();

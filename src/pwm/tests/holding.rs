@@ -36,7 +36,9 @@ fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
         motor.update(tick(1)).unwrap();
         assert_eq!(last(&log), 20_000);
         rest(&mut motor);
-        motor.update(tick(100)).unwrap();
+        for ms in 2..=101 {
+            motor.update(tick(ms)).unwrap();
+        }
         motor.arm(at_ms(101)).unwrap();
         motor.set_duty(0.1).unwrap();
         motor.update(Tick::new(at_ms(102), 0.0)).unwrap();

@@ -5,7 +5,7 @@ use super::*;
 fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
     let config = config.with_arming_time(Duration::from_millis(5));
     let mut esc = RcPwm::new(pin("esc", log), config).unwrap();
-    esc.arm(at_ms(0)).unwrap();
+    esc.arm().unwrap();
     for ms in 0..=5 {
         esc.update(tick(ms)).unwrap();
     }
@@ -19,9 +19,9 @@ fn it_takes_targets_only_after_neutral_for_its_arming_time() {
     let mut esc = RcPwm::new(pin("esc", &log), RcConfig::at_once()).unwrap();
     esc.update(tick(0)).unwrap();
     assert_eq!((last(&log), esc.set_throttle(1.0)), (1_500, Err(TargetError::Disarmed)));
-    esc.arm(at_ms(0)).unwrap();
+    esc.arm().unwrap();
     for ms in 1..=2_000 {
-        esc.arm(at_ms(0)).unwrap(); // again and again does not begin anew
+        esc.arm().unwrap(); // again and again does not begin anew
         esc.update(tick(ms)).unwrap();
         assert_eq!((last(&log), esc.set_throttle(1.0)), (1_500, Err(TargetError::Disarmed)));
     }
@@ -61,7 +61,7 @@ fn the_arming_time_begins_with_the_first_neutral_pulse_that_the_channel_took() {
     let log = Log::default();
     let config = RcConfig::at_once().with_arming_time(Duration::from_millis(100));
     let mut esc = RcPwm::new(pin("esc", &log), config).unwrap();
-    esc.arm(at_ms(0)).unwrap();
+    esc.arm().unwrap();
     log.broken.set("esc");
     for ms in 0..500 {
         assert_eq!(esc.update(tick(ms)), Err(Broken));
@@ -91,7 +91,7 @@ fn old_targets_nan_and_stops_give_neutral() {
     assert_eq!((last(&log), esc.is_armed()), (1_500, true));
     esc.set_throttle(0.4).unwrap();
     esc.emergency_stop();
-    assert_eq!(esc.arm(at_ms(108)), Err(ArmError::Stopped));
+    assert_eq!(esc.arm(), Err(ArmError::Stopped));
     esc.update(tick(108)).unwrap();
     assert_eq!((last(&log), esc.is_armed()), (1_500, false));
 }
@@ -128,12 +128,11 @@ fn a_clock_that_stands_or_goes_back_gives_neutral() {
             assert_eq!((last(&log), esc.is_armed()), (1_500, false), "{ms}");
             assert_eq!(esc.set_throttle(1.0), Err(TargetError::Relaxed));
         }
-        assert_eq!(
-            esc.arm(at_ms(100)),
-            Err(ArmError::NotReleased),
-            "94 ms, or less, after the trip"
-        );
-        assert_eq!(esc.arm(at_ms(200)), Ok(()));
+        assert_eq!(esc.arm(), Err(ArmError::NotReleased), "94 ms, or less, after the trip");
+        for ms in 100..200 {
+            esc.update(tick(ms)).unwrap();
+        }
+        assert_eq!(esc.arm(), Ok(()));
     }
 }
 

@@ -247,9 +247,18 @@ fn lost_time<S: Subject>(make: &impl Fn() -> S) -> Outcome {
 /// After a trip: a request that is repeated is never granted, and one after a pause is.
 fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::ArmingIsAGesture;
-    for _ in 0..150 {
+    for round in 0..150 {
+        // A program that stalls did not release its switch.
+        let stalls = round % 50 == 25;
+        if stalls {
+            run.ms += 200;
+            for motor in 0..run.subject.motors() {
+                run.hear(motor);
+            }
+        }
         let now = run.now();
-        let refused = run.subject.device().arm(now) == Err(ArmError::NotReleased);
+        let outcome = run.subject.device().arm(now);
+        let refused = outcome == Err(ArmError::NotReleased) || (stalls && outcome.is_err());
         _ = run.subject.drive(1.0);
         let output = run.step()?;
         run.expect(refused && output.driving == 0, rule)?;
