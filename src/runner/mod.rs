@@ -19,6 +19,7 @@
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
+mod cadence;
 mod edge;
 mod meter;
 mod port;
@@ -42,7 +43,7 @@ pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};
-use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use crate::time::{Clock, Duration, Tick, Ticker};
 use meter::Meter;
 use statistics::increment;
 use watch::Watch;
@@ -129,13 +130,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Sets another period than 1 ms.
-    #[must_use]
-    pub fn with_period(mut self, period: Duration) -> Self {
-        self.ticker = Ticker::new(period);
-        self
-    }
-
     /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
     #[must_use]
     pub fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
@@ -148,37 +142,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
         self.stop = Some(stop);
         self
-    }
-
-    fn read_clock(&mut self) -> Instant {
-        let now = self.clock.now();
-        self.watch.read(now);
-        now
-    }
-
-    /// Reads the clock and returns the step that is due, if any.
-    ///
-    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
-    /// until it is armed again. A clock stands when 200 000 readings show the same time; a received frame counts as 125.
-    pub fn due(&mut self) -> Option<Tick> {
-        let now = self.read_clock();
-        if self.watch.take_standstill() {
-            // Not after the last step that was run, so that it does not count as time that moved on.
-            let last = self.ticker.last();
-            return Some(Tick::new(
-                self.watch.ticked().map_or(last, |ticked| ticked.min(last)),
-                0.0,
-            ));
-        }
-        let before = self.ticker.overruns();
-        let tick = self.ticker.due(now);
-        if tick.is_some() {
-            self.watch.begin_step(now);
-        }
-        if self.ticker.overruns() != before {
-            self.watch.edges.begin(BusCondition::TickOverrun, now);
-        }
-        tick
     }
 
     /// Arms the device: nothing moves before.
