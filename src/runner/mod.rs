@@ -27,6 +27,7 @@ mod port;
 mod queue;
 mod receive;
 mod send;
+mod standstill;
 mod statistics;
 mod stop;
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub struct Statistics {
     pub overruns: u32,
     /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
-    /// Ticks whose time was that of the one before, and spells of a million readings in which the clock stood.
+    /// Ticks whose time was that of the one before, those included that are due because the clock stands.
     pub clock_standstills: u32,
     /// Times that the clock went back.
     pub clock_reversals: u32,
