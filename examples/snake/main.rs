@@ -66,13 +66,13 @@ fn simulate(options: &Options) -> Result<(), Box<dyn Error>> {
 fn robot(port: u16, options: &Options) -> Result<(), Box<dyn Error>> {
     let listener = TcpListener::bind(("127.0.0.1", port))?;
     println!("robot: waits on {}", listener.local_addr()?);
-    let report = tcp::robot(&listener, options.seconds, options.seed)?;
+    let report = tcp::robot(&listener, options.seconds, options.seed, || {})?;
     println!("{}", report::side("robot", &report));
     Ok(report.verdict(FRAME_PERIOD_S)?)
 }
 
 fn host(port: u16, options: &Options) -> Result<(), Box<dyn Error>> {
-    let report = tcp::host(port, options.seconds)?;
+    let report = tcp::host(port, options.seconds, || {})?;
     println!("{}", report::side("host", &report));
     Ok(report.verdict(FRAME_PERIOD_S)?)
 }
