@@ -86,6 +86,8 @@ pub struct Runner<P, K, D> {
     clock: K,
     device: D,
     ticker: Ticker,
+    /// The step that is due and was not run.
+    waiting: Option<Tick>,
     turn: u32,
     statistics: Statistics,
     stop: Option<&'static EmergencyStop>,
@@ -104,6 +106,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             clock,
             device,
             ticker: Ticker::new(Duration::from_millis(1)),
+            waiting: None,
             turn: 0,
             statistics: Statistics {
                 received: 0,
@@ -196,6 +199,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 
     fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
+        self.waiting = None;
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
@@ -215,7 +219,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn statistics(&mut self) -> Statistics {
         Statistics {
             superseded: self.device.superseded(),
-            overruns: self.ticker.overruns(),
+            overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
             clock_standstills: self.watch.standstills,
             clock_reversals: self.watch.reversals,
             ..self.statistics

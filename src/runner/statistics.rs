@@ -35,7 +35,7 @@ pub struct Statistics {
     pub superseded: u32,
     /// Received frames that a queue dropped before they came here.
     pub lost: u32,
-    /// Periods without a tick.
+    /// Periods without a tick: that passed before the program asked, or whose step it did not run.
     pub overruns: u32,
     /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
