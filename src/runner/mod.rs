@@ -185,7 +185,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.tick_with(tick, |_| {});
     }
 
-    /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`.
+    /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`, if they
+    /// have at most 8 bytes.
     pub fn tick_with(&mut self, tick: Tick, evicted: impl FnMut(&CanFrame)) {
         self.step(tick, |_| {}, evicted);
     }

@@ -28,7 +28,7 @@ pub struct Statistics {
     pub send_errors: ErrorCounts,
     /// Own frames that the driver gave back for others of higher priority. Kept as well.
     pub evicted: u32,
-    /// Frames of others that the driver gave back for ours, handed back.
+    /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
     pub evicted_unrelated: u32,
     /// Command frames that newer ones replaced before the driver took them; wraps. See
     /// [`Devices::superseded`](crate::motor::Devices::superseded).
