@@ -4,6 +4,8 @@
 //! the two functions below are embassy tasks, the `RefCell` is an `embassy_sync` mutex, `Timer` is
 //! `embassy_time::Ticker`. `cargo run --example async_sans_io`
 
+mod console;
+
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::frame::CanFrame;
@@ -96,12 +98,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let state = bus.borrow().state(motor).ok_or("the motor was never heard")?;
-    println!(
+    console::line(format_args!(
         "{}: {:.1} rpm, {:.2} A",
         state.motor,
         state.velocity.as_rpm(),
         state.current.as_amperes()
-    );
+    ));
     if (state.velocity.as_rpm() + 100.0).abs() > 2.0 {
         return Err("the motor does not turn at -100 rpm".into());
     }

@@ -3,6 +3,8 @@
 //! Its motor has a gear of 27, an id of its own and frames of its own; everything else, from arming to the command
 //! deadline and the look-out for stalls, it has from the crate. `cargo run --example custom_motor`
 
+mod console;
+
 use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
@@ -166,14 +168,17 @@ mod simulation {
             _ = mine.set_velocity((), AngularVelocity::from_rpm(mine_rpm));
             runner.tick(tick);
             while let Some(edge) = runner.device_mut().next_edge() {
-                println!("{edge}");
+                console::line(format_args!("{edge}"));
                 edges.push((edge.condition, edge.began));
             }
             if ms % 200 == 199 {
                 let (bus, mine) = runner.device();
                 let dji = bus.velocity(wheel).map_or(f32::NAN, AngularVelocity::as_rpm);
                 let own = mine.velocity(()).map_or(f32::NAN, AngularVelocity::as_rpm);
-                println!("{:>5} ms   M3508 {dji:7.1} rpm   MyMotor {own:7.1} rpm", ms + 1);
+                console::line(format_args!(
+                    "{:>5} ms   M3508 {dji:7.1} rpm   MyMotor {own:7.1} rpm",
+                    ms + 1
+                ));
             }
         }
         let (bus, mine) = runner.device();
@@ -182,7 +187,7 @@ mod simulation {
         if (dji - rpm).abs() > 4.0 || (own - mine_rpm).abs() > 3.0 {
             return Err(format!("{dji} and {own} rpm are not {rpm} and {mine_rpm}").into());
         }
-        println!("{}", mine.health());
+        console::line(format_args!("{}", mine.health()));
         if edges != [(Condition::Stalled, true), (Condition::Stalled, false)] {
             return Err(format!("one stall was expected, not {edges:?}").into());
         }
@@ -228,7 +233,7 @@ mod simulation {
         let mut robot = (bus, Own::new(DamiaoSpeed(MyMotor::new(1)?)));
         match robot.arm(Instant::START) {
             Err(ArmError::Clash(one, other)) => {
-                println!("refused: {one} clashes with {other}");
+                console::line(format_args!("refused: {one} clashes with {other}"));
                 let clash = [&one, &other].map(Claim::role) == [Role::Feedback, Role::Command];
                 if clash { Ok(()) } else { Err("the wrong clash".into()) }
             }

@@ -10,6 +10,7 @@
 //! further off than it may be, or is driven by an IMU that is dead.
 
 mod arguments;
+mod console;
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
@@ -190,16 +191,18 @@ fn worst(samples: &[Sample], from_s: f32, until_s: f32) -> f32 {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    const USAGE: &str = "usage: gimbal [--fault dead-imu] [FILE.svg]";
     let (mut imu_dies, mut path) = (false, String::from("gimbal.svg"));
     let mut options = arguments::of("gimbal");
     while let Some(option) = options.next() {
         match option.as_str() {
             "--fault" if options.next().as_deref() == Some("dead-imu") => imu_dies = true,
             file if !file.starts_with('-') => file.clone_into(&mut path),
-            _ => {
-                eprintln!("usage: gimbal [--fault dead-imu] [FILE.svg]");
-                std::process::exit(2);
+            "-h" | "--help" => {
+                console::line(format_args!("{USAGE}"));
+                return Ok(());
             }
+            _ => arguments::refuse("gimbal", USAGE),
         }
     }
     let (samples, stale) = drive(imu_dies)?;
@@ -215,7 +218,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ] {
         if from_s < until_s {
             let worst = worst(&samples, from_s, until_s);
-            println!("{what:<32} at most {worst:.2}° off");
+            console::line(format_args!("{what:<32} at most {worst:.2}° off"));
             if worst > BOUND_DEG {
                 wrong.push(format!("{what}: {worst:.2}° off, not {BOUND_DEG}°"));
             }
@@ -225,9 +228,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let driven = samples.iter().filter(|sample| sample.raw != 0).map(|sample| sample.time_s);
         let last = driven.fold(0.0, f32::max);
         let after_ms = (last - FAULT_S) * 1e3;
-        println!(
+        console::line(format_args!(
             "the IMU died at {FAULT_S} s; driven for {after_ms:.0} ms more, {stale} targets refused"
-        );
+        ));
         // The last frame is up to 1 ms older, and 20 ms old is too old; a command takes 1 ms to the motor.
         if !(0.0..=22.0).contains(&after_ms) || stale < 2_900 {
             wrong.push(format!("driven for {after_ms} ms by a dead IMU, {stale} refused"));
@@ -235,7 +238,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     } else if stale > 0 {
         wrong.push(format!("{stale} measurements of a healthy IMU were too old"));
     }
-    println!("{path}");
+    console::line(format_args!("{path}"));
     if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ").into()) }
 }
 

@@ -4,6 +4,8 @@
 //! the interrupt and one of the task), and the mailbox of targets is a critical-section mutex.
 //! `cargo run --example interrupt_queue`
 
+mod console;
+
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
@@ -82,11 +84,15 @@ fn main() -> Result<(), Box<dyn Error>> {
                 reached = rpm;
             }
             if ms % 100 == 99 {
-                println!("{:>4} ms  {rpm:6.1} rpm  armed {}", ms + 1, runner.is_armed());
+                console::line(format_args!(
+                    "{:>4} ms  {rpm:6.1} rpm  armed {}",
+                    ms + 1,
+                    runner.is_armed()
+                ));
             }
         }
         drop(wire);
-        println!("{} frames dropped by the queue", runner.statistics().lost);
+        console::line(format_args!("{} frames dropped by the queue", runner.statistics().lost));
         if (reached - 200.0).abs() > 4.0 || runner.is_armed() {
             return Err(
                 format!("reached {reached:.1} rpm of 200, armed {}", runner.is_armed()).into()

@@ -4,6 +4,8 @@
 //! rest is. The drives are played by hand on the simulated bus. One turns, one holds an angle; then a drive loses its supply
 //! for a moment, and at the end there is an emergency stop. `cargo run --example mit_motor`
 
+mod console;
+
 use drivetrain::frame::CanFrame;
 use drivetrain::math::wrap_pi;
 use drivetrain::motor::{Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order};
@@ -248,7 +250,7 @@ mod simulation {
             _ = second.set_angle((), joint);
             runner.tick(tick);
             while let Some(edge) = runner.device_mut().next_edge() {
-                println!("{edge}");
+                console::line(format_args!("{edge}"));
                 edges.push((edge.motor.id(), edge.condition, edge.began));
             }
             if ms % 200 == 199 {
@@ -260,7 +262,7 @@ mod simulation {
                         "{power} {velocity_rad_per_s:5.2} rad/s {degrees:6.1}° {torque_nm:6.3} Nm"
                     )
                 });
-                println!("{:>5} ms   {}", ms + 1, state.join("   "));
+                console::line(format_args!("{:>5} ms   {}", ms + 1, state.join("   ")));
             }
             let at =
                 (drives[0].shaft.velocity_rad_per_s, drives[1].shaft.position_rad.to_degrees());

@@ -26,11 +26,14 @@ const DISTANCE_M: f32 = 0.22;
 const SPEED: PidConfig = PidConfig::new(4.0, 10.0, 0.0).with_output_limit(8.0);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = course::output("omni")?;
+    let path = course::output("omni");
     let world = World::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear"], &samples)?;
-    println!("bus          {:.0} % load", 100.0 * world.traffic(Line::Can1).load());
+    course::console::line(format_args!(
+        "bus          {:.0} % load",
+        100.0 * world.traffic(Line::Can1).load()
+    ));
     course::judge(&samples)
 }
 

@@ -2,6 +2,8 @@
 //!
 //! A GM6020 turns its absolute angle back and forth. `cargo run --example sans_io`
 
+mod console;
+
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 use drivetrain::frame::CanFrame;
@@ -59,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if ms % 250 == 249 {
             let angle =
                 bus.state(yaw).map_or(f32::NAN, |state| state.position.angle().as_degrees());
-            println!("{ms:>5} ms  {angle:7.2} degrees");
+            console::line(format_args!("{ms:>5} ms  {angle:7.2} degrees"));
         }
     }
     let angle = bus.state(yaw).ok_or("the motor was never heard")?.position.angle();

@@ -48,12 +48,15 @@ type Motors = ModuleMotors<Handle<M3508>, Handle<Gm6020Voltage>>;
 type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = course::output("swerve")?;
+    let path = course::output("swerve");
     let world = World::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear left", "rear right"], &samples)?;
     for (line, kind) in [(Line::Can1, "drive"), (Line::Can2, "steering")] {
-        println!("bus          {:.0} % load, {kind}", 100.0 * world.traffic(line).load());
+        course::console::line(format_args!(
+            "bus          {:.0} % load, {kind}",
+            100.0 * world.traffic(line).load()
+        ));
     }
     course::judge(&samples)
 }

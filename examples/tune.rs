@@ -8,6 +8,7 @@
 //! of their inertia and friction is an estimate: take the procedure home, not the gains.
 
 mod arguments;
+mod console;
 
 use drivetrain::control::{
     Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
@@ -128,13 +129,13 @@ fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepMeasures, Cu
 
 fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
     let found = identify(plan)?;
-    println!(
+    console::line(format_args!(
         "{}: ultimate gain {:.3} {unit} per rad/s, ultimate period {:.1} ms",
         plan.name,
         found.ultimate_gain,
         1e3 * found.ultimate_period_s,
         unit = plan.unit,
-    );
+    ));
     let (before, before_curve) = step(plan, plan.guessed)?;
     report("guessed", plan.guessed, &before);
     let gains = found.gains(plan.rule);
@@ -146,7 +147,7 @@ fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
 fn report(title: &str, speed: PidConfig, measures: &StepMeasures) {
     let ms = |time_s: Option<f32>| time_s.map_or("never".into(), |s| format!("{:.0} ms", 1e3 * s));
     let (kp, ki, _) = speed.gains();
-    println!(
+    console::line(format_args!(
         "  {title:<15} kp {:.3}  ki {:.2}   rise {}, overshoot {:.1} %, settled (5 %) {}, steady error {:+.3} rad/s",
         kp,
         ki,
@@ -154,7 +155,7 @@ fn report(title: &str, speed: PidConfig, measures: &StepMeasures) {
         100.0 * measures.overshoot,
         ms(measures.settling_time_s),
         measures.steady_error,
-    );
+    ));
 }
 
 fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
@@ -187,14 +188,17 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    let path = match arguments::of("tune").next() {
-        Some(option) if option.starts_with('-') => {
-            eprintln!("usage: tune [FILE.svg]");
-            std::process::exit(if ["-h", "--help"].contains(&option.as_str()) { 0 } else { 2 });
-        }
-        path => path.unwrap_or_else(|| "tune.svg".into()),
-    };
+    const USAGE: &str = "usage: tune [FILE.svg]";
+    let mut arguments = arguments::of("tune");
+    let path = arguments.next().unwrap_or_else(|| "tune.svg".into());
+    if ["-h", "--help"].contains(&path.as_str()) {
+        console::line(format_args!("{USAGE}"));
+        return Ok(());
+    }
+    if path.starts_with('-') || arguments.next().is_some() {
+        arguments::refuse("tune", USAGE);
+    }
     plot(&path, &[tune(&WHEEL)?, tune(&YAW)?])?;
-    println!("plot: {path}");
+    console::line(format_args!("plot: {path}"));
     Ok(())
 }

@@ -5,6 +5,8 @@
 //! both axles, because half a chassis pulls sideways; that is its decision, and the gimbal holds its angle meanwhile.
 //! `cargo run --example two_buses`
 
+mod console;
+
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, Handle, M3508};
@@ -172,17 +174,21 @@ fn main() -> Result<(), Box<dyn Error>> {
                 mecanum.forward(wheels).vx_m_s
             });
             let heard = odometry.map_or("a bus is down".into(), |vx| format!("{vx:5.2} m/s"));
-            println!("{:>5} ms   true {:5.2} m/s   odometry {heard}", ms + 1, truth.vx_m_s);
+            console::line(format_args!(
+                "{:>5} ms   true {:5.2} m/s   odometry {heard}",
+                ms + 1,
+                truth.vx_m_s
+            ));
         }
     }
     let back = world.chassis().ok_or("no chassis")?.twist;
-    edges.iter().for_each(|(bus, edge)| println!("{bus}: {edge}"));
-    println!(
+    edges.iter().for_each(|(bus, edge)| console::line(format_args!("{bus}: {edge}")));
+    console::line(format_args!(
         "frames sent: {} in front, {} in the rear, {} above; the gimbal stayed within {yaw_error:.2}°",
         front.runner.statistics().sent,
         rear.runner.statistics().sent,
         gimbal.runner.statistics().sent,
-    );
+    ));
     if !front_relaxed {
         return Err("the front axle was driven while the rear bus was down".into());
     }

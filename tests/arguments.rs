@@ -1,13 +1,15 @@
-//! An argument that is not UTF-8 is an error with a text in every example that takes arguments, and no panic.
+//! What a shell does to the examples: arguments that make no sense, and an output that nobody reads.
 
 #![cfg(test)]
 #![cfg(unix)]
 
 use std::ffi::OsStr;
 use std::fs;
+use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output, Stdio};
 
 /// The files below a folder of the examples, or the file itself.
 fn sources(path: &Path) -> Vec<PathBuf> {
@@ -15,6 +17,11 @@ fn sources(path: &Path) -> Vec<PathBuf> {
         Ok(entries) => entries.flat_map(|entry| sources(&entry.unwrap().path())).collect(),
         Err(_) => vec![path.to_owned()],
     }
+}
+
+/// What stands in them.
+fn texts(path: &Path) -> Vec<String> {
+    sources(path).into_iter().map(|file| fs::read_to_string(file).unwrap()).collect()
 }
 
 fn examples() -> PathBuf {
@@ -27,8 +34,7 @@ fn with_arguments() -> Vec<String> {
     let takes_some = |path: &PathBuf| {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
         let asks = [format!("arguments::of(\"{name}\")"), format!("course::output(\"{name}\")")];
-        let texts = sources(path).into_iter().map(|file| fs::read_to_string(file).unwrap());
-        let found = texts.into_iter().any(|text| asks.iter().any(|ask| text.contains(ask)));
+        let found = texts(path).iter().any(|text| asks.iter().any(|ask| text.contains(ask)));
         found.then(|| name.to_owned())
     };
     let mut names: Vec<_> = examples.filter_map(|path| takes_some(&path)).collect();
@@ -62,6 +68,94 @@ fn an_argument_that_is_not_utf_8_is_named_and_ends_each_example_with_code_2() {
             assert_eq!((output.status.code(), &*said), (Some(2), &*expected));
             assert!(output.stdout.is_empty(), "{name} began to work");
         }
+    }
+}
+
+/// Runs an example whose output nobody reads.
+fn unread(mut program: Command) -> Output {
+    let (reader, writer) = UnixStream::pair().unwrap();
+    drop(reader);
+    program.stdin(Stdio::null()).stdout(OwnedFd::from(writer)).output().unwrap()
+}
+
+// Exit code 1 of `omni`, `swerve`, `socketcan` and `faults`; `tune` left a second argument out without a word.
+#[test]
+fn a_usage_error_is_said_and_ends_each_example_with_code_2() {
+    for name in with_arguments() {
+        if name == "socketcan" && cfg!(not(target_os = "linux")) {
+            continue; // it does nothing there
+        }
+        let output = program(&name).arg("--no-such-option").output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        assert!(said.starts_with(&format!("{name}: ")) && said.len() < 4_000, "{name}: {said}");
+        assert!(output.stdout.is_empty(), "{name} began to work");
+    }
+    for (name, arguments) in [
+        ("chassis", ["--seconds", "never"]),
+        ("snake", ["--robot", "port"]),
+        ("candump", ["--motors", "m3508:9"]),
+        ("faults", ["F24", "F999"]),
+        ("gimbal", ["--fault", "tired-imu"]),
+        ("omni", ["one.svg", "two.svg"]),
+        ("swerve", ["one.svg", "two.svg"]),
+        ("tune", ["one.svg", "two.svg"]),
+    ] {
+        let output = program(name).args(arguments).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name} {arguments:?}: {output:?}");
+    }
+    if cfg!(target_os = "linux") {
+        let both = ["--rpm", "9", "--mecanum", "1,0,0"];
+        let output = program("socketcan").args(both).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+    }
+}
+
+#[test]
+fn each_example_with_arguments_says_how_it_is_called() {
+    for name in with_arguments() {
+        if name == "socketcan" && cfg!(not(target_os = "linux")) {
+            continue; // it does nothing there
+        }
+        let mut asked = program(&name);
+        asked.arg("--help");
+        let output = asked.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && said.contains("usage: "), "{name}: {output:?}");
+        // `chassis --help | true` panicked with code 101, and so did all that printed.
+        let output = unread(asked);
+        let quiet = output.stderr.is_empty() && output.status.success();
+        assert!(quiet, "{name} --help, unread: {output:?}");
+    }
+}
+
+/// Those that print and take no arguments.
+#[test]
+fn each_example_whose_output_nobody_reads_ends_quietly() {
+    let names =
+        ["async_sans_io", "custom_motor", "interrupt_queue", "mit_motor", "sans_io", "two_buses"];
+    for name in names {
+        let output = unread(program(name));
+        assert!(output.status.success() && output.stderr.is_empty(), "{name}: {output:?}");
+    }
+    let rest = fs::read_dir(examples()).unwrap().map(|entry| entry.unwrap().path());
+    let prints = rest.filter(|path| texts(path).iter().any(|text| text.contains("console::line")));
+    let mut known: Vec<_> = names.map(str::to_owned).into_iter().chain(with_arguments()).collect();
+    known.extend(["arguments", "course"].map(str::to_owned));
+    for path in prints {
+        let name = path.file_stem().and_then(OsStr::to_str).unwrap();
+        assert!(known.iter().any(|known| known == name), "{name} prints");
+    }
+}
+
+#[test]
+fn no_example_prints_by_a_way_that_panics() {
+    for file in sources(&examples()) {
+        let text = fs::read_to_string(&file).unwrap();
+        let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let prints =
+            code.into_iter().find(|line| line.contains("print!(") || line.contains("println!("));
+        assert_eq!(prints, None, "{}", file.display());
     }
 }
 

@@ -169,6 +169,14 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
             assert_eq!(chassis.set_limits(limits), Err(LimitError::NotPositive(name)), "{bad}");
         }
     }
+    // For ever, or as good as that: a dead program would drive on.
+    for too_long_s in [f32::INFINITY, f32::MAX, 3_600.0, 1.000_001] {
+        let limits = limits.with_command_timeout(too_long_s);
+        let refused = LimitError::TooLong("command timeout");
+        assert_eq!(limits.validate(), Err(refused), "{too_long_s}");
+        assert_eq!(chassis.set_limits(limits), Err(refused), "{too_long_s}");
+    }
+    assert_eq!(limits.with_command_timeout(1.0).validate(), Ok(()));
     let mut fastest = 0.0_f32;
     for step in 0..2_000_u16 {
         chassis.set_body(Twist::new(1.0, 0.0, 0.0));

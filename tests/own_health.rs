@@ -10,11 +10,17 @@ use drivetrain::motor::{
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{Frame, Id, StandardId};
+use proptest::prelude::*;
+use std::cell::Cell;
+use std::rc::Rc;
 
 /// Reports what the last frame said: temperature, error code, effort and speed in percent. Keeps the share of its last frame.
+#[derive(Default)]
 struct Talker {
     vitals: Vitals,
     share: f32,
+    /// Reported instead of what the frame said.
+    instead: Rc<Cell<Option<Vitals>>>,
 }
 
 fn id(raw: u16) -> Id {
@@ -60,7 +66,7 @@ impl OwnMotor for Talker {
     }
     fn reset(&mut self) {}
     fn vitals(&self) -> Vitals {
-        self.vitals
+        self.instead.get().unwrap_or(self.vitals)
     }
 }
 
@@ -71,7 +77,7 @@ struct Bench {
 
 impl Bench {
     fn new(config: &'static HealthConfig) -> Self {
-        let talker = Talker { vitals: Vitals::default(), share: 1.0 };
+        let talker = Talker { share: 1.0, ..Talker::default() };
         let own = Own::new(talker).with_health(config).unwrap().with_opening(Duration::ZERO);
         let mut bench = Self { own, ms: 0 };
         bench.step([30, 0, 0, 0]);
@@ -198,4 +204,61 @@ fn silence_is_an_edge_and_health_fits_a_line() {
     let line = bench.own.health().to_string();
     let start = "talker #1: offline, disarmed, late, offline, command lost; 1000 Hz, gap 992 us, 30 C, error 0;";
     assert!(line.starts_with(start), "{line}");
+}
+
+/// A hundredth and anything that `f32` can hold.
+fn number() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        (-300..300_i16).prop_map(|percent| f32::from(percent) / 100.0),
+        any::<u32>().prop_map(f32::from_bits),
+    ]
+}
+
+proptest! {
+    /// Law: the share of an order is 0 to 1, and a number, whatever the motor tells, however its health is configured, however it
+    /// opens, and whatever its clock shows.
+    #[test]
+    fn the_share_of_an_order_is_a_number_from_0_to_1(
+        hold in number(),
+        temperatures in prop_oneof![(0..120_i16, 0..120_i16), any::<(i16, i16)>()],
+        opening_us in prop_oneof![0..400_000_u64, any::<u64>()],
+        steps in prop::collection::vec(
+            (prop::option::of(any::<i16>()), -20..130_i16, number(), number(), 0..30_000_u64),
+            1..60,
+        ),
+    ) {
+        let config = HealthConfig::new()
+            .with_temperatures(temperatures.0, temperatures.1)
+            .with_stall(0.1, 0.5, Duration::from_millis(5))
+            .with_stall_hold(hold);
+        let talker = Talker::default();
+        let told = Rc::clone(&talker.instead);
+        let own = Own::new(talker).with_opening(Duration::from_micros(opening_us));
+        // One that makes no sense is refused, and that of the start is left.
+        let mut own = match own.with_health(Box::leak(Box::new(config))) {
+            Ok(own) => own,
+            Err(parameter) => {
+                let broken = !(0.0..=1.0).contains(&hold) || temperatures.0 >= temperatures.1;
+                prop_assert!(broken, "{}", parameter);
+                return Ok(());
+            }
+        };
+        prop_assert!((0.0..=1.0).contains(&hold));
+        let mut us = 1_000;
+        for (any_celsius, celsius, effort, speed, gap_us) in steps {
+            us += gap_us;
+            let now = Instant::from_micros(us);
+            let frame = CanFrame::new(id(0x124), &[0; 4]).unwrap();
+            _ = own.ingest(&frame, now);
+            let temperature_c = any_celsius.or(Some(celsius));
+            let vitals = Vitals { temperature_c, effort, speed, ..Vitals::default() };
+            told.set(Some(vitals));
+            _ = own.arm(now);
+            _ = own.set_velocity((), AngularVelocity::from_rad_per_s(1.0));
+            own.update(Tick::new(now, 0.001));
+            while own.next_frame(0).is_some() {}
+            let share = own.motor().share;
+            prop_assert!((0.0..=1.0).contains(&share), "{} of {:?}", share, vitals);
+        }
+    }
 }

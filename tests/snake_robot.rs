@@ -11,6 +11,7 @@ use drivetrain::sim::{Record, Sender};
 use drivetrain::snake::{Command, Register, Reply};
 use embedded_can::Frame;
 use std::net::TcpListener;
+use std::time::Duration;
 use system::checks::{self, RMS_LIMIT_DEG};
 use system::robot::Event;
 use system::simulation::{Run, Setup, Trouble};
@@ -150,17 +151,52 @@ fn nothing_is_sent_to_a_joint_that_owes_an_answer() {
     assert!(asked > 9_000 && asked - answered <= 1, "{asked} {answered}");
 }
 
-/// In threads here, in processes in CI; real bytes over TCP in both.
-#[test]
-fn host_and_robot_talk_over_tcp() {
+/// Runs host and robot in threads, in processes in CI; real bytes over TCP in both. Each side is held up by its hitch.
+fn talk(robot_hitch: impl FnMut() + Send + 'static, host_hitch: impl FnMut()) {
     const SECONDS: f32 = 4.0;
     let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     let robot = std::thread::spawn(move || {
-        tcp::robot(&listener, SECONDS, 1).map_err(|error| error.to_string())
+        tcp::robot(&listener, SECONDS, 1, robot_hitch).map_err(|error| error.to_string())
     });
-    let host = tcp::host(port, SECONDS).unwrap();
+    let host = tcp::host(port, SECONDS, host_hitch).unwrap();
     let robot = robot.join().unwrap().unwrap();
     assert_eq!((host.verdict(0.05), robot.verdict(0.05)), (Ok(()), Ok(())));
-    assert!(robot.counts.frames <= host.sent && host.counts.frames <= robot.sent);
+    let (down, up) = ((robot.counts.frames, host.sent), (host.counts.frames, robot.sent));
+    assert!(down.0 <= down.1 && up.0 <= up.1, "came and sent: {down:?} {up:?}");
+}
+
+/// Sleeps for so many ms in each turn of that number.
+fn every(turns: u32, ms: u64) -> impl FnMut() + Send {
+    let mut turn = 0;
+    move || {
+        turn += 1;
+        if turn % turns == 0 {
+            std::thread::sleep(Duration::from_millis(ms));
+        }
+    }
+}
+
+#[test]
+fn host_and_robot_talk_over_tcp() {
+    talk(|| {}, || {});
+}
+
+/// Turns that a busy machine stretches: at d71443a a robot that simulates slower than real time never read again.
+#[test]
+fn a_robot_that_is_slower_than_real_time_and_its_host_talk_over_tcp() {
+    talk(every(600, 100), || {});
+}
+
+/// At d71443a the robot made up for the delay in one go, without reading, and counted several frames in one write as one that was
+/// sent.
+#[test]
+fn a_robot_that_is_held_up_and_its_host_talk_over_tcp() {
+    talk(every(5_000, 300), || {});
+}
+
+/// At d71443a the robot stopped whenever it did not hear the host for 160 ms.
+#[test]
+fn a_robot_and_its_host_that_is_held_up_talk_over_tcp() {
+    talk(every(4_000, 200), every(100, 200));
 }

@@ -30,6 +30,8 @@ fn chassis_errors_name_the_value() {
     says(&PowerModel::new(1.0, 1.0, -1.0, 0.0).unwrap_err(), &["k2", "zero or more"]);
     let limits = ChassisLimits::new().with_command_timeout(0.0);
     says(&limits.validate().unwrap_err(), &["command timeout", "above zero"]);
+    let limits = ChassisLimits::new().with_command_timeout(f32::INFINITY);
+    says(&limits.validate().unwrap_err(), &["command timeout", "at most 1 s"]);
     let swing = ModeConfig::new(PidConfig::new(1.0, 0.0, 0.0)).with_rotor(1.0, 2.0, 1.0);
     says(&Modes::new(swing).unwrap_err(), &["swing", "base"]);
     let spoilt = ModeConfig::new(PidConfig::new(f32::NAN, 0.0, 0.0));

@@ -20,9 +20,7 @@ fn main() -> ExitCode {
         Ok(Asked::Run(options)) => options,
         Ok(Asked::Help) => return finish(writeln!(io::stdout(), "{}", options::HELP)),
         Err(message) => {
-            // Nobody is left to be told when standard error is closed.
-            let _ = writeln!(io::stderr(), "candump: {message}\n\n{}", options::HELP);
-            return ExitCode::from(2);
+            arguments::refuse("candump", format_args!("{message}\n\n{}", options::HELP))
         }
     };
     let input: Box<dyn BufRead> = match options.file.as_deref() {

@@ -10,6 +10,8 @@
 
 #[path = "../arguments/mod.rs"]
 mod arguments;
+#[path = "../console/mod.rs"]
+mod console;
 mod justfloat;
 mod log;
 mod modes;
@@ -42,19 +44,16 @@ fn main() -> ExitCode {
             match outcome {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(error) => {
-                    eprintln!("chassis: {error}");
+                    _ = writeln!(std::io::stderr(), "chassis: {error}");
                     ExitCode::FAILURE
                 }
             }
         }
         Ok(Request::Help) => {
-            println!("{}", options::USAGE);
+            console::line(format_args!("{}", options::USAGE));
             ExitCode::SUCCESS
         }
-        Err(message) => {
-            eprintln!("chassis: {message}\n{}", options::USAGE);
-            ExitCode::from(2)
-        }
+        Err(message) => arguments::refuse("chassis", format_args!("{message}\n{}", options::USAGE)),
     }
 }
 
@@ -72,7 +71,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     log.finish()?;
     let elapsed = start.elapsed();
     if show_progress {
-        eprintln!();
+        _ = writeln!(std::io::stderr());
     }
     plot::write(&options.output, &run)?;
     if let Some(path) = &options.csv {
@@ -81,10 +80,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(path) = &options.justfloat {
         std::fs::write(path, justfloat::stream(&run.samples)?)?;
     }
-    print!("{}", report::table(&run));
-    println!("plot: {}", options.output.display());
+    console::line(format_args!("{}", report::table(&run).trim_end()));
+    console::line(format_args!("plot: {}", options.output.display()));
     let ticks = run.samples.len().max(1);
-    eprintln!(
+    _ = writeln!(
+        std::io::stderr(),
         "host: {:.2} s for {:.1} s simulated, {:.2} us a tick with the whole simulation",
         elapsed.as_secs_f64(),
         options.seconds,
@@ -110,12 +110,12 @@ fn run_mode(options: &Options, mode: Mode) -> Result<(), Box<dyn Error>> {
     let outcome = drive.run(show, |record| log.write(record))?;
     log.finish()?;
     if show_progress {
-        eprintln!();
+        _ = writeln!(std::io::stderr());
     }
     modes_plot::write(&options.output, &drive, &outcome)?;
     let Verdict { text, faults } = Verdict::of(&drive, &outcome);
-    print!("{text}");
-    println!("plot         {}", options.output.display());
+    console::line(format_args!("{}", text.trim_end()));
+    console::line(format_args!("plot         {}", options.output.display()));
     if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
 }
 
@@ -123,7 +123,8 @@ fn progress(share: f32) {
     const WIDTH: usize = 50;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1")]
     let done = (share * WIDTH as f32) as usize;
-    eprint!(
+    _ = write!(
+        std::io::stderr(),
         "\r[{}{}] {:3.0} %",
         "#".repeat(done),
         " ".repeat(WIDTH.saturating_sub(done)),

@@ -2,6 +2,8 @@
 
 #[path = "../arguments/mod.rs"]
 mod arguments;
+#[path = "../console/mod.rs"]
+pub(crate) mod console;
 
 use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
@@ -109,9 +111,13 @@ pub(crate) fn judge<const WHEELS: usize>(samples: &[Sample<WHEELS>]) -> Result<(
         .iter()
         .flat_map(|sample| sample.measured_rpm)
         .fold(0.0_f32, |fastest, rpm| fastest.max(rpm.abs()));
-    println!("tracking     {:.1} mm off at most, {:.1} mm at the end", most * 1e3, off(last) * 1e3);
-    println!("odometry     {:.1} mm off at the end", odometry * 1e3);
-    println!("wheels       {wheels:.0} rpm at most");
+    console::line(format_args!(
+        "tracking     {:.1} mm off at most, {:.1} mm at the end",
+        most * 1e3,
+        off(last) * 1e3
+    ));
+    console::line(format_args!("odometry     {:.1} mm off at the end", odometry * 1e3));
+    console::line(format_args!("wheels       {wheels:.0} rpm at most"));
     if most <= BOUND_M {
         Ok(())
     } else {
@@ -178,24 +184,21 @@ pub(crate) fn plot<const WHEELS: usize>(
         chart.draw_series(LineSeries::new(points, color))?;
     }
     root.present()?;
-    println!("plot         {}", path.display());
+    console::line(format_args!("plot         {}", path.display()));
     Ok(())
 }
 
-/// The only argument: where the picture goes.
-///
-/// # Errors
-/// Says how the example is called when there is anything else.
-pub(crate) fn output(example: &str) -> Result<std::path::PathBuf, Box<dyn Error>> {
+/// The only argument: where the picture goes. If there is anything else, says how the example is called, and ends it.
+pub(crate) fn output(example: &str) -> std::path::PathBuf {
     let mut arguments = arguments::of(example);
     let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
     let usage = format!("usage: {example} [FILE.svg]");
     if ["-h", "--help"].contains(&path.as_str()) {
-        println!("{usage}");
+        console::line(format_args!("{usage}"));
         std::process::exit(0);
     }
     if path.starts_with('-') || arguments.next().is_some() {
-        return Err(usage.into());
+        arguments::refuse(example, usage);
     }
-    Ok(path.into())
+    path.into()
 }

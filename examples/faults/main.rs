@@ -21,6 +21,8 @@ mod catalogue;
 mod clocks;
 #[path = "../../tests/faults/commands.rs"]
 mod commands;
+#[path = "../console/mod.rs"]
+mod console;
 #[path = "../../tests/faults/health.rs"]
 mod health;
 #[path = "../../tests/faults/plausibility.rs"]
@@ -47,9 +49,17 @@ fn main() -> ExitCode {
     // What fails is told in its row.
     set_hook(Box::new(|_| {}));
     let wanted: Vec<String> = arguments::of("faults").map(|id| id.to_uppercase()).collect();
+    if wanted.iter().any(|id| ["-H", "--HELP"].contains(&id.as_str())) {
+        console::line(format_args!("usage: faults [ID...]"));
+        return ExitCode::SUCCESS;
+    }
+    let rows = rows::rows(TABLE);
+    if let Some(id) = wanted.iter().find(|id| rows.iter().all(|row| row.id != **id)) {
+        arguments::refuse("faults", format_args!("no row {id}; usage: faults [ID...]"));
+    }
     let (mut held, mut wrong) = (0, 0);
-    println!("id  | outcome | ticks to safe | fault | required | observed");
-    for row in rows::rows(TABLE) {
+    console::line(format_args!("id  | outcome | ticks to safe | fault | required | observed"));
+    for row in rows {
         if !wanted.is_empty() && !wanted.iter().any(|id| id == row.id) {
             continue;
         }
@@ -60,7 +70,7 @@ fn main() -> ExitCode {
         }
         print_row(&row, outcome);
     }
-    println!("{held} rows as required, {wrong} not");
+    console::line(format_args!("{held} rows as required, {wrong} not"));
     if wrong == 0 && held > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -96,8 +106,13 @@ fn print_row(row: &Row<'_>, outcome: Result<Seen, String>) {
     match outcome {
         Ok(Seen { what, ticks_to_safe }) => {
             let ticks = ticks_to_safe.map_or("-".to_owned(), |ticks| ticks.to_string());
-            println!("{id} | ok | {ticks} | {fault} | {required} | {}", what.join("; "));
+            console::line(format_args!(
+                "{id} | ok | {ticks} | {fault} | {required} | {}",
+                what.join("; ")
+            ));
         }
-        Err(why) => println!("{id} | DIFFERS | - | {fault} | {required} | {why}"),
+        Err(why) => {
+            console::line(format_args!("{id} | DIFFERS | - | {fault} | {required} | {why}"))
+        }
     }
 }

@@ -10,6 +10,8 @@
 
 #[path = "../arguments/mod.rs"]
 mod arguments;
+#[path = "../console/mod.rs"]
+mod console;
 mod options;
 mod plot;
 mod report;
@@ -17,6 +19,7 @@ mod system;
 
 use options::{Options, Request};
 use std::error::Error;
+use std::io::Write;
 use std::net::TcpListener;
 use std::process::ExitCode;
 use system::tcp;
@@ -30,18 +33,15 @@ fn main() -> ExitCode {
         Ok(Request::Robot(port, options)) => robot(port, &options),
         Ok(Request::Host(port, options)) => host(port, &options),
         Ok(Request::Help) => {
-            println!("{}", options::USAGE);
+            console::line(format_args!("{}", options::USAGE));
             Ok(())
         }
-        Err(message) => {
-            eprintln!("snake: {message}\n{}", options::USAGE);
-            return ExitCode::from(2);
-        }
+        Err(message) => arguments::refuse("snake", format_args!("{message}\n{}", options::USAGE)),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("snake: {error}");
+            _ = writeln!(std::io::stderr(), "snake: {error}");
             ExitCode::FAILURE
         }
     }
@@ -52,10 +52,11 @@ fn simulate(options: &Options) -> Result<(), Box<dyn Error>> {
     let run = options.setup().run(|_| {})?;
     let elapsed = start.elapsed();
     let checks = system::checks::checks(&run);
-    print!("{}", report::table(&run, &checks));
+    console::line(format_args!("{}", report::table(&run, &checks).trim_end()));
     plot::write(&options.output, &run)?;
-    println!("plot: {}", options.output.display());
-    eprintln!("host: {:.2} s for {:.1} s simulated", elapsed.as_secs_f64(), options.seconds);
+    console::line(format_args!("plot: {}", options.output.display()));
+    let (took_s, seconds) = (elapsed.as_secs_f64(), options.seconds);
+    _ = writeln!(std::io::stderr(), "host: {took_s:.2} s for {seconds:.1} s simulated");
     let failed = checks.iter().filter(|check| !check.holds).count();
     if failed > 0 {
         return Err(format!("{failed} of {} checks failed", checks.len()).into());
@@ -65,14 +66,14 @@ fn simulate(options: &Options) -> Result<(), Box<dyn Error>> {
 
 fn robot(port: u16, options: &Options) -> Result<(), Box<dyn Error>> {
     let listener = TcpListener::bind(("127.0.0.1", port))?;
-    println!("robot: waits on {}", listener.local_addr()?);
-    let report = tcp::robot(&listener, options.seconds, options.seed)?;
-    println!("{}", report::side("robot", &report));
+    console::line(format_args!("robot: waits on {}", listener.local_addr()?));
+    let report = tcp::robot(&listener, options.seconds, options.seed, || {})?;
+    console::line(format_args!("{}", report::side("robot", &report)));
     Ok(report.verdict(FRAME_PERIOD_S)?)
 }
 
 fn host(port: u16, options: &Options) -> Result<(), Box<dyn Error>> {
-    let report = tcp::host(port, options.seconds)?;
-    println!("{}", report::side("host", &report));
+    let report = tcp::host(port, options.seconds, || {})?;
+    console::line(format_args!("{}", report::side("host", &report)));
     Ok(report.verdict(FRAME_PERIOD_S)?)
 }

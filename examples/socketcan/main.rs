@@ -15,6 +15,9 @@ mod adapter;
 #[path = "../arguments/mod.rs"]
 mod arguments;
 #[cfg(target_os = "linux")]
+#[path = "../console/mod.rs"]
+mod console;
+#[cfg(target_os = "linux")]
 mod options;
 #[cfg(target_os = "linux")]
 mod outlet;

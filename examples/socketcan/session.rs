@@ -2,6 +2,7 @@
 
 use crate::adapter::Adapter;
 use crate::arguments;
+use crate::console;
 use crate::options::{HELP, Options, parse};
 use crate::outlet::Outlet;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
@@ -20,7 +21,7 @@ use signal_hook::consts::{
 };
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -86,8 +87,10 @@ fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity
 }
 
 pub(crate) fn main() -> Result<ExitCode, Box<dyn Error>> {
-    let Some(options) = parse(arguments::of("socketcan"))? else {
-        writeln!(io::stdout(), "{HELP}")?;
+    let options = parse(arguments::of("socketcan"));
+    let Some(options) = options.unwrap_or_else(|message| arguments::refuse("socketcan", message))
+    else {
+        console::line(format_args!("{HELP}"));
         return Ok(ExitCode::SUCCESS);
     };
     let end = End::new()?;

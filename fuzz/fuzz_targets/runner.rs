@@ -96,7 +96,9 @@ impl embedded_can::nb::Can for Scripted {
 
 static STOP: EmergencyStop = EmergencyStop::new();
 
-/// From the documentation: a clock stands when so many readings show no later time; a received frame counts as 125.
+/// From the documentation: no fewer readings without a later time are a clock that stands, and so many always. Of received
+/// frames 1600 are as good as the limit: 125 readings each at most.
+const MAY_STAND_AFTER: u64 = 1_000;
 const STANDS_AFTER: u64 = 200_000;
 const READINGS_OF_A_FRAME: u64 = 125;
 
@@ -137,7 +139,7 @@ impl Known {
         };
         let at = tick.now().as_micros();
         if tick.dt_s() == 0.0 && Some(at) == self.stepped {
-            return assert!(self.readings >= STANDS_AFTER, "no step at {now}: {self:?}");
+            return assert!(self.readings >= MAY_STAND_AFTER, "no step at {now}: {self:?}");
         }
         assert!(at == now && is_back == (tick.dt_s() == 0.0), "I4: {tick:?} at {now}: {self:?}");
         (self.stepped, self.furthest, self.readings) = (Some(now), Some(now), 0);

@@ -148,7 +148,7 @@ impl<K: Kinematics> Chassis<K> {
     /// Sets the limits; they hold from the next tick on.
     ///
     /// # Errors
-    /// Names the value that is not above zero. The limits then stay as they were.
+    /// Names the value that is not above zero, or too long. The limits then stay as they were.
     pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), LimitError> {
         limits.validate()?;
         self.limits = limits;

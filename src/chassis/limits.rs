@@ -1,6 +1,9 @@
 use crate::geometry::{Twist, World};
 use crate::units::AngularVelocity;
 
+/// The longest time for which a command may drive. It is that of a target of a motor, which the chassis renews in each tick.
+const MAX_COMMAND_TIMEOUT_S: f32 = 1.0;
+
 /// How fast a chassis may go and change. Everything is off by default but the deadline for commands: 0.1 s.
 ///
 /// # Examples
@@ -48,7 +51,7 @@ impl ChassisLimits {
         Self { wheel_rad_s: limit.as_rad_per_s(), ..self }
     }
 
-    /// Sets after how many seconds without a new command the chassis comes to a stop. Above zero.
+    /// Sets after how many seconds without a new command the chassis comes to a stop. Above zero, and at most 1 s.
     #[must_use]
     pub const fn with_command_timeout(self, timeout_s: f32) -> Self {
         Self { command_timeout_s: timeout_s, ..self }
@@ -57,7 +60,8 @@ impl ChassisLimits {
     /// Checks all values.
     ///
     /// # Errors
-    /// Names the first value that is not above zero.
+    /// Names the first value that is not above zero, or a command timeout above 1 s: with an infinite one, a chassis whose
+    /// program is dead drives on for ever.
     pub fn validate(&self) -> Result<(), LimitError> {
         let named = [
             (self.linear_m_s2, "linear_m_s2"),
@@ -69,6 +73,9 @@ impl ChassisLimits {
             if value.is_nan() || value <= 0.0 {
                 return Err(LimitError::NotPositive(name));
             }
+        }
+        if self.command_timeout_s > MAX_COMMAND_TIMEOUT_S {
+            return Err(LimitError::TooLong("command timeout"));
         }
         Ok(())
     }
@@ -112,12 +119,15 @@ impl Default for ChassisLimits {
 pub enum LimitError {
     /// The named value must be above zero.
     NotPositive(&'static str),
+    /// The named value must be at most 1 s.
+    TooLong(&'static str),
 }
 
 impl core::fmt::Display for LimitError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotPositive(name) => write!(f, "{name} must be above zero"),
+            Self::TooLong(name) => write!(f, "{name} must be at most 1 s"),
         }
     }
 }

@@ -19,6 +19,7 @@
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
+mod cadence;
 mod edge;
 mod meter;
 mod port;
@@ -26,6 +27,7 @@ mod port;
 mod queue;
 mod receive;
 mod send;
+mod standstill;
 mod statistics;
 mod stop;
 #[cfg(test)]
@@ -42,7 +44,7 @@ pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};
-use crate::time::{Clock, Duration, Instant, Tick, Ticker};
+use crate::time::{Clock, Duration, Tick, Ticker};
 use meter::Meter;
 use statistics::increment;
 use watch::Watch;
@@ -84,6 +86,8 @@ pub struct Runner<P, K, D> {
     clock: K,
     device: D,
     ticker: Ticker,
+    /// The step that is due and was not run.
+    waiting: Option<Tick>,
     turn: u32,
     statistics: Statistics,
     stop: Option<&'static EmergencyStop>,
@@ -102,6 +106,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             clock,
             device,
             ticker: Ticker::new(Duration::from_millis(1)),
+            waiting: None,
             turn: 0,
             statistics: Statistics {
                 received: 0,
@@ -129,13 +134,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Sets another period than 1 ms.
-    #[must_use]
-    pub fn with_period(mut self, period: Duration) -> Self {
-        self.ticker = Ticker::new(period);
-        self
-    }
-
     /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
     #[must_use]
     pub fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
@@ -148,37 +146,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn with_emergency_stop(mut self, stop: &'static EmergencyStop) -> Self {
         self.stop = Some(stop);
         self
-    }
-
-    fn read_clock(&mut self) -> Instant {
-        let now = self.clock.now();
-        self.watch.read(now);
-        now
-    }
-
-    /// Reads the clock and returns the step that is due, if any.
-    ///
-    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
-    /// until it is armed again. A clock stands when 200 000 readings show the same time; a received frame counts as 125.
-    pub fn due(&mut self) -> Option<Tick> {
-        let now = self.read_clock();
-        if self.watch.take_standstill() {
-            // Not after the last step that was run, so that it does not count as time that moved on.
-            let last = self.ticker.last();
-            return Some(Tick::new(
-                self.watch.ticked().map_or(last, |ticked| ticked.min(last)),
-                0.0,
-            ));
-        }
-        let before = self.ticker.overruns();
-        let tick = self.ticker.due(now);
-        if tick.is_some() {
-            self.watch.begin_step(now);
-        }
-        if self.ticker.overruns() != before {
-            self.watch.edges.begin(BusCondition::TickOverrun, now);
-        }
-        tick
     }
 
     /// Arms the device: nothing moves before.
@@ -218,7 +185,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.tick_with(tick, |_| {});
     }
 
-    /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`.
+    /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`, if they
+    /// have at most 8 bytes.
     pub fn tick_with(&mut self, tick: Tick, evicted: impl FnMut(&CanFrame)) {
         self.step(tick, |_| {}, evicted);
     }
@@ -232,6 +200,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 
     fn step(&mut self, tick: Tick, limit: impl FnOnce(&mut D), mut evicted: impl FnMut(&CanFrame)) {
+        self.waiting = None;
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
@@ -251,7 +220,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     pub fn statistics(&mut self) -> Statistics {
         Statistics {
             superseded: self.device.superseded(),
-            overruns: self.ticker.overruns(),
+            overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
             clock_standstills: self.watch.standstills,
             clock_reversals: self.watch.reversals,
             ..self.statistics

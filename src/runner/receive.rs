@@ -109,7 +109,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         increment(&mut self.statistics.received);
-        self.watch.receive();
+        self.watch.standstill.receive();
         self.meter.count(frame);
         let outcome = self.device.ingest(frame, now);
         increment(match outcome {

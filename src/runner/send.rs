@@ -56,6 +56,11 @@ impl<P: Port, K, D: Devices> Runner<P, K, D> {
                         self.watch.accepted(frame.header(), now);
                     }
                 }
+                Sent::EvictedForeign => {
+                    self.count_sent(&frame);
+                    increment(&mut self.statistics.evicted_unrelated);
+                    self.watch.accepted(frame.header(), now);
+                }
                 Sent::Full => {
                     increment(&mut self.statistics.refused);
                     self.watch.refused(frame.header(), now);

@@ -28,18 +28,18 @@ pub struct Statistics {
     pub send_errors: ErrorCounts,
     /// Own frames that the driver gave back for others of higher priority. Kept as well.
     pub evicted: u32,
-    /// Frames of others that the driver gave back for ours, handed back.
+    /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
     pub evicted_unrelated: u32,
     /// Command frames that newer ones replaced before the driver took them; wraps. See
     /// [`Devices::superseded`](crate::motor::Devices::superseded).
     pub superseded: u32,
     /// Received frames that a queue dropped before they came here.
     pub lost: u32,
-    /// Periods without a tick.
+    /// Periods without a tick: that passed before the program asked, or whose step it did not run.
     pub overruns: u32,
     /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
-    /// Ticks whose time was that of the one before, and spells of a million readings in which the clock stood.
+    /// Ticks whose time was that of the one before, those included that are due because the clock stands.
     pub clock_standstills: u32,
     /// Times that the clock went back.
     pub clock_reversals: u32,

@@ -3,7 +3,7 @@
 use super::*;
 use crate::dji::{Bus, Config, Handle, M3508};
 use crate::motor::Ingest;
-use crate::time::ManualClock;
+use crate::time::{Instant, ManualClock};
 use embedded_can::{ErrorKind, Frame, StandardId};
 use std::collections::VecDeque;
 use std::vec::Vec;

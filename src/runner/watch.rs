@@ -1,18 +1,12 @@
 //! Whether the loop runs: heard, sent, on time, with a clock that goes on.
 
 use super::edge::Edges;
+use super::standstill::Standstill;
 use super::{BusCondition, BusEdge};
 use crate::time::{Duration, Instant};
 
 /// Without feedback for this long, or with a command frame that waits for this long, something is wrong with the bus.
 const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
-
-/// A clock that shows no later time in so many readings stands: a loop that does nothing else takes 50 ms to 1 s for them.
-const READINGS_OF_A_STANDSTILL: u32 = 200_000;
-
-/// A received frame counts as so many readings, for loops that sleep until a frame comes: 1600 frames take a bus of 1 Mbit/s
-/// 80 ms and more.
-const READINGS_OF_A_FRAME: u32 = 125;
 
 /// A frame that the device does not offer any more is not waited for.
 const FORGOTTEN_AFTER: Duration = Duration::from_secs(1);
@@ -34,6 +28,7 @@ struct Unsent {
 #[derive(Debug)]
 pub(super) struct Watch {
     pub(super) edges: Edges,
+    pub(super) standstill: Standstill,
     pub(super) heartbeat: u32,
     pub(super) standstills: u32,
     pub(super) reversals: u32,
@@ -41,9 +36,6 @@ pub(super) struct Watch {
     heard: bool,
     heard_at: Option<Instant>,
     reading: Instant,
-    /// The latest reading since the last step.
-    furthest: Instant,
-    repeated: u32,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
 }
@@ -52,6 +44,7 @@ impl Watch {
     pub(super) const fn new() -> Self {
         Self {
             edges: Edges::new(),
+            standstill: Standstill::new(),
             heartbeat: 0,
             standstills: 0,
             reversals: 0,
@@ -59,8 +52,6 @@ impl Watch {
             heard: false,
             heard_at: None,
             reading: Instant::START,
-            furthest: Instant::START,
-            repeated: 0,
             ticked: None,
             unsent: [None; WATCHED_FRAMES],
         }
@@ -76,19 +67,9 @@ impl Watch {
         self.heard = true;
     }
 
-    /// Notes a received frame: time passed.
-    pub(super) const fn receive(&mut self) {
-        self.repeated = self.repeated.saturating_add(READINGS_OF_A_FRAME);
-    }
-
     /// Notes a reading of the clock.
     pub(super) fn read(&mut self, now: Instant) {
-        if now > self.furthest {
-            self.furthest = now;
-            self.repeated = 0;
-        } else {
-            self.repeated = self.repeated.saturating_add(1);
-        }
+        self.standstill.read(now);
         if now < self.reading {
             self.go_back(now);
         }
@@ -98,21 +79,6 @@ impl Watch {
     /// Returns the time of the last step that was run.
     pub(super) const fn ticked(&self) -> Option<Instant> {
         self.ticked
-    }
-
-    /// Notes a step: the clock may have gone back to it.
-    pub(super) const fn begin_step(&mut self, now: Instant) {
-        self.furthest = now;
-        self.repeated = 0;
-    }
-
-    /// Tells whether the clock stands; once for each time that it takes to be sure.
-    pub(super) fn take_standstill(&mut self) -> bool {
-        let stands = self.repeated >= READINGS_OF_A_STANDSTILL;
-        if stands {
-            self.repeated = 0;
-        }
-        stands
     }
 
     fn stand(&mut self, now: Instant) {

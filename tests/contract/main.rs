@@ -2,6 +2,7 @@
 //! motors on pins; and the check finds devices that do not.
 
 #![cfg(test)]
+#![expect(clippy::duplicate_mod, reason = "each example brings its own output")]
 
 mod careless;
 mod dji;
@@ -13,7 +14,9 @@ mod pins;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Own, TargetError, VelocityDrive};
+use drivetrain::motor::{
+    Claim, Devices, Ingest, MotorName, Order, Own, OwnMotor, TargetError, VelocityDrive, Vitals,
+};
 use drivetrain::sim::{Subject, check_contract};
 use drivetrain::units::AngularVelocity;
 use embedded_can::Frame;
@@ -79,4 +82,62 @@ fn drive_all(bus: &mut Bus, share: f32) -> Result<(), TargetError> {
 
 fn drive_own(motor: &mut Own<MyMotor>, share: f32) -> Result<(), TargetError> {
     motor.set_velocity((), velocity(share))
+}
+
+/// A motor that claims blocks of ids: its frames differ in bits that the masks leave out.
+struct Block(MyMotor, u16);
+
+impl Block {
+    const MASK: u32 = 0x7F3;
+
+    /// The next of the four ids.
+    fn next(&mut self, frame: CanFrame) -> CanFrame {
+        self.1 = (self.1 + 4) % 16;
+        CanFrame::new(id(u16::try_from(frame.header()).unwrap() + self.1), frame.data()).unwrap()
+    }
+}
+
+impl OwnMotor for Block {
+    fn name(&self) -> MotorName {
+        self.0.name()
+    }
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        self.0.claims().into_iter().map(|claim| claim.with_mask(Self::MASK))
+    }
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        self.0.decode(frame)
+    }
+    fn velocity(&self) -> AngularVelocity {
+        self.0.velocity()
+    }
+    fn rest(&mut self) -> CanFrame {
+        let frame = self.0.rest();
+        self.next(frame)
+    }
+    fn control(&mut self, order: Order) -> CanFrame {
+        let frame = self.0.control(order);
+        self.next(frame)
+    }
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+    fn vitals(&self) -> Vitals {
+        self.0.vitals()
+    }
+}
+
+// At d71443a: `ClaimsFeedback` broken, and `SendsWhatItClaims`, as the check looked at the first id of a block only.
+#[test]
+fn motors_that_claim_blocks_of_ids_keep_the_contract() {
+    let motor = |id| Own::new(Block(MyMotor::new(id).unwrap(), 0));
+    let made = || Mixed {
+        device: [motor(1), motor(2)],
+        ids: vec![0x145, 0x14E],
+        drive: |motors: &mut [Own<Block>; 2], share| {
+            let [first, second] =
+                motors.each_mut().map(|motor| motor.set_velocity((), velocity(share)));
+            first.and(second)
+        },
+    };
+    assert_eq!(check_contract(made), Ok(RULES));
 }

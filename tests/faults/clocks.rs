@@ -17,6 +17,7 @@ pub(crate) const CASES: &[Case] = cases![
     f65_a_clock_that_wraps_early_or_swings_drives_no_longer_than_the_deadline,
     f66_a_clock_that_is_set_back_gives_zeros_at_once_and_as_long_as_needed,
     f67_a_clock_that_stands_gives_zeros_within_200_000_polls,
+    f67_a_clock_that_stops_gives_zeros_within_a_second_in_slow_and_fast_loops,
     f67_a_clock_that_stands_gives_zeros_within_1_600_frames,
     f67_a_clock_that_wanders_within_a_tick_stands,
     f71_ages_that_would_drive_blindly_are_refused,
@@ -154,8 +155,8 @@ const TURN_US: u64 = 250;
 const ORIGIN: Instant = Instant::from_micros(20_000_000);
 
 impl<'c> Shell<'c> {
-    /// Driven at 5 A for 300 ms, until just after a tick.
-    fn driving(clock: &'c ManualClock) -> Self {
+    /// Armed, with a first tick.
+    fn armed(clock: &'c ManualClock) -> Self {
         let (mut bus, wheel) = (Bus::new(), at_once::<M3508>(1));
         let wheel = bus.attach(wheel).unwrap();
         clock.set(ORIGIN);
@@ -163,6 +164,12 @@ impl<'c> Shell<'c> {
         _ = shell.runner.ingest(&feedback(0x201, 0, 0), ORIGIN);
         shell.runner.arm(Tick::new(ORIGIN, 0.001)).unwrap();
         assert!(shell.go_on(true), "the grid of the ticks begins here");
+        shell
+    }
+
+    /// Driven at 5 A for 300 ms, until just after a tick.
+    fn driving(clock: &'c ManualClock) -> Self {
+        let mut shell = Self::armed(clock);
         while clock.now() < ORIGIN + Duration::from_millis(300) {
             clock.advance(Duration::from_micros(TURN_US));
             shell.turn(true);
@@ -281,6 +288,46 @@ fn f67_a_clock_that_stands_gives_zeros_within_200_000_polls() {
         }
     }
     saw(format!("stands: zero after {longest} polls"));
+}
+
+/// A loop that waits 1 ms in each turn, and hears nothing any more, read the clock 200 000 times in 200 s.
+#[cfg_attr(test, test)]
+fn f67_a_clock_that_stops_gives_zeros_within_a_second_in_slow_and_fast_loops() {
+    let mut longest_us = 0;
+    // The turn of the loop, the resolution of the clock, the bound: in us.
+    for (turn_us, resolution_us, bound_us) in [
+        (1, 1, 2_000),
+        (1, 1_000, 100_000),
+        (1, 10_000, 200_000),
+        (100, 1, 100_000),
+        (250, 1, 250_000),
+        (1_000, 1, 1_000_000),
+        (1_000, 250, 1_000_000),
+    ] {
+        let clock = ManualClock::new(ORIGIN);
+        let mut shell = Shell::armed(&clock);
+        let mut heard_us = 0;
+        for turn in 0..500_000 / turn_us {
+            // A wait is never quite regular.
+            let true_us = turn * turn_us + turn % 3 * turn_us / 3;
+            clock.set(at_us(ORIGIN.as_micros() + true_us / resolution_us * resolution_us));
+            if true_us >= heard_us {
+                shell.turn(true);
+                heard_us += 1_000;
+            } else {
+                shell.go_on(true);
+            }
+            assert!(shell.runner.is_armed(), "{turn_us} us, {resolution_us} us: {true_us} us");
+        }
+        assert_eq!(shell.held(), WORD);
+        // It stands while the motor is driven, and nothing is heard.
+        let turns = turns_to_rest(&mut shell, 200_001, |shell| _ = shell.go_on(true));
+        assert!(!shell.runner.is_armed() && shell.told(BusCondition::ClockStandstill));
+        let stood_us = u64::from(turns) * turn_us;
+        assert!(stood_us <= bound_us, "{turn_us} us, {resolution_us} us: {stood_us} us");
+        longest_us = longest_us.max(stood_us);
+    }
+    saw(format!("stops in loops of 1 us to 1 ms: zero after {} ms", longest_us / 1_000));
 }
 
 /// A loop that sleeps until the interrupt of the CAN controller wakes it up polls once a frame: 1 600 frames take a bus of

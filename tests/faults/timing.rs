@@ -263,8 +263,9 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     assert_eq!((edge.condition, edge.at), (BusCondition::ClockStandstill, at_ms(10)));
     // Back: a tick at once, for the zeros, and the ticks go on from there.
     clock.set(at_ms(3));
-    assert_eq!(runner.due(), Some(Tick::new(at_ms(3), 0.0)));
-    assert!(runner.due().is_none());
+    for _ in 0..2 {
+        assert_eq!(runner.due(), Some(Tick::new(at_ms(3), 0.0)), "due until it is run");
+    }
     assert_eq!(runner.statistics().clock_reversals, 1);
     let edge = runner.next_edge().unwrap();
     assert_eq!(
@@ -354,7 +355,8 @@ fn f32_a_huge_time_step_moves_no_integral() {
     let clock = ManualClock::new(at_ms(1));
     let world = World::new(1);
     let mut runner = Runner::new(Nb(world.controller()), &clock, Bus::new());
-    runner.due().unwrap();
+    let tick = runner.due().unwrap();
+    runner.tick(tick);
     clock.advance(Duration::from_secs(10));
     let tick = runner.due().unwrap();
     runner.tick(tick);

@@ -7,17 +7,22 @@ use super::{at, seconds};
 use drivetrain::sim::World;
 use drivetrain::time::Instant;
 use drivetrain::wire::Counts;
-use drivetrain::wire::host_link::COMMAND_LENGTH;
+use drivetrain::wire::host_link::{COMMAND_LENGTH, TELEMETRY_LENGTH};
 use std::error::Error;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time;
 
 const NAP: time::Duration = time::Duration::from_micros(500);
-/// How long one side waits for the other to appear.
+/// How long one side waits for the other, to appear and to go on.
 const PATIENCE: time::Duration = time::Duration::from_secs(20);
 /// Simulated time does not make up for more than this: a machine that is busy makes it slower, not jumpy.
 const LARGEST_DELAY_S: f32 = 0.02;
+/// Nor does it go on for longer than this when the host is busy, which has 160 ms for the next frame.
+const LONGEST_SILENCE_S: f32 = 0.12;
+/// The period of the telemetry. The host is at most a frame and a half ahead of it, however slowly the robot is simulated.
+const TELEMETRY_PERIOD_S: f32 = 0.05;
+const LARGEST_LEAD_S: f32 = 0.08;
 /// A frame in so many has to arrive, whatever the machine does besides.
 const LEAST_SHARE: f32 = 0.5;
 
@@ -52,11 +57,12 @@ impl Report {
     }
 }
 
-/// Plays the robot for a connection of the host.
+/// Plays the robot for a connection of the host; calls `hitch` in each turn of its loops, where a test holds it up.
 pub(crate) fn robot(
     listener: &TcpListener,
     run_s: f32,
     seed: u64,
+    mut hitch: impl FnMut(),
 ) -> Result<Report, Box<dyn Error>> {
     let mut stream = accept(listener)?;
     let world = World::new(seed);
@@ -65,14 +71,23 @@ pub(crate) fn robot(
     let mut output = Output::default();
     let mut buffer = [0; 1024];
     let mut wall = Wall::start();
+    let mut heard_s = 0.0;
     let mut report = Report::new(run_s);
-    while wall.seconds() < run_s {
+    while seconds(world.now()) < run_s {
         std::thread::sleep(NAP);
         let Some(received) = read(&mut stream, &mut buffer)? else { break };
         report.bytes += received.len();
         robot.hear_host(received, world.now());
-        wall.catch_up(seconds(world.now()), LARGEST_DELAY_S);
-        while world.now() < wall.now() {
+        if !received.is_empty() {
+            heard_s = seconds(world.now());
+            wall.hear();
+        }
+        wall.wait_at(seconds(world.now()) + LARGEST_DELAY_S);
+        wall.wait_for_the_other_at(heard_s + LONGEST_SILENCE_S);
+        // Read once: a machine that simulates slower than real time would never come to an end.
+        let until = wall.now();
+        while world.now() < until {
+            hitch();
             plant.step(|_| {});
             let now = world.now();
             let mut bytes = [0; 128];
@@ -87,7 +102,7 @@ pub(crate) fn robot(
             output.servo.clear();
         }
         if !output.host.is_empty() {
-            report.sent += 1;
+            report.sent += u32::try_from(output.host.len() / TELEMETRY_LENGTH)?;
             if !write(&mut stream, &output.host)? {
                 break;
             }
@@ -109,16 +124,26 @@ pub(crate) fn robot(
     Ok(report)
 }
 
-/// Plays the host against a robot on this machine.
-pub(crate) fn host(port: u16, run_s: f32) -> Result<Report, Box<dyn Error>> {
+/// Plays the host against a robot on this machine; calls `hitch` in each turn of its loop.
+pub(crate) fn host(
+    port: u16,
+    run_s: f32,
+    mut hitch: impl FnMut(),
+) -> Result<Report, Box<dyn Error>> {
     let mut stream = connect(port)?;
     let mut host = Host::new(watchful(run_s));
     let mut buffer = [0; 1024];
-    let wall = Wall::start();
+    let mut wall = Wall::start();
     let mut report = Report::new(run_s);
-    while wall.seconds() < run_s {
+    while seconds(wall.now()) < run_s {
+        hitch();
         let Some(received) = read(&mut stream, &mut buffer)? else { break };
         report.bytes += received.len();
+        if !received.is_empty() {
+            wall.hear();
+        }
+        let told_s = report.bytes as f32 / TELEMETRY_LENGTH as f32 * TELEMETRY_PERIOD_S;
+        wall.wait_for_the_other_at(told_s + LARGEST_LEAD_S);
         host.receive(received, wall.now());
         let mut frame = [0; COMMAND_LENGTH];
         if let Some(bytes) = host.command(wall.now(), &mut frame) {
@@ -164,25 +189,33 @@ impl Report {
 struct Wall {
     start: time::Instant,
     behind_s: f32,
+    /// When the other side was heard.
+    heard: time::Instant,
 }
 
 impl Wall {
     fn start() -> Self {
-        Self { start: time::Instant::now(), behind_s: 0.0 }
-    }
-
-    fn seconds(&self) -> f32 {
-        self.start.elapsed().as_secs_f32()
+        let now = time::Instant::now();
+        Self { start: now, behind_s: 0.0, heard: now }
     }
 
     fn now(&self) -> Instant {
-        at(self.seconds() - self.behind_s)
+        at(self.start.elapsed().as_secs_f32() - self.behind_s)
     }
 
-    fn catch_up(&mut self, simulated_s: f32, most_s: f32) {
-        let delay_s = self.seconds() - self.behind_s - simulated_s;
-        if delay_s > most_s {
-            self.behind_s += delay_s - most_s;
+    fn hear(&mut self) {
+        self.heard = time::Instant::now();
+    }
+
+    /// Takes off what is later than this.
+    fn wait_at(&mut self, limit_s: f32) {
+        self.behind_s += (seconds(self.now()) - limit_s).max(0.0);
+    }
+
+    /// The same, unless the other side hangs.
+    fn wait_for_the_other_at(&mut self, limit_s: f32) {
+        if self.heard.elapsed() < PATIENCE {
+            self.wait_at(limit_s);
         }
     }
 }

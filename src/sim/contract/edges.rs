@@ -50,11 +50,16 @@ fn index<S: Subject>(run: &mut Run<S>, name: MotorName) -> Option<usize> {
     (0..run.subject.motors()).find(|motor| called(run, *motor) == Some(name))
 }
 
-/// Returns how a motor of the subject is called.
+/// Returns how a motor of the subject is called. Of motors that share an id, the claims have the order of the motors.
 fn called<S: Subject>(run: &mut Run<S>, motor: usize) -> Option<MotorName> {
     let id = run.subject.feedback(motor)?.id();
-    let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.id() == id;
-    run.subject.device().claims().find(feedback).map(|claim| claim.motor())
+    let shares = |other: &usize| run.subject.feedback(*other).is_some_and(|frame| frame.id() == id);
+    let before = (0..motor).filter(shares).count();
+    let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.covers(id);
+    let mut last = None;
+    let claims = run.subject.device().claims().filter(feedback).map(|claim| claim.motor());
+    // A motor may claim the id more than once.
+    claims.filter(|name| last.replace(*name) != Some(*name)).nth(before)
 }
 
 /// Motors fall silent one after the other, and each change is read in the millisecond in which it happens.

@@ -19,7 +19,8 @@ pub trait Subject {
     /// feedback is not asked of it then.
     fn motors(&self) -> usize;
 
-    /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame, in which it stands still.
+    /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame, in which it stands still. Motors that
+    /// share an id have the order of the device's claims.
     fn feedback(&self, motor: usize) -> Option<CanFrame>;
 
     /// Sets the targets of all motors to this share of something that moves them, and so gives commands that are not

@@ -43,7 +43,7 @@ fn claims<S: Subject>(mut run: Run<S>) -> Outcome {
         let Some(frame) = run.subject.feedback(motor) else {
             return run.expect(false, Rule::ClaimsFeedback);
         };
-        let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.id() == frame.id();
+        let feedback = |claim: &Claim| claim.role() == Role::Feedback && claim.covers(frame.id());
         let claimed = run.subject.device().claims().any(|claim| feedback(&claim));
         run.expect(claimed, Rule::ClaimsFeedback)?;
     }

@@ -131,7 +131,7 @@ impl<S: Subject> Run<S> {
             .subject
             .device()
             .claims()
-            .any(|claim| claim.role() == Role::Command && claim.id() == frame.id());
+            .any(|claim| claim.role() == Role::Command && claim.covers(frame.id()));
         claimed && frame.is_data_frame()
     }
 }
