@@ -23,7 +23,7 @@
 //! | on top of a layout | what it does |
 //! |---|---|
 //! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
-//! | [`WheelDrive`] | the motors that it drives; [`ModuleMotors`], [`SwerveBuses`] for modules, also on two buses |
+//! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
 //!
@@ -68,7 +68,7 @@ mod wheels;
 
 pub use base::Chassis;
 pub use differential::{Differential, DifferentialGeometry};
-pub use drive::{ModuleMotors, SwerveBuses, WheelDrive};
+pub use drive::{ModuleMotors, WheelDrive};
 pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::{ChassisLimits, LimitError};
