@@ -13,11 +13,11 @@
 mod course;
 
 use course::Sample;
-use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve, SwerveBuses};
+use drivetrain::chassis::{Chassis, ChassisLimits, ModuleMotors, Swerve};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::Vec2;
-use drivetrain::motor::VelocityDrive;
+use drivetrain::motor::{OneOf, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, Controller, Line, Model, MotorConfig, SimClock, Wheel, World,
@@ -44,7 +44,9 @@ const MODULES: [(Vec2, Angle); 4] = [
     (Vec2::new(-0.2, -0.2), Angle::from_degrees(333.0)),
 ];
 
-type Motors = ModuleMotors<Handle<M3508>, Handle<Gm6020Voltage>>;
+/// A motor on the first bus or on the second.
+type Motor = OneOf<Handle<M3508>, Handle<Gm6020Voltage>>;
+type Modules = [ModuleMotors<Motor>; 4];
 type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -59,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The motors that roll, those that steer, and the floor under them.
-fn robot(world: &World) -> Result<(Robot<'_>, Robot<'_>, [Motors; 4]), Box<dyn Error>> {
+fn robot(world: &World) -> Result<(Robot<'_>, Robot<'_>, Modules), Box<dyn Error>> {
     let (mut can1, mut can2) =
         (Bus::new().with_load_ceiling(0.9), Bus::new().with_load_ceiling(0.9));
     let (mut floor, mut motors) = (Vec::new(), Vec::new());
@@ -71,8 +73,8 @@ fn robot(world: &World) -> Result<(Robot<'_>, Robot<'_>, [Motors; 4]), Box<dyn E
         let steering = world.attach(steering)?;
         floor.push(Wheel::steered(drive, WHEEL_RADIUS_M, place, steering, zero));
         let drive = can1.attach(Config::<M3508>::new(id).speed_loop(DRIVE))?;
-        let steering = Config::<Gm6020Voltage>::new(id).position_loop(ANGLE, RATE);
-        motors.push(ModuleMotors::new(drive, can2.attach(steering)?, zero));
+        let steering = can2.attach(Config::<Gm6020Voltage>::new(id).position_loop(ANGLE, RATE))?;
+        motors.push(ModuleMotors::new(OneOf::First(drive), OneOf::Second(steering), zero));
     }
     world.attach_chassis(ChassisConfig::new(&floor))?;
     let motors = motors.try_into().map_err(|_| "there are four modules")?;
@@ -99,29 +101,30 @@ fn drive(world: &World) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
         world.advance(Duration::from_micros(100));
         drives.poll(16);
         steerings.poll(16);
-        let (Some(tick), Some(steering_tick)) = (drives.due(), steerings.due()) else {
-            continue;
-        };
-        if is_ready(&mut steerings, steering_tick) & is_ready(&mut drives, tick) {
-            started = started.or(Some(tick.now()));
+        // Each runner has a grid of its own. The chassis is driven in the steps of the drive motors.
+        if let Some(tick) = drives.due() {
+            if is_ready(&mut steerings, tick) & is_ready(&mut drives, tick) {
+                started = started.or(Some(tick.now()));
+            }
+            let time_s = tick.now().since(started.unwrap_or(tick.now())).as_secs_f32();
+            let (driven_m, heading) = course::truth(world)?;
+            course::command(&mut chassis, time_s, heading);
+            let mut buses = (drives.device_mut(), steerings.device_mut());
+            let targets = chassis.drive(&mut buses, modules, tick);
+            let measured = modules.map(|module| buses.velocity(module.drive));
+            samples.push(Sample {
+                time_s,
+                planned_m: course::plan(time_s).0,
+                driven_m,
+                believed_m: course::place(chassis.pose()),
+                target_rpm: targets.map(|module| module.velocity.as_rpm()),
+                measured_rpm: measured.map(|wheel| wheel.map_or(0.0, AngularVelocity::as_rpm)),
+            });
+            drives.tick(tick);
         }
-        let time_s = tick.now().since(started.unwrap_or(tick.now())).as_secs_f32();
-        let (driven_m, heading) = course::truth(world)?;
-        course::command(&mut chassis, time_s, heading);
-        let mut buses =
-            SwerveBuses { drives: drives.device_mut(), steerings: steerings.device_mut() };
-        let targets = chassis.drive(&mut buses, modules, tick);
-        let measured = modules.map(|module| buses.velocity(module.drive));
-        samples.push(Sample {
-            time_s,
-            planned_m: course::plan(time_s).0,
-            driven_m,
-            believed_m: course::place(chassis.pose()),
-            target_rpm: targets.map(|module| module.velocity.as_rpm()),
-            measured_rpm: measured.map(|wheel| wheel.map_or(0.0, AngularVelocity::as_rpm)),
-        });
-        drives.tick(tick);
-        steerings.tick(steering_tick);
+        if let Some(tick) = steerings.due() {
+            steerings.tick(tick);
+        }
     }
     Ok(samples)
 }

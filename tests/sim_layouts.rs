@@ -5,11 +5,12 @@
 
 use drivetrain::chassis::{
     Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, ModuleMotors,
-    OmniFour, OmniFourWheels, Swerve, SwerveBuses,
+    OmniFour, OmniFourWheels, Swerve,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::motor::OneOf;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, MotorKey, SimClock, Wheel,
@@ -115,6 +116,8 @@ const CORNERS: [Vec2; 4] =
 /// What the encoders show when the modules point forward.
 const ZERO: Angle = Angle::from_degrees(70.0);
 
+type Motors = ModuleMotors<OneOf<Handle<M3508>, Handle<Gm6020Voltage>>>;
+
 /// Four modules, drive on the first bus and steering on the second.
 struct Modules<'w> {
     world: &'w World,
@@ -155,7 +158,10 @@ impl<'w> Modules<'w> {
         let (drives, wheels) = drives;
         let (runner, modules) = steerings;
         let mut modules = modules.iter();
-        let motors = wheels.map(|wheel| ModuleMotors::new(wheel, *modules.next().unwrap(), ZERO));
+        let motors = wheels.map(|wheel| {
+            let steering = OneOf::Second(*modules.next().unwrap());
+            Motors::new(OneOf::First(wheel), steering, ZERO)
+        });
         each_tick(world, drives, |drives, tick| {
             runner.poll(16);
             let _due = runner.due();
@@ -164,9 +170,7 @@ impl<'w> Modules<'w> {
                 Some(motion) => chassis.set_body(motion),
                 None => chassis.lock(),
             }
-            let buses = (drives.device_mut(), runner.device_mut());
-            let mut buses = SwerveBuses { drives: buses.0, steerings: buses.1 };
-            chassis.drive(&mut buses, motors, tick);
+            chassis.drive(&mut (drives.device_mut(), runner.device_mut()), motors, tick);
             if *relaxed {
                 wheels.iter().for_each(|wheel| drives.device_mut().relax(*wheel));
             }

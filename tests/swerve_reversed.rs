@@ -4,7 +4,7 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Kinematics, ModuleMotors, ModuleState, SteeringConfig, Swerve,
-    SwerveBuses, SwerveSteering, WheelSpeed,
+    SwerveSteering, WheelSpeed,
 };
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{AngleDrive, TargetError, VelocityDrive};
@@ -212,25 +212,22 @@ struct Bench {
     angles: [Angle; 4],
 }
 
-struct Drives<'a>(&'a mut [AngularVelocity; 4]);
-struct Steerings<'a>(&'a mut [Angle; 4]);
-
-impl VelocityDrive<usize> for Drives<'_> {
+impl VelocityDrive<usize> for Bench {
     fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
-        self.0.get(motor).copied()
+        self.speeds.get(motor).copied()
     }
     fn set_velocity(&mut self, motor: usize, target: AngularVelocity) -> Result<(), TargetError> {
-        self.0[motor] = target;
+        self.speeds[motor] = target;
         Ok(())
     }
 }
 
-impl AngleDrive<usize> for Steerings<'_> {
+impl AngleDrive<usize> for Bench {
     fn angle(&self, motor: usize) -> Option<Angle> {
-        self.0.get(motor).copied()
+        self.angles.get(motor).copied()
     }
     fn set_angle(&mut self, motor: usize, target: Angle) -> Result<(), TargetError> {
-        self.0[motor] = target;
+        self.angles[motor] = target;
         Ok(())
     }
 }
@@ -246,11 +243,7 @@ impl Bench {
 
     fn drive(&mut self, chassis: &mut Chassis<Swerve<4>>) {
         let modules = [0, 1, 2, 3].map(|motor| ModuleMotors::new(motor, motor, ZERO));
-        let mut owner = SwerveBuses {
-            drives: Drives(&mut self.speeds),
-            steerings: Steerings(&mut self.angles),
-        };
-        chassis.drive(&mut owner, modules, TICK);
+        chassis.drive(self, modules, TICK);
     }
 
     fn reversed(&self) -> [bool; 4] {

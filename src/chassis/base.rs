@@ -1,15 +1,17 @@
 use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
-use super::{ChassisLimits, Kinematics, LimitError, Odometry, WheelDrive, WheelSpeed};
+use super::{
+    ChassisLimits, ChassisStatus, Kinematics, LimitError, MotionSource, Odometry, WheelDrive,
+    WheelSpeed,
+};
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
-use crate::motor::TargetError;
 use crate::time::Tick;
 use crate::units::Angle;
 
 /// A chassis of any layout: commands in, wheel speeds out, pose kept.
 ///
-/// Once a tick: set a command, then [`drive`](Self::drive) the motors, or hand the measured wheel speeds to
-/// [`update`](Self::update) and take its targets where the wheels sit on several buses. In a tick:
+/// Once a tick: set a command, then [`drive`](Self::drive) the motors, whichever devices own them. A program without motors
+/// of this crate gives measured wheel speeds to [`update`](Self::update) and sends the targets itself. In a tick:
 ///
 /// 1. measured wheels and gyroscope move the [`Odometry`];
 /// 2. the command is brought into the world and approached within the acceleration limits: the same for every heading;
@@ -59,57 +61,6 @@ enum Command {
     Body(Twist<Body>),
     World(Twist<World>),
     Lock,
-}
-
-/// Where the measured motion of the last tick comes from.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum MotionSource {
-    /// From all wheels.
-    AllWheels,
-    /// From some wheels: the others gave no feedback, and the rest suffices.
-    SomeWheels,
-    /// From none: too few wheels gave feedback. The position stands still; a gyroscope's heading goes on.
-    #[default]
-    Unknown,
-}
-
-/// What went on in a chassis, besides the motion.
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::{Chassis, MotionSource, OmniThree, OmniThreeWheels};
-/// use drivetrain::time::{Instant, Tick};
-///
-/// let mut chassis = Chassis::new(OmniThree::new(0.05, 0.2)?);
-/// let _ = chassis.update(OmniThreeWheels::splat(None), Tick::new(Instant::from_micros(1_000), 0.001));
-/// let status = chassis.status();
-/// assert_eq!((status.source, status.lost_wheels), (MotionSource::Unknown, 3));
-/// assert_eq!(status.blind_s, 0.001);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ChassisStatus {
-    /// How the motion of the last tick was measured.
-    pub source: MotionSource,
-    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
-    pub lost_wheels: u8,
-    /// Seconds for which the position could not be followed, in all.
-    pub blind_s: f32,
-    /// Largest contradiction between the wheels of the last tick in m/s; `None` while one of them is lost, because the
-    /// others then say too little about each other. Never NaN: `f32::MAX` where it overflows.
-    pub slip_m_s: Option<f32>,
-    /// The last tick ran without a fresh command, or the clock is dead.
-    pub command_stale: bool,
-    /// The wheels' speed limit slowed the chassis in the last tick.
-    pub saturated: bool,
-    /// Commands, headings and poses that were NaN or infinite, in all; a command and its heading count once.
-    pub rejected: u16,
-    /// Wheels of which a motor refused its target in the last [`drive`](Chassis::drive).
-    pub refused: u8,
-    /// Why the first of them did.
-    pub refusal: Option<TargetError>,
 }
 
 impl<K: Kinematics> Chassis<K> {
@@ -349,12 +300,46 @@ impl<K: Kinematics> Chassis<K> {
         &self.kinematics
     }
 
-    /// Reads the motors of the wheels, gives each wheel what it shall do, and returns that.
+    /// Reads the motors of all wheels, sets their targets, and returns the targets.
     ///
-    /// The handles of plain wheels are those of any [`VelocityDrive`](crate::motor::VelocityDrive), those of modules
-    /// are [`ModuleMotors`](super::ModuleMotors). What a motor refuses is in [`status`](Self::status); the others are
-    /// driven all the same. When all wheels refuse, nothing is driven: the angles to hold are forgotten, and when a motor takes
-    /// its target again, the command is approached from the measured motion.
+    /// `owner` is a [`VelocityDrive`](crate::motor::VelocityDrive): a bus, a motor of your own, or a tuple or array of these.
+    /// The handle of a wheel is that of its motor, the handle of a swerve module is [`ModuleMotors`](super::ModuleMotors).
+    /// For motors on two buses, with a runner each, `owner` is the tuple of both buses and a handle tells its bus
+    /// ([`OneOf`](crate::motor::OneOf)); each runner goes on with its own `due` and `tick`.
+    ///
+    /// If a motor refuses its target, [`status`](Self::status) counts it and keeps the first error; all other wheels are
+    /// driven, those of the same device and those of other devices. If all wheels of all devices refuse, the chassis starts
+    /// over: it discards the angles to hold, and when a motor takes its target again, the command is approached from the
+    /// measured motion. An application that stops a chassis with a lost wheel disarms its devices.
+    ///
+    /// # Examples
+    /// Front wheels on one bus, rear wheels on another:
+    /// ```
+    /// use drivetrain::chassis::{Chassis, Mecanum, MecanumGeometry, MecanumWheels};
+    /// use drivetrain::control::PidConfig;
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::motor::{OneOf, TargetError};
+    /// use drivetrain::{geometry::Twist, time::{Instant, Tick}};
+    ///
+    /// let (mut front, mut rear) = (Bus::new(), Bus::new());
+    /// let wheel = |id| Config::<M3508>::new(id).speed_loop(PidConfig::new(1.9, 2.4, 0.0));
+    /// let wheels = MecanumWheels {
+    ///     front_left: OneOf::First(front.attach(wheel(1))?),
+    ///     front_right: OneOf::First(front.attach(wheel(2).reversed())?),
+    ///     rear_left: OneOf::Second(rear.attach(wheel(1))?),
+    ///     rear_right: OneOf::Second(rear.attach(wheel(2).reversed())?),
+    /// };
+    /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
+    /// let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+    ///
+    /// // Each millisecond; with runners, `&mut (front.device_mut(), rear.device_mut())`:
+    /// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
+    /// let targets = chassis.drive(&mut (&mut front, &mut rear), wheels, Tick::new(Instant::from_micros(1_000), 0.001));
+    /// assert!((targets.rear_left.as_rad_per_s() - 10.0).abs() < 1e-4);
+    /// assert_eq!(chassis.status().refused, 4);
+    /// assert_eq!(chassis.status().refusal, Some(TargetError::Disarmed));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn drive<H: Copy, D: WheelDrive<H, K::Speed> + ?Sized>(
         &mut self,
         owner: &mut D,
@@ -389,11 +374,11 @@ fn can_be_meant<F>(twist: Twist<F>) -> bool {
 mod tests {
     use super::*;
     use crate::chassis::{
-        Mecanum, MecanumGeometry, MecanumWheels, ModuleMotors, ModuleState, Swerve, SwerveBuses,
+        Mecanum, MecanumGeometry, MecanumWheels, ModuleMotors, ModuleState, Swerve,
     };
     use crate::geometry::Vec2;
     use crate::math::wrap_pi;
-    use crate::motor::{AngleDrive, VelocityDrive};
+    use crate::motor::{AngleDrive, TargetError, VelocityDrive};
     use crate::time::Instant;
     use crate::units::AngularVelocity;
     use proptest::prelude::*;
@@ -823,9 +808,37 @@ mod tests {
         }
     }
 
-    struct Modules {
+    struct Motors {
         drives: Bench,
         steerings: Turned,
+    }
+
+    impl VelocityDrive<usize> for Motors {
+        fn velocity(&self, motor: usize) -> Option<AngularVelocity> {
+            self.drives.velocity(motor)
+        }
+
+        fn set_velocity(
+            &mut self,
+            motor: usize,
+            target: AngularVelocity,
+        ) -> Result<(), TargetError> {
+            self.drives.set_velocity(motor, target)
+        }
+    }
+
+    impl AngleDrive<usize> for Motors {
+        fn angle(&self, motor: usize) -> Option<Angle> {
+            self.steerings.angle(motor)
+        }
+
+        fn set_angle(&mut self, motor: usize, target: Angle) -> Result<(), TargetError> {
+            self.steerings.set_angle(motor, target)
+        }
+    }
+
+    struct Modules {
+        motors: Motors,
         chassis: Chassis<Swerve<4>>,
     }
 
@@ -833,17 +846,14 @@ mod tests {
         const NONE: usize = 9;
 
         fn new() -> Self {
-            Self {
-                drives: Bench { speeds: [AngularVelocity::ZERO; 4], broken: Self::NONE },
-                steerings: Turned { angles: [ZERO; 4], broken: Self::NONE },
-                chassis: Chassis::new(swerve()),
-            }
+            let drives = Bench { speeds: [AngularVelocity::ZERO; 4], broken: Self::NONE };
+            let steerings = Turned { angles: [ZERO; 4], broken: Self::NONE };
+            Self { motors: Motors { drives, steerings }, chassis: Chassis::new(swerve()) }
         }
 
         fn drive(&mut self) {
-            let Self { drives, steerings, chassis } = self;
             let modules = [0, 1, 2, 3].map(|motor| ModuleMotors::new(motor, motor, ZERO));
-            chassis.drive(&mut SwerveBuses { drives, steerings }, modules, TICK);
+            self.chassis.drive(&mut self.motors, modules, TICK);
         }
 
         fn go(&mut self, vx: f32, vy: f32) {
@@ -852,7 +862,7 @@ mod tests {
         }
 
         fn degrees(&self) -> [f32; 4] {
-            self.steerings.angles.map(|angle| (angle - ZERO).as_degrees())
+            self.motors.steerings.angles.map(|angle| (angle - ZERO).as_degrees())
         }
 
         fn assert_degrees(&self, expected: [f32; 4]) {
@@ -875,14 +885,14 @@ mod tests {
         modules.chassis.stop();
         modules.drive();
         modules.assert_degrees([45.0; 4]);
-        assert_eq!(modules.drives.speeds, [AngularVelocity::ZERO; 4]);
+        assert_eq!(modules.motors.drives.speeds, [AngularVelocity::ZERO; 4]);
         assert!((modules.chassis.pose().x_m - 0.0505).abs() < 2e-3, "{:?}", modules.chassis.pose());
     }
 
     #[test]
     fn a_swerve_chassis_before_its_first_command_turns_no_module() {
         let mut modules = Modules::new();
-        modules.steerings.angles = [10.0, 250.0, 98.0, 333.0].map(Angle::from_degrees);
+        modules.motors.steerings.angles = [10.0, 250.0, 98.0, 333.0].map(Angle::from_degrees);
         let before = modules.degrees();
         modules.drive();
         modules.assert_degrees(before);
@@ -908,7 +918,7 @@ mod tests {
             modules.drive();
         }
         modules.assert_degrees(x);
-        assert_eq!(modules.drives.speeds, [AngularVelocity::ZERO; 4]);
+        assert_eq!(modules.motors.drives.speeds, [AngularVelocity::ZERO; 4]);
         for _ in 0..200 {
             modules.drive();
         }
@@ -921,10 +931,10 @@ mod tests {
     #[test]
     fn a_module_that_does_not_steer_does_not_drive_and_the_others_do() {
         let mut modules = Modules::new();
-        modules.steerings.broken = 2;
+        modules.motors.steerings.broken = 2;
         modules.go(1.0, 0.0);
         assert_eq!(
-            modules.drives.speeds.map(|speed| speed > AngularVelocity::ZERO),
+            modules.motors.drives.speeds.map(|speed| speed > AngularVelocity::ZERO),
             [true, true, false, true]
         );
         let status = modules.chassis.status();
@@ -935,7 +945,7 @@ mod tests {
     #[test]
     fn a_module_whose_drive_is_silent_still_steers() {
         let mut modules = Modules::new();
-        modules.drives.broken = 1;
+        modules.motors.drives.broken = 1;
         modules.go(0.0, 1.0);
         modules.assert_degrees([90.0; 4]);
         assert_eq!(
@@ -951,7 +961,7 @@ mod tests {
         let mut modules = Modules::new();
         modules.go(1.0, 0.0);
         modules.chassis.restart();
-        modules.steerings.angles = turned;
+        modules.motors.steerings.angles = turned;
         modules.drive();
         modules.assert_degrees(by_hand);
 
@@ -962,7 +972,7 @@ mod tests {
         let four = [0, 1, 2, 3].map(|motor| ModuleMotors::new(motor, motor, ZERO));
         modules.chassis.drive(&mut refusing, four, TICK);
         modules.chassis.stop();
-        modules.steerings.angles = turned;
+        modules.motors.steerings.angles = turned;
         modules.drive();
         modules.assert_degrees(by_hand);
     }

@@ -1,11 +1,11 @@
 use super::ModuleState;
-use crate::motor::{AngleDrive, Capabilities, TargetError, VelocityDrive};
+use crate::motor::{AngleDrive, TargetError, VelocityDrive};
 use crate::units::{Angle, AngularVelocity};
 
-/// An owner of the motors of wheels: what [`Chassis::drive`](super::Chassis::drive) reads and tells.
+/// An owner of the motors of wheels, for [`Chassis::drive`](super::Chassis::drive).
 ///
-/// `H` names the motors of one wheel, `S` is what the wheel does. Whoever is a [`VelocityDrive`] drives plain wheels,
-/// and whoever is an [`AngleDrive`] too drives the modules of a [`Swerve`](super::Swerve).
+/// `H` is the handle of a wheel, `S` its speed. A [`VelocityDrive`] drives plain wheels. An owner that is an [`AngleDrive`] too
+/// drives the modules of a [`Swerve`](super::Swerve).
 ///
 /// # Examples
 /// ```
@@ -36,10 +36,10 @@ use crate::units::{Angle, AngularVelocity};
 /// # Ok::<(), drivetrain::chassis::GeometryError>(())
 /// ```
 pub trait WheelDrive<H: Copy, S> {
-    /// Returns what the wheel does; `None` when it is not heard.
+    /// Returns the measured speed of the wheel; `None` without fresh feedback.
     fn measured(&self, wheel: H) -> Option<S>;
 
-    /// Tells the wheel what to do.
+    /// Sets the target of the wheel.
     ///
     /// # Errors
     /// Says why a motor of the wheel cannot take its target now.
@@ -56,7 +56,10 @@ impl<H: Copy, D: VelocityDrive<H> + ?Sized> WheelDrive<H, AngularVelocity> for D
     }
 }
 
-/// The two motors of a swerve module.
+/// The handles of the two motors of a swerve module.
+///
+/// Four modules have eight motors, too many for one CAN bus at 1 kHz. With the drive motors on one bus and the steering motors
+/// on another, the owner is the tuple of both buses, and both handles are a [`OneOf`](crate::motor::OneOf).
 ///
 /// # Examples
 /// ```
@@ -74,19 +77,40 @@ impl<H: Copy, D: VelocityDrive<H> + ?Sized> WheelDrive<H, AngularVelocity> for D
 /// assert_eq!(front.zero.as_degrees(), 12.0); // the encoder shows 12 degrees when the module points forward
 /// # Ok::<(), drivetrain::dji::AttachError>(())
 /// ```
+///
+/// On two buses:
+/// ```
+/// use drivetrain::chassis::ModuleMotors;
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
+/// use drivetrain::{motor::OneOf, units::Angle};
+///
+/// type Motor = OneOf<Handle<M3508>, Handle<Gm6020Voltage>>;
+///
+/// let (mut drives, mut steerings) = (Bus::new(), Bus::new());
+/// let speed = PidConfig::new(2.4, 6.0, 0.0);
+/// let drive = drives.attach(Config::<M3508>::new(1).speed_loop(speed))?;
+/// let angle = PidConfig::new(50.0, 0.0, 0.0);
+/// let steering = steerings.attach(Config::<Gm6020Voltage>::new(1).position_loop(angle, speed))?;
+/// let front: ModuleMotors<Motor> =
+///     ModuleMotors::new(OneOf::First(drive), OneOf::Second(steering), Angle::from_degrees(12.0));
+/// // chassis.drive(&mut (&mut drives, &mut steerings), [front, rear], tick);
+/// # assert_eq!(front.drive, OneOf::First(drive));
+/// # Ok::<(), drivetrain::dji::AttachError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ModuleMotors<D, S> {
-    /// The motor that rolls the wheel.
+pub struct ModuleMotors<D, S = D> {
+    /// Handle of the drive motor, which rolls the wheel.
     pub drive: D,
-    /// The motor that turns the module; seen from above, counter-clockwise positive.
+    /// Handle of the steering motor, which turns the module; seen from above, counter-clockwise positive.
     pub steering: S,
-    /// What the steering motor shows when the module points forward.
+    /// Angle of the steering motor at which the module points forward.
     pub zero: Angle,
 }
 
 impl<D, S> ModuleMotors<D, S> {
-    /// Takes the motor that rolls, the one that steers, and what that one shows when the module points forward.
+    /// Takes the handles of drive and steering motor, and the angle of the steering motor at which the module points forward.
     #[must_use]
     pub const fn new(drive: D, steering: S, zero: Angle) -> Self {
         Self { drive, steering, zero }
@@ -106,7 +130,7 @@ where
         Some(ModuleState::new(self.velocity(module.drive).unwrap_or(unknown), angle))
     }
 
-    /// A wheel whose module cannot be steered is told to stand.
+    /// If the steering motor refuses its target, the target of the drive motor is zero.
     fn command(
         &mut self,
         module: ModuleMotors<D, S>,
@@ -115,54 +139,5 @@ where
         let steered = self.set_angle(module.steering, target.angle + module.zero);
         let velocity = if steered.is_ok() { target.velocity } else { AngularVelocity::ZERO };
         steered.and(self.set_velocity(module.drive, velocity))
-    }
-}
-
-/// Two owners as one: the motors that roll on one bus, those that steer on another.
-///
-/// Four modules have eight motors, too many for one bus at 1 kHz. Make it for the call, from two `&mut`; a robot with
-/// another division implements [`VelocityDrive`] and [`AngleDrive`] for a type of its own.
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::SwerveBuses;
-/// use drivetrain::dji::{AttachError, Bus, Config, M2006};
-/// use drivetrain::{control::PidConfig, motor::{TargetError, VelocityDrive}, units::AngularVelocity};
-///
-/// let (mut rolling, mut steering) = (Bus::new(), Bus::new());
-/// let wheel = rolling.attach(Config::<M2006>::new(1).speed_loop(PidConfig::new(1.0, 0.0, 0.0)))?;
-/// let mut both = SwerveBuses { drives: &mut rolling, steerings: &mut steering };
-/// assert_eq!(both.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::Disarmed));
-/// # Ok::<(), AttachError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SwerveBuses<D, S> {
-    /// Owns the motors that roll.
-    pub drives: D,
-    /// Owns the motors that steer.
-    pub steerings: S,
-}
-
-impl<H: Copy, D: VelocityDrive<H>, S> VelocityDrive<H> for SwerveBuses<D, S> {
-    fn velocity(&self, motor: H) -> Option<AngularVelocity> {
-        self.drives.velocity(motor)
-    }
-
-    fn capabilities(&self, motor: H) -> Capabilities {
-        self.drives.capabilities(motor)
-    }
-
-    fn set_velocity(&mut self, motor: H, target: AngularVelocity) -> Result<(), TargetError> {
-        self.drives.set_velocity(motor, target)
-    }
-}
-
-impl<H: Copy, D, S: AngleDrive<H>> AngleDrive<H> for SwerveBuses<D, S> {
-    fn angle(&self, motor: H) -> Option<Angle> {
-        self.steerings.angle(motor)
-    }
-
-    fn set_angle(&mut self, motor: H, target: Angle) -> Result<(), TargetError> {
-        self.steerings.set_angle(motor, target)
     }
 }

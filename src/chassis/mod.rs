@@ -23,7 +23,7 @@
 //! | on top of a layout | what it does |
 //! |---|---|
 //! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
-//! | [`WheelDrive`] | the motors that it drives; [`ModuleMotors`], [`SwerveBuses`] for modules, also on two buses |
+//! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
 //!
@@ -61,13 +61,14 @@ mod omni;
 mod power;
 mod power_buffer;
 mod power_fit;
+mod status;
 mod steering;
 mod swerve;
 mod wheels;
 
-pub use base::{Chassis, ChassisStatus, MotionSource};
+pub use base::Chassis;
 pub use differential::{Differential, DifferentialGeometry};
-pub use drive::{ModuleMotors, SwerveBuses, WheelDrive};
+pub use drive::{ModuleMotors, WheelDrive};
 pub use error::GeometryError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::{ChassisLimits, LimitError};
@@ -78,6 +79,7 @@ pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
 pub use power::{PowerCut, PowerError, PowerModel, WheelLoad};
 pub use power_buffer::{BufferError, PowerBuffer};
 pub use power_fit::PowerFit;
+pub use status::{ChassisStatus, MotionSource};
 pub use steering::{SteeringConfig, SwerveSteering};
 pub use swerve::{ModuleState, Swerve};
 pub use wheels::{DifferentialWheels, MecanumWheels, OmniFourWheels, OmniThreeWheels};

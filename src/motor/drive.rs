@@ -1,9 +1,28 @@
 use super::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
+use core::convert::Infallible;
 
 /// An owner of motors whose output shafts follow a velocity.
 ///
 /// `H` is the owner's handle type. A chassis needs no more than this from its wheels.
+///
+/// A tuple or array of owners and `&mut D` are owners. The handle of a motor then tells its owner too: [`OneOf`] for a tuple,
+/// `(index, handle)` for an array.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::dji::{AttachError, Bus, Config, M3508};
+/// use drivetrain::motor::{TargetError, VelocityDrive};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let (mut front, mut rear) = (Bus::new(), Bus::new());
+/// let wheel = Config::<M3508>::new(1).speed_loop(PidConfig::new(1.9, 2.4, 0.0));
+/// let wheels = [(0, front.attach(wheel)?), (1, rear.attach(wheel)?)];
+/// let stop = wheels.map(|wheel| (wheel, AngularVelocity::ZERO));
+/// assert_eq!([&mut front, &mut rear].drive(stop), Err(TargetError::Disarmed));
+/// # Ok::<(), AttachError>(())
+/// ```
 pub trait VelocityDrive<H: Copy> {
     /// Returns the measured velocity of the output shaft; `None` when there is no fresh feedback.
     fn velocity(&self, motor: H) -> Option<AngularVelocity>;
@@ -53,7 +72,8 @@ impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
 
 /// An owner of motors whose output shafts go to an angle, by the shortest way: those that steer a wheel, say.
 ///
-/// `H` is the owner's handle type. The motors have [`Capability::Angle`].
+/// `H` is the owner's handle type. The motors have [`Capability::Angle`]. A tuple or array is an owner if each of its owners is
+/// one, with the handles of [`VelocityDrive`]; so is `&mut D`.
 pub trait AngleDrive<H: Copy> {
     /// Returns the measured angle of the output shaft; `None` when there is no fresh feedback, or it is not homed.
     fn angle(&self, motor: H) -> Option<Angle>;
@@ -75,12 +95,131 @@ impl<H: Copy, D: AngleDrive<H>> AngleDrive<H> for &mut D {
     }
 }
 
+/// The handle of a motor in a tuple of two to four owners: which owner, and the handle there.
+///
+/// Tuples and arrays nest, so an owner in the tuple may be a tuple or an array itself.
+///
+/// # Examples
+/// A robot with two DJI motors in front and two motors of its own in the rear:
+/// ```
+/// use drivetrain::chassis::MecanumWheels;
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::dji::{AttachError, Bus, Config, Handle, M3508};
+/// use drivetrain::motor::OneOf;
+///
+/// /// The handle of a motor in `(Bus, [Own<M>; 2])`.
+/// type Wheel = OneOf<Handle<M3508>, (usize, ())>;
+///
+/// let mut bus = Bus::new();
+/// let config = |id| Config::<M3508>::new(id).speed_loop(PidConfig::new(1.9, 2.4, 0.0));
+/// let wheels: MecanumWheels<Wheel> = MecanumWheels {
+///     front_left: OneOf::First(bus.attach(config(1))?),
+///     front_right: OneOf::First(bus.attach(config(2))?),
+///     rear_left: OneOf::Second((0, ())),
+///     rear_right: OneOf::Second((1, ())),
+/// };
+/// assert_eq!(wheels.rear_right, OneOf::Second((1, ()))); // the second motor of the array
+/// # Ok::<(), AttachError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum OneOf<A, B, C = Infallible, D = Infallible> {
+    /// A motor of the first owner.
+    First(A),
+    /// A motor of the second owner.
+    Second(B),
+    /// A motor of the third owner.
+    Third(C),
+    /// A motor of the fourth owner.
+    Fourth(D),
+}
+
+macro_rules! tuple {
+    ($handles:ty: $($owner:ident $handle:ident $index:tt $place:ident),+) => {
+        impl<$($handle: Copy, $owner: VelocityDrive<$handle>),+> VelocityDrive<$handles>
+            for ($($owner,)+)
+        {
+            fn velocity(&self, motor: $handles) -> Option<AngularVelocity> {
+                match motor {
+                    $(OneOf::$place(motor) => self.$index.velocity(motor),)+
+                }
+            }
+
+            fn capabilities(&self, motor: $handles) -> Capabilities {
+                match motor {
+                    $(OneOf::$place(motor) => self.$index.capabilities(motor),)+
+                }
+            }
+
+            fn set_velocity(
+                &mut self,
+                motor: $handles,
+                target: AngularVelocity,
+            ) -> Result<(), TargetError> {
+                match motor {
+                    $(OneOf::$place(motor) => self.$index.set_velocity(motor, target),)+
+                }
+            }
+        }
+
+        impl<$($handle: Copy, $owner: AngleDrive<$handle>),+> AngleDrive<$handles>
+            for ($($owner,)+)
+        {
+            fn angle(&self, motor: $handles) -> Option<Angle> {
+                match motor {
+                    $(OneOf::$place(motor) => self.$index.angle(motor),)+
+                }
+            }
+
+            fn set_angle(&mut self, motor: $handles, target: Angle) -> Result<(), TargetError> {
+                match motor {
+                    $(OneOf::$place(motor) => self.$index.set_angle(motor, target),)+
+                }
+            }
+        }
+    };
+}
+
+tuple!(OneOf<HA, HB>: A HA 0 First, B HB 1 Second);
+tuple!(OneOf<HA, HB, HC>: A HA 0 First, B HB 1 Second, C HC 2 Third);
+tuple!(OneOf<HA, HB, HC, HD>: A HA 0 First, B HB 1 Second, C HC 2 Third, D HD 3 Fourth);
+
+/// If there is no owner with this index, the motor counts as detached.
+impl<H: Copy, D: VelocityDrive<H>, const N: usize> VelocityDrive<(usize, H)> for [D; N] {
+    fn velocity(&self, (index, motor): (usize, H)) -> Option<AngularVelocity> {
+        self.get(index)?.velocity(motor)
+    }
+
+    fn capabilities(&self, (index, motor): (usize, H)) -> Capabilities {
+        self.get(index).map_or(Capabilities::NONE, |owner| owner.capabilities(motor))
+    }
+
+    fn set_velocity(
+        &mut self,
+        (index, motor): (usize, H),
+        target: AngularVelocity,
+    ) -> Result<(), TargetError> {
+        self.get_mut(index).ok_or(TargetError::Detached)?.set_velocity(motor, target)
+    }
+}
+
+/// If there is no owner with this index, the motor counts as detached.
+impl<H: Copy, D: AngleDrive<H>, const N: usize> AngleDrive<(usize, H)> for [D; N] {
+    fn angle(&self, (index, motor): (usize, H)) -> Option<Angle> {
+        self.get(index)?.angle(motor)
+    }
+
+    fn set_angle(&mut self, (index, motor): (usize, H), target: Angle) -> Result<(), TargetError> {
+        self.get_mut(index).ok_or(TargetError::Detached)?.set_angle(motor, target)
+    }
+}
+
 /// Why a motor does not take a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum TargetError {
-    /// The handle's motor was detached.
+    /// The owner has no motor with this handle; it was detached, say.
     Detached,
     /// The target is NaN or infinite. The motor goes to its safe output at once.
     NotFinite,

@@ -15,6 +15,7 @@
 //! | [`CanDevice`] | the seam between a device family and whatever moves its frames |
 //! | [`VelocityDrive`] | an owner of motors that follow a velocity: all that a chassis needs |
 //! | [`AngleDrive`] | an owner of motors that go to an angle: those that steer |
+//! | [`OneOf`] | the handle of a motor whose owner is one of several |
 //! | [`Capabilities`] | what a motor offers: which targets, which readings |
 //! | [`MotorName`], [`Link`] | how a motor is called, and whether it is heard |
 //! | [`ArmError`], [`TargetError`] | why nothing moves |
@@ -54,7 +55,7 @@ pub use capability::{Capabilities, Capability};
 pub use claim::{Claim, Role};
 pub use device::{CanDevice, Ingest, Malformed};
 pub use devices::Devices;
-pub use drive::{AngleDrive, TargetError, VelocityDrive};
+pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
 pub(crate) use gesture::Gesture;
 pub use guard::Guard;
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};

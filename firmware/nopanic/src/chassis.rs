@@ -3,6 +3,7 @@
 use crate::opaque::Function;
 use drivetrain::chassis::*;
 use drivetrain::dji::{AnyHandle, Bus};
+use drivetrain::motor::OneOf;
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
 
@@ -67,10 +68,14 @@ pub fn call_all() {
     (|chassis: &mut Chassis<Swerve<2>>,
       drives: &mut Bus,
       steerings: &mut Bus,
-      modules: [ModuleMotors<AnyHandle, AnyHandle>; 2],
-      tick: Tick| {
-        Chassis::drive(chassis, &mut SwerveBuses { drives, steerings }, modules, tick)
-    })
+      modules: [ModuleMotors<OneOf<AnyHandle, AnyHandle>>; 2],
+      tick: Tick| Chassis::drive(chassis, &mut (drives, steerings), modules, tick))
+    .call();
+    (|chassis: &mut Chassis<Mecanum>,
+      front: &mut Bus,
+      rear: &mut Bus,
+      wheels: MecanumWheels<(usize, AnyHandle)>,
+      tick: Tick| Chassis::drive(chassis, &mut [front, rear], wheels, tick))
     .call();
     ModuleMotors::<AnyHandle, AnyHandle>::new.call();
     ChassisLimits::new.call();

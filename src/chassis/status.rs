@@ -1,0 +1,52 @@
+use crate::motor::TargetError;
+
+/// Where the measured motion of the last tick comes from.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MotionSource {
+    /// From all wheels.
+    AllWheels,
+    /// From some wheels: the others gave no feedback, and the rest suffices.
+    SomeWheels,
+    /// From none: too few wheels gave feedback. The position stands still; a gyroscope's heading goes on.
+    #[default]
+    Unknown,
+}
+
+/// What went on in a chassis, besides the motion.
+///
+/// # Examples
+/// ```
+/// use drivetrain::chassis::{Chassis, MotionSource, OmniThree, OmniThreeWheels};
+/// use drivetrain::time::{Instant, Tick};
+///
+/// let mut chassis = Chassis::new(OmniThree::new(0.05, 0.2)?);
+/// let _ = chassis.update(OmniThreeWheels::splat(None), Tick::new(Instant::from_micros(1_000), 0.001));
+/// let status = chassis.status();
+/// assert_eq!((status.source, status.lost_wheels), (MotionSource::Unknown, 3));
+/// assert_eq!(status.blind_s, 0.001);
+/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ChassisStatus {
+    /// How the motion of the last tick was measured.
+    pub source: MotionSource,
+    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
+    pub lost_wheels: u8,
+    /// Seconds for which the position could not be followed, in all.
+    pub blind_s: f32,
+    /// Largest contradiction between the wheels of the last tick in m/s; `None` while one of them is lost, because the
+    /// others then say too little about each other. Never NaN: `f32::MAX` where it overflows.
+    pub slip_m_s: Option<f32>,
+    /// The last tick ran without a fresh command, or the clock is dead.
+    pub command_stale: bool,
+    /// The wheels' speed limit slowed the chassis in the last tick.
+    pub saturated: bool,
+    /// Commands, headings and poses that were NaN or infinite, in all; a command and its heading count once.
+    pub rejected: u16,
+    /// Wheels of which a motor refused its target in the last [`drive`](super::Chassis::drive).
+    pub refused: u8,
+    /// Why the first of them did.
+    pub refusal: Option<TargetError>,
+}
