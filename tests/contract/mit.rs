@@ -20,7 +20,10 @@ struct Pair {
 
 impl Pair {
     fn new(drive: Drive) -> Self {
-        Self { motors: [1, 2].map(|id| Own::new(J4310::new(id, 0x010 + u16::from(id)))), drive }
+        Self {
+            motors: [1, 2].map(|id| Own::new(J4310::new(id, 0x010 + u16::from(id)).unwrap())),
+            drive,
+        }
     }
 
     fn answer(motor: usize, status: u8) -> Option<CanFrame> {
