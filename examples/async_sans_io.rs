@@ -61,7 +61,7 @@ async fn control(can: &AsyncCan<'_>, bus: &RefCell<Bus>, motor: Handle<M2006>) {
         let tick = Tick::new(can.0.now(), PERIOD.as_secs_f32());
         {
             let mut bus = bus.borrow_mut();
-            // When the motor is heard, and never again after a fault.
+            // By itself, which only a simulated robot may: when the motor is heard, and never again after a fault.
             armed_once = armed_once || bus.arm(tick.now()).is_ok();
             _ = bus.set_velocity(motor, AngularVelocity::from_rpm(-100.0));
             bus.update(tick);

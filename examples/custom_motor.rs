@@ -65,12 +65,12 @@ impl OwnMotor for MyMotor {
         self.command(0.0)
     }
 
-    fn control(&mut self, order: Order) -> CanFrame {
-        let Order { target: Target::Velocity(target), share, step } = order else {
-            return self.rest();
-        };
+    fn control(&mut self, Order { target, share, step }: Order) -> CanFrame {
+        let Target::Velocity(target) = target else { return self.rest() };
+        let config = SPEED.with_output_limit(share * LIMIT_A); // the integral keeps within it
+        let Ok(()) = self.speed.set_config(config) else { return self.rest() };
         let measured = self.velocity().as_rad_per_s();
-        let amperes = share * self.speed.step(target.as_rad_per_s(), measured, &step);
+        let amperes = self.speed.step(target.as_rad_per_s(), measured, &step);
         self.effort = amperes / LIMIT_A;
         self.command(amperes)
     }

@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // The 1 kHz task.
             runner.poll_queue(&mut received, 32);
             let Some(tick) = runner.due() else { continue };
-            // When the motor is heard, and never again after a fault or a stop.
+            // By itself, which only a simulated robot may: when the motor is heard, never after a fault or a stop.
             armed_once = armed_once || runner.arm(tick).is_ok();
             let newest = target.lock().map_or(AngularVelocity::ZERO, |target| *target);
             _ = runner.device_mut().set_velocity(wheel, newest); // refused, harmlessly, until armed

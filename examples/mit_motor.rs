@@ -3,6 +3,9 @@
 //! Such a drive is enabled by a frame before it follows, and eight zero bytes are its full negative torque: the motor says what
 //! rest is. The drives are played by hand on the simulated bus. One turns, one holds an angle; then a drive loses its supply
 //! for a moment, and at the end there is an emergency stop. `cargo run --example mit_motor`
+//!
+//! A drive whose cable is cut goes on with its last command unless its own time-out is set: the register `TIMEOUT` (9) of a Damiao
+//! drive, in units of 50 µs, where 2000 is 100 ms and 0 is none. No program can do that for it: set it before the first run.
 
 mod console;
 
@@ -15,12 +18,14 @@ use drivetrain::wire::mit::{self, Command, Feedback, Ranges};
 use embedded_can::{Frame, Id, StandardId};
 
 /// Position in rad, velocity in rad/s, torque in Nm: the registers PMAX, VMAX and TMAX of the drive have to say the same.
-const RANGES: Ranges = match Ranges::new(12.5, 30.0, 10.0) {
+const PMAX_RAD: f32 = 12.5;
+const RANGES: Ranges = match Ranges::new(PMAX_RAD, 30.0, 10.0) {
     Ok(ranges) => ranges,
     Err(_) => panic!("the ranges of a DM-J4310 are not valid"),
 };
-/// The rated torque.
+/// The rated torque and speed: no target asks for more.
 const LIMIT_NM: f32 = 3.0;
+const LIMIT_RAD_PER_S: f32 = 12.5;
 /// Nm/rad and Nm s/rad: damped with 0.7 for an inertia of 0.01 kg m² at the output.
 const STIFFNESS: f32 = 20.0;
 const DAMPING: f32 = 0.6;
@@ -35,19 +40,33 @@ pub(crate) struct J4310 {
     /// 0 disabled, 1 enabled, from 8 on an error; `None` before the first answer.
     status: Option<u8>,
     measured: Feedback,
+    /// The position is at an end of its range: the shaft is there or beyond.
+    is_at_end: bool,
     temperature_c: u8,
     effort: f32,
 }
 
 impl J4310 {
-    /// Takes an id of 1 to 15 and the register `MST_ID` of the drive, which may be that of other drives too.
-    pub(crate) const fn new(id: u8, master_id: u16) -> Self {
+    /// Takes an id of 1 to 15, for which an answer has room, and the register `MST_ID` of the drive, which may be that of other
+    /// drives too. `None` for another id.
+    pub(crate) const fn new(id: u8, master_id: u16) -> Option<Self> {
+        if !matches!(id, 1..=15) {
+            return None;
+        }
         let measured = Feedback { position_rad: 0.0, velocity_rad_per_s: 0.0, torque_nm: 0.0 };
-        Self { id, master_id, status: None, measured, temperature_c: 0, effort: 0.0 }
+        let (status, is_at_end) = (None, false);
+        Some(Self { id, master_id, status, measured, is_at_end, temperature_c: 0, effort: 0.0 })
     }
 
     fn frame(&self, data: [u8; 8]) -> CanFrame {
         CanFrame::of(standard(self.id.into()), data)
+    }
+
+    /// The velocity next to the wanted one whose damping, beside so much torque, keeps within the limit.
+    fn near(&self, wanted: f32, torque_nm: f32) -> f32 {
+        let measured = self.measured.velocity_rad_per_s;
+        let (least, most) = (-LIMIT_NM - torque_nm, LIMIT_NM - torque_nm);
+        measured + (wanted - measured).clamp(least / DAMPING, most / DAMPING)
     }
 }
 
@@ -74,6 +93,7 @@ impl OwnMotor for J4310 {
         }
         self.status = Some(status);
         self.measured = RANGES.decode_feedback(&[a, b, c, d, e]);
+        self.is_at_end = matches!([a, b], [0, 0] | [0xFF, 0xFF]);
         self.temperature_c = driver_c.max(rotor_c);
         Ingest::Taken
     }
@@ -83,32 +103,37 @@ impl OwnMotor for J4310 {
     }
 
     fn angle(&self) -> Option<Angle> {
-        Some(Angle::from_radians(self.measured.position_rad))
+        (!self.is_at_end).then(|| Angle::from_radians(self.measured.position_rad))
     }
 
     fn rest(&mut self) -> CanFrame {
         self.frame(RANGES.encode(&Command::REST))
     }
 
-    /// The loops are in the drive, so it takes no step; torque and gains keep within the share.
+    /// The loops are in the drive, so it takes no step. Position and velocity are sent so near that the torque, which is gains times
+    /// what is left to go, keeps within the share of the limit.
     fn control(&mut self, Order { target, share, step: _ }: Order) -> CanFrame {
         let Feedback { position_rad, velocity_rad_per_s, .. } = self.measured;
         let (kp, kd) = (share * STIFFNESS, share * DAMPING);
         let command = match target {
             Target::Torque(nm) => Command::torque(nm.clamp(-share * LIMIT_NM, share * LIMIT_NM)),
             Target::Velocity(velocity) => {
-                Command { velocity_rad_per_s: velocity.as_rad_per_s(), kd, ..Command::REST }
+                let wanted = velocity.as_rad_per_s().clamp(-LIMIT_RAD_PER_S, LIMIT_RAD_PER_S);
+                Command { velocity_rad_per_s: self.near(wanted, 0.0), kd, ..Command::REST }
             }
-            Target::Angle(angle) => {
+            Target::Angle(angle) if !self.is_at_end => {
                 let way = wrap_pi(angle.as_radians() - position_rad);
-                Command { position_rad: position_rad + way, kp, kd, ..Command::REST }
+                let near = position_rad + way.clamp(-LIMIT_NM / STIFFNESS, LIMIT_NM / STIFFNESS);
+                let near = near.clamp(-PMAX_RAD, PMAX_RAD);
+                let velocity_rad_per_s = self.near(0.0, STIFFNESS * (near - position_rad));
+                Command { position_rad: near, velocity_rad_per_s, kp, kd, ..Command::REST }
             }
             _ => Command::REST,
         };
         let torque_nm = command.kp * (command.position_rad - position_rad)
             + command.kd * (command.velocity_rad_per_s - velocity_rad_per_s)
             + command.torque_nm;
-        self.effort = torque_nm / RANGES.torque_nm();
+        self.effort = torque_nm / LIMIT_NM;
         self.frame(RANGES.encode(&command))
     }
 
@@ -223,7 +248,8 @@ mod simulation {
     pub(crate) fn drive() -> Result<(), Box<dyn Error>> {
         let world = World::new(1);
         let mut drives = [Drive::new(1), Drive::new(2)];
-        let robot = [1, 2].map(|id| Own::new(J4310::new(id, MASTER_ID)));
+        let motor = |id| J4310::new(id, MASTER_ID).map(Own::new).ok_or("ids are 1 to 15");
+        let robot = [motor(1)?, motor(2)?];
         let mut runner = Runner::new(Nb(world.controller()), world.clock(), robot);
         let (wheel, joint) = (AngularVelocity::from_rad_per_s(6.0), Angle::from_degrees(90.0));
         let mut edges = Vec::new();

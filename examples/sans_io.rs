@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let Some(tick) = ticker.due(now) else { continue };
         if !armed_once {
-            // Again in the next millisecond, until the motor is heard; but never again after a fault.
+            // By itself, which only a simulated robot may: in each millisecond until the motor is heard, never after a fault.
             armed_once = bus.arm(now).is_ok();
         } else {
             let target = if ms % 2_000 < 1_000 { 90.0 } else { 270.0 };

@@ -107,7 +107,7 @@ impl<'w> Robot<'w> {
     }
 }
 
-/// Arms both axles if an operator presses the arming key, which is each 110 ms.
+/// Arms both axles each 110 ms, as if an operator pressed a key: only a simulated robot may. On a real one a person does.
 fn arm(front: &mut Axle<'_, Front>, rear: &mut Axle<'_, Rear>, tick: Tick) -> bool {
     let is_pressed = (tick.now().as_micros() / 1_000).is_multiple_of(110);
     is_pressed && front.arm(tick).is_ok() & rear.arm(tick).is_ok()
@@ -131,6 +131,7 @@ impl<'w> Gimbal<'w> {
     fn tick(&mut self) {
         self.runner.poll(16);
         let Some(tick) = self.runner.due() else { return };
+        // It arms by itself, which only a simulated robot may.
         let _not_yet = self.runner.is_armed() || self.runner.arm(tick).is_ok();
         _ = self.runner.device_mut().set_angle(self.yaw, HELD);
         self.runner.tick(tick);

@@ -27,6 +27,8 @@ enum Read {
     /// Disables it, or clears its error and leaves it disabled.
     Disable,
     Command {
+        position_rad: f64,
+        velocity_rad_per_s: f64,
         kp: f64,
         kd: f64,
         torque_nm: f64,
@@ -34,6 +36,10 @@ enum Read {
 }
 
 const TORQUE_MAX_NM: f64 = 10.0;
+
+fn position_rad(count: u16) -> f64 {
+    f64::from(count) * 25.0 / 65_535.0 - 12.5
+}
 
 impl Read {
     fn of(frame: &CanFrame) -> Self {
@@ -49,6 +55,8 @@ impl Read {
             count as f64 * (max - min) / 4_095.0 + min
         };
         Self::Command {
+            position_rad: position_rad((bits >> 48) as u16),
+            velocity_rad_per_s: field(36, -30.0, 30.0),
             kp: field(24, 0.0, 500.0),
             kd: field(12, 0.0, 5.0),
             torque_nm: field(0, -TORQUE_MAX_NM, TORQUE_MAX_NM),
@@ -60,7 +68,7 @@ impl Read {
         match self {
             Self::Enable => false,
             Self::Disable => true,
-            Self::Command { kp, kd, torque_nm } => {
+            Self::Command { kp, kd, torque_nm, .. } => {
                 let half_a_count_nm = 0.5 * 2.0 * TORQUE_MAX_NM / 4_095.0;
                 kp == 0.0 && kd == 0.0 && torque_nm.abs() <= half_a_count_nm + 1e-12
             }
@@ -79,7 +87,7 @@ trait Mit: OwnMotor {
 
 impl Mit for J4310 {
     fn make() -> Self {
-        Self::new(1, MASTER_ID)
+        Self::new(1, MASTER_ID).unwrap()
     }
 }
 
@@ -88,7 +96,7 @@ struct EightZeros(J4310);
 
 impl Mit for EightZeros {
     fn make() -> Self {
-        Self(J4310::new(1, MASTER_ID))
+        Self(J4310::make())
     }
 }
 
@@ -132,6 +140,10 @@ impl OwnMotor for EightZeros {
     fn vitals(&self) -> Vitals {
         self.0.vitals()
     }
+}
+
+fn own(number: u8) -> Own<J4310> {
+    Own::new(J4310::new(number, MASTER_ID).unwrap())
 }
 
 fn id(raw: u16) -> StandardId {
@@ -399,7 +411,8 @@ fn every_cause_of_rest_sends_rest_in_the_same_cycle_and_until_it_is_over() {
 #[test]
 fn eight_zero_bytes_are_a_torque_of_minus_ten_newton_metres() {
     let zeros = CanFrame::of(id(1), [0; 8]);
-    assert_eq!(Read::of(&zeros), Read::Command { kp: 0.0, kd: 0.0, torque_nm: -10.0 });
+    let Read::Command { kp, kd, torque_nm, .. } = Read::of(&zeros) else { panic!("a command") };
+    assert_eq!((kp, kd, torque_nm), (0.0, 0.0, -10.0));
     let found = check::<EightZeros>().unwrap_err();
     assert!(found.starts_with("Torque, Disarm, cycle 0: "), "{found}");
     assert!(found.ends_with("torque_nm: -10.0 }"), "{found}");
@@ -458,7 +471,9 @@ fn the_first_commands_ask_for_little() {
         let mut strongest = 0.0_f64;
         for ms in 1..=250 {
             let sent = bench.live(kind);
-            let [Read::Command { kp, kd, torque_nm }] = sent[..] else { panic!("{ms}: {sent:?}") };
+            let [Read::Command { kp, kd, torque_nm, .. }] = sent[..] else {
+                panic!("{ms}: {sent:?}")
+            };
             let share = (kp / 20.0).max(kd / 0.6).max(torque_nm / 3.0);
             assert!(share <= f64::from(ms) / 200.0 + 0.01, "{kind:?} {ms}: {sent:?}");
             strongest = strongest.max(share);
@@ -471,15 +486,16 @@ fn the_first_commands_ask_for_little() {
 fn an_angle_starts_from_where_the_shaft_is() {
     let mut bench = Bench::<J4310>::new();
     bench.is_enabled = true;
-    // 0x9000 of 0xFFFF in ±12.5 rad.
-    let shaft_rad = f32::from(0x9000_u16) * 25.0 / 65_535.0 - 12.5;
-    let target_rad = shaft_rad - 1.5;
-    let target = Angle::from_radians(target_rad + 3.0 * std::f32::consts::TAU);
-    let mut positions = Vec::new();
+    let start_rad = position_rad(0x9000);
+    let target_rad = start_rad - 1.5;
+    // 0x9000 of 0xFFFF in ±12.5 rad, and three turns.
+    let turned_rad = f32::from(0x9000_u16) * 25.0 / 65_535.0 - 14.0;
+    let target = Angle::from_radians(turned_rad + 3.0 * std::f32::consts::TAU);
+    let (mut shaft, mut positions) = (0x9000, Vec::new());
     for ms in 0..260 {
         bench.micros += 1_000;
         let now = bench.now();
-        assert_eq!(bench.hear(ENABLED), Ingest::Taken);
+        assert_eq!(bench.own.ingest(&answer(ENABLED, shaft), now), Ingest::Taken);
         if ms == 5 {
             bench.own.arm(now).unwrap();
         }
@@ -488,20 +504,120 @@ fn an_angle_starts_from_where_the_shaft_is() {
         while let Some(frame) = bench.own.next_frame(0) {
             if Read::of(&frame).drives() {
                 let [a, b, ..] = *frame.bytes();
-                let count = u16::from_be_bytes([a, b]);
-                positions.push(f32::from(count) * 25.0 / 65_535.0 - 12.5);
+                shaft = u16::from_be_bytes([a, b]); // follows at once
+                positions.push(position_rad(shaft));
             }
         }
     }
     let steps = positions.windows(2).map(|pair| pair[0] - pair[1]);
-    assert!(shaft_rad - positions[0] < 0.03, "{}", positions[0]);
+    assert!(start_rad - positions[0] < 0.03, "{}", positions[0]);
     assert!(steps.into_iter().all(|step| (-0.001..0.01).contains(&step)), "{positions:?}");
     assert!((positions.last().unwrap() - target_rad).abs() < 0.001, "{positions:?}");
 }
 
+/// The torque that the drive applies where it answers with these counts of position and velocity.
+fn asked_nm(read: Read, position: u16, velocity: u16) -> f64 {
+    let Read::Command { position_rad: wanted_rad, velocity_rad_per_s, kp, kd, torque_nm } = read
+    else {
+        panic!("{read:?}")
+    };
+    let measured = f64::from(velocity) * 60.0 / 4_095.0 - 30.0;
+    kp * (wanted_rad - position_rad(position)) + kd * (velocity_rad_per_s - measured) + torque_nm
+}
+
+/// The torque for this target, where the range opens for so long: it takes 200 ms.
+fn asked_of(kind: Kind, target: f32, opened_ms: u32, position: u16, velocity: u16) -> f64 {
+    let mut bench = Bench::<J4310>::new();
+    bench.is_enabled = true;
+    let mut read = None;
+    for ms in 0..=opened_ms {
+        bench.micros += 1_000;
+        let now = bench.now();
+        let [a, b] = position.to_be_bytes();
+        let [c, d] = (velocity << 4 | 0x7).to_be_bytes();
+        let frame = CanFrame::of(id(MASTER_ID), [0x11, a, b, c, d, 0xFF, 40, 35]);
+        assert_eq!(bench.own.ingest(&frame, now), Ingest::Taken);
+        if ms == 0 {
+            bench.own.arm(now).unwrap();
+        }
+        _ = match kind {
+            Kind::Torque => bench.own.set_torque(target),
+            Kind::Velocity => bench.own.set_velocity((), AngularVelocity::from_rad_per_s(target)),
+            Kind::Angle => bench.own.set_angle((), Angle::from_radians(target)),
+        };
+        read = bench.update(0.001).pop();
+    }
+    asked_nm(read.unwrap(), position, velocity)
+}
+
+const LIMIT_NM: f64 = 3.0;
+/// Each field is truncated to a count.
+const COUNTS_NM: f64 = 0.05;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+    /// Law: no target of any kind asks for more than the share of the limit, wherever the shaft is and however fast it turns.
+    #[test]
+    fn no_target_asks_for_more_than_the_share_of_the_limit(
+        kind in prop::sample::select(&KINDS[..]),
+        target in -60.0_f32..60.0,
+        opened_ms in 1_u32..240,
+        position: u16,
+        velocity in 0_u16..4_096,
+    ) {
+        let asked = asked_of(kind, target, opened_ms, position, velocity);
+        let limit = LIMIT_NM * (f64::from(opened_ms) / 200.0).min(1.0) + COUNTS_NM;
+        prop_assert!(asked.abs() <= limit, "{asked} Nm of {limit}");
+    }
+}
+
+#[test]
+fn a_step_of_each_kind_asks_for_the_whole_limit_and_none_for_nothing() {
+    let (middle, stands) = (0x8000, 2_047);
+    for (kind, target) in [(Kind::Torque, 9.0), (Kind::Velocity, 20.0), (Kind::Angle, 3.0)] {
+        for sign in [-1.0_f32, 1.0] {
+            let asked = asked_of(kind, sign * target, 220, middle, stands);
+            let wanted = f64::from(sign) * LIMIT_NM;
+            assert!((asked - wanted).abs() < COUNTS_NM, "{kind:?}: {asked} for {wanted}");
+        }
+        assert!(asked_of(kind, 0.0, 220, middle, stands).abs() < COUNTS_NM, "{kind:?}");
+    }
+    // The speed has a limit too: this count is 12.5 rad/s.
+    let asked = asked_of(Kind::Velocity, 20.0, 220, middle, 2_900);
+    assert!(asked.abs() < COUNTS_NM, "{asked}");
+}
+
+/// A position at an end of its range is that one or any beyond.
+#[test]
+fn at_an_end_of_the_range_there_is_no_angle_and_an_angle_target_rests() {
+    for end in [0, u16::MAX] {
+        let mut bench = Bench::<J4310>::driving(Kind::Angle);
+        bench.micros += 1_000;
+        let now = bench.now();
+        assert!(bench.own.angle(()).is_some());
+        assert_eq!(bench.own.ingest(&answer(ENABLED, end), now), Ingest::Taken);
+        assert_eq!(bench.own.angle(()), None);
+        bench.set(Kind::Angle, 1.0).unwrap();
+        assert!(bench.update(0.001).into_iter().all(Read::is_rest));
+        assert!(bench.live(Kind::Angle).into_iter().any(Read::drives), "back within it");
+    }
+}
+
+#[test]
+fn an_id_that_an_answer_has_no_room_for_is_refused_and_so_is_one_id_for_command_and_answers() {
+    for number in [0, 16, 0x15, 255] {
+        assert!(J4310::new(number, MASTER_ID).is_none(), "{number}");
+    }
+    let refused = Own::new(J4310::new(5, 5).unwrap()).arm(Instant::START).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "command of DM-J4310 #5 on 0x5 clashes with feedback of DM-J4310 #5 on 0x5"
+    );
+}
+
 #[test]
 fn two_motors_share_the_id_of_their_answers() {
-    let mut pair = (Own::new(J4310::new(1, MASTER_ID)), Own::new(J4310::new(2, MASTER_ID)));
+    let mut pair = (own(1), own(2));
     let now = Instant::from_micros(1_000);
     let of = |drive: u8, position: u8| {
         CanFrame::of(id(MASTER_ID), [drive, position, 0, 0x7F, 0xF7, 0xFF, 40, 35])
@@ -510,10 +626,10 @@ fn two_motors_share_the_id_of_their_answers() {
     assert_eq!(pair.ingest(&of(3, 0xFF), now), Ingest::Unrelated);
     let missing = pair.arm(now).unwrap_err().to_string();
     assert_eq!(missing, "no feedback from DM-J4310 #1");
-    assert_eq!(pair.ingest(&of(1, 0x00), now), Ingest::Taken);
+    assert_eq!(pair.ingest(&of(1, 0x01), now), Ingest::Taken);
     assert_eq!(pair.arm(now), Ok(()));
     assert!(pair.0.angle(()).unwrap() < pair.1.angle(()).unwrap());
-    let mut twins = (Own::new(J4310::new(1, MASTER_ID)), Own::new(J4310::new(1, MASTER_ID)));
+    let mut twins = (own(1), own(1));
     assert!(twins.clash().is_some(), "the commands are not shared");
 }
 

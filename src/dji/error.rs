@@ -21,6 +21,13 @@ pub enum AttachError {
         /// The name of the parameter.
         parameter: &'static str,
     },
+    /// A proportional gain is impossible for the model.
+    Gain {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The gain.
+        gain: SteepGain,
+    },
     /// The bus would be loaded beyond its ceiling: lower the rate of the feedback, or use a second bus.
     Load {
         /// The motor that was to be attached.
@@ -52,6 +59,26 @@ pub struct Collision {
     pub slot: Option<(CommandFrame, u8)>,
 }
 
+/// A proportional gain with which the finest error that feedback tells asks for more than there is, in whole numbers.
+///
+/// The unit is that of the loop: A, or V in voltage mode, per rad/s of the output shaft, or rad/s per rad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SteepGain {
+    /// The name of the gain and of its loop.
+    pub parameter: &'static str,
+    /// The gain that was given.
+    pub value: u32,
+    /// The highest gain that the model takes.
+    pub highest: u32,
+}
+
+impl core::fmt::Display for SteepGain {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(Message::new().gain(*self).as_str())
+    }
+}
+
 impl AttachError {
     /// Returns the error in words; `const`, so that a `const` wiring can fail to compile with them.
     #[must_use]
@@ -80,6 +107,7 @@ impl AttachError {
             Self::Parameter { motor, parameter } => {
                 message.name(*motor).text(": ").text(parameter).text(" is not usable")
             }
+            Self::Gain { motor, gain } => message.name(*motor).text(": ").gain(*gain),
             Self::Load { motor, load, ceiling_percent, feedback_hz } => {
                 let message = message
                     .name(*motor)
@@ -188,6 +216,15 @@ impl Message {
         message
     }
 
+    const fn gain(self, SteepGain { parameter, value, highest }: SteepGain) -> Self {
+        self.text(parameter)
+            .text(" is ")
+            .number(value)
+            .text(", at most ")
+            .number(highest)
+            .text(" in SI units of the output shaft: WordGains converts words per rpm")
+    }
+
     const fn name(self, motor: MotorName) -> Self {
         self.text(motor.model()).text(" #").number(motor.id() as u32)
     }
@@ -244,6 +281,18 @@ mod tests {
         assert_eq!(id.to_string(), "M2006 #109: the id is not within 1..=8");
         let parameter = AttachError::Parameter { motor: M3508, parameter: "kp" };
         assert_eq!(parameter.to_string(), "M3508 #5: kp is not usable");
+    }
+
+    #[test]
+    fn a_steep_gain_tells_value_bound_and_remedy_and_is_not_cut() {
+        let gain =
+            SteepGain { parameter: "kp of the position loop", value: u32::MAX, highest: 1_263_787 };
+        let motor = MotorName::new("GM6020 (voltage)", 7);
+        assert_eq!(
+            AttachError::Gain { motor, gain }.to_string(),
+            "GM6020 (voltage) #7: kp of the position loop is 4294967295, at most 1263787 \
+             in SI units of the output shaft: WordGains converts words per rpm"
+        );
     }
 
     #[test]

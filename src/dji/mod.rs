@@ -109,7 +109,7 @@ mod word_gains;
 pub use bus::{Bus, Counters};
 pub use command::CommandFrame;
 pub use config::Config;
-pub use error::{AttachError, Collision, Message};
+pub use error::{AttachError, Collision, Message, SteepGain};
 pub use feedback::{ErrorCode, Feedback, FeedbackError};
 pub use handle::{AnyHandle, Handle};
 pub use model::{

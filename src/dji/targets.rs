@@ -1,7 +1,7 @@
 //! What the application asks of the motors.
 
 use super::slot::Slot;
-use super::{AnyHandle, Bus, CurrentControlled, Handle, Model, VoltageControlled};
+use super::{AnyHandle, Bus, CurrentControlled, Handle, Model, SteepGain, VoltageControlled};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::motor::{AngleDrive, Capabilities, TargetError, VelocityDrive};
@@ -190,6 +190,8 @@ pub enum LoopError {
     NoLoop,
     /// A parameter is not usable.
     Parameter(&'static str),
+    /// A proportional gain is impossible for the model.
+    Gain(SteepGain),
 }
 
 impl core::fmt::Display for LoopError {
@@ -198,6 +200,7 @@ impl core::fmt::Display for LoopError {
             Self::Detached => f.write_str("the motor was detached"),
             Self::NoLoop => f.write_str("the motor was attached without this loop"),
             Self::Parameter(parameter) => write!(f, "{parameter} is not usable"),
+            Self::Gain(gain) => write!(f, "{gain}"),
         }
     }
 }

@@ -22,7 +22,8 @@ use core::f32::consts::TAU;
 ///
 /// Gains that were not converted are seldom refused. A `kp` of 10 words per rpm of the output shaft is 0.117 A per rad/s for
 /// an M3508. The same number in A per rad/s is 86 times as much, yet a possible loop: an error of one rpm of the rotor asks for
-/// 0.055 A. `attach` refuses a `kp` above 3667 A per rad/s, with which this error asks for more than the 20 A that there are.
+/// 0.055 A. `attach` refuses a `kp` above 3667 A per rad/s, with which this error asks for more than the 20 A that there are, and
+/// tells both numbers.
 ///
 /// # Examples
 /// A wheel whose loop had `kp` 10 and `ki` 0.5, in words per rpm of the output shaft, with the time in seconds:

@@ -61,18 +61,18 @@ pub enum ArmError {
     Missing(Missing),
     /// Two motors of different owners use one CAN id.
     Clash(Claim, Claim),
-    /// The emergency stop is still set: clear it first.
+    /// The emergency stop is set: `clear_emergency_stop` first.
     Stopped,
     /// Another node sends a command frame of this device.
     SecondMaster(Claim),
-    /// These motors report a fault, or run away, or share an id with another.
+    /// These motors report a fault, or run away, or share an id with another. Their `Health` has the code.
     Faulty(Missing),
     /// There is no motor to arm.
     NoMotors,
     /// The driver takes no frames.
     BusDown,
     /// A motor was relaxed since it was armed, and the last request to arm, or that moment, lies less than 100 ms back. A
-    /// request that is repeated in each tick is one request, and is not granted.
+    /// request that is repeated in each tick is one request, and is not granted. Only updates whose time moves on count.
     NotReleased,
 }
 
@@ -82,12 +82,12 @@ impl core::fmt::Display for ArmError {
             Self::Missing(missing) => write!(f, "no feedback from {missing}"),
             Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
             Self::SecondMaster(claim) => write!(f, "another node sends the {claim}"),
-            Self::Faulty(motors) => write!(f, "not fit to be driven: {motors}"),
-            Self::Stopped => f.write_str("the emergency stop is set"),
+            Self::Faulty(motors) => write!(f, "not fit to be driven, see health(): {motors}"),
+            Self::Stopped => f.write_str("the emergency stop is set: call clear_emergency_stop"),
             Self::NoMotors => f.write_str("no motor is attached"),
             Self::BusDown => f.write_str("the CAN driver takes no frames"),
             Self::NotReleased => f.write_str(
-                "a motor was relaxed since it was armed: release the request to arm for 100 ms, then arm again",
+                "a motor was relaxed since it was armed: release the request to arm for 100 ms of a clock that moves on, then arm again",
             ),
         }
     }
@@ -99,6 +99,18 @@ impl core::error::Error for ArmError {}
 mod tests {
     use super::*;
     use std::string::ToString;
+
+    #[test]
+    fn a_refusal_says_what_to_do() {
+        let faulty = Missing::collect([MotorName::new("DM-J8009", 5)].into_iter()).unwrap();
+        for (error, remedy) in [
+            (ArmError::Stopped, "clear_emergency_stop"),
+            (ArmError::NotReleased, "a clock that moves on"),
+            (ArmError::Faulty(faulty), "see health(): DM-J8009 #5"),
+        ] {
+            assert!(error.to_string().contains(remedy), "{error}");
+        }
+    }
 
     #[test]
     fn the_missing_are_named_up_to_the_capacity_and_counted_beyond() {

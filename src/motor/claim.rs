@@ -89,10 +89,11 @@ impl Claim {
     }
 
     /// Tells whether some id belongs to both claims, unless both [share](Self::shared) it in one direction, or they are the two
-    /// directions of one motor: some protocols send command and feedback with one id.
+    /// directions of one motor: some protocols send command and feedback with one id, which is then not shared.
     #[must_use]
     pub fn clashes_with(&self, other: &Self) -> bool {
-        if self.motor == other.motor && self.role != other.role {
+        let is_shared = self.is_shared || other.is_shared;
+        if self.motor == other.motor && self.role != other.role && !is_shared {
             return false;
         }
         if self.is_shared && other.is_shared && self.role == other.role {
@@ -160,5 +161,7 @@ mod tests {
         assert!(command.clashes_with(&command)); // attached twice
         assert!(command.covers(id) && !command.covers(StandardId::ZERO));
         assert!(command.clashes_with(&claim(Role::Feedback, "another")));
+        // Others answer with this id while the motor is commanded with it.
+        assert!(command.clashes_with(&claim(Role::Feedback, "joint").shared()));
     }
 }

@@ -136,6 +136,9 @@ pub trait Devices {
     /// Arming is a gesture. After a trip it is granted only when nobody asked for 100 ms of updates, so a program that calls this in each
     /// tick never re-arms. A refused call counts as asking.
     ///
+    /// At power-on, or after a reset, there is no trip to remember. Call this when a switch *turns* on, and take it as on before the
+    /// first reading: one that is left on then arms nothing.
+    ///
     /// # Errors
     /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a set emergency stop, a
     /// request that was not released since a trip.

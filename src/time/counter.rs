@@ -3,8 +3,9 @@ use core::num::NonZeroU32;
 
 /// Extends a free-running 16- or 32-bit hardware counter to an [`Instant`] that never wraps.
 ///
-/// It has to be read at least once in each wrap of the counter (65 ms for 16 bits at 1 MHz). No 64-bit
-/// division takes place, and no time is lost to rounding: the remainder is carried.
+/// It has to be read at least once in each wrap of the counter: 65 ms for 16 bits at 1 MHz. If a reading comes later, whole wraps
+/// are lost, and the time is slow without a sign of it. No 64-bit division takes place, and no time is lost to rounding: the
+/// remainder is carried.
 ///
 /// # Examples
 /// ```
@@ -28,46 +29,67 @@ pub struct ExtendedCounter {
     denominator: NonZeroU32,
 }
 
-/// The frequency of a counter that cannot be extended without loss.
+/// Why a counter is not extended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct CounterError {
-    /// The refused frequency.
-    pub ticks_per_second: u32,
+pub enum CounterError {
+    /// The ratio of the frequency to 1 MHz does not fit 32 bits.
+    Ratio {
+        /// The refused frequency.
+        ticks_per_second: u32,
+    },
+    /// A counter of 16 bits wraps in less than 10 ms.
+    Wrap {
+        /// The refused frequency.
+        ticks_per_second: u32,
+    },
 }
 
 impl core::fmt::Display for CounterError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(
-            f,
-            "a counter of {} Hz has no exact ratio to 1 MHz that fits 32 bits: use a rounder frequency",
-            self.ticks_per_second
-        )
+        match self {
+            Self::Ratio { ticks_per_second } => write!(
+                f,
+                "a counter of {ticks_per_second} Hz has no exact ratio to 1 MHz that fits 32 bits: use a rounder frequency"
+            ),
+            Self::Wrap { ticks_per_second } => write!(
+                f,
+                "a 16-bit counter of {ticks_per_second} Hz wraps within 10 ms: use a prescaler, {} Hz at most, or 32 bits",
+                ExtendedCounter::FASTEST_16_BIT
+            ),
+        }
     }
 }
 
 impl core::error::Error for CounterError {}
 
 impl ExtendedCounter {
+    /// In ticks a second: 10 ms to a wrap. A loop at 1 kHz may then miss nine periods, and feedback counts as late by then.
+    const FASTEST_16_BIT: u32 = 0x1_0000 * 100;
+
     /// Takes the frequency of a counter that wraps at 2^16.
     ///
     /// # Errors
-    /// For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not leave room for
-    /// the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 8 388 593 Hz and 268 435 250 Hz do not.
+    /// Above 6 553 600 Hz, where the counter wraps in less than 10 ms: a loop that reads it each 1 ms and stalls once would lose a
+    /// wrap. For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not leave room
+    /// for the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 999 983 Hz does not.
     pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, CounterError> {
+        if ticks_per_second > Self::FASTEST_16_BIT {
+            return Err(CounterError::Wrap { ticks_per_second });
+        }
         Self::new(ticks_per_second, 0xFFFF)
     }
 
     /// Takes the frequency of a counter that wraps at 2^32.
     ///
     /// # Errors
-    /// As [`new_16_bit`](Self::new_16_bit).
+    /// For 0 Hz and a frequency without such a ratio, as [`new_16_bit`](Self::new_16_bit). The fastest wraps in 1 s.
     pub const fn new_32_bit(ticks_per_second: u32) -> Result<Self, CounterError> {
         Self::new(ticks_per_second, u32::MAX)
     }
 
     const fn new(ticks_per_second: u32, mask: u32) -> Result<Self, CounterError> {
-        let error = CounterError { ticks_per_second };
+        let error = CounterError::Ratio { ticks_per_second };
         let (mut divisor, mut rest) = (ticks_per_second, 1_000_000);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
@@ -101,6 +123,7 @@ impl ExtendedCounter {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
     use std::vec::Vec;
 
     #[test]
@@ -108,11 +131,23 @@ mod tests {
         for ticks_per_second in [0, 4_294_967_291, 8_388_593, 268_435_250] {
             assert_eq!(
                 ExtendedCounter::new_32_bit(ticks_per_second).err(),
-                Some(CounterError { ticks_per_second })
+                Some(CounterError::Ratio { ticks_per_second })
             );
         }
-        let refused = std::format!("{}", CounterError { ticks_per_second: 8_388_593 });
+        let refused = std::format!("{}", CounterError::Ratio { ticks_per_second: 8_388_593 });
         assert!(refused.starts_with("a counter of 8388593 Hz has no exact ratio"), "{refused}");
+    }
+
+    #[test]
+    fn a_counter_that_wraps_faster_than_a_loop_reads_it_is_refused() {
+        for ticks_per_second in [6_553_601, 84_000_000, u32::MAX] {
+            let refused = ExtendedCounter::new_16_bit(ticks_per_second).err();
+            assert_eq!(refused, Some(CounterError::Wrap { ticks_per_second }));
+        }
+        assert!(ExtendedCounter::new_16_bit(6_553_600).is_ok());
+        assert!(ExtendedCounter::new_32_bit(84_000_000).is_ok());
+        let refused = CounterError::Wrap { ticks_per_second: 84_000_000 }.to_string();
+        assert!(refused.ends_with("use a prescaler, 6553600 Hz at most, or 32 bits"), "{refused}");
     }
 
     #[test]
@@ -142,11 +177,11 @@ mod tests {
             let hertz = denominator.unsigned_abs() * u64::from(1_000_000 / numerator);
             u32::try_from(hertz).unwrap_or(u32::MAX)
         });
-        prop_oneof![3 => near, 1 => any::<u32>(), 1 => (0_u32..5_000).prop_map(|khz| khz * 1_000)]
+        prop_oneof![3 => near, 1 => any::<u32>(), 2 => (0_u32..7_000).prop_map(|khz| khz * 1_000)]
     }
 
     proptest! {
-        /// Law: a frequency is accepted exactly when the scaled rest and the remainder fit 32 bits; each reading then
+        /// Law: a frequency is accepted exactly when a wrap takes 10 ms and the scaled rest and the remainder fit 32 bits; each reading then
         /// gives floor(total ticks / frequency) in microseconds, in the arithmetic of 128 bits.
         #[test]
         fn a_frequency_is_refused_or_no_reading_loses_a_tick(
@@ -158,7 +193,8 @@ mod tests {
             let divisor = greatest_common_divisor(frequency.into(), 1_000_000).max(1);
             let (numerator, denominator) = (1_000_000 / divisor, u128::from(frequency) / divisor);
             let fits = denominator > 0 && (numerator + 1) * (denominator - 1) <= u32::MAX.into();
-            prop_assert_eq!(made.is_ok(), fits, "{} / {}", numerator, denominator);
+            let is_slow = wide || frequency <= 6_553_600;
+            prop_assert_eq!(made.is_ok(), fits && is_slow, "{} / {}", numerator, denominator);
             let Ok(mut time) = made else { return Ok(()) };
             let mask = if wide { u32::MAX } else { 0xFFFF };
             let mut total = 0_u128;
@@ -178,12 +214,16 @@ mod tests {
         /// Law: after any readings, the extended time is floor(total ticks / frequency) in microseconds.
         #[test]
         fn no_tick_is_lost_for_common_frequencies(
-            frequency in prop::sample::select(&[32_768_u32, 1_000_000, 1_125_000, 25_000_000, 72_000_000, 168_000_000, 480_000_000][..]),
+            frequency in prop::sample::select(&[32_768_u32, 1_000_000, 1_125_000, 6_000_000, 25_000_000, 72_000_000, 168_000_000, 480_000_000][..]),
             wide in any::<bool>(),
             steps in prop::collection::vec(any::<u32>(), 1..200),
         ) {
             let mask = if wide { u32::MAX } else { 0xFFFF };
-            let mut time = if wide { ExtendedCounter::new_32_bit(frequency) } else { ExtendedCounter::new_16_bit(frequency) }.unwrap();
+            let made = if wide { ExtendedCounter::new_32_bit(frequency) } else { ExtendedCounter::new_16_bit(frequency) };
+            let Ok(mut time) = made else {
+                prop_assert!(!wide && frequency > 6_553_600);
+                return Ok(());
+            };
             let mut total = 0_u128;
             for step in steps {
                 total += u128::from(step & mask);

@@ -23,7 +23,15 @@
 //! # Ok::<(), drivetrain::wire::mit::RangeError>(())
 //! ```
 //!
-//! Sources: Damiao's protocol as python-damiao-driver documents it; frames of public tests, see `tests/data/wire`.
+//! **A drive goes on with its last command** when no other comes: a cut cable, or a program that stops, leaves it driving. Only a
+//! time-out of its own ends that, and it has to be set in the drive. For Damiao it is the register `TIMEOUT` (9), in units of
+//! 50 µs, 0 for none: 2000 is 100 ms. The drive then disables itself and reports error 13. Other makes have a setting of their
+//! own. Pull the cable while the wheels are lifted to see that it is set.
+//!
+//! A position saturates at the range of the field, so [`Feedback::position_rad`] at either end of it is no position: the shaft
+//! is there or beyond.
+//!
+//! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
 
 /// The data that enables a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);

@@ -151,7 +151,11 @@ fn second_master<D: Devices>(mut bench: Bench<D>, number: u8, case: &str) {
 fn fault<D: Devices>(mut bench: Bench<D>, number: u8, case: &str) {
     bench.wait(20);
     bench.step(|other| Some(if other == number { faulty(other) } else { healthy(other) }));
-    assert_eq!(bench.arm(), Err(format!("not fit to be driven: mine #{number}")), "{case}");
+    assert_eq!(
+        bench.arm(),
+        Err(format!("not fit to be driven, see health(): mine #{number}")),
+        "{case}"
+    );
     bench.assert_rests(case);
     bench.wait(PAUSE_MS);
     assert_eq!(bench.arm(), Ok(()), "{case}");
@@ -167,7 +171,11 @@ fn tripped<D: Devices>(mut bench: Bench<D>, number: u8, case: &str) {
     let expected: Vec<bool> = bench.numbers().map(|other| other != number).collect();
     assert_eq!(bench.armed(), expected, "{case}");
     assert_eq!(bench.edges(), [(number, Condition::Fault, true)], "{case}");
-    assert_eq!(bench.arm(), Err(format!("not fit to be driven: mine #{number}")), "{case}");
+    assert_eq!(
+        bench.arm(),
+        Err(format!("not fit to be driven, see health(): mine #{number}")),
+        "{case}"
+    );
     bench.step(|other| Some(healthy(other)));
     assert_eq!(bench.edges(), [(number, Condition::Fault, false)], "{case}");
     for _ in 0..PAUSE_MS {

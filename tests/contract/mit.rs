@@ -23,7 +23,8 @@ struct Pair {
 impl Pair {
     fn new(masters: [u16; 2], drive: Drive) -> Self {
         let [first, second] = masters;
-        let motors = [(1, first), (2, second)].map(|(id, master)| Own::new(J4310::new(id, master)));
+        let motors =
+            [(1, first), (2, second)].map(|(id, master)| Own::new(J4310::new(id, master).unwrap()));
         Self { motors, masters, drive }
     }
 

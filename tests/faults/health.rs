@@ -274,7 +274,9 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
         assert_eq!(armed, expected == warning);
         if expected == fault {
             let refused = bus.arm(at_ms(40)).map_err(|error| error.to_string());
-            assert!(refused.is_err_and(|why| why.starts_with("not fit to be driven: M")));
+            assert!(
+                refused.is_err_and(|why| why.starts_with("not fit to be driven, see health(): M"))
+            );
         }
         // An error is over when a whole round of looks heard none. A fault stays relaxed then, until it is armed.
         let word = hear(&mut bus, 0, 30);

@@ -170,11 +170,11 @@ impl Slot {
             Ok(loops) => loops,
             Err(error) => return Err(parameter!(error.parameter())),
         };
-        if let Some(name) = steep::position(&position, facts) {
-            return Err(parameter!(name));
+        if let Some(gain) = steep::position(&position, facts) {
+            return Err(AttachError::Gain { motor, gain });
         }
-        if let Some(name) = steep::speed(&speed, facts, rad_per_s_per_rpm) {
-            return Err(parameter!(name));
+        if let Some(gain) = steep::speed(&speed, facts, rad_per_s_per_rpm) {
+            return Err(AttachError::Gain { motor, gain });
         }
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));

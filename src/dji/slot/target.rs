@@ -1,9 +1,9 @@
 use super::arming::Arming;
 use super::{Slot, is_loop, steep};
 use crate::control::{Pid, PidConfig};
-use crate::dji::LoopError;
 use crate::dji::command::{Outbox, to_raw};
 use crate::dji::range::Range;
+use crate::dji::{LoopError, SteepGain};
 use crate::encoder::Position;
 use crate::motor::{Link, TargetError};
 
@@ -280,13 +280,13 @@ fn replace(
     pid: &mut Pid,
     config: PidConfig,
     limit: f32,
-    steep: Option<&'static str>,
+    steep: Option<SteepGain>,
 ) -> Result<(), LoopError> {
     if !is_loop(pid) {
         return Err(LoopError::NoLoop);
     }
-    if let Some(name) = steep {
-        return Err(LoopError::Parameter(name));
+    if let Some(gain) = steep {
+        return Err(LoopError::Gain(gain));
     }
     pid.set_config(super::within(Some(config), limit))
         .map_err(|error| LoopError::Parameter(error.parameter()))

@@ -9,9 +9,15 @@ const fn p(kp: f32) -> PidConfig {
 fn assert_steepest<M: Model>(config: Config<M>, steepest: f32) {
     let mut bus: Bus = Bus::new();
     let error = bus.attach(config.speed_loop(p(1.001 * steepest))).unwrap_err();
-    assert!(error.to_string().ends_with("#1: kp of the speed loop is not usable"), "{error}");
+    let AttachError::Gain { gain, .. } = error else { panic!("{error}") };
+    assert_eq!(gain.parameter, "kp of the speed loop");
+    let (down, up) = (
+        f64::from(steepest) - f64::from(gain.highest),
+        f64::from(gain.value) - f64::from(1.001 * steepest),
+    );
+    assert!((0.0..1.0).contains(&down) && (0.0..1.0).contains(&up), "{gain:?}");
     let motor = bus.attach(config.speed_loop(p(0.999 * steepest))).unwrap();
-    let refused = Err(LoopError::Parameter("kp of the speed loop"));
+    let refused = Err(LoopError::Gain(gain));
     assert_eq!(bus.set_speed_loop(motor, p(1.001 * steepest)), refused);
     assert_eq!(bus.set_speed_loop(motor, p(0.999 * steepest)), Ok(()));
 }
@@ -36,9 +42,10 @@ fn a_gain_with_which_one_count_of_the_encoder_asks_for_the_no_load_speed_is_refu
     let with = |kp| Config::<M3508>::new(1).position_loop(p(kp), SPEED);
     let mut bus: Bus = Bus::new();
     let error = bus.attach(with(1.265e6)).unwrap_err();
-    assert_eq!(error.to_string(), "M3508 #1: kp of the position loop is not usable");
+    let AttachError::Gain { gain, .. } = error else { panic!("{error}") };
+    assert_eq!((gain.parameter, gain.value), ("kp of the position loop", 1_265_000));
     let arm = bus.attach(with(1.263e6)).unwrap();
-    let refused = Err(LoopError::Parameter("kp of the position loop"));
+    let refused = Err(LoopError::Gain(gain));
     assert_eq!(bus.set_position_loop(arm, p(1.265e6)), refused);
     assert_eq!(bus.set_position_loop(arm, p(1.263e6)), Ok(()));
     let yaw = |kp| Config::<Gm6020Voltage>::new(5).position_loop(p(kp), SPEED);

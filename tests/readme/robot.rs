@@ -1,0 +1,75 @@
+use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{self, Gm6020Voltage, M3508};
+use drivetrain::frame::CanFrame;
+use drivetrain::geometry::{Heading, Twist, World};
+use drivetrain::motor::{ArmError, Edge, VelocityDrive};
+use drivetrain::runner::{EmergencyStop, Nb, Runner};
+use drivetrain::time::Clock;
+use drivetrain::units::{Angle, AngularVelocity};
+
+const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0); // A per rad/s, A per rad: 20 kg, see "Gains" below
+const ANGLE: PidConfig = PidConfig::new(15.0, 0.0, 0.0).with_output_limit(4.0); // rad/s per rad, at most 4 rad/s
+const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0); // V per rad/s, V per rad
+
+static STOP: EmergencyStop = EmergencyStop::new(); // `STOP.set()`, from an interrupt too
+
+trait Pilot {
+    fn is_switch_on(&self) -> bool; // as it stands: on drives, off disarms
+    fn clears_stop(&mut self) -> bool; // on purpose, when what set STOP is over
+    fn twist(&self) -> Twist<World>; // m/s and rad/s, in the world's frame
+    fn heading(&self) -> Heading; // from the IMU
+    fn offer(&mut self, frame: &CanFrame); // a frame that is no motor's
+    fn report(&mut self, why: ArmError); // "no feedback from M3508 #3"
+    fn note(&mut self, change: Edge); // "M3508 #2: ESC fault began at 10240 us"
+}
+
+fn robot(
+    can: impl embedded_can::nb::Can,
+    clock: impl Clock,
+    mut pilot: impl Pilot,
+) -> Result<(), Box<dyn core::error::Error>> {
+    let mut bus = dji::Bus::new();
+    let wheel = |id| dji::Config::<M3508>::new(id).speed_loop(SPEED);
+    // The ids as DJI counts them: 1 front right, 2 front left, 3 rear left, 4 rear right.
+    let wheels = MecanumWheels {
+        front_left: bus.attach(wheel(2))?,
+        front_right: bus.attach(wheel(1).reversed())?,
+        rear_left: bus.attach(wheel(3))?,
+        rear_right: bus.attach(wheel(4).reversed())?,
+    };
+    let yaw = bus.attach(dji::Config::<Gm6020Voltage>::new(5).position_loop(ANGLE, RATE))?;
+    let mecanum = Mecanum::new(MecanumGeometry {
+        wheel_radius_m: 0.076,
+        half_wheelbase_m: 0.20,
+        half_track_m: 0.18,
+    })?;
+    let fastest = AngularVelocity::from_rpm(450.0);
+    let mut runner = Runner::new(Nb(can), clock, bus).with_emergency_stop(&STOP);
+    let mut was_on = true; // a switch that is on at power-on, or after a watchdog's reset, arms nothing
+    loop {
+        runner.poll_with(16, |other| pilot.offer(other)); // bounded; foreign frames are yours
+        let Some(tick) = runner.due() else { continue }; // 1 kHz on a grid, overruns counted
+        let is_on = pilot.is_switch_on();
+        if !is_on {
+            runner.device_mut().disarm();
+        } else if !was_on {
+            if let Err(why) = runner.arm(tick) {
+                pilot.report(why);
+            }
+        }
+        was_on = is_on;
+        if pilot.clears_stop() {
+            runner.clear_emergency_stop(); // then the switch, off and on, arms
+        }
+        // Armed means all of them: when one wheel is lost for 100 ms, the others stop as well.
+        let wanted = if runner.is_armed() { pilot.twist() } else { Twist::new(0.0, 0.0, 0.0) };
+        let speeds = mecanum.inverse(wanted.to_body(pilot.heading())).desaturate(fastest);
+        _ = runner.device_mut().drive(wheels.zip(speeds).into_array());
+        _ = runner.device_mut().set_angle(yaw, Angle::from_degrees(90.0));
+        runner.tick(tick); // update, then send
+        while let Some(change) = runner.device_mut().next_edge() {
+            pilot.note(change);
+        }
+    }
+}
