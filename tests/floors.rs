@@ -266,3 +266,39 @@ fn the_decisions_are_numbered_in_their_order() {
     assert!(numbers.len() > 20);
     assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>());
 }
+
+/// A family asks the safety core, and has no rule of its own about these.
+const RULES: [&str; 9] = [
+    "late_us",
+    "offline_us",
+    "command_us",
+    "measured_us",
+    "good_frames",
+    "is_near",
+    "Gesture",
+    "Condition::Late",
+    "Condition::ClockFault, true",
+];
+
+fn own_rules(text: &str) -> Vec<String> {
+    let code = code(text).filter(|line| !line.trim_start().starts_with("//"));
+    let lines = (1..).zip(code).filter(|(_, line)| RULES.iter().any(|rule| line.contains(rule)));
+    lines.map(|(number, line)| format!("{number}: {line}")).collect()
+}
+
+#[test]
+fn no_family_has_a_safety_rule_of_its_own() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for family in ["dji", "snake", "pwm", "motor/own"] {
+        let files = rust_files(&src.join(family));
+        for file in
+            files.iter().filter(|file| !file.components().any(|part| part.as_os_str() == "tests"))
+        {
+            let found = own_rules(&fs::read_to_string(file).unwrap());
+            assert!(found.is_empty(), "{}: {found:?}", file.display());
+        }
+    }
+    let core = rust_files(&src.join("motor/safety"));
+    let of_core = core.iter().map(|file| own_rules(&fs::read_to_string(file).unwrap()).len());
+    assert!(of_core.sum::<usize>() > 10, "the rules are somewhere");
+}

@@ -284,7 +284,7 @@ impl Story {
                 let reply = Reply::decode(frame.data()).expect("a reply");
                 let known = &mut self.known[index_of(frame).expect("of an attached joint")];
                 if reply.register() == Register::ActualPosition {
-                    known.heard = known.heard.max(Some(self.now));
+                    known.heard = Some(self.now);
                     known.news[0] = true;
                     known.raw = reply.value();
                 }
@@ -406,7 +406,7 @@ impl Story {
                 continue;
             }
             known.lose_time();
-            known.stamp = self.now;
+            (known.stamp, known.armed_at) = (self.now, 0);
             assert!(!self.joints.is_joint_armed(*handle), "I4: armed without time: {known:?}");
             let is_fresh = self.joints.link(*handle) == Some(Link::Online);
             assert!(!is_fresh, "I4: fresh without time: {known:?}");

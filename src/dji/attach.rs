@@ -102,7 +102,7 @@ impl<B> Bus<B> {
         let Some(slot) = self.slot_mut(motor) else { return };
         let place = slot.place;
         slot.free();
-        self.journal.forget(motor.key().place());
+        self.guard.journal_mut().forget(motor.key().place());
         self.outbox.put(place, 0);
         let shared = self
             .slots

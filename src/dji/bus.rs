@@ -6,7 +6,7 @@ use super::slot::Slot;
 use super::{AnyHandle, CommandFrame, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Gesture, Ingest, Journal, Link, MotorName, Timeouts};
+use crate::motor::{DeviceGuard, Ingest, Link, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
@@ -20,10 +20,6 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
-
-/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
-pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
-pub(super) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -64,36 +60,20 @@ pub(super) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_U
 pub struct Bus<B = ()> {
     pub(super) slots: [Slot; SLOTS],
     pub(super) outbox: Outbox,
-    /// The time that new targets get.
-    pub(super) now: u32,
-    pub(super) timeouts: Timeouts,
+    pub(super) guard: DeviceGuard<12>,
     pub(super) budget: Budget,
-    /// The time of the last update; before the first one, that of the last frame of a motor.
-    pub(super) updated: Instant,
-    /// The time of the last arming: no update lies before it.
-    pub(super) armed_at: Instant,
-    pub(super) gesture: Gesture,
-    /// Until then no age exceeds its limit and no frame is due, unless something [disturbs](Self::disturb) that.
-    pub(super) quiet_until: Instant,
     /// The last usable time step as it was given, and as the loops take it.
     dt_s: f32,
     step: TimeStep,
     pub(super) rejects: Rejects,
-    pub(super) held_steps: u8,
-    /// Whether each motor has to be seen to with the next update.
-    pub(super) is_disturbed: bool,
     /// All slots from here on are free.
     pub(super) used: u8,
-    /// Whether there was an update.
-    pub(super) running: bool,
-    pub(super) stopped: bool,
-    pub(super) journal: Journal<12>,
     pub(super) rounds: Rounds,
     brand: PhantomData<fn() -> B>,
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 320 && size_of::<Bus>() <= 3744);
+const _: () = assert!(size_of::<Slot>() <= 316 && size_of::<Bus>() <= 3784);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +99,6 @@ pub(super) struct Rejects {
     pub(super) bad_length: u32,
     pub(super) bad_field: u32,
     pub(super) unattached: u32,
-    pub(super) bad_steps: u32,
 }
 
 impl Bus {
@@ -155,22 +134,12 @@ impl<B> Bus<B> {
         Self {
             slots: [Slot::FREE; SLOTS],
             outbox: Outbox::new(),
-            now: 0,
-            timeouts: Timeouts::new(),
+            guard: DeviceGuard::NEW,
             budget: Budget::new(),
-            updated: Instant::START,
-            armed_at: Instant::START,
-            gesture: Gesture::NEW,
-            quiet_until: Instant::START,
             dt_s: 0.001,
             step: TimeStep::new(0.001, LONGEST_STEP_S),
-            rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0, bad_steps: 0 },
-            held_steps: 0,
-            is_disturbed: true,
+            rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0 },
             used: 0,
-            running: false,
-            stopped: false,
-            journal: Journal::EMPTY,
             rounds: Rounds::NEW,
             brand: PhantomData,
         }
@@ -179,8 +148,7 @@ impl<B> Bus<B> {
     /// Sets when feedback and commands count as lost.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
-        self.timeouts = timeouts;
-        self.disturb();
+        self.guard.set_timeouts(timeouts);
         self
     }
 
@@ -191,7 +159,7 @@ impl<B> Bus<B> {
             Some(micros) if micros < 10_000_000 => micros,
             _ => 10_000_000,
         });
-        self.disturb();
+        self.guard.disturb();
         self
     }
 
@@ -231,8 +199,7 @@ impl<B> Bus<B> {
     /// but for motors that were relaxed; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and
     /// derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
-        let before = core::mem::replace(&mut self.updated, tick.now());
-        self.now = tick.now().stamp();
+        let before = self.guard.begin(tick.now());
         if !self.takes_step(tick.dt_s()) || !self.takes_time(before) {
             return self.update_without_step(before);
         }
@@ -250,8 +217,7 @@ impl<B> Bus<B> {
     /// Sees to what the time that passed brings with it; `false` when none passed.
     #[inline]
     fn takes_time(&mut self, before: Instant) -> bool {
-        let is_quiet = before < self.updated && self.updated < self.quiet_until;
-        is_quiet || self.look_around(before)
+        self.guard.is_quiet(before) || self.look_around(before)
     }
 
     /// Takes over a time step, unless it is none.
@@ -287,13 +253,13 @@ impl<B> Bus<B> {
     /// Tells whether a motor is heard; `None` once it is detached.
     #[must_use]
     pub fn link(&self, motor: impl Into<AnyHandle<B>>) -> Option<Link> {
-        Some(self.slot(motor.into())?.link())
+        Some(self.slot(motor.into())?.guard.link())
     }
 
     /// Tells whether a motor takes targets: armed, and not relaxed by a fault.
     #[must_use]
     pub fn is_motor_armed(&self, motor: impl Into<AnyHandle<B>>) -> bool {
-        self.slot(motor.into()).is_some_and(Slot::is_armed)
+        self.slot(motor.into()).is_some_and(|slot| slot.guard.is_armed())
     }
 
     /// Iterates over the attached motors, in the order of their feedback ids.
@@ -307,7 +273,8 @@ impl<B> Bus<B> {
     /// Returns what the bus has counted.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        let Rejects { bad_length, bad_field, unattached, bad_steps } = self.rejects;
+        let Rejects { bad_length, bad_field, unattached } = self.rejects;
+        let bad_steps = self.guard.bad_steps();
         let (packed, superseded) = (self.outbox.packed, self.outbox.superseded);
         Counters { bad_length, bad_field, unattached, bad_steps, packed, superseded }
     }
@@ -341,14 +308,7 @@ impl<B> Bus<B> {
         (first & !open, 0x7FF & !open)
     }
 
-    /// Has the next update see to each motor. To be called wherever an age may become greater than by the time that
-    /// passes, or another limit hold for it.
-    pub(super) const fn disturb(&mut self) {
-        self.quiet_until = Instant::START;
-        self.is_disturbed = true;
-    }
-
-    /// Changes a slot, and notes what follows: edges, and the pause after a trip.
+    /// Changes a slot, and sees to what follows.
     pub(super) fn change<T>(
         &mut self,
         motor: u8,
@@ -356,19 +316,11 @@ impl<B> Bus<B> {
         change: impl FnOnce(&mut Slot) -> T,
     ) -> Option<T> {
         let slot = self.slots.get_mut(usize::from(motor))?;
-        let (conditions, was_armed) = (slot.conditions, slot.is_armed());
+        let before = slot.guard.known();
         let outcome = change(slot);
-        self.journal.note(motor, &conditions, &slot.conditions, now);
-        if was_armed && !slot.is_armed() {
-            self.note_trip();
-        }
+        slot.settle();
+        self.guard.note(motor, before, &slot.guard, now);
         Some(outcome)
-    }
-
-    /// Begins the pause after a trip, of which each update is a part.
-    pub(super) const fn note_trip(&mut self) {
-        self.gesture.trip();
-        self.quiet_until = Instant::START;
     }
 
     pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {

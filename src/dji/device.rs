@@ -1,6 +1,5 @@
 //! The bus as a device of the runner.
 
-use super::bus::LONGEST_PAUSE;
 use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
@@ -48,7 +47,7 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> {
-        let missing = move |slot: &&Slot| self.misses(slot, now);
+        let missing = move |slot: &&Slot| self.guard.misses(&slot.guard, now);
         self.slots.iter().filter(missing).filter_map(Slot::name)
     }
 
@@ -65,11 +64,11 @@ impl<B> CanDevice for Bus<B> {
     }
 
     fn ask(&mut self) -> bool {
-        self.gesture.ask()
+        self.guard.ask()
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.stopped && !self.is_far(now) && self.gesture.take() {
+        if !self.guard.is_far(now) && self.guard.begin_arming(now).is_ok() {
             self.engage_all(0..self.used, now);
         }
     }
@@ -80,7 +79,7 @@ impl<B> CanDevice for Bus<B> {
 
     fn trip(&mut self) {
         Self::disarm(self);
-        self.note_trip();
+        self.guard.trip();
     }
 
     fn is_armed(&self) -> bool {
@@ -121,7 +120,10 @@ impl<B> Bus<B> {
 
     /// Relaxes every motor and refuses targets until armed again.
     pub fn disarm(&mut self) {
-        self.slots.iter_mut().for_each(Slot::disarm);
+        for slot in &mut self.slots {
+            slot.guard.disarm();
+            slot.settle();
+        }
         self.outbox.clear();
     }
 
@@ -129,29 +131,25 @@ impl<B> Bus<B> {
     #[must_use]
     pub fn is_armed(&self) -> bool {
         let mut attached = self.slots.iter().filter(|slot| slot.facts().is_some()).peekable();
-        attached.peek().is_some() && attached.all(Slot::is_armed)
+        attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())
     }
 
     /// Relaxes every motor at once, until the stop is cleared and the bus armed.
     pub fn emergency_stop(&mut self) {
-        if !self.stopped {
-            CanDevice::trip(self);
-            self.stopped = true;
+        if self.guard.stop() {
+            Self::disarm(self);
         }
     }
 
     /// Clears the emergency stop. The bus stays disarmed, and arming needs a new request.
     pub const fn clear_emergency_stop(&mut self) {
-        if self.stopped {
-            self.note_trip();
-            self.stopped = false;
-        }
+        self.guard.clear_stop();
     }
 
     /// Tells whether the emergency stop is set.
     #[must_use]
     pub const fn is_stopped(&self) -> bool {
-        self.stopped
+        self.guard.is_stopped()
     }
 
     /// Arms these motors only, whatever the others do.
@@ -178,15 +176,15 @@ impl<B> Bus<B> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
-        let granted = self.gesture.ask();
-        if self.stopped {
+        self.guard.ask();
+        if self.guard.is_stopped() {
             return Err(ArmError::Stopped);
         }
         let chosen = || motors.iter().filter_map(|motor| self.slot(*motor));
         if chosen().next().is_none() {
             return Err(ArmError::NoMotors);
         }
-        let missing = chosen().filter(|slot| self.misses(slot, now));
+        let missing = chosen().filter(|slot| self.guard.misses(&slot.guard, now));
         if let Some(missing) = Missing::collect(missing.filter_map(Slot::name)) {
             return Err(ArmError::Missing(missing));
         }
@@ -197,46 +195,32 @@ impl<B> Bus<B> {
         if let Some(faulty) = Missing::collect(faulty.filter_map(Slot::name)) {
             return Err(ArmError::Faulty(faulty));
         }
-        if !(granted && self.gesture.take()) {
-            return Err(ArmError::NotReleased);
-        }
+        self.guard.begin_arming(now)?;
         for motor in motors {
             if self.slot(*motor).is_some() {
                 let place = motor.key().place();
                 self.engage_all(place..place + 1, now);
             }
         }
-        if self.slots.iter().any(Slot::is_tripped) {
-            self.gesture.keep();
+        if self.slots.iter().any(|slot| slot.guard.is_tripped()) {
+            self.guard.keep_trip();
         }
         Ok(())
     }
 
-    /// Tells whether a motor has no fresh feedback, as far as its stamp tells.
-    fn misses(&self, slot: &Slot, now: Instant) -> bool {
-        self.is_far(now) || slot.is_missing(now.stamp(), &self.timeouts)
-    }
-
-    /// Tells whether a time lies so far after or before the last one that no stamp tells how far.
-    fn is_far(&self, now: Instant) -> bool {
-        now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE
-    }
-
     fn engage_all(&mut self, motors: core::ops::Range<u8>, now: Instant) {
-        self.now = now.stamp();
-        // An arming at an earlier time takes nothing back: motors that run may have targets of the later one.
-        self.armed_at = self.armed_at.max(now);
-        self.disturb();
-        let timeouts = self.timeouts;
         for motor in motors {
-            self.change(motor, now, |slot| slot.engage(now.stamp(), &timeouts));
+            let slot = self.slots.get(usize::from(motor)).filter(|slot| slot.is_fit());
+            if slot.is_some_and(|slot| self.guard.may_engage(&slot.guard, now)) {
+                self.change(motor, now, |slot| slot.engage(now.stamp()));
+            }
         }
     }
 
     /// Returns the measured velocity of a motor that is online.
     pub(super) fn fresh_velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
         let slot = self.slot(motor)?;
-        (slot.link() == Link::Online).then(|| slot.velocity())
+        (slot.guard.link() == Link::Online).then(|| slot.velocity())
     }
 
     /// Returns the measured angle of a motor that is online and knows where its shaft points.

@@ -99,7 +99,7 @@ impl<B> Bus<B> {
     /// Returns what is wrong with a motor; nothing once it is detached.
     #[must_use]
     pub fn conditions(&self, motor: impl Into<AnyHandle<B>>) -> Conditions {
-        self.slot(motor.into()).map_or(Conditions::NONE, |slot| slot.conditions.active())
+        self.slot(motor.into()).map_or(Conditions::NONE, |slot| slot.guard.latch().active())
     }
 
     /// Returns the oldest change of a motor's condition that was not read yet.
@@ -126,20 +126,21 @@ impl<B> Bus<B> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn next_edge(&mut self) -> Option<Edge> {
-        while let Some(entry) = self.journal.pop() {
-            let at = self.journal.time_of(&entry, self.updated);
+        let updated = self.guard.updated();
+        while let Some(entry) = self.guard.journal_mut().pop() {
+            let at = self.guard.journal().time_of(&entry, updated);
             let Some(slot) = self.slots.get_mut(usize::from(entry.motor)) else { continue };
             let Some(motor) = slot.name() else { continue };
             let (condition, began) = (entry.condition, entry.began);
-            if slot.conditions.take(condition, began) {
+            if slot.guard.latch_mut().take(condition, began) {
                 return Some(Edge { motor, condition, began, at });
             }
         }
-        let at = self.journal.last_time(self.updated);
+        let at = self.guard.journal().last_time(updated);
         self.slots.iter_mut().find_map(|slot| {
             let motor = slot.name()?;
-            let (condition, began) = slot.conditions.next()?;
-            slot.conditions.take(condition, began);
+            let (condition, began) = slot.guard.latch().next()?;
+            slot.guard.latch_mut().take(condition, began);
             Some(Edge { motor, condition, began, at })
         })
     }
@@ -149,7 +150,7 @@ impl<B> Bus<B> {
     pub(super) fn check_one_slot(&mut self) {
         let motor = self.rounds.next;
         let Some(slot) = self.slots.get_mut(usize::from(motor)) else {
-            return self.rounds.begin(self.now);
+            return self.rounds.begin(self.guard.now());
         };
         self.rounds.next = motor + 1;
         let word = self.outbox.get(slot.place);
@@ -161,14 +162,14 @@ impl<B> Bus<B> {
     #[inline(never)]
     fn check_closely(&mut self, motor: u8, word: i16) {
         let look = Look {
-            now: self.now,
+            now: self.guard.now(),
             elapsed: self.rounds.elapsed,
             word,
             window: self.rounds.closes_window.then_some(self.rounds.window),
             feedback_hz: self.budget.feedback_hz,
-            is_alone: self.now.wrapping_sub(self.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
+            is_alone: self.guard.now().wrapping_sub(self.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
         };
-        self.change(motor, self.updated, |slot| slot.check(&look));
+        self.change(motor, self.guard.updated(), |slot| slot.check(&look));
     }
 
     /// Takes a frame of another node that may be one of our commands.
@@ -192,7 +193,7 @@ impl<B> Bus<B> {
         &self,
         mut slots: impl Iterator<Item = &'a Slot>,
     ) -> Option<Claim> {
-        let slot = slots.find(|slot| slot.conditions.has(Condition::SecondMaster))?;
+        let slot = slots.find(|slot| slot.guard.latch().has(Condition::SecondMaster))?;
         super::device::claim(slot.place.frame().id(), Role::Command, slot.name()?)
     }
 }

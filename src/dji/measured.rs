@@ -1,9 +1,8 @@
 //! Angles by another sensor than the encoder of the motor.
 
-use super::bus::LONGEST_PAUSE;
 use super::{AnyHandle, Bus};
 use crate::encoder::Position;
-use crate::motor::{Measured, TargetError};
+use crate::motor::{LONGEST_PAUSE, Measured, TargetError};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 
@@ -92,20 +91,17 @@ impl<B> Bus<B> {
         velocity: AngularVelocity,
         at: Instant,
     ) -> Result<(), TargetError> {
-        let (now, timeouts) = (self.now, self.timeouts);
+        let (now, updated, timeouts) =
+            (self.guard.now(), self.guard.updated(), *self.guard.timeouts());
         // A stamp of 32 bits alone would be fresh again every 71 minutes.
-        let is_ahead = self.running && at.since(self.updated) > LONGEST_PAUSE;
-        let is_far = is_ahead || self.updated.since(at) > timeouts.measured();
+        let is_ahead = self.guard.is_running() && at.since(updated) > LONGEST_PAUSE;
+        let is_far = is_ahead || updated.since(at) > timeouts.measured();
         let at = (!is_far).then(|| at.stamp());
-        let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
-        let before = slot.conditions;
-        let outcome =
-            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts);
-        let after = slot.conditions;
-        self.journal.note(motor.key().place(), &before, &after, self.updated);
-        outcome?;
+        self.change_at(motor, |slot| {
+            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
+        })?;
         // It lasts for a shorter time than other targets.
-        self.disturb();
+        self.guard.disturb();
         Ok(())
     }
 }

@@ -112,13 +112,7 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        let motor = motor.into();
-        let slot = self.slot_mut(motor).ok_or(TargetError::Detached)?;
-        let before = slot.conditions;
-        let outcome = slot.set_present_position(position);
-        let after = slot.conditions;
-        self.journal.note(motor.key().place(), &before, &after, self.updated);
-        outcome
+        self.change_at(motor.into(), |slot| slot.set_present_position(position))
     }
 
     /// Changes the speed loop of a motor while it runs, without a jump of its output.
@@ -168,13 +162,24 @@ impl<B> Bus<B> {
         self.slot(motor.into()).map_or(Capabilities::NONE, Slot::capabilities)
     }
 
+    /// Changes a motor now, and sees to what follows.
+    pub(super) fn change_at(
+        &mut self,
+        motor: AnyHandle<B>,
+        change: impl FnOnce(&mut Slot) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        self.slot(motor).ok_or(TargetError::Detached)?;
+        let changed = self.change(motor.key().place(), self.guard.updated(), change);
+        changed.unwrap_or(Err(TargetError::Detached))
+    }
+
     #[inline]
     fn set(
         &mut self,
         motor: AnyHandle<B>,
         set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
     ) -> Result<(), TargetError> {
-        let now = self.now;
+        let now = self.guard.now();
         set(self.slot_mut(motor).ok_or(TargetError::Detached)?, now)
     }
 }

@@ -5,7 +5,7 @@ use super::slot::{Slot, name};
 use super::{AttachError, Command, Config, Joint, Reply, ReplyError, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Link, Malformed, MotorName, Progress, Timeouts};
+use crate::motor::{DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
 
@@ -55,7 +55,6 @@ const ANY_STEP_S: f32 = f32::INFINITY;
 pub struct Joints {
     pub(super) slots: [Slot; SLOTS],
     pub(super) now: Instant,
-    timeouts: Timeouts,
     reply_timeout: Duration,
     pub(super) answers: Answers,
     pub(super) budget: Budget,
@@ -72,12 +71,10 @@ pub struct Joints {
     pub(super) told: u8,
     pub(super) written: u8,
     pub(super) asked: u8,
-    pub(super) held_steps: u8,
-    /// An update came, so that `now` is the time of one.
-    progress: Progress,
+    /// Of time and stop; each joint has a guard of its own.
+    pub(super) guard: DeviceGuard<0>,
     /// Frames that are sent are heard again.
     pub(super) echoes: bool,
-    pub(super) stopped: bool,
     pub(super) counters: Counters,
 }
 
@@ -116,7 +113,6 @@ impl Joints {
         Self {
             slots: [Slot::FREE; SLOTS],
             now: Instant::START,
-            timeouts: Timeouts::POLLED,
             reply_timeout: Duration::from_millis(2),
             answers: Answers::NONE,
             budget: Budget::new(),
@@ -130,10 +126,8 @@ impl Joints {
             told: IDS - 1,
             written: IDS - 1,
             asked: IDS - 1,
-            held_steps: 0,
-            progress: Progress::NEW,
+            guard: DeviceGuard::with(Timeouts::POLLED),
             echoes: false,
-            stopped: false,
             counters: Counters {
                 replies: 0,
                 bad_length: 0,
@@ -152,7 +146,7 @@ impl Joints {
     /// Sets when feedback and targets count as lost, for joints attached afterwards.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
-        self.timeouts = timeouts;
+        self.guard.set_timeouts(timeouts);
         self
     }
 
@@ -177,7 +171,7 @@ impl Joints {
             return Err(AttachError::Taken(joint));
         }
         let generation = slot.next_generation().ok_or(AttachError::WornOut(joint))?;
-        *slot = Slot::new(&config, self.timeouts, generation)?;
+        *slot = Slot::new(&config, *self.guard.timeouts(), generation)?;
         self.returned.0 |= 1 << index;
         Ok(Joint::new(index, generation))
     }
@@ -233,14 +227,12 @@ impl Joints {
     /// zero, infinite or NaN chooses no joint for one update; a second one in a row relaxes all joints. Frames that disable
     /// a joint are sent all the same.
     pub fn update(&mut self, tick: Tick) {
-        if self.progress.advance(tick.now()).is_none() {
-            self.lose_time(tick.now());
-            return self.hold(tick.now());
+        let before = self.guard.begin(tick.now());
+        let moves_on = self.guard.moves_on(before);
+        if !moves_on || TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() {
+            return self.hold(before, moves_on);
         }
-        if TimeStep::new(tick.dt_s(), ANY_STEP_S).is_hold() {
-            return self.hold(tick.now());
-        }
-        self.held_steps = 0;
+        self.guard.run();
         self.now = tick.now();
         self.give_up(Some(self.reply_timeout));
         for index in 0..SLOTS {
@@ -265,17 +257,18 @@ impl Joints {
     }
 
     /// An update without a step chooses no joint, but disables joints that have to rest.
-    fn hold(&mut self, now: Instant) {
+    fn hold(&mut self, before: Instant, moves_on: bool) {
         count(&mut self.counters.bad_steps);
-        self.held_steps = self.held_steps.saturating_add(1);
-        let is_late = now.since(self.now) > self.timeouts.late();
-        if self.held_steps >= 2 || is_late {
-            (0..SLOTS).for_each(|index| self.relax_at(index));
+        let now = self.guard.updated();
+        match self.guard.hold(before, moves_on) {
+            Hold::Keep => {}
+            Hold::Rest => (0..SLOTS).for_each(|index| self.relax_at(index)),
+            Hold::LoseTime => self.lose_time(now),
         }
         let stands = now <= self.now;
         self.now = self.now.max(now);
         // A clock that stands or went back does not tell when an answer is overdue: then an update counts for a millisecond.
-        let held = Duration::from_millis(self.held_steps.into());
+        let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
         self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
         self.remind();

@@ -66,7 +66,7 @@ impl CanDevice for Joints {
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.stopped {
+        if !self.guard.is_stopped() {
             let heard = self.slots.iter_mut().filter(|slot| slot.id.is_some());
             for slot in heard.filter(|slot| !slot.is_missing(now)) {
                 slot.engage(now);
@@ -88,20 +88,19 @@ impl CanDevice for Joints {
     }
 
     fn emergency_stop(&mut self) {
-        if !self.stopped {
+        if self.guard.stop() {
             self.rest_all(Guard::emergency_stop);
             self.stop_all();
-            self.stopped = true;
         }
     }
 
     fn clear_emergency_stop(&mut self) {
         self.slots.iter_mut().for_each(|slot| slot.guard.clear_emergency_stop());
-        self.stopped = false;
+        self.guard.clear_stop();
     }
 
     fn is_stopped(&self) -> bool {
-        self.stopped
+        self.guard.is_stopped()
     }
 }
 

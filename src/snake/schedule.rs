@@ -80,7 +80,7 @@ impl Joints {
         }
         let write = next_after(self.written, self.writes & !quiet);
         // An update without a step does not know how long an answer is waited for.
-        let reads = if self.held_steps == 0 { self.reads & !quiet } else { 0 };
+        let reads = if self.guard.held_steps() == 0 { self.reads & !quiet } else { 0 };
         let read = next_after(self.asked, reads);
         match (write, read) {
             (Some(index), None) => self.write(index),

@@ -292,7 +292,6 @@ fn motor() {
     Guard::link.call();
     Guard::refused_targets.call();
     Guard::forgotten_targets.call();
-    Guard::reversals.call();
     Capability::is_target.call();
     (|list: &[Capability]| Capabilities::of(list)).call();
     Capabilities::with.call();
@@ -357,7 +356,7 @@ pub fn family<D: CanDevice + 'static>() {
     (|device: &D, now: Instant| device.missing(now).count()).call();
     (|device: &D| (device.faulty().count(), device.second_master())).call();
     (|device: &mut D| device.next_edge()).call();
-    (|device: &mut D, now: Instant| device.ask(now)).call();
+    (|device: &mut D| device.ask()).call();
     (|device: &mut D, now: Instant| device.engage(now)).call();
     (|device: &mut D| device.disarm()).call();
     (|device: &mut D| device.trip()).call();

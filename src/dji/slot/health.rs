@@ -1,12 +1,11 @@
 //! What is looked at in one motor a tick.
 
-use super::target::Action;
-use super::{Slot, age};
+use super::Slot;
 use crate::dji::Facts;
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
 use crate::encoder::{Homing, Position};
-use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample};
+use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};
 use crate::time::Duration;
 use crate::units::Angle;
 
@@ -67,9 +66,9 @@ impl Slot {
     /// From now on a glance is enough, if all is well.
     #[inline(never)]
     pub(super) fn relent(&mut self, facts: &Facts) {
-        let is_well = self.conditions.active().is_empty()
-            && self.link == Link::Online
-            && self.opened.is_none()
+        let is_well = self.guard.latch().active().is_empty()
+            && self.guard.link() == Link::Online
+            && !self.guard.is_opening()
             && self.error_code == 0
             && self.range == Range::within(self.full_limit)
             && self.health.soft_limits().is_none();
@@ -83,27 +82,27 @@ impl Slot {
 
     /// A condition began that a look at the motor has to end, or is to see.
     pub(super) const fn begin(&mut self, condition: Condition) {
-        self.conditions.set(condition, true);
+        self.guard.latch_mut().set(condition, true);
         self.attend();
     }
 
     /// Looks at everything that need not be looked at in every tick.
     pub(in crate::dji) fn check(&mut self, look: &Look) {
         let Some(facts) = self.facts else { return };
-        let before = self.conditions.active();
+        let before = self.guard.latch().active();
         if let Some(window) = look.window {
             self.close_window(window, look.feedback_hz);
         }
         if !before.is_empty() {
             self.end_what_is_over(look);
         }
-        if self.link == Link::Online {
+        if self.guard.link() == Link::Online {
             let share = self.examine(facts, look);
             self.narrow(share, look.elapsed, look.now);
         } else {
             self.monitor = Monitor::NEW;
         }
-        if !self.conditions.active().is_empty() || self.error_code != 0 {
+        if !self.guard.latch().active().is_empty() || self.error_code != 0 {
             self.attend();
             self.react(before);
         } else if self.cool_below == 0 {
@@ -119,7 +118,7 @@ impl Slot {
         }
         self.monitor.hear_error();
         if facts.errors.severity(code) > facts.errors.severity(self.error_code) {
-            let before = self.conditions.active();
+            let before = self.guard.latch().active();
             self.take_error(facts, code);
             self.attend();
             self.react(before);
@@ -129,7 +128,7 @@ impl Slot {
     fn take_error(&mut self, facts: &Facts, code: u8) {
         if code != self.error_code {
             self.error_code = code;
-            self.conditions.report(facts.errors.severity(code), true, self.health);
+            self.guard.latch_mut().report(facts.errors.severity(code), true, self.health);
         }
     }
 
@@ -144,7 +143,7 @@ impl Slot {
         self.saturated = self.saturated.saturating_add(u16::from(at_limit));
         let sample = Sample {
             elapsed: look.elapsed,
-            fresh: age(look.now, self.heard) <= u32::from(look.elapsed) << 10,
+            fresh: age(look.now, self.guard.heard()) <= u32::from(look.elapsed) << 10,
             effort: f32::from(look.word) / f32::from(self.full_limit),
             speed: f32::from(feedback.rpm()) / f32::from(facts.rotor_no_load_rpm()),
             current: f32::from(feedback.current()) / f32::from(facts.current_raw),
@@ -157,17 +156,48 @@ impl Slot {
                 .has_temperature
                 .then(|| (celsius(feedback.temperature()), temperatures(facts, self.health))),
         };
-        self.monitor.look(&mut self.conditions, &sample, self.health)
+        self.monitor.look(self.guard.latch_mut(), &sample, self.health)
     }
 
     /// Narrows the output to the share that is left, in the directions that are left.
     fn narrow(&mut self, share: f32, elapsed: u8, now: u32) {
-        let share = share.min(self.open_share(now));
+        let share = share.min(self.guard.share(now));
         let limit = to_raw(share, f32::from(self.full_limit), self.full_limit);
         self.range = Range::within(limit);
         self.keep_inside(elapsed);
         if self.range != Range::within(self.full_limit) {
             self.hold_back();
+        }
+    }
+
+    /// Keeps the integral of the speed loop within what is left of the output: the loop knows only the full limit, and would
+    /// wind up.
+    fn hold_back(&mut self) {
+        let end = |raw: i16| f32::from(self.range.nearest(raw.into())) / self.raw_per_unit;
+        let (one, other) = (end(i16::MIN), end(i16::MAX));
+        self.loops.speed_mut().keep_integral_between(one.min(other), one.max(other));
+    }
+
+    /// Tells whether there is a motor, and nothing that keeps it from being armed.
+    pub(in crate::dji) fn is_fit(&self) -> bool {
+        self.facts.is_some() && !self.is_faulty()
+    }
+
+    /// Takes targets from now on, starting from rest; what relaxed the motor before is noticed anew.
+    pub(in crate::dji) fn engage(&mut self, now: u32) {
+        self.guard.engage(now);
+        for condition in Monitor::NOTICED_ANEW {
+            self.guard.latch_mut().set(condition, false);
+        }
+        self.monitor = Monitor::NEW;
+        self.begin_opening();
+        self.keep_inside(0);
+    }
+
+    /// The output range opens from zero, where it does not open at once.
+    pub(super) fn begin_opening(&mut self) {
+        if self.guard.is_opening() {
+            self.range = Range::ZERO;
         }
     }
 
@@ -190,16 +220,16 @@ impl Slot {
     fn soft_limits(&mut self, ahead: u8) -> (bool, bool) {
         let Some((lower, upper)) = self.health.soft_limits() else { return (false, false) };
         if self.homing == Homing::Relative {
-            self.conditions.set(Condition::SoftLimit, false);
+            self.guard.latch_mut().set(Condition::SoftLimit, false);
             return (false, false);
         }
         let here = self.shaft.position().as_angle().as_radians();
         // Where it is when it is looked at next.
         let there = here + self.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
         let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
-        let lingers = self.conditions.has(Condition::SoftLimit)
+        let lingers = self.guard.latch().has(Condition::SoftLimit)
             && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
-        self.conditions.set(Condition::SoftLimit, below || above || lingers);
+        self.guard.latch_mut().set(Condition::SoftLimit, below || above || lingers);
         (below, above)
     }
 
@@ -217,14 +247,10 @@ impl Slot {
     }
 
     fn end_what_is_over(&mut self, look: &Look) {
-        if self.asked != Action::Rest {
-            self.conditions.set(Condition::CommandLost, false);
-        }
+        self.guard.end_what_is_over();
         if look.is_alone {
-            self.conditions.set(Condition::SecondMaster, false);
+            self.guard.latch_mut().set(Condition::SecondMaster, false);
         }
-        // An update that looks here has moved on.
-        self.conditions.set(Condition::ClockFault, false);
     }
 
     fn close_window(&mut self, window: u16, feedback_hz: u32) {
@@ -233,26 +259,26 @@ impl Slot {
         self.traffic.close(window, feedback_hz);
         if self.traffic.is_crowded() {
             // Every frame is compared from now on.
-            self.trusted_gap_us = 0;
+            self.guard.trust(0);
         }
         if was_crowded && !double {
-            self.conditions.set(Condition::DuplicateId, false);
+            self.guard.latch_mut().set(Condition::DuplicateId, false);
         }
     }
 
     /// Relaxes the motor when something began, or still holds, for which it has to be.
     pub(super) fn react(&mut self, before: Conditions) {
-        let active = self.conditions.active();
+        let active = self.guard.latch().active();
         let begun = active.minus(before).and(self.health.relaxing());
         if !begun.is_empty() || self.is_faulty() {
-            self.trip();
+            self.guard.trip();
         }
     }
 
     /// Another node has sent the motor's command frame.
     pub(in crate::dji) fn hear_rival(&mut self) {
         if !self.health.ignores(Condition::SecondMaster) {
-            let before = self.conditions.active();
+            let before = self.guard.latch().active();
             self.begin(Condition::SecondMaster);
             self.react(before);
         }
@@ -261,27 +287,27 @@ impl Slot {
     /// Returns how the motor is.
     pub(in crate::dji) fn health(&self) -> Option<Health> {
         let facts = self.facts?;
-        let heard = self.link != Link::Unheard;
+        let heard = self.guard.link() != Link::Unheard;
         let celsius = celsius(self.feedback.temperature());
         Some(Health {
             motor: self.name()?,
-            link: self.link,
-            armed: self.is_armed(),
-            conditions: self.conditions.active(),
+            link: self.guard.link(),
+            armed: self.guard.is_armed(),
+            conditions: self.guard.latch().active(),
             feedback_hz: self.traffic.rate_hz(),
             longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
             temperature_c: (heard && facts.has_temperature).then_some(celsius),
             error_code: self.error_code,
             saturated: self.saturated,
-            refused_targets: self.refused_targets,
-            forgotten_targets: self.forgotten_targets,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
             ambiguous_gaps: self.ambiguous_gaps,
         })
     }
 
     /// Tells whether the motor must not be armed.
     pub(in crate::dji) fn is_faulty(&self) -> bool {
-        !self.conditions.active().and(OBSTACLES).and(self.health.relaxing()).is_empty()
+        !self.guard.latch().active().and(OBSTACLES).and(self.health.relaxing()).is_empty()
     }
 }
 

@@ -1,6 +1,6 @@
+use super::Slot;
 use super::target::{Action, Goal, needs};
-use super::{Slot, age, is_near};
-use crate::motor::{TargetError, Timeouts};
+use crate::motor::{MotorGuard, TargetError, Timeouts};
 
 impl Slot {
     /// Takes the way that another sensor leaves, in rad, and the rate that it measures, in rad/s; `at` is `None` when that
@@ -15,18 +15,15 @@ impl Slot {
     ) -> Result<(), TargetError> {
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
         needs(self.loops.position())?;
-        let (limit, command_us) = (timeouts.measured_us(), timeouts.command_us());
-        let Some(at) = at.filter(|at| is_near(now, *at, limit)) else {
-            if self.asked != Action::Rest {
-                self.forget_target();
+        let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
+        else {
+            if self.guard.has_target() {
+                self.guard.forget_target();
+                self.settle();
             }
             return Err(TargetError::StaleMeasurement);
         };
-        // It counts until the measurement is too old: as if it had been set so long before.
-        let commanded = at.wrapping_add(limit).wrapping_sub(command_us);
-        let is_ahead = age(now, commanded) == 0;
-        let goal = Goal::measured(way, rad_per_s);
-        self.start(Action::Measured, goal, if is_ahead { now } else { commanded });
+        self.start(Action::Measured, Goal::measured(way, rad_per_s), stamp);
         Ok(())
     }
 }

@@ -1,6 +1,5 @@
 //! One motor: feedback in, loops, raw command out.
 
-mod arming;
 mod capability;
 mod health;
 mod measured;
@@ -17,55 +16,38 @@ use super::{AttachError, Facts, Feedback, State};
 use crate::control::{Cascade, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft};
 use crate::motor::{
-    Condition, HealthConfig, Latch, Link, Monitor, MotorName, Recovery, TargetError, Traffic,
+    Condition, HealthConfig, Link, Monitor, MotorGuard, MotorName, Recovery, TargetError, Traffic,
 };
-use crate::time::Duration;
 use crate::units::{AngularVelocity, Current};
-use arming::Arming;
 use core::f32::consts::TAU;
-use core::num::NonZeroU16;
 pub(super) use health::Look;
 use health::celsius;
 use target::{Action, Duty, Goal};
-pub(super) use update::Ages;
 
 #[derive(Debug, Clone, Copy)]
 // In the order of use, so that neighbours are loaded and stored together.
 #[repr(C)]
 pub(super) struct Slot {
     feedback: Feedback,
-    heard: u32,
-    /// Up to this age of the last frame the shortest way is the way; 0 unless online.
-    trusted_gap_us: u32,
+    pub(super) guard: MotorGuard,
     shaft: Shaft,
     rad_per_s_per_rpm: f32,
     /// What an update does: what is asked for, or nothing while the feedback is late.
     duty: Duty,
     asked: Action,
     pub(super) place: Place,
-    link: Link,
+    homing: Homing,
     /// What is left of the full limit.
     range: Range,
     full_limit: i16,
     calm_word: u16,
     raw_per_unit: f32,
     goal: Goal,
-    commanded: u32,
     loops: Cascade,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
-    /// Since when the output range opens; `None` when it is open.
-    opened: Option<NonZeroU16>,
-    opening_ms: Option<NonZeroU16>,
     ambiguous_gaps: u16,
-    refused_targets: u16,
-    forgotten_targets: u16,
-    arming: Arming,
-    homing: Homing,
-    good_frames: u8,
     generation: u8,
-    /// Whether the motor takes targets again after a recovery.
-    resumes: bool,
     error_code: u8,
     /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
     /// well when it was looked at last, and nothing has begun since.
@@ -73,7 +55,6 @@ pub(super) struct Slot {
     /// What the last update did.
     acted: Action,
     saturated: u16,
-    pub(super) conditions: Latch,
     health: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
@@ -96,33 +77,22 @@ impl Slot {
         goal: Goal::NONE,
         shaft: Shaft::new(GearRatio::DIRECT, false),
         feedback: Feedback::NONE,
-        heard: 0,
-        commanded: 0,
-        trusted_gap_us: 0,
+        guard: MotorGuard::NEW,
         rad_per_s_per_rpm: 0.0,
         raw_per_unit: 0.0,
         nm_per_a: 0.0,
         range: Range::ZERO,
         full_limit: 0,
-        opening_ms: None,
-        opened: None,
-        resumes: false,
         ambiguous_gaps: 0,
-        refused_targets: 0,
-        forgotten_targets: 0,
         loops: NO_LOOPS,
         generation: 0,
         place: Place::Nowhere,
-        link: Link::Unheard,
-        good_frames: 0,
         homing: Homing::Relative,
-        arming: Arming::Disarmed,
         error_code: 0,
         cool_below: 0,
         acted: Action::Rest,
         calm_word: 0,
         saturated: 0,
-        conditions: Latch::NONE,
         health: &USUAL,
         monitor: Monitor::NEW,
         traffic: Traffic::NONE,
@@ -188,8 +158,8 @@ impl Slot {
             nm_per_a,
             range: Range::within(limit_raw),
             full_limit: limit_raw,
-            opening_ms: whole_ms(config.opening),
-            resumes: matches!(config.recovery, Recovery::Resume),
+            guard: MotorGuard::NEW
+                .with(config.opening, matches!(config.recovery, Recovery::Resume)),
             loops,
             generation,
             place,
@@ -238,14 +208,10 @@ impl Slot {
         before + self.place.slot() + 1
     }
 
-    pub(super) const fn link(&self) -> Link {
-        self.link
-    }
-
     /// Returns what is known; `None` before the first frame.
     pub(super) fn state(&self) -> Option<State> {
         let facts = self.facts?;
-        if self.link == Link::Unheard {
+        if self.guard.link() == Link::Unheard {
             return None;
         }
         let amperes =
@@ -262,12 +228,19 @@ impl Slot {
             error: facts.errors.read(self.feedback.error()),
             rotor_counts: self.shaft.rotor_counts(),
             ambiguous_gaps: self.ambiguous_gaps,
-            refused_targets: self.refused_targets,
-            forgotten_targets: self.forgotten_targets,
-            conditions: self.conditions.active(),
-            link: self.link,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+            conditions: self.guard.latch().active(),
+            link: self.guard.link(),
             feedback: self.feedback,
         })
+    }
+
+    /// Time did not move on. A free slot loses nothing.
+    pub(super) fn lose_time(&mut self) {
+        if self.facts.is_some() {
+            self.guard.lose_time();
+        }
     }
 
     /// Returns the velocity of the output shaft.
@@ -279,7 +252,7 @@ impl Slot {
     /// Calls the present position `position`. A motor that holds an angle or position is relaxed: its target
     /// was given in the old terms.
     pub(super) fn set_present_position(&mut self, position: Position) -> Result<(), TargetError> {
-        if self.link != Link::Online {
+        if self.guard.link() != Link::Online {
             return Err(TargetError::NoFeedback);
         }
         if !position.is_finite() {
@@ -290,7 +263,7 @@ impl Slot {
         }
         self.shaft.set_position(position);
         self.homing = Homing::Homed;
-        self.conditions.set(Condition::PositionUncertain, false);
+        self.guard.latch_mut().set(Condition::PositionUncertain, false);
         self.keep_inside(0);
         Ok(())
     }
@@ -307,28 +280,6 @@ impl Slot {
     fn direction(&self) -> f32 {
         1.0_f32.copysign(self.raw_per_unit)
     }
-}
-
-/// Tells whether a stamp lies within `limit` of `now`, before or after.
-///
-/// After, because an interrupt may stamp a frame just after a tick has read the clock; no further, because a clock that
-/// was set back must not make an old stamp look fresh.
-#[inline]
-const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
-    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
-}
-
-/// Returns the age of a stamp; zero when it lies ahead.
-const fn age(now: u32, stamp: u32) -> u32 {
-    let age = now.wrapping_sub(stamp);
-    if age.cast_signed() < 0 { 0 } else { age }
-}
-
-/// Whole milliseconds, at most 65 s; `None` for less than one.
-const fn whole_ms(time: Duration) -> Option<NonZeroU16> {
-    let millis = time.as_micros() / 1_000;
-    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
-    NonZeroU16::new(if millis < 65_000 { millis as u16 } else { 65_000 })
 }
 
 /// The velocity of the output shaft without load: what a position loop may ask for.

@@ -1,21 +1,19 @@
-use super::target::Action;
-use super::{Slot, age, is_near};
-use crate::dji::bus::LONGEST_PAUSE_US;
+use super::Slot;
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
-use crate::motor::{Condition, Link, Timeouts};
+use crate::motor::{Condition, Link, Timeouts, age};
 
 impl Slot {
     /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
     /// returns `false`. A motor that is not online, and a free slot, trust no gap.
     #[inline]
     pub(in crate::dji) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
-        let in_time = now.wrapping_sub(self.heard) < self.trusted_gap_us;
+        let in_time = self.guard.is_in_time(now);
         if in_time {
             self.traffic.count();
             self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
             self.feedback = feedback;
-            self.heard = now;
+            self.guard.hear_in_time(now);
         }
         in_time
     }
@@ -29,43 +27,32 @@ impl Slot {
         timeouts: &Timeouts,
         running: bool,
     ) {
-        if self.link != Link::Unheard {
-            self.traffic.gap(age(now, self.heard));
+        let (link, gap_us) = (self.guard.link(), age(now, self.guard.heard()));
+        let in_time = now.wrapping_sub(self.guard.heard()) < trusted_gap_us(facts);
+        if link != Link::Unheard {
+            self.traffic.gap(gap_us);
         }
         self.traffic.count();
-        match self.link {
-            Link::Unheard => {
-                self.shaft.seed(feedback.angle());
-                self.set_online(facts);
-            }
-            Link::Online | Link::Late => {
-                let in_time = now.wrapping_sub(self.heard) < trusted_gap_us(facts);
-                if in_time && !running {
-                    self.move_shortest(feedback);
-                } else {
-                    self.follow(facts, feedback, age(now, self.heard));
-                }
-                self.set_online(facts);
-            }
+        match link {
+            Link::Unheard => self.shaft.seed(feedback.angle()),
+            Link::Online | Link::Late if in_time && !running => self.move_shortest(feedback),
+            Link::Online | Link::Late => self.follow(facts, feedback, gap_us),
             Link::Offline => {
                 self.move_shortest(feedback);
                 self.doubt_position();
-                self.good_frames = 1;
-                self.link = Link::Recovering;
-                self.finish_recovery(facts, timeouts, now);
             }
-            Link::Recovering => {
-                self.move_shortest(feedback);
-                let in_a_row = is_near(now, self.heard, timeouts.late_us());
-                self.good_frames = if in_a_row { self.good_frames.saturating_add(1) } else { 1 };
-                self.finish_recovery(facts, timeouts, now);
-            }
+            Link::Recovering => self.move_shortest(feedback),
         }
         self.feedback = feedback;
-        self.heard = now;
-        if !running {
-            // Nobody looks at ages yet, so every frame has to: it comes this way.
-            self.trusted_gap_us = 0;
+        self.guard.hear(now, timeouts);
+        if self.guard.link() == Link::Online {
+            // Before the first update nobody looks at ages, so that every frame has to: it comes this way.
+            let is_trusted = running && !self.traffic.is_crowded();
+            self.guard.trust(if is_trusted { trusted_gap_us(facts) } else { 0 });
+            if link == Link::Recovering || link == Link::Offline {
+                self.begin_opening();
+            }
+            self.relent(facts);
         }
     }
 
@@ -101,7 +88,7 @@ impl Slot {
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         self.traffic.compare(counts, predicted as i32, tolerance as i32);
         if self.traffic.is_double() && !self.health.ignores(Condition::DuplicateId) {
-            let before = self.conditions.active();
+            let before = self.guard.latch().active();
             self.begin(Condition::DuplicateId);
             self.react(before);
         }
@@ -118,52 +105,6 @@ impl Slot {
         if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
-    }
-
-    fn finish_recovery(&mut self, facts: &Facts, timeouts: &Timeouts, now: u32) {
-        if self.good_frames >= timeouts.good_frames() {
-            self.set_online(facts);
-            self.resume(now);
-        }
-    }
-
-    fn set_online(&mut self, facts: &Facts) {
-        self.link = Link::Online;
-        self.trusted_gap_us = if self.traffic.is_crowded() { 0 } else { trusted_gap_us(facts) };
-        self.conditions.set(Condition::Late, false);
-        self.conditions.set(Condition::Offline, false);
-        self.relent(facts);
-        self.settle();
-    }
-
-    /// The feedback is too old for its angle to be followed blindly: the next frame is looked at.
-    pub(super) fn set_late(&mut self) {
-        self.link = Link::Late;
-        self.begin(Condition::Late);
-        self.trusted_gap_us = 0;
-        self.loops.interrupt();
-        self.settle();
-    }
-
-    /// Gives up what nobody knows any more how old it is: after a pause everything, otherwise what is so old that nobody
-    /// will know.
-    pub(in crate::dji) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
-        let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
-        if self.link != Link::Unheard && is_bygone(self.heard) {
-            self.set_offline();
-        } else if self.asked != Action::Rest && is_bygone(self.commanded) {
-            self.forget_target();
-        }
-    }
-
-    /// The motor is lost: relaxed, and latched until it is armed again or ramps back.
-    pub(super) fn set_offline(&mut self) {
-        self.link = Link::Offline;
-        self.begin(Condition::Late);
-        self.begin(Condition::Offline);
-        self.trusted_gap_us = 0;
-        self.latch();
-        self.relax();
     }
 }
 

@@ -1,11 +1,10 @@
-use super::arming::Arming;
 use super::{Slot, is_loop, steep};
 use crate::control::{Pid, PidConfig};
 use crate::dji::command::{Outbox, to_raw};
 use crate::dji::range::Range;
 use crate::dji::{LoopError, SteepGain};
 use crate::encoder::Position;
-use crate::motor::{Link, TargetError};
+use crate::motor::{Link, Rest, TargetError};
 
 /// What a motor is asked to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,8 +92,8 @@ impl Goal {
 impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
-        self.ask(Action::Rest, Goal::NONE);
-        self.loops.reset();
+        self.guard.relax();
+        self.settle();
     }
 
     /// Takes a value in the unit of the command: amperes or volts.
@@ -176,37 +175,38 @@ impl Slot {
         replaced
     }
 
-    /// A value that cannot be followed takes the target before it away: zero output, integrators untouched. An older
-    /// value must not act in its place when the feedback comes back.
-    pub(super) fn admit(&mut self, finite: bool) -> Result<(), TargetError> {
-        if !finite {
-            self.ask(Action::Rest, Goal::NONE);
-            self.refused_targets = self.refused_targets.saturating_add(1);
-            return Err(TargetError::NotFinite);
+    /// Tells whether a target may be taken; where not, the one before may be over.
+    #[inline]
+    pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        match self.guard.admit(is_finite) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.refuse(error)),
         }
-        match self.arming {
-            Arming::Disarmed => return Err(TargetError::Disarmed),
-            Arming::Latched | Arming::Tripped => return Err(TargetError::Relaxed),
-            Arming::Armed => {}
-        }
-        if self.link != Link::Online {
-            self.ask(Action::Rest, Goal::NONE);
-            return Err(TargetError::NoFeedback);
-        }
-        Ok(())
     }
 
+    #[cold]
+    #[inline(never)]
+    fn refuse(&mut self, error: TargetError) -> TargetError {
+        self.settle();
+        error
+    }
+
+    #[inline]
     pub(super) fn start(&mut self, action: Action, goal: Goal, now: u32) {
-        self.ask(action, goal);
-        self.commanded = now;
+        self.goal = goal;
+        if self.asked == action {
+            self.guard.renew_target(now);
+        } else {
+            self.start_anew(action, now);
+        }
     }
 
-    fn ask(&mut self, action: Action, goal: Goal) {
-        self.goal = goal;
-        if self.asked != action {
-            self.asked = action;
-            self.settle();
-        }
+    #[cold]
+    #[inline(never)]
+    fn start_anew(&mut self, action: Action, now: u32) {
+        self.asked = action;
+        self.guard.take_target(now);
+        self.settle();
     }
 
     /// Tells whether the motor was at rest, not asked or not heard, at any time since the last usable update: its command
@@ -215,11 +215,18 @@ impl Slot {
         matches!(self.duty, Duty::Rest | Duty::First)
     }
 
-    /// Finds out what an update has to do. To be called wherever the link, the range, a loop or what is asked for changes.
-    pub(super) fn settle(&mut self) {
+    /// Finds out what an update has to do. To be called wherever the guard, the range, a loop or what is asked for changes.
+    pub(in crate::dji) fn settle(&mut self) {
+        if !self.guard.has_target() {
+            self.asked = Action::Rest;
+        }
+        let is_online = self.guard.link() == Link::Online;
+        if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
+            self.attend();
+        }
         let is_free = self.range == Range::within(self.full_limit) && self.loops.speed().is_plain();
         self.duty = match self.asked {
-            _ if self.link != Link::Online => Duty::Rest,
+            _ if !is_online => Duty::Rest,
             Action::Rest => Duty::Rest,
             _ if self.has_rested() => Duty::First,
             _ if self.acted != self.asked => Duty::Other,
@@ -232,6 +239,11 @@ impl Slot {
 
     /// What is asked for has an output from now on.
     pub(super) fn end_rest(&mut self) {
+        match self.guard.end_rest() {
+            Rest::Relaxed => self.loops.reset(),
+            Rest::Pause => self.loops.interrupt(),
+            Rest::None => {}
+        }
         self.acted = Action::Rest;
         self.duty = Duty::Other;
         self.settle();
@@ -335,7 +347,8 @@ mod tests {
             slot.range = Range::within(1_000);
             slot.settle();
             assert_eq!(slot.duty, Duty::Other, "less than the full output");
-            slot.see_to(500_000, &Timeouts::new());
+            slot.guard.age(500_000, &Timeouts::new());
+            slot.settle();
             assert_eq!(slot.duty, Duty::Rest, "not heard");
         }
     }

@@ -1,10 +1,8 @@
-use super::gesture::Gesture;
-use super::opening::{OPENING, Opening};
-use super::progress::Progress;
-use super::{Condition, Journal, Latch, Link, TargetError, Timeouts};
-use crate::time::{Duration, Instant};
+//! The rules of a motor that is a device by itself.
 
-mod edges;
+use super::{DeviceGuard, MotorGuard, OPENING};
+use crate::motor::{Link, TargetError, Timeouts};
+use crate::time::{Duration, Instant};
 
 /// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
 ///
@@ -37,88 +35,62 @@ mod edges;
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Guard {
-    timeouts: Timeouts,
-    now: Instant,
-    progress: Progress,
-    gesture: Gesture,
-    opening: Opening,
-    heard: Option<Instant>,
-    commanded: Option<Instant>,
-    link: Link,
-    good_frames: u8,
-    listens: bool,
-    armed: bool,
-    latched: bool,
-    stopped: bool,
-    refused_targets: u16,
-    forgotten_targets: u16,
-    reversals: u16,
-    latch: Latch,
-    journal: Journal<6>,
+    pub(super) device: DeviceGuard<6>,
+    pub(super) motor: MotorGuard,
 }
 
 impl Guard {
     /// Makes one for a motor with feedback: disarmed, not heard.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            timeouts: Timeouts::new(),
-            now: Instant::START,
-            progress: Progress::NEW,
-            gesture: Gesture::NEW,
-            opening: Opening::new(OPENING),
-            heard: None,
-            commanded: None,
-            link: Link::Unheard,
-            good_frames: 0,
-            listens: true,
-            armed: false,
-            latched: false,
-            stopped: false,
-            refused_targets: 0,
-            forgotten_targets: 0,
-            reversals: 0,
-            latch: Latch::NONE,
-            journal: Journal::EMPTY,
-        }
+        Self { device: DeviceGuard::NEW, motor: MotorGuard::NEW }.with_opening(OPENING)
     }
 
     /// Makes one for a motor that reports nothing, such as a servo: it counts as heard.
     #[must_use]
     pub const fn without_feedback() -> Self {
-        Self { listens: false, link: Link::Online, ..Self::new() }
+        Self { device: DeviceGuard::NEW, motor: MotorGuard::DEAF }.with_opening(OPENING)
     }
 
     /// Sets when feedback and commands count as lost.
     #[must_use]
-    pub const fn with_timeouts(self, timeouts: Timeouts) -> Self {
-        Self { timeouts, ..self }
+    pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
+        self.device.set_timeouts(timeouts);
+        self
     }
 
-    /// Sets the time in which the output range opens after arming, from zero to the whole; 0.2 s at first.
+    /// Sets the time in which the output range opens after arming, from zero to the whole; 0.2 s at first, whole milliseconds
+    /// of at most 65 s.
     #[must_use]
     pub const fn with_opening(self, time: Duration) -> Self {
-        Self { opening: Opening::new(time), ..self }
+        Self { motor: self.motor.with(time, false), ..self }
     }
 
     /// Notes valid feedback that arrived at `now`.
     pub fn hear(&mut self, now: Instant) {
-        let in_a_row = self.heard.is_some_and(|heard| now.since(heard) <= self.timeouts.late());
-        self.heard = Some(self.heard.map_or(now, |heard| heard.max(now)));
-        self.link = match self.link {
-            Link::Unheard | Link::Online | Link::Late => Link::Online,
-            Link::Offline | Link::Recovering => {
-                let before =
-                    if self.link == Link::Recovering && in_a_row { self.good_frames } else { 0 };
-                self.good_frames = before.saturating_add(1);
-                let enough = self.good_frames >= self.timeouts.good_frames();
-                if enough { Link::Online } else { Link::Recovering }
-            }
-        };
-        if self.link == Link::Online {
-            self.note(Condition::Late, false, now);
-            self.note(Condition::Offline, false, now);
+        if !self.device.is_running() {
+            let before = self.device.pass_unwatched(now);
+            self.forget_bygones(before, now);
         }
+        let timeouts = *self.device.timeouts();
+        self.change(now, |motor| motor.hear(now.stamp(), &timeouts));
+    }
+
+    fn forget_bygones(&mut self, before: Instant, now: Instant) {
+        let is_pause = self.device.is_pause(before);
+        self.change(now, |motor| motor.forget_bygones(now.stamp(), is_pause));
+    }
+
+    /// Changes the motor, and notes what follows.
+    pub(super) fn change<T>(
+        &mut self,
+        now: Instant,
+        change: impl FnOnce(&mut MotorGuard) -> T,
+    ) -> T {
+        let before = self.motor.known();
+        let outcome = change(&mut self.motor);
+        self.device.note(0, before, &self.motor, now);
+        outcome
     }
 
     /// Tells whether a new target may be taken, and notes its time when it is.
@@ -127,23 +99,8 @@ impl Guard {
     /// Says why not. A target that is not finite is counted. It takes the present one away, as does any that comes without
     /// fresh feedback: an older target must not act in the place of a newer one when the feedback is back.
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        if !is_finite {
-            self.refused_targets = self.refused_targets.saturating_add(1);
-            self.commanded = None;
-            return Err(TargetError::NotFinite);
-        }
-        if !self.armed {
-            return Err(TargetError::Disarmed);
-        }
-        if self.latched {
-            return Err(TargetError::Relaxed);
-        }
-        if !matches!(self.link, Link::Online) {
-            self.commanded = None;
-            return Err(TargetError::NoFeedback);
-        }
-        self.commanded = Some(self.now);
-        self.note(Condition::CommandLost, false, self.now);
+        self.motor.admit(is_finite)?;
+        self.motor.take_target(self.device.now());
         Ok(())
     }
 
@@ -151,102 +108,60 @@ impl Guard {
     /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
     #[must_use]
     pub fn drives(&mut self, now: Instant) -> bool {
-        if let Some(step) = self.progress.advance(now) {
-            self.gesture.pass(Some(step));
-            self.note(Condition::ClockFault, false, now);
-        } else {
-            self.lose_time(now);
+        let before = self.device.begin(now);
+        if !self.device.moves_on(before) {
+            self.device.hold(before, false);
+            self.change(now, MotorGuard::lose_time);
+            return false;
         }
-        self.now = now;
-        self.age(now);
-        if let Some(commanded) = self.commanded {
-            if now.since(commanded) > self.timeouts.command() {
-                self.commanded = None;
-                self.forgotten_targets = self.forgotten_targets.saturating_add(1);
-                self.note(Condition::CommandLost, true, now);
-            }
-        }
-        self.is_armed() && self.link == Link::Online && self.has_target()
+        self.forget_bygones(before, now);
+        self.device.run();
+        let timeouts = *self.device.timeouts();
+        self.change(now, |motor| {
+            motor.end_what_is_over();
+            motor.age(now.stamp(), &timeouts);
+        });
+        self.motor.drives()
     }
 
     /// Returns the share of the output range that is open, 0 to 1: it rises from zero after arming.
     pub fn share(&mut self) -> f32 {
-        self.opening.share(self.now)
+        self.motor.share(self.device.now())
     }
 
     /// Closes the output range, which opens from now on: the drive did not follow before.
-    pub(super) const fn reopen(&mut self) {
-        self.opening.begin(self.now);
+    pub(in crate::motor) const fn reopen(&mut self) {
+        self.motor.open(self.device.now());
     }
 
     /// Time did not move on, so that no age is known: feedback counts as late until the next one, and the motor trips.
     pub(crate) fn lose_time(&mut self, now: Instant) {
-        self.note(Condition::ClockFault, true, now);
-        self.gesture.pass(None);
-        self.reversals = self.reversals.saturating_add(1);
-        self.heard = self.heard.map(|heard| heard.min(now));
-        self.now = now;
-        if self.listens && self.link == Link::Online {
-            self.set_late(now);
-        }
-        self.relax_until_armed();
-    }
-
-    fn set_late(&mut self, now: Instant) {
-        self.link = Link::Late;
-        self.note(Condition::Late, true, now);
-    }
-
-    fn age(&mut self, now: Instant) {
-        if !self.listens {
-            return;
-        }
-        let Some(heard) = self.heard else { return };
-        let age = now.since(heard);
-        let ahead = heard.since(now) > self.timeouts.late();
-        if age > self.timeouts.offline() {
-            self.lose();
-        } else if (ahead || age > self.timeouts.late()) && self.link == Link::Online {
-            self.set_late(now);
-        }
-    }
-
-    /// Takes the motor for lost: relaxed, and latched until it is armed again.
-    fn lose(&mut self) {
-        if matches!(self.link, Link::Online | Link::Late | Link::Recovering) && self.listens {
-            self.link = Link::Offline;
-            self.note(Condition::Late, true, self.now);
-            self.note(Condition::Offline, true, self.now);
-        }
-        self.relax_until_armed();
+        let before = self.device.begin(now);
+        self.device.moves_on(before);
+        self.device.hold(before, false);
+        self.change(now, MotorGuard::lose_time);
     }
 
     /// Trips: takes the target away and refuses others until the motor is armed again.
-    pub const fn relax_until_armed(&mut self) {
-        if self.is_armed() {
-            self.gesture.trip();
-        }
-        self.latched = true;
-        self.commanded = None;
+    pub fn relax_until_armed(&mut self) {
+        self.change(self.device.updated(), MotorGuard::trip);
     }
 
     /// Tells whether there is a target that still counts.
     #[must_use]
     pub const fn has_target(&self) -> bool {
-        self.commanded.is_some()
+        self.motor.has_target()
     }
 
     /// Takes the target away.
     pub const fn relax(&mut self) {
-        self.commanded = None;
+        self.motor.relax();
     }
 
     /// Tells whether feedback is missing for arming at `now`.
     #[must_use]
     pub fn is_missing(&self, now: Instant) -> bool {
-        let late = self.timeouts.late();
-        let fresh = |heard: Instant| now.since(heard) <= late && heard.since(now) <= late;
-        self.listens && !(self.link == Link::Online && self.heard.is_some_and(fresh))
+        self.device.misses(&self.motor, now)
     }
 
     /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
@@ -273,88 +188,72 @@ impl Guard {
     /// assert!(guard.ask() && guard.engage(at_ms(150)));
     /// ```
     pub const fn ask(&mut self) -> bool {
-        self.gesture.ask()
+        self.device.ask()
     }
 
     /// Lets targets through from now on, starting from none, if the motor is heard and, after a trip, the last request
     /// [counts](Self::ask). A motor that takes targets already goes on undisturbed. Without effect while stopped. Returns
     /// whether it starts.
     pub fn engage(&mut self, now: Instant) -> bool {
-        if self.stopped || self.is_armed() || self.is_missing(now) || !self.gesture.take() {
-            return false;
+        let begins =
+            self.device.may_engage(&self.motor, now) && self.device.begin_arming(now).is_ok();
+        if begins {
+            self.motor.engage(now.stamp());
         }
-        self.now = self.now.max(now);
-        self.progress.begin(now);
-        self.opening.begin(now);
-        self.note(Condition::CommandLost, false, self.now);
-        self.commanded = None;
-        self.latched = false;
-        self.armed = true;
-        true
+        begins
     }
 
     /// Refuses targets until it is engaged again.
     pub const fn disarm(&mut self) {
-        self.armed = false;
-        self.commanded = None;
+        self.motor.disarm();
     }
 
     /// Disarms, and requires a new request to arm.
     pub const fn trip(&mut self) {
-        self.disarm();
-        self.gesture.trip();
+        self.motor.disarm();
+        self.device.trip();
     }
 
     /// Trips, and stays so until it is cleared and armed.
     pub const fn emergency_stop(&mut self) {
-        if !self.stopped {
-            self.trip();
+        if self.device.stop() {
+            self.motor.disarm();
         }
-        self.stopped = true;
     }
 
     /// Takes the emergency stop back; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
-        if self.stopped {
-            self.gesture.trip();
-        }
-        self.stopped = false;
+        self.device.clear_stop();
     }
 
     /// Tells whether targets are taken: armed, and not relaxed by a fault since.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
-        self.armed && !self.latched
+        self.motor.is_armed()
     }
 
     /// Tells whether the emergency stop is set.
     #[must_use]
     pub const fn is_stopped(&self) -> bool {
-        self.stopped
+        self.device.is_stopped()
     }
 
     /// Returns whether the motor is heard.
     #[must_use]
     pub const fn link(&self) -> Link {
-        self.link
+        self.motor.link()
     }
 
     /// Returns how often a target was NaN or infinite, saturating.
     #[must_use]
     pub const fn refused_targets(&self) -> u16 {
-        self.refused_targets
+        self.motor.refused_targets()
     }
 
     /// Returns how often no target came in time, saturating.
     #[must_use]
     pub const fn forgotten_targets(&self) -> u16 {
-        self.forgotten_targets
-    }
-
-    /// Returns how often an update did not lie after the one before, saturating.
-    #[must_use]
-    pub const fn reversals(&self) -> u16 {
-        self.reversals
+        self.motor.forgotten_targets()
     }
 }
 
@@ -367,7 +266,7 @@ impl Default for Guard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::MotorName;
+    use crate::motor::{Condition, MotorName};
 
     fn at_ms(ms: u64) -> Instant {
         Instant::START + Duration::from_millis(ms)
@@ -376,6 +275,13 @@ mod tests {
     fn driving() -> Guard {
         let mut guard = Guard::new();
         guard.hear(at_ms(1));
+        guard.engage(at_ms(1));
+        guard.admit(true).unwrap();
+        guard
+    }
+
+    fn deaf() -> Guard {
+        let mut guard = Guard::without_feedback();
         guard.engage(at_ms(1));
         guard.admit(true).unwrap();
         guard
@@ -416,16 +322,16 @@ mod tests {
 
     #[test]
     fn time_that_goes_back_is_never_fresh_for_ever() {
-        for mut guard in [driving(), Guard { listens: false, ..driving() }] {
+        for mut guard in [driving(), deaf()] {
             assert!(guard.drives(at_ms(5)));
             assert!(!guard.drives(at_ms(4)));
-            assert_eq!((guard.reversals(), guard.admit(true)), (1, Err(TargetError::Relaxed)));
+            assert_eq!(guard.admit(true), Err(TargetError::Relaxed));
         }
     }
 
     #[test]
     fn time_that_stands_still_trips() {
-        for mut guard in [driving(), Guard { listens: false, ..driving() }] {
+        for mut guard in [driving(), deaf()] {
             assert!(guard.drives(at_ms(1)), "the tick in which it was armed");
             assert!(!guard.drives(at_ms(1)) && !guard.is_armed() && !guard.has_target());
             guard.hear(at_ms(2));
@@ -441,7 +347,7 @@ mod tests {
 
     #[test]
     fn time_that_goes_back_is_an_edge_for_a_motor_that_is_not_heard_too() {
-        let mut guard = Guard { listens: false, ..driving() };
+        let mut guard = deaf();
         assert!(guard.drives(at_ms(5)) && !guard.drives(at_ms(4)));
         let edge = guard.next_edge(MotorName::new("fan", 1)).unwrap();
         assert_eq!((edge.condition, edge.began), (Condition::ClockFault, true));

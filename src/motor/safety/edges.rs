@@ -18,16 +18,13 @@ impl Guard {
         now: Instant,
         look: impl FnOnce(&mut Latch) -> T,
     ) -> T {
-        let before = self.latch;
-        let seen = look(&mut self.latch);
-        self.journal.note(0, &before, &self.latch, now);
-        seen
+        self.change(now, |motor| look(motor.latch_mut()))
     }
 
     /// Returns what is wrong with the motor.
     #[must_use]
     pub const fn conditions(&self) -> Conditions {
-        self.latch.active()
+        self.motor.latch().active()
     }
 
     /// Returns the oldest change of a condition that was not read yet; the guard does not know its motor's name.
@@ -47,23 +44,24 @@ impl Guard {
     /// # Ok::<(), &str>(())
     /// ```
     pub fn next_edge(&mut self, motor: MotorName) -> Option<Edge> {
-        while let Some(entry) = self.journal.pop() {
-            if self.latch.take(entry.condition, entry.began) {
-                let at = self.journal.time_of(&entry, self.now);
+        let now = self.device.updated();
+        while let Some(entry) = self.device.journal_mut().pop() {
+            if self.motor.latch_mut().take(entry.condition, entry.began) {
+                let at = self.device.journal().time_of(&entry, now);
                 let (condition, began) = (entry.condition, entry.began);
                 return Some(Edge { motor, condition, began, at });
             }
         }
-        let (condition, began) = self.latch.next()?;
-        self.latch.take(condition, began);
-        Some(Edge { motor, condition, began, at: self.journal.last_time(self.now) })
+        let (condition, began) = self.motor.latch().next()?;
+        self.motor.latch_mut().take(condition, began);
+        Some(Edge { motor, condition, began, at: self.device.journal().last_time(now) })
     }
 
     /// Returns what the guard knows of a motor's health.
     pub(crate) const fn health(&self, motor: MotorName) -> Health {
         Health {
             motor,
-            link: self.link,
+            link: self.link(),
             armed: self.is_armed(),
             conditions: self.conditions(),
             feedback_hz: 0,
@@ -71,15 +69,16 @@ impl Guard {
             temperature_c: None,
             error_code: 0,
             saturated: 0,
-            refused_targets: self.refused_targets,
-            forgotten_targets: self.forgotten_targets,
+            refused_targets: self.refused_targets(),
+            forgotten_targets: self.forgotten_targets(),
             ambiguous_gaps: 0,
         }
     }
 
     /// Returns when the change that [`next_edge`](Self::next_edge) returns next was noted: to read several motors in order.
     pub(crate) fn next_edge_at(&self) -> Option<Instant> {
-        self.latch.next()?;
-        Some(self.journal.first_time(self.now).unwrap_or_else(|| self.journal.last_time(self.now)))
+        self.motor.latch().next()?;
+        let (journal, now) = (self.device.journal(), self.device.updated());
+        Some(journal.first_time(now).unwrap_or_else(|| journal.last_time(now)))
     }
 }

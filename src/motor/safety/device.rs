@@ -1,0 +1,268 @@
+//! The rules that hold for the motors of a device together: time, the request to arm, the emergency stop.
+
+use super::gesture::Gesture;
+use super::{Ages, MotorGuard};
+use crate::motor::{ArmError, Journal, Latch, Timeouts};
+use crate::time::{Duration, Instant};
+
+/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
+pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
+pub(crate) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
+
+/// Decides what an update may do, and who may be armed. `N` times of edges are kept.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeviceGuard<const N: usize> {
+    /// The time that new targets get.
+    now: u32,
+    timeouts: Timeouts,
+    /// The time of the last update; before the first one, that of the last feedback.
+    updated: Instant,
+    /// Until then no age exceeds its limit, unless something [disturbs](Self::disturb) that.
+    quiet_until: Instant,
+    /// The time of the last arming: no update lies before it.
+    armed_at: Instant,
+    gesture: Gesture,
+    /// Whether each motor has to be seen to with the next update.
+    is_disturbed: bool,
+    /// Whether there was an update.
+    is_running: bool,
+    is_stopped: bool,
+    /// Updates in a row without a usable step.
+    held_steps: u8,
+    bad_steps: u32,
+    journal: Journal<N>,
+}
+
+/// What an update without a usable step may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hold {
+    /// Leave the last commands.
+    Keep,
+    /// Send zeros.
+    Rest,
+    /// Send zeros, and [relax](MotorGuard::lose_time) every motor until it is armed again: time did not move on.
+    LoseTime,
+}
+
+/// What a device has to know of a motor before a change of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub(super) latch: Latch,
+    pub(super) is_armed: bool,
+}
+
+impl<const N: usize> DeviceGuard<N> {
+    pub(crate) const NEW: Self = Self {
+        now: 0,
+        timeouts: Timeouts::new(),
+        updated: Instant::START,
+        quiet_until: Instant::START,
+        armed_at: Instant::START,
+        gesture: Gesture::NEW,
+        is_disturbed: true,
+        is_running: false,
+        is_stopped: false,
+        held_steps: 0,
+        bad_steps: 0,
+        journal: Journal::EMPTY,
+    };
+
+    pub(crate) const fn with(timeouts: Timeouts) -> Self {
+        Self { timeouts, ..Self::NEW }
+    }
+
+    pub(crate) const fn set_timeouts(&mut self, timeouts: Timeouts) {
+        self.timeouts = timeouts;
+        self.disturb();
+    }
+
+    pub(crate) const fn timeouts(&self) -> &Timeouts {
+        &self.timeouts
+    }
+
+    /// Returns the stamp that new targets get.
+    pub(crate) const fn now(&self) -> u32 {
+        self.now
+    }
+
+    pub(crate) const fn updated(&self) -> Instant {
+        self.updated
+    }
+
+    pub(crate) const fn is_running(&self) -> bool {
+        self.is_running
+    }
+
+    pub(crate) const fn bad_steps(&self) -> u32 {
+        self.bad_steps
+    }
+
+    pub(crate) const fn journal(&self) -> &Journal<N> {
+        &self.journal
+    }
+
+    pub(crate) const fn journal_mut(&mut self) -> &mut Journal<N> {
+        &mut self.journal
+    }
+
+    // Time.
+
+    /// Takes the time of an update; returns that of the one before.
+    #[inline]
+    pub(crate) const fn begin(&mut self, now: Instant) -> Instant {
+        self.now = now.stamp();
+        core::mem::replace(&mut self.updated, now)
+    }
+
+    /// Tells whether time moved on since `before`, and no age exceeds its limit.
+    #[inline]
+    pub(crate) fn is_quiet(&self, before: Instant) -> bool {
+        before < self.updated && self.updated < self.quiet_until
+    }
+
+    /// Notes feedback before the first update: time passes with it. Returns the time before.
+    pub(crate) const fn pass_unwatched(&mut self, now: Instant) -> Instant {
+        core::mem::replace(&mut self.updated, now)
+    }
+
+    /// Tells whether the present update lies after the one before, and not before the arming: ages mean nothing where it does
+    /// not. To be asked once in each update that is not [quiet](Self::is_quiet).
+    pub(crate) fn moves_on(&mut self, before: Instant) -> bool {
+        let moves_on = self.armed_at <= self.updated && (!self.is_running || before < self.updated);
+        let step = if self.is_running { self.updated.since(before) } else { Duration::ZERO };
+        self.gesture.pass(moves_on.then_some(step));
+        moves_on
+    }
+
+    /// Tells whether no stamp tells how long the pause before the present time was.
+    pub(crate) fn is_pause(&self, before: Instant) -> bool {
+        self.updated > before + LONGEST_PAUSE
+    }
+
+    /// The update has a usable step, and time moved on.
+    pub(crate) const fn run(&mut self) {
+        self.is_running = true;
+        self.held_steps = 0;
+    }
+
+    /// Returns the ages of no motor, or `None` where each motor has to be seen to; that is over then.
+    pub(crate) fn ages(&mut self) -> Option<Ages> {
+        let is_disturbed = core::mem::replace(&mut self.is_disturbed, false);
+        (!is_disturbed).then(|| Ages::none(self.now, self.timeouts))
+    }
+
+    /// No age exceeds its limit for so long.
+    pub(crate) fn rest_for(&mut self, micros: u32) {
+        // After a trip each update is part of the pause before a request to arm.
+        let micros = if self.gesture.is_tripped() { 0 } else { micros };
+        self.quiet_until = self.updated + Duration::from_micros(micros.into());
+    }
+
+    /// Has the next update see to each motor. To be called wherever an age may become greater than by the time that
+    /// passes, or another limit hold for it.
+    pub(crate) const fn disturb(&mut self) {
+        self.quiet_until = Instant::START;
+        self.is_disturbed = true;
+    }
+
+    /// Ends an update whose time or time step is not usable, after [`moves_on`](Self::moves_on) said whether time moved on.
+    pub(crate) fn hold(&mut self, before: Instant, moves_on: bool) -> Hold {
+        self.is_running = true;
+        self.disturb();
+        self.bad_steps = self.bad_steps.saturating_add(1);
+        self.held_steps = self.held_steps.saturating_add(1);
+        if !moves_on {
+            // No target is left that an update before the arming could make younger.
+            self.armed_at = self.updated;
+            return Hold::LoseTime;
+        }
+        let is_late = self.updated.since(before) > self.timeouts.late();
+        if self.held_steps >= 2 || is_late { Hold::Rest } else { Hold::Keep }
+    }
+
+    /// Returns how many updates in a row had no usable time or step.
+    pub(crate) const fn held_steps(&self) -> u8 {
+        self.held_steps
+    }
+
+    // Arming.
+
+    /// Tells whether a motor's feedback is not fresh, as far as its stamp tells.
+    pub(crate) fn misses(&self, motor: &MotorGuard, now: Instant) -> bool {
+        motor.listens() && (self.is_far(now) || motor.is_missing(now.stamp(), &self.timeouts))
+    }
+
+    /// Tells whether a time lies so far after or before the last one that no stamp tells how far.
+    pub(crate) fn is_far(&self, now: Instant) -> bool {
+        now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE
+    }
+
+    /// Takes a request to arm; `false` if it does not count.
+    pub(crate) const fn ask(&mut self) -> bool {
+        self.gesture.ask()
+    }
+
+    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`, and takes a trip back if so.
+    ///
+    /// # Errors
+    /// The emergency stop is set, or a request is missing.
+    pub(crate) fn begin_arming(&mut self, now: Instant) -> Result<(), ArmError> {
+        if self.is_stopped {
+            return Err(ArmError::Stopped);
+        }
+        if !self.gesture.take() {
+            return Err(ArmError::NotReleased);
+        }
+        self.now = now.stamp();
+        // An arming at an earlier time takes nothing back: motors that run may have targets of the later one.
+        self.armed_at = self.armed_at.max(now);
+        self.disturb();
+        Ok(())
+    }
+
+    /// Tells whether a motor may be [engaged](MotorGuard::engage): it is heard. One that takes targets goes on undisturbed.
+    pub(crate) fn may_engage(&self, motor: &MotorGuard, now: Instant) -> bool {
+        !motor.is_armed() && !self.misses(motor, now)
+    }
+
+    /// Keeps the trip: a motor still waits to be armed.
+    pub(crate) const fn keep_trip(&mut self) {
+        self.gesture.keep();
+    }
+
+    /// Notes what a change of a motor, of which this was [known](MotorGuard::known) before, brings with it: edges, and the
+    /// pause after a trip.
+    pub(crate) fn note(&mut self, index: u8, before: Known, motor: &MotorGuard, now: Instant) {
+        self.journal.note(index, &before.latch, motor.latch(), now);
+        if before.is_armed && !motor.is_armed() {
+            self.trip();
+        }
+    }
+
+    /// Begins the pause after a trip, of which each update is a part.
+    pub(crate) const fn trip(&mut self) {
+        self.gesture.trip();
+        self.quiet_until = Instant::START;
+    }
+
+    /// Sets the emergency stop; `false` if it is set already. The motors are to be disarmed.
+    pub(crate) const fn stop(&mut self) -> bool {
+        if self.is_stopped {
+            return false;
+        }
+        self.trip();
+        self.is_stopped = true;
+        true
+    }
+
+    pub(crate) const fn clear_stop(&mut self) {
+        if self.is_stopped {
+            self.trip();
+            self.is_stopped = false;
+        }
+    }
+
+    pub(crate) const fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+}

@@ -1,0 +1,406 @@
+//! The rules of one motor.
+
+use super::device::{Known, LONGEST_PAUSE_US};
+use super::stamp::{age, is_near};
+use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
+use crate::time::Duration;
+
+/// Whether a motor takes targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Arming {
+    Disarmed,
+    Armed,
+    /// Relaxed since it was armed, because it was lost.
+    Latched,
+    /// Relaxed since it was armed, for something else.
+    Tripped,
+}
+
+/// How a motor rested since its loops ran last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Rest {
+    /// Not at all.
+    None,
+    /// Its feedback was late, or its target refused: what was measured before says nothing of a rate.
+    Pause,
+    /// Nothing was asked of it: the loops start afresh.
+    Relaxed,
+}
+
+/// Decides whether one motor may be driven. See the [module](super) for its states.
+#[derive(Debug, Clone, Copy)]
+// In the order of use, so that neighbours are loaded and stored together.
+#[repr(C)]
+pub(crate) struct MotorGuard {
+    /// When its feedback came last.
+    pub(super) heard: u32,
+    /// Feedback that comes sooner after the one before needs no closer look; 0 unless online.
+    trusted_gap_us: u32,
+    /// When its target was set.
+    pub(super) commanded: u32,
+    pub(super) link: Link,
+    arming: Arming,
+    pub(super) has_target: bool,
+    rest: Rest,
+    /// When the output range began to open.
+    opened: u32,
+    /// In what time it opens.
+    opening_ms: u16,
+    is_opening: bool,
+    good_frames: u8,
+    /// Whether it has feedback at all.
+    listens: bool,
+    /// Whether it takes targets again after a recovery.
+    resumes: bool,
+    refused_targets: u16,
+    forgotten_targets: u16,
+    latch: Latch,
+}
+
+impl MotorGuard {
+    /// A motor with feedback: disarmed, not heard.
+    pub(crate) const NEW: Self = Self {
+        heard: 0,
+        trusted_gap_us: 0,
+        commanded: 0,
+        link: Link::Unheard,
+        arming: Arming::Disarmed,
+        has_target: false,
+        rest: Rest::Relaxed,
+        opened: 0,
+        opening_ms: 0,
+        is_opening: false,
+        good_frames: 0,
+        listens: true,
+        resumes: false,
+        refused_targets: 0,
+        forgotten_targets: 0,
+        latch: Latch::NONE,
+    };
+
+    /// A motor that reports nothing: it counts as heard.
+    pub(super) const DEAF: Self = Self { listens: false, link: Link::Online, ..Self::NEW };
+
+    /// Sets the time in which the output range opens, at most 65 s, and whether targets are taken again after a recovery.
+    pub(crate) const fn with(self, opening: Duration, resumes: bool) -> Self {
+        Self { opening_ms: whole_ms(opening), resumes, ..self }
+    }
+
+    pub(crate) const fn link(&self) -> Link {
+        self.link
+    }
+
+    /// Returns the stamp of the last feedback.
+    pub(crate) const fn heard(&self) -> u32 {
+        self.heard
+    }
+
+    pub(crate) const fn is_armed(&self) -> bool {
+        matches!(self.arming, Arming::Armed)
+    }
+
+    /// Tells whether the motor was relaxed since it was armed, and waits to be armed again.
+    pub(crate) const fn is_tripped(&self) -> bool {
+        matches!(self.arming, Arming::Latched | Arming::Tripped)
+    }
+
+    pub(crate) const fn has_target(&self) -> bool {
+        self.has_target
+    }
+
+    /// Tells whether the motor may be driven: armed, heard, with a target that counts.
+    pub(crate) fn drives(&self) -> bool {
+        self.is_armed() && self.link == Link::Online && self.has_target
+    }
+
+    pub(crate) const fn refused_targets(&self) -> u16 {
+        self.refused_targets
+    }
+
+    pub(crate) const fn forgotten_targets(&self) -> u16 {
+        self.forgotten_targets
+    }
+
+    /// Returns what a change is to be [compared](super::DeviceGuard::note) with.
+    pub(crate) const fn known(&self) -> Known {
+        Known { latch: self.latch, is_armed: self.is_armed() }
+    }
+
+    pub(crate) const fn latch(&self) -> &Latch {
+        &self.latch
+    }
+
+    pub(crate) const fn latch_mut(&mut self) -> &mut Latch {
+        &mut self.latch
+    }
+
+    pub(super) const fn listens(&self) -> bool {
+        self.listens
+    }
+
+    /// Tells whether its feedback is not fresh.
+    pub(super) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
+        self.listens && !(self.link == Link::Online && self.is_fresh(now, timeouts))
+    }
+
+    fn is_fresh(&self, now: u32, timeouts: &Timeouts) -> bool {
+        !self.listens || is_near(now, self.heard, timeouts.late_us())
+    }
+
+    /// Tells whether feedback comes shortly after the one before, of a motor that is online.
+    #[inline]
+    pub(crate) const fn is_in_time(&self, now: u32) -> bool {
+        now.wrapping_sub(self.heard) < self.trusted_gap_us
+    }
+
+    /// Notes feedback that is [in time](Self::is_in_time).
+    #[inline]
+    pub(crate) const fn hear_in_time(&mut self, now: u32) {
+        self.heard = now;
+    }
+
+    /// Sets which gap is short, as long as the motor is online.
+    pub(crate) fn trust(&mut self, gap_us: u32) {
+        self.trusted_gap_us = if self.link == Link::Online { gap_us } else { 0 };
+    }
+
+    /// Notes feedback, whenever the one before came.
+    pub(crate) fn hear(&mut self, now: u32, timeouts: &Timeouts) {
+        let was_offline = matches!(self.link, Link::Offline | Link::Recovering);
+        let in_a_row = self.link == Link::Recovering && self.is_fresh(now, timeouts);
+        self.heard = now;
+        self.good_frames = if in_a_row { self.good_frames.saturating_add(1) } else { 1 };
+        if was_offline && self.good_frames < timeouts.good_frames() {
+            self.link = Link::Recovering;
+            return;
+        }
+        self.link = Link::Online;
+        self.latch.set(Condition::Late, false);
+        self.latch.set(Condition::Offline, false);
+        if was_offline && self.arming == Arming::Latched && self.resumes {
+            self.arming = Arming::Armed;
+            self.open(now);
+        }
+    }
+
+    /// Sees to what grew old; `false` when there may be more to see to at the next update, whatever comes or does not come
+    /// until then.
+    pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
+        let is_settled = match self.link {
+            Link::Unheard | Link::Offline => return true,
+            Link::Online if self.is_fresh(now, timeouts) => true,
+            Link::Online | Link::Late | Link::Recovering => {
+                self.grow_old(now, timeouts);
+                false
+            }
+        };
+        if self.has_target && !is_near(now, self.commanded, timeouts.command_us()) {
+            self.forget_target();
+        }
+        is_settled
+    }
+
+    /// The last feedback is not fresh; its age decides how far that goes.
+    fn grow_old(&mut self, now: u32, timeouts: &Timeouts) {
+        if age(now, self.heard) > timeouts.offline_us() {
+            self.lose();
+        } else if self.link == Link::Online {
+            self.set_late();
+        }
+    }
+
+    fn set_late(&mut self) {
+        self.link = Link::Late;
+        self.trusted_gap_us = 0;
+        self.latch.set(Condition::Late, true);
+        self.interrupt();
+    }
+
+    /// The motor is lost: relaxed, and refuses targets until it is armed again or, where that is configured, is back.
+    fn lose(&mut self) {
+        self.link = Link::Offline;
+        self.trusted_gap_us = 0;
+        self.latch.set(Condition::Late, true);
+        self.latch.set(Condition::Offline, true);
+        if self.is_armed() {
+            self.arming = Arming::Latched;
+        }
+        self.relax();
+    }
+
+    /// The application has not set a target for too long.
+    pub(crate) fn forget_target(&mut self) {
+        self.relax();
+        self.latch.set(Condition::CommandLost, true);
+        self.forgotten_targets = self.forgotten_targets.saturating_add(1);
+    }
+
+    /// Gives up what nobody knows any more how old it is: after a pause everything, otherwise what is so old that nobody
+    /// will know.
+    pub(crate) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
+        let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
+        if self.listens && self.link != Link::Unheard && is_bygone(self.heard) {
+            self.lose();
+        } else if self.has_target && is_bygone(self.commanded) {
+            self.forget_target();
+        }
+    }
+
+    /// Ends the conditions that an update with a step ends.
+    pub(crate) const fn end_what_is_over(&mut self) {
+        if self.has_target {
+            self.latch.set(Condition::CommandLost, false);
+        }
+        self.latch.set(Condition::ClockFault, false);
+    }
+
+    /// Tells whether a new target may be taken.
+    ///
+    /// A value that cannot be followed takes the target before it away: an older value must not act in its place when the
+    /// feedback comes back.
+    #[inline]
+    pub(crate) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        if is_finite && self.is_armed() && self.link == Link::Online {
+            return Ok(());
+        }
+        Err(self.refuse(is_finite))
+    }
+
+    #[cold]
+    fn refuse(&mut self, is_finite: bool) -> TargetError {
+        if !is_finite {
+            self.refused_targets = self.refused_targets.saturating_add(1);
+            self.drop_target();
+            return TargetError::NotFinite;
+        }
+        match self.arming {
+            Arming::Disarmed => TargetError::Disarmed,
+            Arming::Latched | Arming::Tripped => TargetError::Relaxed,
+            Arming::Armed => {
+                self.drop_target();
+                TargetError::NoFeedback
+            }
+        }
+    }
+
+    /// Takes the target away, and leaves the loops as they are.
+    fn drop_target(&mut self) {
+        self.has_target = false;
+        self.interrupt();
+    }
+
+    fn interrupt(&mut self) {
+        self.rest = self.rest.max(Rest::Pause);
+    }
+
+    /// There is a target from now on.
+    pub(crate) const fn take_target(&mut self, now: u32) {
+        self.has_target = true;
+        self.renew_target(now);
+    }
+
+    /// There is a new target in the place of one.
+    #[inline]
+    pub(crate) const fn renew_target(&mut self, now: u32) {
+        self.commanded = now;
+    }
+
+    /// Returns the stamp of a target that goes with a measurement of another sensor, taken at `at`: it counts until the
+    /// measurement is too old, as if it had been set so long before. `None` when the measurement is too old already.
+    pub(crate) const fn stamp_of_measurement(
+        at: u32,
+        now: u32,
+        timeouts: &Timeouts,
+    ) -> Option<u32> {
+        if !is_near(now, at, timeouts.measured_us()) {
+            return None;
+        }
+        let stamp = at.wrapping_add(timeouts.measured_us()).wrapping_sub(timeouts.command_us());
+        let is_ahead = age(now, stamp) == 0;
+        Some(if is_ahead { now } else { stamp })
+    }
+
+    /// Asks for nothing.
+    pub(crate) const fn relax(&mut self) {
+        self.has_target = false;
+        self.rest = Rest::Relaxed;
+    }
+
+    /// Returns how the motor rested, which is over.
+    pub(crate) const fn end_rest(&mut self) -> Rest {
+        core::mem::replace(&mut self.rest, Rest::None)
+    }
+
+    /// Takes targets from now on, starting from rest.
+    pub(crate) const fn engage(&mut self, now: u32) {
+        self.relax();
+        self.arming = Arming::Armed;
+        self.open(now);
+    }
+
+    pub(crate) const fn disarm(&mut self) {
+        self.relax();
+        self.arming = Arming::Disarmed;
+    }
+
+    /// Relaxes the motor, and refuses targets until it is armed again.
+    pub(crate) const fn trip(&mut self) {
+        if !matches!(self.arming, Arming::Disarmed) {
+            self.arming = Arming::Tripped;
+        }
+        self.relax();
+    }
+
+    /// Time did not move on: no age is known. Feedback counts as late until the next one, and the motor trips.
+    pub(crate) fn lose_time(&mut self) {
+        self.latch.set(Condition::ClockFault, true);
+        if self.listens && self.link == Link::Online {
+            self.set_late();
+        }
+        self.trip();
+    }
+
+    /// Has the output range open from zero.
+    pub(crate) const fn open(&mut self, now: u32) {
+        self.is_opening = self.opening_ms > 0;
+        self.opened = now;
+    }
+
+    /// Tells whether less than the whole output range is open.
+    pub(crate) const fn is_opening(&self) -> bool {
+        self.is_opening
+    }
+
+    /// Returns the share of the output range that is open, 0 to 1. A time before the beginning gives 0.
+    pub(crate) fn share(&mut self, now: u32) -> f32 {
+        let (passed, whole) = (age(now, self.opened), u32::from(self.opening_ms) * 1_000);
+        self.is_opening = self.is_opening && passed < whole;
+        if self.is_opening { passed as f32 / whole as f32 } else { 1.0 }
+    }
+}
+
+/// Whole milliseconds, at most 65 s.
+const fn whole_ms(time: Duration) -> u16 {
+    let millis = time.as_micros() / 1_000;
+    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
+    if millis < 65_000 { millis as u16 } else { 65_000 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::OPENING;
+    use super::*;
+
+    #[test]
+    fn the_range_opens_in_proportion_to_time_and_stays_open() {
+        let at_ms = |ms: u32| (1_000 * ms).wrapping_sub(1_100_000); // over the wrap
+        let mut motor = MotorGuard::NEW.with(OPENING, false);
+        assert_eq!(motor.share(at_ms(5)).to_bits(), 1.0_f32.to_bits(), "never closed");
+        motor.open(at_ms(1_000));
+        let shares = [990, 1_000, 1_100, 1_200, 1_000].map(|ms| motor.share(at_ms(ms)));
+        assert_eq!(shares.map(f32::to_bits), [0.0, 0.0, 0.5, 1.0, 1.0].map(f32::to_bits));
+        let mut at_once = MotorGuard::NEW.with(Duration::ZERO, false);
+        at_once.open(at_ms(1));
+        assert_eq!(at_once.share(at_ms(1)).to_bits(), 1.0_f32.to_bits());
+    }
+}

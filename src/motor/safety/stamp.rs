@@ -1,0 +1,16 @@
+//! Times as stamps of 32 bits in µs, which repeat after 71 min 35 s.
+
+/// Tells whether a stamp lies within `limit` of `now`, before or after.
+///
+/// After, because an interrupt may stamp a frame just after a tick has read the clock; no further, because a clock that
+/// was set back must not make an old stamp look fresh.
+#[inline]
+pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
+    now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
+}
+
+/// Returns the age of a stamp; zero when it lies ahead.
+pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
+    let age = now.wrapping_sub(stamp);
+    if age.cast_signed() < 0 { 0 } else { age }
+}
