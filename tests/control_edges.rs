@@ -63,12 +63,11 @@ macro_rules! subjects {
 struct ByError(PositionActuator);
 
 subjects! {
-    Pid, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
-    IncrementalPid, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
+    Pid, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.rejected();
     Cascade, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.position().rejected().max(it.speed().rejected());
-    SpeedActuator, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
-    PositionActuator, 3, it, [a, b, c], dt_s => it.update(a, b, c, dt_s), it.rejected();
-    ByError, 2, it, [a, b, _], dt_s => it.0.update_error(a, b, dt_s), it.0.rejected();
+    SpeedActuator, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.rejected();
+    PositionActuator, 3, it, [a, b, c], dt_s => it.step(a, b, c, &TimeStep::of(dt_s)), it.rejected();
+    ByError, 2, it, [a, b, _], dt_s => it.0.step_error(a, b, &TimeStep::of(dt_s)), it.0.rejected();
     LinearDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     OptimalDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     LowPass, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
@@ -115,8 +114,8 @@ type Row = (Long, Box<dyn Subject>);
 /// Every type with the loop gains given, twice where its options change what it does.
 fn table(gains: PidConfig) -> Vec<Row> {
     let (kp, ki, kd) = gains.gains();
-    let incremental = IncrementalPidConfig::new(kp, ki, kd).with_output_limit(50.0);
-    let tracking = incremental.with_max_step(0.01).with_tracking(80.0);
+    let incremental = PidConfig::new(kp, ki, kd).with_output_limit(50.0).with_incremental_form();
+    let tracking = incremental.with_tracking(80.0);
     let filtered = SpeedActuatorConfig::new(gains).with_feedback_filter(100.0);
     let options = every_option().with_gains(kp, ki, kd);
     use Long::{CountsAs, Freezes, FreezesBehindFilter, InFull, NoTime, StartsAnew};
@@ -124,7 +123,7 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (Freezes, Box::new(Pid::new(gains).unwrap())),
         (Freezes, Box::new(Pid::new(gains.with_derivative_on_error()).unwrap())),
         (Freezes, Box::new(Pid::new(options).unwrap())),
-        (Freezes, Box::new(IncrementalPid::new(incremental).unwrap())),
+        (Freezes, Box::new(Pid::new(incremental).unwrap())),
         (CountsAs(0.01), Box::new(LinearDifferentiator::new(100.0, 0.01).unwrap())),
         (CountsAs(0.01), Box::new(OptimalDifferentiator::new(1e4, 0.0125, 0.01).unwrap())),
         (CountsAs(0.1), Box::new(SlewLimiter::new(30.0, 60.0).unwrap())),
@@ -134,7 +133,7 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (Freezes, Box::new(ByError(bare(gains, gains)))),
         (FreezesBehindFilter, Box::new(SpeedActuator::new(filtered).unwrap())),
         (FreezesBehindFilter, Box::new(position(gains, gains))),
-        (FreezesBehindFilter, Box::new(IncrementalPid::new(tracking).unwrap())),
+        (FreezesBehindFilter, Box::new(Pid::new(tracking).unwrap())),
         (InFull, Box::new(LowPass::new(10.0).unwrap())),
         (InFull, Box::new(StepResponse::new(0.0, 1.0, 100.0, 0.02).unwrap())),
         (StartsAnew, Box::new(RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).unwrap())),
@@ -292,9 +291,7 @@ fn huge_gains_and_huge_inputs_end_at_a_limit_and_never_in_nan() {
 
 fn is_controller(subject: &dyn Subject) -> bool {
     let kind = format!("{subject:?}");
-    ["Pid", "IncrementalPid", "Cascade", "SpeedA", "PositionA", "ByError"]
-        .iter()
-        .any(|name| kind.starts_with(name))
+    ["Pid", "Cascade", "SpeedA", "PositionA", "ByError"].iter().any(|name| kind.starts_with(name))
 }
 
 #[test]
@@ -347,16 +344,34 @@ fn after_a_bad_input_the_filters_of_an_actuator_start_anew_and_smooth_again() {
     let mut position = PositionActuator::new(position.with_angle_filter(1.0)).unwrap();
     for bad in NOT_FINITE {
         for _ in 0..5 {
-            speed.update(0.0, 1.0, DT_S);
-            position.update(0.0, 1.0, 1.0, DT_S);
+            speed.step(0.0, 1.0, &TimeStep::of(DT_S));
+            position.step(0.0, 1.0, 1.0, &TimeStep::of(DT_S));
         }
         let held = (speed.output(), position.output());
-        assert_eq!((speed.update(0.0, bad, DT_S), position.update(0.0, 1.0, bad, DT_S)), held);
-        assert_eq!((speed.update(bad, 1.0, DT_S), position.update(0.0, bad, 1.0, DT_S)), held);
+        assert_eq!(
+            (
+                speed.step(0.0, bad, &TimeStep::of(DT_S)),
+                position.step(0.0, 1.0, bad, &TimeStep::of(DT_S))
+            ),
+            held
+        );
+        assert_eq!(
+            (
+                speed.step(bad, 1.0, &TimeStep::of(DT_S)),
+                position.step(0.0, bad, 1.0, &TimeStep::of(DT_S))
+            ),
+            held
+        );
         // As the first ones they count in full, and not a 160th part as those that follow.
-        let first = (speed.update(0.0, 5.0, DT_S), position.update(0.0, 5.0, 4.0, DT_S));
+        let first = (
+            speed.step(0.0, 5.0, &TimeStep::of(DT_S)),
+            position.step(0.0, 5.0, 4.0, &TimeStep::of(DT_S)),
+        );
         assert_eq!(first, (-10.0, -38.0));
-        let next = (speed.update(0.0, 9.0, DT_S), position.update(0.0, 9.0, 8.0, DT_S));
+        let next = (
+            speed.step(0.0, 9.0, &TimeStep::of(DT_S)),
+            position.step(0.0, 9.0, 8.0, &TimeStep::of(DT_S)),
+        );
         assert!((next.0 + 10.05).abs() < 0.01 && (next.1 + 38.2).abs() < 0.01, "{next:?}");
     }
     assert_eq!((speed.rejected(), position.rejected()), (6, 6));
@@ -372,11 +387,10 @@ fn a_positive_kd_damps_in_every_controller_by_every_way_in() {
     let (mut one, mut two, mut three) = (pid(damper), pid(damper), pid(damper));
     let mut on_error = pid(damper.with_derivative_on_error());
     let mut options = pid(every_option().with_gains(0.0, 0.0, 0.5).with_feed_forward(0.0, 0.0));
-    let incremental = IncrementalPidConfig::new(0.0, 0.0, 0.5);
-    let mut four = IncrementalPid::new(incremental).unwrap();
+    let incremental = PidConfig::new(0.0, 0.0, 0.5).with_incremental_form();
+    let mut four = Pid::new(incremental).unwrap();
     let mut five = four;
-    let mut tracking =
-        IncrementalPid::new(incremental.with_max_step(0.01).with_tracking(80.0)).unwrap();
+    let mut tracking = Pid::new(incremental.with_tracking(80.0)).unwrap();
     let mut six = SpeedActuator::new(SpeedActuatorConfig::new(damper)).unwrap();
     let mut seven = six;
     let (mut eight, mut inner) = (bare(damper, follower), bare(idle, damper));
@@ -384,24 +398,27 @@ fn a_positive_kd_damps_in_every_controller_by_every_way_in() {
     let mut cascade = Cascade::new(damper, follower).unwrap();
     let (mut outer, mut speed) = (cascade, Cascade::new(idle, damper).unwrap());
     let ways: [(&str, Way); 18] = [
-        ("update", Box::new(move |at, _| one.update(0.0, at, DT_S))),
+        ("update", Box::new(move |at, _| one.step(0.0, at, &TimeStep::of(DT_S)))),
         ("step", Box::new(move |at, _| two.step(0.0, at, &step))),
         ("step_error", Box::new(move |_, rate| three.step_error(0.0, rate, &step))),
-        ("on error", Box::new(move |at, _| on_error.update(0.0, at, DT_S))),
-        ("every option", Box::new(move |at, _| options.update(0.0, at, DT_S))),
-        ("incremental update", Box::new(move |at, _| four.update(0.0, at, DT_S))),
+        ("on error", Box::new(move |at, _| on_error.step(0.0, at, &TimeStep::of(DT_S)))),
+        ("every option", Box::new(move |at, _| options.step(0.0, at, &TimeStep::of(DT_S)))),
+        ("incremental update", Box::new(move |at, _| four.step(0.0, at, &TimeStep::of(DT_S)))),
         ("incremental step", Box::new(move |at, _| five.step(0.0, at, &step))),
-        ("tracking", Box::new(move |at, _| tracking.update(0.0, at, DT_S))),
-        ("speed update", Box::new(move |at, _| six.update(0.0, at, DT_S))),
+        ("tracking", Box::new(move |at, _| tracking.step(0.0, at, &TimeStep::of(DT_S)))),
+        ("speed update", Box::new(move |at, _| six.step(0.0, at, &TimeStep::of(DT_S)))),
         ("speed step", Box::new(move |at, _| seven.step(0.0, at, &step))),
-        ("angle update", Box::new(move |at, _| eight.update(0.0, at, 0.0, DT_S))),
+        ("angle update", Box::new(move |at, _| eight.step(0.0, at, 0.0, &TimeStep::of(DT_S)))),
         ("angle step", Box::new(move |at, _| nine.step(0.0, at, 0.0, &step))),
-        ("angle error", Box::new(move |_, rate| ten.update_error(0.0, rate, DT_S))),
+        ("angle error", Box::new(move |_, rate| ten.step_error(0.0, rate, &TimeStep::of(DT_S)))),
         ("angle error step", Box::new(move |_, rate| eleven.step_error(0.0, rate, &step))),
-        ("inner loop", Box::new(move |at, _| inner.update(0.0, 0.0, at, DT_S))),
+        ("inner loop", Box::new(move |at, _| inner.step(0.0, 0.0, at, &TimeStep::of(DT_S)))),
         ("cascade", Box::new(move |_, rate| cascade.step(0.0, rate, &step))),
-        ("cascade, position", Box::new(move |_, rate| outer.step_position(0.0, rate, &step))),
-        ("cascade, speed", Box::new(move |at, _| speed.step_speed(0.0, at, &step))),
+        (
+            "cascade, position",
+            Box::new(move |_, rate| outer.position_mut().step_error(0.0, rate, &step)),
+        ),
+        ("cascade, speed", Box::new(move |at, _| speed.speed_mut().step(0.0, at, &step))),
     ];
     for (name, mut way) in ways {
         for rate in [10.0, -10.0] {
@@ -418,7 +435,7 @@ fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
     const SPEED: SpeedActuatorConfig = SpeedActuatorConfig::new(GAINS).with_feedback_filter(100.0);
     const MADE: [bool; 16] = [
         Pid::new(every_option()).is_ok(),
-        IncrementalPid::new(IncrementalPidConfig::new(1.0, 1.0, 0.0).with_tracking(5.0)).is_ok(),
+        Pid::new(GAINS.with_incremental_form().with_tracking(5.0)).is_ok(),
         Cascade::new(GAINS, GAINS).is_ok(),
         SpeedActuator::new(SPEED).is_ok(),
         PositionActuator::new(PositionActuatorConfig::new(GAINS, SPEED)).is_ok(),
@@ -460,7 +477,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 18);
+    assert_eq!(seen, 17);
 }
 
 #[test]
@@ -483,11 +500,11 @@ fn without_ki_nothing_is_wound_up() {
         assert_eq!(subject.step([0.0; 3], DT_S), 0.0, "{subject:?}");
     }
     // The incremental form: P of 200 and 180 is cut to 50, and no more than that is gone.
-    let config = IncrementalPidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0);
-    let mut incremental = IncrementalPid::new(config).unwrap();
-    assert_eq!(incremental.update(100.0, 0.0, DT_S), 50.0);
-    assert_eq!(incremental.update(90.0, 0.0, DT_S), 50.0);
-    assert_eq!(incremental.update(0.0, 0.0, DT_S), 0.0);
+    let config = PidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0).with_incremental_form();
+    let mut incremental = Pid::new(config).unwrap();
+    assert_eq!(incremental.step(100.0, 0.0, &TimeStep::of(DT_S)), 50.0);
+    assert_eq!(incremental.step(90.0, 0.0, &TimeStep::of(DT_S)), 50.0);
+    assert_eq!(incremental.step(0.0, 0.0, &TimeStep::of(DT_S)), 0.0);
 }
 
 #[test]
@@ -498,7 +515,7 @@ fn the_angle_loop_rests_when_one_of_its_steps_was_too_long() {
     let mut actuator = PositionActuator::new(config).unwrap();
     for step in 0..=8 {
         let dt_s = if step == 6 { 10.0 } else { 0.1 };
-        actuator.update(1.0, 0.0, 0.0, dt_s);
+        actuator.step(1.0, 0.0, 0.0, &TimeStep::of(dt_s));
     }
     // Four steps of 0.1 s on the first turn; none on the second, though three of its four were good.
     assert!((actuator.speed_setpoint() - 0.4).abs() < 1e-6, "{}", actuator.speed_setpoint());
@@ -512,7 +529,7 @@ fn the_integral_of_the_angle_loop_works_at_every_divider() {
         let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(divider);
         let mut actuator = PositionActuator::new(config).unwrap();
         for _ in 0..=10 * u32::from(divider) {
-            actuator.update(1.0, 0.0, 0.0, DT_S);
+            actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
         let expected = 10.0 * f32::from(divider) * DT_S;
         assert!((actuator.speed_setpoint() - expected).abs() < 1e-4, "{divider}");
@@ -545,7 +562,6 @@ const MORE_THAN_ZERO: Parameters = &[
     ("period", |x| Pid::new(GAINS.with_period(x)).err()),
     ("derivative_filter", |x| Pid::new(GAINS.with_derivative_filter(x)).err()),
     ("output_limit", |x| incremental(|config| config.with_output_limit(x))),
-    ("max_step", |x| incremental(|config| config.with_max_step(x))),
     ("r", |x| incremental(|config| config.with_tracking(x))),
     ("r", |x| LinearDifferentiator::new(x, DT_S).err()),
     ("max_step", |x| LinearDifferentiator::new(1.0, x).err()),
@@ -580,7 +596,7 @@ const ZERO_OR_MORE: Parameters = &[
     ("ki", |x| Pid::new(PidConfig::new(0.0, x, 0.0)).err()),
     ("kd", |x| Pid::new(PidConfig::new(0.0, 0.0, x)).err()),
     ("kp", |x| Pid::new(GAINS).ok()?.set_gains(x, 0.0, 0.0).err()),
-    ("ki", |x| IncrementalPid::new(IncrementalPidConfig::new(0.0, x, 0.0)).err()),
+    ("ki", |x| Pid::new(PidConfig::new(0.0, x, 0.0).with_incremental_form()).err()),
     ("kd", |x| Cascade::new(GAINS.with_gains(0.0, 0.0, x), GAINS).err()),
     ("kd", |x| Cascade::new(GAINS, GAINS.with_gains(0.0, 0.0, x)).err()),
     ("variable_integral", |x| Pid::new(GAINS.with_variable_integral(x, 10.0)).err()),
@@ -599,6 +615,7 @@ const CONTRADICTIONS: Parameters = &[
     ("output_range", |_| Pid::new(GAINS.with_output_range(5.0, 5.0)).err()),
     ("output_range", |_| incremental(|config| config.with_output_range(1.0, -2.0))),
     ("variable_integral", |_| Pid::new(GAINS.with_variable_integral(3.0, 2.0)).err()),
+    ("r", |_| Pid::new(GAINS.with_period(360.0).with_tracking(80.0)).err()),
     ("r", |_| LinearDifferentiator::new(1001.0, DT_S).err()),
     ("h0", |_| OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).err()),
     ("cutoff", |_| Biquad::low_pass(500.0, 1.0, 1000.0).err()),
@@ -619,8 +636,8 @@ const CONTRADICTIONS: Parameters = &[
     ("distance", |_| Profile::plan(f32::MIN, f32::MAX, &MotionLimits::new(1.0, 1.0)).err()),
 ];
 
-fn incremental(with: impl Fn(IncrementalPidConfig) -> IncrementalPidConfig) -> Option<ConfigError> {
-    IncrementalPid::new(with(IncrementalPidConfig::new(1.0, 1.0, 1.0))).err()
+fn incremental(with: impl Fn(PidConfig) -> PidConfig) -> Option<ConfigError> {
+    Pid::new(with(PidConfig::new(1.0, 1.0, 1.0).with_incremental_form())).err()
 }
 
 fn speed(with: impl Fn(SpeedActuatorConfig) -> SpeedActuatorConfig) -> Option<ConfigError> {

@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 use drivetrain::control::{
-    Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, MotionLimits,
-    OptimalDifferentiator, Oscillation, Pid, PidConfig, Profile, TuningRule, fhan,
+    Biquad, LinearDifferentiator, LowPass, MotionLimits, OptimalDifferentiator, Oscillation, Pid,
+    PidConfig, Profile, TimeStep, TuningRule, fhan,
 };
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
@@ -21,14 +21,9 @@ fn assert_close(actual: f32, expected: f32, tolerance: f32, what: &str) {
     assert!((actual - expected).abs() <= allowed, "{what}: {actual} instead of {expected}");
 }
 
-enum Controller {
-    Positional(Pid),
-    Incremental(IncrementalPid),
-}
-
-fn controller(case: &str) -> Option<Controller> {
+fn controller(case: &str) -> Option<Pid> {
     let pid = PidConfig::new;
-    let positional = match case {
+    let config = match case {
         "plain" => pid(2.0, 15.0, 0.01),
         "output_limit" => pid(4.0, 40.0, 0.01).with_output_limit(1.5),
         "output_range" => pid(4.0, 40.0, 0.0).with_output_range(-0.25, 1.5),
@@ -56,21 +51,12 @@ fn controller(case: &str) -> Option<Controller> {
             .with_period(8.0)
             .with_derivative_filter(80.0)
             .with_back_calculation(0.05),
-        _ => {
-            let incremental = match case {
-                "incremental" => IncrementalPidConfig::new(2.0, 15.0, 0.01),
-                "incremental_limit" => {
-                    IncrementalPidConfig::new(4.0, 40.0, 0.01).with_output_limit(1.5)
-                }
-                "incremental_tracking" => IncrementalPidConfig::new(2.0, 15.0, 0.0)
-                    .with_max_step(0.01)
-                    .with_tracking(60.0),
-                _ => return None,
-            };
-            return IncrementalPid::new(incremental).ok().map(Controller::Incremental);
-        }
+        "incremental" => pid(2.0, 15.0, 0.01).with_incremental_form(),
+        "incremental_limit" => pid(4.0, 40.0, 0.01).with_output_limit(1.5).with_incremental_form(),
+        "incremental_tracking" => pid(2.0, 15.0, 0.0).with_tracking(60.0).with_incremental_form(),
+        _ => return None,
     };
-    Pid::new(positional).ok().map(Controller::Positional)
+    Pid::new(config).ok()
 }
 
 #[test]
@@ -83,8 +69,7 @@ fn pid_with_each_option_alone_and_all_together() {
             cases += 1;
         }
         let output = match &mut running.1 {
-            Some(Controller::Positional(pid)) => pid.update(row[1], row[2], row[3]),
-            Some(Controller::Incremental(pid)) => pid.update(row[1], row[2], row[3]),
+            Some(pid) => pid.step(row[1], row[2], &TimeStep::of(row[3])),
             None => f32::NAN,
         };
         assert_close(output, row[4], 5e-5, case);

@@ -3,14 +3,12 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::control::{
-    IncrementalPid, IncrementalPidConfig, Pid, PidConfig, StepMeasures, StepResponse,
-};
+use drivetrain::control::{Pid, PidConfig, StepMeasures, StepResponse, TimeStep};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Model, MotorConfig, World};
 use drivetrain::time::Duration;
-use drivetrain::units::Current;
+use drivetrain::units::{AngularVelocity, Current};
 
 const TARGET: f32 = 30.0; // rad/s
 const LIMIT: f32 = 6.0; // A
@@ -45,16 +43,17 @@ fn after_a_step_that_saturates_the_incremental_form_settles_as_fast_as_the_posit
     for (kp, ki) in [(0.6, 0.3), (0.6, 1.5), (0.6, 6.0), (2.0, 10.0), (4.0, 4.0)] {
         let config = PidConfig::new(kp, ki, 0.0).with_output_limit(LIMIT);
         let mut positional = Pid::new(config).unwrap();
-        let config = IncrementalPidConfig::new(kp, ki, 0.0).with_output_limit(LIMIT);
-        let mut incremental = IncrementalPid::new(config).unwrap();
+        let config = config.with_incremental_form();
+        let mut incremental = Pid::new(config).unwrap();
         let mut most = 0.0_f32;
         let expected = step_response(|setpoint, speed, dt_s| {
-            let amperes = positional.update(setpoint, speed, dt_s);
+            let amperes = positional.step(setpoint, speed, &TimeStep::of(dt_s));
             most = most.max(amperes);
             amperes
         });
-        let measured =
-            step_response(|setpoint, speed, dt_s| incremental.update(setpoint, speed, dt_s));
+        let measured = step_response(|setpoint, speed, dt_s| {
+            incremental.step(setpoint, speed, &TimeStep::of(dt_s))
+        });
         assert!((most - LIMIT).abs() < 1e-6, "{most}"); // the step does saturate
         let settled = |measures: &StepMeasures| measures.settling_time_s.unwrap_or(f32::INFINITY);
         assert!(settled(&expected) < 3.0, "kp {kp}, ki {ki}: {expected:?}");
@@ -63,4 +62,45 @@ fn after_a_step_that_saturates_the_incremental_form_settles_as_fast_as_the_posit
             "kp {kp}, ki {ki}: {measured:?}, positional {expected:?}"
         );
     }
+}
+
+/// The loop of a motor, as the bus runs it: speed and amperes of each tick after a step of the target.
+fn driven(speed_loop: PidConfig) -> Vec<(f32, f32)> {
+    let world = World::new(1);
+    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let mut bus = Bus::new();
+    let config = Config::<M3508>::new(1).with_opening(Duration::ZERO).speed_loop(speed_loop);
+    let motor = bus.attach(config).unwrap();
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let (mut armed, mut ticks) = (false, Vec::new());
+    while ticks.len() < 1_000 {
+        world.advance(Duration::from_micros(100));
+        runner.poll(8);
+        let Some(tick) = runner.due() else { continue };
+        armed = armed || runner.arm(tick).is_ok();
+        if armed {
+            let target = AngularVelocity::from_rad_per_s(TARGET);
+            runner.device_mut().set_velocity(motor, target).unwrap();
+        }
+        runner.tick(tick);
+        let Some(state) = runner.device().state(motor) else { continue };
+        let amperes = runner.device().commanded_current(motor).unwrap().as_amperes();
+        ticks.push((state.velocity.as_rad_per_s(), amperes));
+    }
+    ticks
+}
+
+#[test]
+fn an_incremental_speed_loop_with_a_tracking_differentiator_drives_a_motor() {
+    let plain = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(LIMIT);
+    let fastest = |ticks: &[(f32, f32)]| ticks.iter().fold(0.0_f32, |most, tick| most.max(tick.0));
+    let most = |ticks: &[(f32, f32)]| ticks.iter().fold(0.0_f32, |most, tick| most.max(tick.1));
+    let positional = driven(plain);
+    // Step by step the same loop, so the same words.
+    assert_eq!(driven(plain.with_incremental_form()), positional);
+    assert!((most(&positional) - LIMIT).abs() < 1e-2); // a step of 30 rad/s asks for 18 A
+    let led = driven(plain.with_incremental_form().with_tracking(8.0));
+    assert!(most(&led) < 0.8 * LIMIT, "{}", most(&led));
+    assert!(fastest(&led) < fastest(&positional), "{}", fastest(&led));
+    assert!(led.last().is_some_and(|&(speed, _)| (speed - TARGET).abs() < 0.5), "{:?}", led.last());
 }

@@ -102,8 +102,8 @@ fn benches(criterion: &mut Criterion) {
     measure(criterion, "pid step", || {
         black_box(pid.step(black_box(1.0), black_box(0.5), &step));
     });
-    measure(criterion, "pid update", || {
-        black_box(pid.update(black_box(1.0), black_box(0.5), black_box(0.001)));
+    measure(criterion, "pid step with its time", || {
+        black_box(pid.step(black_box(1.0), black_box(0.5), &TimeStep::of(black_box(0.001))));
     });
 
     let mut eight = Eight::new();

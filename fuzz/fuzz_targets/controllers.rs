@@ -2,10 +2,10 @@
 #![no_main]
 
 use drivetrain::control::{
-    Biquad, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, LowPass, Median,
-    MotionLimits, MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator,
-    PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
-    SpeedActuatorConfig, StepResponse, TimeStep,
+    Biquad, LinearDifferentiator, LowPass, Median, MotionLimits, MovingAverage,
+    OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig, Profile,
+    RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse,
+    TimeStep,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -15,8 +15,7 @@ const ANY: (f32, f32) = (f32::MIN, f32::MAX);
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
     match input.byte() % 12 {
-        0 | 1 => pid(input),
-        2 => incremental(input),
+        0..=2 => pid(input),
         3 => speed_actuator(input),
         4 => position_actuator(input),
         5 => filters(input),
@@ -49,8 +48,10 @@ fn pid_config(input: &mut Input) -> PidConfig {
             (4, _) => config.with_feed_forward(input.float(), input.float()),
             (5, 0) => config.with_slew_limit(input.positive()),
             (5, _) => config.with_period(input.positive()),
-            (6, _) => config.with_derivative_filter(input.positive()),
-            _ => config.with_derivative_on_error(),
+            (6, 0) => config.with_derivative_filter(input.positive()),
+            (6, _) => config.with_tracking(input.positive()),
+            (_, 0) => config.with_derivative_on_error(),
+            _ => config.with_incremental_form(),
         };
     }
     config
@@ -109,8 +110,9 @@ fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
         [terms.p, terms.i, terms.d, terms.feed_forward].map(f32::to_bits)
     };
     let range = pid.get().config().output_range();
-    let taken =
-        pid.step(range, Pid::rejected, |pid: &mut Pid| pid.update(setpoint, measured, dt_s));
+    let taken = pid.step(range, Pid::rejected, |pid: &mut Pid| {
+        pid.step(setpoint, measured, &TimeStep::of(dt_s))
+    });
     let ([.., before_d, _], [.., d, _]) = (bits(&before.0), bits(pid.get()));
     match (taken, before.1) {
         (false, _) => {
@@ -121,52 +123,6 @@ fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
         }
         (true, true) => assert_eq!(before_d, d, "D does not rest: {pid:?}"),
         (true, false) => {}
-    }
-}
-
-fn incremental(mut input: Input) {
-    let gains = [input.positive(), input.positive(), input.positive()];
-    let mut config = IncrementalPidConfig::new(gains[0], gains[1], gains[2]);
-    let options = input.byte();
-    let mut range = ANY;
-    if options & 4 != 0 {
-        range = (input.float(), input.float());
-        config = config.with_output_range(range.0, range.1);
-    } else if options & 1 != 0 {
-        let limit = input.positive();
-        range = (-limit, limit);
-        config = config.with_output_limit(limit);
-    }
-    if options & 2 != 0 {
-        config = config.with_tracking(input.positive());
-    }
-    let Ok(pid) = IncrementalPid::new(config) else { return };
-    let (mut pid, mut fresh, mut kd) = (Observed::new(pid), pid, gains[2]);
-    while !input.is_empty() {
-        match input.byte() {
-            0..=239 => {
-                let (setpoint, measured, dt_s) = (input.float(), input.float(), input.step_s());
-                let taken = pid.step(range, IncrementalPid::rejected, |pid| {
-                    pid.update(setpoint, measured, dt_s)
-                });
-                if !taken && kd > 0.0 && !TimeStep::of(dt_s).is_hold() {
-                    pid.rests();
-                }
-            }
-            240..=245 => pid.restart(fresh),
-            246..=250 => pid.restart_at(input.float()),
-            _ => {
-                let gains = [input.positive(), input.positive(), input.positive()];
-                if fresh.set_gains(gains[0], gains[1], gains[2]).is_ok() {
-                    kd = gains[2];
-                }
-                pid.forgive();
-                pid.change(|pid| {
-                    _ = pid.set_gains(gains[0], gains[1], gains[2]);
-                    pid.output()
-                });
-            }
-        }
     }
 }
 
@@ -191,7 +147,7 @@ fn speed_actuator(mut input: Input) {
             0..=231 => {
                 let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
                 let taken = actuator.step(range, SpeedActuator::rejected, |actuator| {
-                    actuator.update(setpoint, speed, dt_s)
+                    actuator.step(setpoint, speed, &TimeStep::of(dt_s))
                 });
                 // D rests, and the filter before it starts anew.
                 if !taken && !TimeStep::of(dt_s).is_hold() {
@@ -232,9 +188,9 @@ fn position_actuator(mut input: Input) {
                 let dt_s = input.step_s();
                 let taken = actuator.step(range, PositionActuator::rejected, |actuator| {
                     if options & 4 == 0 {
-                        actuator.update(setpoint, angle, speed, dt_s)
+                        actuator.step(setpoint, angle, speed, &TimeStep::of(dt_s))
                     } else {
-                        actuator.update_error(setpoint, speed, dt_s)
+                        actuator.step_error(setpoint, speed, &TimeStep::of(dt_s))
                     }
                 });
                 // D rests also in the next step of the outer loop, which may be many steps away.

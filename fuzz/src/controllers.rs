@@ -1,5 +1,5 @@
 use core::fmt::Debug;
-use drivetrain::control::{IncrementalPid, Pid, PositionActuator, SpeedActuator};
+use drivetrain::control::{Pid, PositionActuator, SpeedActuator};
 
 /// What can start anew, from rest or from an output that another has held.
 pub trait Restart {
@@ -26,7 +26,7 @@ macro_rules! restart {
     )*};
 }
 
-restart!(Pid, IncrementalPid, SpeedActuator, PositionActuator);
+restart!(Pid, SpeedActuator, PositionActuator);
 
 /// A controller or filter under observation, beside a copy that never sees what was refused.
 #[derive(Debug)]

@@ -1,5 +1,5 @@
 use super::clock::DeadClock;
-use crate::control::{ConfigError, Pid, PidConfig};
+use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
 use crate::units::Angle;
@@ -296,7 +296,8 @@ impl Modes {
             }
             (Mode::FollowGimbal, Some(yaw)) => {
                 // The chassis stands at minus the yaw on the gimbal's circle, and shall stand at zero.
-                let wz_rad_s = self.follow.update(0.0, -yaw.angle().as_radians(), dt_s);
+                let step = TimeStep::of(dt_s);
+                let wz_rad_s = self.follow.step(0.0, -yaw.angle().as_radians(), &step);
                 command.to_body_by_yaw(yaw).with_wz(wz_rad_s)
             }
             (Mode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),

@@ -1,6 +1,6 @@
 use super::clock::DeadClock;
 use super::power::{PowerError, not_negative};
-use crate::control::{ConfigError, Pid, PidConfig};
+use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
 
 /// Spends an energy buffer down to a reserve, and lets it fill up again: the power to allow from its charge.
 ///
@@ -88,7 +88,8 @@ impl PowerBuffer {
             return limit_w * self.blind_share;
         };
         // The buffer is the measurement: above the reserve the loop's output is negative.
-        let allowance_w = limit_w - self.pid.update(self.reserve_j, energy_j, dt_s);
+        let step = TimeStep::of(dt_s);
+        let allowance_w = limit_w - self.pid.step(self.reserve_j, energy_j, &step);
         let integral = self.pid.terms().i;
         self.pid.keep_integral_within(if integral > 0.0 { limit_w } else { 0.0 });
         if allowance_w > 0.0 { allowance_w } else { 0.0 }

@@ -1,5 +1,5 @@
 use super::error::{ConfigError, ConfigFault, check, positive};
-use super::number::{Sum, finite, limited};
+use super::number::{Sum, finite};
 use super::step::TimeStep;
 use crate::math;
 
@@ -52,18 +52,8 @@ impl LinearDifferentiator {
 
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        self.follow(input, &TimeStep::new(dt_s, self.follower.max_step_s))
-    }
-
-    /// Steps by a time that was validated before, with a longest step that may be another one.
-    pub(super) fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
-        let dt_s = limited(step.dt_s, 0.0, self.follower.max_step_s);
-        self.follow(input, &TimeStep { dt_s, ..*step })
-    }
-
-    fn follow(&mut self, input: f32, step: &TimeStep) -> f32 {
-        let r = self.r;
-        self.follower.step(input, step, |error, rate| -r * finite(r * error + 2.0 * rate))
+        let (r, step) = (self.r, TimeStep::new(dt_s, self.follower.max_step_s));
+        self.follower.step(input, &step, |error, rate| -r * finite(r * error + 2.0 * rate))
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.

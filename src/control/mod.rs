@@ -4,7 +4,7 @@
 //! | loop or task | use | start with |
 //! |---|---|---|
 //! | wheel or shooter speed | [`SpeedActuator`], or [`Pid`] alone | PI, output and integral limit, `with_feed_forward` |
-//! | speed, and the setpoint jumps | [`IncrementalPid`] | `with_tracking` |
+//! | speed, and the setpoint jumps | [`Pid`] | `with_tracking`; `with_incremental_form` where gains change on the way |
 //! | arm or lift position | [`PositionActuator`] | P over PI, the angle loop's output limit is the speed limit |
 //! | gimbal or swerve angle | [`PositionActuator`] | `with_period(360.0)`: the shortest way round |
 //! | the same, with an error from integers | [`Cascade`] | as the motors of a bus do |
@@ -31,11 +31,11 @@
 //! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.
 //!
 //! ```
-//! use drivetrain::control::{Pid, PidConfig};
+//! use drivetrain::control::{Pid, PidConfig, TimeStep};
 //!
 //! let speed = PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 //! let mut wheel = Pid::new(speed)?;
-//! assert_eq!(wheel.update(14.0, 10.0, 0.001), 8.0); // A for rad/s: 2 times 4
+//! assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0); // A for rad/s: 2 times 4
 //! # Ok::<(), drivetrain::control::ConfigError>(())
 //! ```
 
@@ -55,7 +55,8 @@ pub use actuator::{
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::{ConfigError, ConfigFault};
 pub use filter::{Biquad, LowPass, Median, MovingAverage};
-pub use pid::{IncrementalPid, IncrementalPidConfig, Pid, PidConfig, Terms};
+pub(crate) use pid::Input;
+pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
 pub use tuning::{

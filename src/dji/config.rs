@@ -89,6 +89,17 @@ impl<M: Model> Config<M> {
     /// finest error that feedback tells, asks for more than the model's whole range: above 3667 A per rad/s for an M3508, 3438 for
     /// an M2006, 28.6 for a GM6020 in current mode, and 229 V per rad/s in voltage mode, each with its own gearbox.
     /// [`WheelTuning`](crate::control::WheelTuning) reckons gains for a wheel, [`WordGains`](super::WordGains) converts them.
+    /// Every option of a [`PidConfig`] works here, the incremental form and a tracked setpoint too.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::PidConfig;
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let speed = PidConfig::new(1.9, 2.4, 0.0).with_incremental_form().with_tracking(30.0);
+    /// let mut bus = Bus::new();
+    /// assert!(bus.attach(Config::<M3508>::new(1).speed_loop(speed)).is_ok());
+    /// ```
     #[must_use]
     pub const fn speed_loop(mut self, speed: PidConfig) -> Self {
         self.plain.speed = Some(speed);

@@ -3,8 +3,8 @@
 use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{
-    ConfigError, IncrementalPid, IncrementalPidConfig, LinearDifferentiator, OptimalDifferentiator,
-    Pid, PidConfig, TimeStep, WheelTuning, fhan,
+    ConfigError, LinearDifferentiator, OptimalDifferentiator, Pid, PidConfig, TimeStep,
+    WheelTuning, fhan,
 };
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
@@ -162,13 +162,14 @@ fn control() {
     PidConfig::with_period.call();
     PidConfig::with_derivative_filter.call();
     PidConfig::with_derivative_on_error.call();
+    PidConfig::with_tracking.call();
+    PidConfig::with_incremental_form.call();
     PidConfig::with_gains.call();
     PidConfig::gains.call();
     PidConfig::output_range.call();
     PidConfig::validate.call();
     PidConfig::period.call();
     Pid::new.call();
-    Pid::update.call();
     Pid::step.call();
     Pid::step_error.call();
     Pid::reset.call();
@@ -179,21 +180,6 @@ fn control() {
     Pid::output.call();
     Pid::config.call();
     Pid::rejected.call();
-    IncrementalPidConfig::new.call();
-    IncrementalPidConfig::with_output_limit.call();
-    IncrementalPidConfig::with_output_range.call();
-    IncrementalPidConfig::with_tracking.call();
-    IncrementalPidConfig::with_max_step.call();
-    IncrementalPidConfig::validate.call();
-    IncrementalPid::new.call();
-    IncrementalPid::update.call();
-    IncrementalPid::step.call();
-    IncrementalPid::reset.call();
-    IncrementalPid::reset_to.call();
-    IncrementalPid::set_gains.call();
-    IncrementalPid::output.call();
-    IncrementalPid::config.call();
-    IncrementalPid::rejected.call();
     LinearDifferentiator::new.call();
     LinearDifferentiator::update.call();
     LinearDifferentiator::reset_to.call();

@@ -6,8 +6,6 @@ use drivetrain::control::*;
 pub fn call_all() {
     Cascade::new.call();
     Cascade::step.call();
-    Cascade::step_position.call();
-    Cascade::step_speed.call();
     Cascade::reset.call();
     Cascade::interrupt.call();
     Cascade::output.call();
@@ -19,8 +17,6 @@ pub fn call_all() {
     PositionActuatorConfig::with_angle_filter.call();
     PositionActuatorConfig::with_outer_divider.call();
     PositionActuator::new.call();
-    PositionActuator::update.call();
-    PositionActuator::update_error.call();
     PositionActuator::step.call();
     PositionActuator::step_error.call();
     PositionActuator::interrupt.call();
@@ -35,7 +31,6 @@ pub fn call_all() {
     SpeedActuatorConfig::with_feedback_filter.call();
     SpeedActuatorConfig::with_output_filter.call();
     SpeedActuator::new.call();
-    SpeedActuator::update.call();
     SpeedActuator::step.call();
     SpeedActuator::reset.call();
     SpeedActuator::reset_to.call();

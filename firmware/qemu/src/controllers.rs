@@ -5,10 +5,10 @@ use crate::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
-    Biquad, Cascade, ConfigError, FeedForward, IncrementalPid, IncrementalPidConfig,
-    LinearDifferentiator, LowPass, Median, MotionLimits, MovingAverage, OptimalDifferentiator,
-    PidConfig, PositionActuator, PositionActuatorConfig, Profile, ProfileState, RelayTuner,
-    RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep,
+    Biquad, Cascade, ConfigError, FeedForward, LinearDifferentiator, LowPass, Median, MotionLimits,
+    MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig,
+    Profile, ProfileState, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
+    SpeedActuatorConfig, StepResponse, TimeStep,
 };
 
 const DT_S: f32 = 0.001;
@@ -27,9 +27,9 @@ macro_rules! functions {
 }
 
 functions! {
-    control_incremental(pid: &mut IncrementalPid, setpoint, measurement, dt_s) -> f32 = pid.update(setpoint, measurement, dt_s);
-    control_speed(actuator: &mut SpeedActuator, setpoint, speed, dt_s) -> f32 = actuator.update(setpoint, speed, dt_s);
-    control_position(actuator: &mut PositionActuator, setpoint, angle, speed, dt_s) -> f32 = actuator.update(setpoint, angle, speed, dt_s);
+    control_incremental(pid: &mut Pid, setpoint, measurement, dt_s) -> f32 = pid.step(setpoint, measurement, &TimeStep::of(dt_s));
+    control_speed(actuator: &mut SpeedActuator, setpoint, speed, dt_s) -> f32 = actuator.step(setpoint, speed, &TimeStep::of(dt_s));
+    control_position(actuator: &mut PositionActuator, setpoint, angle, speed, dt_s) -> f32 = actuator.step(setpoint, angle, speed, &TimeStep::of(dt_s));
     control_low_pass(filter: &mut LowPass, input, dt_s) -> f32 = filter.update(input, dt_s);
     control_biquad(filter: &mut Biquad, input) -> f32 = filter.update(input);
     control_moving_average(filter: &mut MovingAverage<8>, sample) -> f32 = filter.update(sample);
@@ -100,14 +100,18 @@ fn tuning() {
 }
 
 fn loops() {
-    let config = IncrementalPidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0);
-    let mut pid = IncrementalPid::new(black_box(config)).unwrap();
-    row(
-        "incremental_update",
-        &[instructions(control_incremental as Step<_>, |update, call| {
-            update(&mut pid, 1.0, swinging(call), DT_S);
-        })],
-    );
+    let incremental =
+        PidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0).with_incremental_form();
+    let led = incremental.with_tracking(100.0);
+    for (name, config) in [("incremental_update", incremental), ("tracking_update", led)] {
+        let mut pid = Pid::new(black_box(config)).unwrap();
+        row(
+            name,
+            &[instructions(control_incremental as Step<_>, |update, call| {
+                update(&mut pid, 1.0, swinging(call), DT_S);
+            })],
+        );
+    }
     let pid = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0).with_integral_limit(10.0);
     let bare = SpeedActuatorConfig::new(pid);
     let filtered = bare.with_feedback_filter(100.0).with_output_filter(200.0);

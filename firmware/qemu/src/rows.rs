@@ -6,7 +6,7 @@ use crate::wiring::{Drive, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
-use drivetrain::control::{IncrementalPid, Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
 use drivetrain::encoder::{Position, Shaft};
 use drivetrain::frame::CanFrame;
@@ -50,7 +50,7 @@ fn row_pid_step(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep)
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn row_pid_update(pid: &mut Pid, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
-    pid.update(setpoint, measurement, dt_s)
+    pid.step(setpoint, measurement, &TimeStep::of(dt_s))
 }
 
 #[unsafe(no_mangle)]
@@ -296,7 +296,7 @@ fn pid_step_through(config: PidConfig, way: impl Fn(u32) -> (f32, f32)) -> u32 {
 
 fn pid_update(config: PidConfig) -> u32 {
     let mut pid = Pid::new(black_box(config)).unwrap();
-    pid.update(1.0, 0.5, 0.001);
+    pid.step(1.0, 0.5, &TimeStep::of(0.001));
     instructions(row_pid_update as fn(&mut Pid, f32, f32, f32) -> f32, |pid_update, call| {
         pid_update(&mut pid, 1.0, swinging(call), 0.001);
     })
@@ -363,7 +363,7 @@ pub fn sizes() {
     }
     sizes!(
         "Bus" Bus, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
-        "Pid" Pid, "PidConfig" PidConfig, "IncrementalPid" IncrementalPid,
+        "Pid" Pid, "PidConfig" PidConfig,
         "Shaft" Shaft, "Mecanum" Mecanum, "Transform2" Place2, "Transform3" Place3, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
     );
 }

@@ -27,7 +27,7 @@ use crate::control::step::TimeStep;
 /// let mut arm = Cascade::new(position, PidConfig::new(2.0, 0.0, 0.0))?;
 /// let step = TimeStep::of(0.001);
 /// assert_eq!(arm.step(1.0, 1.0, &step), 6.0); // 4 rad/s wanted, 1 rad/s measured
-/// assert_eq!(arm.step_speed(1.5, 1.0, &step), 1.0); // the speed loop alone
+/// assert_eq!(arm.speed_mut().step(1.5, 1.0, &step), 1.0); // the speed loop alone
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,20 +52,8 @@ impl Cascade {
     /// Steps both loops and returns the output.
     #[inline]
     pub fn step(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {
-        let wanted = self.step_position(error, velocity, step);
-        self.step_speed(wanted, velocity, step)
-    }
-
-    /// Steps the position loop and returns the velocity that it wants.
-    #[inline]
-    pub fn step_position(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {
-        self.position.step_error(error, velocity, step)
-    }
-
-    /// Steps the speed loop and returns the output.
-    #[inline]
-    pub fn step_speed(&mut self, setpoint: f32, velocity: f32, step: &TimeStep) -> f32 {
-        self.speed.step(setpoint, velocity, step)
+        let wanted = self.position.step_error(error, velocity, step);
+        self.speed.step(wanted, velocity, step)
     }
 
     /// Resets both loops: see [`Pid::reset`].
@@ -94,7 +82,7 @@ impl Cascade {
         &self.position
     }
 
-    /// Returns the position loop, for changing its gains and for taking over from another controller.
+    /// Returns the position loop, for stepping it alone, for changing its gains and for taking over from another controller.
     #[inline]
     pub const fn position_mut(&mut self) -> &mut Pid {
         &mut self.position
@@ -107,7 +95,7 @@ impl Cascade {
         &self.speed
     }
 
-    /// Returns the speed loop, for changing its gains and for taking over from another controller.
+    /// Returns the speed loop, for stepping it alone, for changing its gains and for taking over from another controller.
     #[inline]
     pub const fn speed_mut(&mut self) -> &mut Pid {
         &mut self.speed

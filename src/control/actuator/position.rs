@@ -69,12 +69,12 @@ impl PositionActuatorConfig {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
+/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig, TimeStep};
 ///
 /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
 /// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 0.0, 0.0));
 /// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
-/// assert_eq!(arm.update(1.0, 0.0, 1.0, 0.001), 6.0); // 4 rad/s wanted, 1 rad/s measured
+/// assert_eq!(arm.step(1.0, 0.0, 1.0, &TimeStep::of(0.001)), 6.0); // 4 rad/s wanted, 1 rad/s measured
 /// assert_eq!(arm.speed_setpoint(), 4.0);
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
@@ -125,11 +125,6 @@ impl PositionActuator {
         }
     }
 
-    /// Steps by `dt_s` seconds, of which [`TimeStep::MAX_S`] are believed, and returns the output.
-    pub fn update(&mut self, setpoint: f32, angle: f32, speed: f32, dt_s: f32) -> f32 {
-        self.step(setpoint, angle, speed, &TimeStep::of(dt_s))
-    }
-
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, angle: f32, speed: f32, step: &TimeStep) -> f32 {
         let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
@@ -151,17 +146,12 @@ impl PositionActuator {
     ///
     /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right, which is there from the
     /// first call on. The angle filter does not apply.
-    pub fn update_error(&mut self, error: f32, speed: f32, dt_s: f32) -> f32 {
-        self.step_error(error, speed, &TimeStep::of(dt_s))
-    }
-
-    /// As [`update_error`](Self::update_error), by a time that was validated before.
     pub fn step_error(&mut self, error: f32, speed: f32, step: &TimeStep) -> f32 {
         if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
             return self.miss(step); // the rate of the angle is given: none of it is missed
         }
         if let Some(outer) = self.outer_step(step) {
-            self.cascade.step_position(error, speed, &outer);
+            self.cascade.position_mut().step_error(error, speed, &outer);
         }
         self.step_speed(speed, step)
     }
@@ -179,13 +169,13 @@ impl PositionActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
+    /// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig, TimeStep};
     ///
     /// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0));
     /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
     /// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
     /// arm.reset_to(3.0);
-    /// assert_eq!((arm.output(), arm.update(1.0, 0.0, 0.0, 0.001)), (3.0, 3.0));
+    /// assert_eq!((arm.output(), arm.step(1.0, 0.0, 0.0, &TimeStep::of(0.001))), (3.0, 3.0));
     /// # Ok::<(), drivetrain::control::ConfigError>(())
     /// ```
     pub const fn reset_to(&mut self, output: f32) {
@@ -292,7 +282,7 @@ mod tests {
             let (mut angle, mut speed) = (0.0_f32, 0.0_f32);
             let mut fastest = 0.0_f32;
             for _ in 0..3000 {
-                speed += actuator.update(target, angle, speed, DT_S) * 20.0 * DT_S;
+                speed += actuator.step(target, angle, speed, &TimeStep::of(DT_S)) * 20.0 * DT_S;
                 angle += speed * DT_S;
                 fastest = fastest.max(speed.abs());
             }
@@ -311,7 +301,7 @@ mod tests {
         let mut changes = 0;
         let mut last = 0.0;
         for _ in 0..=100 {
-            actuator.update(1.0, 0.0, 0.0, DT_S);
+            actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
             changes += u32::from(actuator.speed_setpoint() != last);
             last = actuator.speed_setpoint();
         }
@@ -326,20 +316,20 @@ mod tests {
             (PositionActuator::new(config).unwrap(), PositionActuator::new(config).unwrap());
         for sample in 0..20_u8 {
             let angle = f32::from(sample) * 0.1;
-            let expected = clean.update(3.0, angle, 1.0, DT_S);
+            let expected = clean.step(3.0, angle, 1.0, &TimeStep::of(DT_S));
             let (held, before) = (hit.output(), hit);
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-                assert_eq!(hit.update(bad, angle, 1.0, DT_S), held);
-                assert_eq!(hit.update(3.0, bad, 1.0, DT_S), held);
-                assert_eq!(hit.update(3.0, angle, bad, DT_S), held);
-                assert_eq!(hit.update(3.0, angle, 1.0, bad), held);
-                assert_eq!(hit.update_error(bad, 1.0, DT_S), held);
+                assert_eq!(hit.step(bad, angle, 1.0, &TimeStep::of(DT_S)), held);
+                assert_eq!(hit.step(3.0, bad, 1.0, &TimeStep::of(DT_S)), held);
+                assert_eq!(hit.step(3.0, angle, bad, &TimeStep::of(DT_S)), held);
+                assert_eq!(hit.step(3.0, angle, 1.0, &TimeStep::of(bad)), held);
+                assert_eq!(hit.step_error(bad, 1.0, &TimeStep::of(DT_S)), held);
             }
             hit = before;
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -DT_S] {
-                assert_eq!(hit.update(3.0, angle, 1.0, bad), held);
+                assert_eq!(hit.step(3.0, angle, 1.0, &TimeStep::of(bad)), held);
             }
-            assert_eq!(hit.update(3.0, angle, 1.0, DT_S), expected);
+            assert_eq!(hit.step(3.0, angle, 1.0, &TimeStep::of(DT_S)), expected);
         }
         assert_eq!((hit.rejected(), PositionActuator { rejected: 0, ..hit }), (100, clean));
     }
@@ -357,7 +347,7 @@ mod tests {
             for sample in 0..200_u8 {
                 (angle, speed) = (angle + 10.0 * DT_S, speed + 10.0 * DT_S);
                 let bad = (100..150).contains(&sample);
-                actuator.update(0.0, if bad { f32::NAN } else { angle }, speed, DT_S);
+                actuator.step(0.0, if bad { f32::NAN } else { angle }, speed, &TimeStep::of(DT_S));
                 for pid in [actuator.cascade().position(), actuator.cascade().speed()] {
                     most = most.max(pid.terms().d.abs());
                 }
@@ -374,11 +364,11 @@ mod tests {
         );
         let mut actuator = PositionActuator::new(damper).unwrap();
         for speed in [2.0, -2.0] {
-            actuator.update_error(0.0, speed, DT_S); // on the first call too
+            actuator.step_error(0.0, speed, &TimeStep::of(DT_S)); // on the first call too
             assert_eq!(actuator.speed_setpoint(), -speed);
         }
         actuator.reset();
-        assert_eq!(actuator.update(0.0, 2.0, 0.0, DT_S), 0.0); // by angles, there is no travel yet
+        assert_eq!(actuator.step(0.0, 2.0, 0.0, &TimeStep::of(DT_S)), 0.0); // by angles, there is no travel yet
     }
 
     #[test]
@@ -391,12 +381,12 @@ mod tests {
                     PositionActuatorConfig::new(config().angle, speed).with_outer_divider(divider);
                 let mut actuator = PositionActuator::new(config).unwrap();
                 for _ in 0..20 {
-                    actuator.update(1.0, 0.0, 0.0, DT_S);
+                    actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
                 }
                 actuator.reset_to(3.0);
                 assert_eq!((actuator.output(), actuator.speed_setpoint()), (3.0, 0.0));
-                assert!((actuator.update(0.5, 0.2, 0.1, DT_S) - 3.0).abs() < 1e-5);
-                assert!((actuator.update(0.5, 0.2, 0.1, DT_S) - 3.0).abs() < 0.05);
+                assert!((actuator.step(0.5, 0.2, 0.1, &TimeStep::of(DT_S)) - 3.0).abs() < 1e-5);
+                assert!((actuator.step(0.5, 0.2, 0.1, &TimeStep::of(DT_S)) - 3.0).abs() < 0.05);
                 actuator.reset_to(100.0);
                 assert_eq!(actuator.output(), 20.0);
                 actuator.reset_to(f32::NAN);
@@ -414,7 +404,7 @@ mod tests {
             .with_outer_divider(4);
         let mut actuator = PositionActuator::new(config).unwrap();
         for _ in 0..10 {
-            actuator.update(1.0, 0.0, 0.0, DT_S);
+            actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
         let integrals = |actuator: &PositionActuator| {
             (actuator.cascade().position().terms().i, actuator.cascade().speed().terms().i)
@@ -422,7 +412,7 @@ mod tests {
         let before = integrals(&actuator);
         assert!(before.0 > 0.0 && before.1 > 0.0);
         actuator.interrupt();
-        actuator.update(1.0, 0.7, 0.4, DT_S);
+        actuator.step(1.0, 0.7, 0.4, &TimeStep::of(DT_S));
         assert_eq!(integrals(&actuator), before);
         let (position, speed) =
             (actuator.cascade().position().terms(), actuator.cascade().speed().terms());
@@ -454,17 +444,17 @@ mod tests {
         let damper = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
         let config = PositionActuatorConfig::new(PidConfig::new(0.0, 0.0, 1.0), damper);
         let mut actuator = PositionActuator::new(config).unwrap();
-        actuator.update_error(0.0, 2.0, DT_S);
-        actuator.update_error(f32::NAN, 2.0, DT_S);
-        actuator.update_error(0.0, f32::NAN, DT_S);
-        actuator.update_error(0.0, 5.0, DT_S);
+        actuator.step_error(0.0, 2.0, &TimeStep::of(DT_S));
+        actuator.step_error(f32::NAN, 2.0, &TimeStep::of(DT_S));
+        actuator.step_error(0.0, f32::NAN, &TimeStep::of(DT_S));
+        actuator.step_error(0.0, 5.0, &TimeStep::of(DT_S));
         assert_eq!(actuator.cascade().position().terms().d, -5.0); // and not that of two steps ago
         // By angles, the travel since the last good one is not that of one step: D keeps its value once.
         let mut actuator = PositionActuator::new(config).unwrap();
-        actuator.update(0.0, 0.0, 0.0, DT_S);
-        actuator.update(0.0, 0.002, 0.0, DT_S);
-        actuator.update(0.0, f32::NAN, 0.0, DT_S);
-        actuator.update(0.0, 0.5, 0.0, DT_S);
+        actuator.step(0.0, 0.0, 0.0, &TimeStep::of(DT_S));
+        actuator.step(0.0, 0.002, 0.0, &TimeStep::of(DT_S));
+        actuator.step(0.0, f32::NAN, 0.0, &TimeStep::of(DT_S));
+        actuator.step(0.0, 0.5, 0.0, &TimeStep::of(DT_S));
         assert!((actuator.cascade().position().terms().d + 2.0).abs() < 1e-5);
     }
 
@@ -472,7 +462,7 @@ mod tests {
     fn reset_forgets() {
         let mut actuator = PositionActuator::new(config()).unwrap();
         for _ in 0..10 {
-            actuator.update(1.0, 0.0, 0.0, DT_S);
+            actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
         actuator.reset();
         assert_eq!(actuator, PositionActuator::new(config()).unwrap());

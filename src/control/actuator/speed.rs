@@ -68,10 +68,10 @@ impl SpeedActuatorConfig {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
+/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig, TimeStep};
 ///
 /// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(PidConfig::new(2.0, 2.5, 0.0)))?;
-/// assert_eq!(wheel.update(14.0, 10.0, 0.001), 8.0);
+/// assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0);
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,16 +163,10 @@ impl SpeedActuator {
         }
     }
 
-    /// Steps by `dt_s` seconds and returns the output.
-    pub fn update(&mut self, setpoint: f32, speed: f32, dt_s: f32) -> f32 {
-        let step = TimeStep::of(dt_s);
-        self.step(setpoint, speed, &step)
-    }
-
     /// Steps by a time that was validated before, and returns the output.
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
-            self.pid.refuse(step);
+            self.pid.refuse(!step.is_hold());
             self.filters.miss(step);
             return self.output();
         }
@@ -195,15 +189,15 @@ impl SpeedActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
+    /// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig, TimeStep};
     ///
     /// let loop_ = PidConfig::new(0.0, 1.0, 0.5);
     /// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(loop_).with_feedback_filter(10.0))?;
     /// for _ in 0..=1000 {
-    ///     wheel.update(1.0, 0.0, 0.001);
+    ///     wheel.step(1.0, 0.0, &TimeStep::of(0.001));
     /// }
     /// wheel.interrupt();
-    /// assert!((wheel.update(1.0, 0.7, 0.001) - 1.0).abs() < 1e-3); // no kick of D for the step of 0.7
+    /// assert!((wheel.step(1.0, 0.7, &TimeStep::of(0.001)) - 1.0).abs() < 1e-3); // no kick of D for the step of 0.7
     /// # Ok::<(), drivetrain::control::ConfigError>(())
     /// ```
     pub const fn interrupt(&mut self) {
@@ -255,18 +249,21 @@ mod tests {
         let mut pid = Pid::new(config).unwrap();
         for sample in 0..50_u8 {
             let speed = f32::from(sample) * 0.1;
-            assert_eq!(actuator.update(3.0, speed, DT_S), pid.update(3.0, speed, DT_S));
+            assert_eq!(
+                actuator.step(3.0, speed, &TimeStep::of(DT_S)),
+                pid.step(3.0, speed, &TimeStep::of(DT_S))
+            );
         }
     }
 
     #[test]
     fn both_filters_smooth() {
         let mut actuator = SpeedActuator::new(filtered()).unwrap();
-        assert_eq!(actuator.update(0.0, 0.0, DT_S), 0.0);
-        let first = actuator.update(4.0, 0.0, DT_S);
+        assert_eq!(actuator.step(0.0, 0.0, &TimeStep::of(DT_S)), 0.0);
+        let first = actuator.step(4.0, 0.0, &TimeStep::of(DT_S));
         assert!(first > 0.5 && first < 1.5, "{first}"); // a quarter of the step after dt / (dt + T)
         let before = actuator.output();
-        assert!((actuator.update(4.0, 1.0, DT_S) - before).abs() < 1.0);
+        assert!((actuator.step(4.0, 1.0, &TimeStep::of(DT_S)) - before).abs() < 1.0);
     }
 
     #[test]
@@ -275,19 +272,19 @@ mod tests {
             (SpeedActuator::new(filtered()).unwrap(), SpeedActuator::new(filtered()).unwrap());
         for sample in 0..20_u8 {
             let speed = f32::from(sample) * 0.1;
-            let expected = clean.update(3.0, speed, DT_S);
+            let expected = clean.step(3.0, speed, &TimeStep::of(DT_S));
             let before = hit;
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                 let held = hit.output();
-                assert_eq!(hit.update(3.0, bad, DT_S), held);
-                assert_eq!(hit.update(bad, speed, DT_S), held);
-                assert_eq!(hit.update(3.0, speed, bad), held);
+                assert_eq!(hit.step(3.0, bad, &TimeStep::of(DT_S)), held);
+                assert_eq!(hit.step(bad, speed, &TimeStep::of(DT_S)), held);
+                assert_eq!(hit.step(3.0, speed, &TimeStep::of(bad)), held);
             }
             hit = before;
             for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -DT_S] {
-                assert_eq!(hit.update(3.0, speed, bad), before.output());
+                assert_eq!(hit.step(3.0, speed, &TimeStep::of(bad)), before.output());
             }
-            assert_eq!(hit.update(3.0, speed, DT_S), expected);
+            assert_eq!(hit.step(3.0, speed, &TimeStep::of(DT_S)), expected);
         }
         assert_eq!(hit.rejected(), 100);
     }
@@ -295,10 +292,10 @@ mod tests {
     #[test]
     fn reset_to_takes_over_without_a_jump() {
         let mut actuator = SpeedActuator::new(filtered()).unwrap();
-        actuator.update(1.0, 0.0, DT_S);
+        actuator.step(1.0, 0.0, &TimeStep::of(DT_S));
         actuator.reset_to(2.0);
         assert_eq!(actuator.output(), 2.0);
-        assert!((actuator.update(9.0, 8.0, DT_S) - 2.0).abs() < 1e-5);
+        assert!((actuator.step(9.0, 8.0, &TimeStep::of(DT_S)) - 2.0).abs() < 1e-5);
         actuator.reset();
         assert_eq!(actuator.output(), 0.0);
     }
@@ -311,8 +308,8 @@ mod tests {
                 PidConfig::new(1.0, 0.0, 0.0).with_output_range(-0.37 * f32::from(parts), 1.1);
             let config = SpeedActuatorConfig::new(pid).with_output_filter(1e12);
             let mut actuator = SpeedActuator::new(config).unwrap();
-            actuator.update(-1e4, 0.0, DT_S);
-            let output = actuator.update(1e4, 0.0, DT_S);
+            actuator.step(-1e4, 0.0, &TimeStep::of(DT_S));
+            let output = actuator.step(1e4, 0.0, &TimeStep::of(DT_S));
             assert!(output <= 1.1, "{output}");
         }
     }
@@ -321,13 +318,13 @@ mod tests {
     fn a_limit_that_was_narrowed_holds_behind_the_filter_at_once() {
         let mut actuator = SpeedActuator::new(filtered()).unwrap();
         for _ in 0..100 {
-            actuator.update(100.0, 0.0, DT_S);
+            actuator.step(100.0, 0.0, &TimeStep::of(DT_S));
         }
         actuator
             .pid_mut()
             .set_config(PidConfig::new(1.0, 2.0, 0.0).with_output_limit(1.0))
             .unwrap();
-        assert_eq!(actuator.update(100.0, 0.0, DT_S), 1.0);
+        assert_eq!(actuator.step(100.0, 0.0, &TimeStep::of(DT_S)), 1.0);
     }
 
     #[test]

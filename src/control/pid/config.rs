@@ -1,6 +1,52 @@
 use crate::control::error::{
-    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
+    ConfigError, ConfigFault, check, gains, not_negative, off_or_positive, ordered, output_ends,
+    positive,
 };
+
+const ASYMMETRIC: u16 = 1;
+const INTEGRAL_WEIGHT: u16 = 1 << 1;
+const DEAD_BAND: u16 = 1 << 2;
+pub(super) const FEED_FORWARD: u16 = 1 << 3;
+pub(super) const SLEW_LIMIT: u16 = 1 << 4;
+pub(super) const PERIOD: u16 = 1 << 5;
+pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
+pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 7;
+pub(super) const TRACKING: u16 = 1 << 8;
+pub(super) const BACK_CALCULATION: u16 = 1 << 9;
+/// The options that the plain step does not know.
+pub(super) const NOT_PLAIN: u16 = (1 << 10) - 1;
+pub(super) const INCREMENTAL: u16 = 1 << 10;
+/// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
+pub(super) const REST_DERIVATIVE: u16 = 1 << 11;
+/// Set by `reset_to` until the first step after it.
+pub(super) const TRACK_OUTPUT: u16 = 1 << 12;
+/// Of a step whose error and rate are given.
+pub(super) const GIVEN: u16 = 1 << 13;
+/// The options that such a step does not know.
+pub(super) const OF_SETPOINT: u16 = FEED_FORWARD | PERIOD | DERIVATIVE_ON_ERROR | TRACKING;
+
+/// The numbers of a [`PidConfig`] that a controller stores as they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(C)]
+pub(super) struct Parameters {
+    pub(super) kp: f32,
+    pub(super) ki: f32,
+    pub(super) kd: f32,
+    pub(super) output_upper: f32,
+    pub(super) output_lower: f32,
+    pub(super) full_rate_below: f32,
+    /// Equal to the former for an integral separation.
+    pub(super) no_rate_above: f32,
+    pub(super) dead_band: f32,
+    pub(super) static_gain: f32,
+    pub(super) velocity_gain: f32,
+    pub(super) slew_per_s: f32,
+    pub(super) derivative_time_s: f32,
+    /// Of back-calculation. Zero for conditional integration, [`PidConfig::OFF`] without anti-windup: nothing is drained.
+    pub(super) drain_time_s: f32,
+}
 
 /// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
 ///
@@ -33,24 +79,14 @@ use crate::control::error::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PidConfig {
-    pub(super) kp: f32,
-    pub(super) ki: f32,
-    pub(super) kd: f32,
-    pub(super) output_lower: f32,
-    pub(super) output_upper: f32,
+    pub(super) parameters: Parameters,
     pub(super) integral_limit: f32,
-    pub(super) integral_separation: f32,
-    pub(super) full_rate_below: f32,
-    pub(super) no_rate_above: f32,
-    pub(super) dead_band: f32,
-    pub(super) static_gain: f32,
-    pub(super) velocity_gain: f32,
-    pub(super) slew_per_s: f32,
+    /// Zero without one.
     pub(super) period: f32,
-    pub(super) derivative_time_s: f32,
-    pub(super) tracking_time_s: f32,
+    /// Zero without tracking.
+    pub(super) tracking_r: f32,
     pub(super) derivative_on_error: bool,
-    pub(super) wind_up: bool,
+    pub(super) incremental: bool,
 }
 
 impl PidConfig {
@@ -62,25 +98,28 @@ impl PidConfig {
     /// Each must be finite and zero or more.
     #[must_use]
     pub const fn new(kp: f32, ki: f32, kd: f32) -> Self {
-        Self {
+        let parameters = Parameters {
             kp,
             ki,
             kd,
-            output_lower: -Self::OFF,
             output_upper: Self::OFF,
-            integral_limit: Self::OFF,
-            integral_separation: Self::OFF,
+            output_lower: -Self::OFF,
             full_rate_below: Self::OFF,
             no_rate_above: Self::OFF,
             dead_band: 0.0,
             static_gain: 0.0,
             velocity_gain: 0.0,
             slew_per_s: Self::OFF,
-            period: 0.0,
             derivative_time_s: 0.0,
-            tracking_time_s: 0.0,
+            drain_time_s: 0.0,
+        };
+        Self {
+            parameters,
+            integral_limit: Self::OFF,
+            period: 0.0,
+            tracking_r: 0.0,
             derivative_on_error: false,
-            wind_up: false,
+            incremental: false,
         }
     }
 
@@ -94,41 +133,53 @@ impl PidConfig {
 
     /// Keeps the output in `lower..=upper`, `lower` below `upper`; otherwise as [`with_output_limit`](Self::with_output_limit).
     #[must_use]
-    pub const fn with_output_range(self, lower: f32, upper: f32) -> Self {
-        Self { output_lower: lower, output_upper: upper, ..self }
+    pub const fn with_output_range(mut self, lower: f32, upper: f32) -> Self {
+        self.parameters.output_lower = lower;
+        self.parameters.output_upper = upper;
+        self
     }
 
     /// Keeps the integral term (in units of the output) in ±`limit`, more than zero. Off by default.
     #[must_use]
-    pub const fn with_integral_limit(self, limit: f32) -> Self {
-        Self { integral_limit: limit, ..self }
+    pub const fn with_integral_limit(mut self, limit: f32) -> Self {
+        self.integral_limit = limit;
+        self
     }
 
     /// Lets the integral rest while the error is beyond ±`threshold`, more than zero. Off by default: the integral always works.
+    ///
+    /// Of this and [`with_variable_integral`](Self::with_variable_integral), the later call counts.
     #[must_use]
-    pub const fn with_integral_separation(self, threshold: f32) -> Self {
-        Self { integral_separation: threshold, ..self }
+    pub const fn with_integral_separation(mut self, threshold: f32) -> Self {
+        self.parameters.full_rate_below = threshold;
+        self.parameters.no_rate_above = threshold;
+        self
     }
 
     /// Integrates at full rate for an error up to `full_below`, not at all from `none_above` on, and in proportion between.
     ///
     /// `full_below` must be zero or more and lie below `none_above`. Off by default.
     #[must_use]
-    pub const fn with_variable_integral(self, full_below: f32, none_above: f32) -> Self {
-        Self { full_rate_below: full_below, no_rate_above: none_above, ..self }
+    pub const fn with_variable_integral(mut self, full_below: f32, none_above: f32) -> Self {
+        self.parameters.full_rate_below = full_below;
+        let is_step = full_below.to_bits() == none_above.to_bits();
+        self.parameters.no_rate_above = if is_step { f32::NAN } else { none_above };
+        self
     }
 
     /// Uses back-calculation instead of conditional integration: what the limits cut off the output drains the
-    /// integral with the time constant `tracking_time_s`, more than zero.
+    /// integral with the time constant `time_s`, more than zero.
     #[must_use]
-    pub const fn with_back_calculation(self, tracking_time_s: f32) -> Self {
-        Self { tracking_time_s: not_off(tracking_time_s), wind_up: false, ..self }
+    pub const fn with_back_calculation(mut self, time_s: f32) -> Self {
+        self.parameters.drain_time_s = not_off(time_s);
+        self
     }
 
     /// Lets the integral grow while the output is at its limit, as far as its own limit.
     #[must_use]
-    pub const fn without_anti_windup(self) -> Self {
-        Self { tracking_time_s: 0.0, wind_up: true, ..self }
+    pub const fn without_anti_windup(mut self) -> Self {
+        self.parameters.drain_time_s = Self::OFF;
+        self
     }
 
     /// Counts an error smaller than `width` as none; one of exactly `width` counts in full. Zero or more; zero, the default, is off.
@@ -136,8 +187,9 @@ impl PidConfig {
     /// Inside the band P is zero and the integral moves towards zero only: it does not grow, but one that is wound up
     /// is not frozen either.
     #[must_use]
-    pub const fn with_dead_band(self, width: f32) -> Self {
-        Self { dead_band: width, ..self }
+    pub const fn with_dead_band(mut self, width: f32) -> Self {
+        self.parameters.dead_band = width;
+        self
     }
 
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
@@ -146,8 +198,10 @@ impl PidConfig {
     /// The setpoint is taken as `measurement + e`: on a circle it is the one next to the measurement, whatever its turn, and
     /// one that is lost in the rounding of the error counts as zero. With an error formed elsewhere there is none.
     #[must_use]
-    pub const fn with_feed_forward(self, static_gain: f32, velocity_gain: f32) -> Self {
-        Self { static_gain, velocity_gain, ..self }
+    pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
+        self.parameters.static_gain = static_gain;
+        self.parameters.velocity_gain = velocity_gain;
+        self
     }
 
     /// Lets the output change by at most `per_s` a second, more than zero. Off by default.
@@ -156,48 +210,105 @@ impl PidConfig {
     /// counts as saturation. A change in a step of less than half the spacing of `f32` at the output is none: 4e-3 a second at an
     /// output of 100 and 1 kHz.
     #[must_use]
-    pub const fn with_slew_limit(self, per_s: f32) -> Self {
-        Self { slew_per_s: per_s, ..self }
+    pub const fn with_slew_limit(mut self, per_s: f32) -> Self {
+        self.parameters.slew_per_s = per_s;
+        self
     }
 
     /// Takes setpoint and measurement as points on a circle of `period` (360.0, 2 pi, 8192.0), more than zero.
     ///
     /// The error and the derivative go by the shortest way. Off by default.
     #[must_use]
-    pub const fn with_period(self, period: f32) -> Self {
-        Self { period: not_off(period), ..self }
+    pub const fn with_period(mut self, period: f32) -> Self {
+        self.period = not_off(period);
+        self
     }
 
     /// Filters the derivative with a first-order low-pass of this cut-off frequency, more than zero. Off by default.
     #[must_use]
-    pub const fn with_derivative_filter(self, cutoff_hz: f32) -> Self {
-        Self { derivative_time_s: not_off(1.0 / (core::f32::consts::TAU * cutoff_hz)), ..self }
+    pub const fn with_derivative_filter(mut self, cutoff_hz: f32) -> Self {
+        self.parameters.derivative_time_s = not_off(1.0 / (core::f32::consts::TAU * cutoff_hz));
+        self
     }
 
     /// Takes the derivative of the error, so that D answers changes of the setpoint too.
     ///
     /// The default is the derivative of the measurement, without a kick when the setpoint jumps.
     #[must_use]
-    pub const fn with_derivative_on_error(self) -> Self {
-        Self { derivative_on_error: true, ..self }
+    pub const fn with_derivative_on_error(mut self) -> Self {
+        self.derivative_on_error = true;
+        self
+    }
+
+    /// Leads the setpoint through a linear tracking differentiator of speed `r` in 1/s, more than zero. Off by default.
+    ///
+    /// A step of the setpoint is followed to 4 % after `5 / r` seconds, without overshoot, from the first measurement on: see
+    /// [`LinearDifferentiator`](crate::control::LinearDifferentiator). A time step longer than `1 / r` counts as `1 / r`, which is as fast as
+    /// the setpoint can be followed without overshoot. With an error formed elsewhere there is no setpoint to follow. Not with a
+    /// period: an [`OptimalDifferentiator`](crate::control::OptimalDifferentiator) in front of the controller follows an angle.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(1.0, 0.0, 0.0).with_tracking(100.0))?;
+    /// let step = TimeStep::of(0.001);
+    /// assert_eq!(pid.step(1.0, 0.0, &step), 0.0); // the setpoint starts where the shaft is
+    /// for _ in 0..50 {
+    ///     pid.step(1.0, 0.0, &step);
+    /// }
+    /// assert!((pid.output() - 0.96).abs() < 0.01);
+    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub const fn with_tracking(mut self, r: f32) -> Self {
+        self.tracking_r = not_off(r);
+        self
+    }
+
+    /// Takes the incremental form: the output is the memory. Off by default.
+    ///
+    /// Step by step it gives what the positional form does. New gains never move the output, and
+    /// [`Pid::reset_to`](super::Pid::reset_to) starts from any output, with `ki` zero too: see [`Pid`](super::Pid).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    ///
+    /// let mut pid = Pid::new(PidConfig::new(2.0, 0.0, 0.0).with_incremental_form())?;
+    /// let step = TimeStep::of(0.001);
+    /// pid.reset_to(5.0);
+    /// assert_eq!(pid.step(1.0, 0.0, &step), 5.0);
+    /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0); // 2 times the change of the error
+    /// pid.set_gains(8.0, 0.0, 0.0)?;
+    /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0);
+    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub const fn with_incremental_form(mut self) -> Self {
+        self.incremental = true;
+        self
     }
 
     /// Replaces the three gains.
     #[must_use]
-    pub const fn with_gains(self, kp: f32, ki: f32, kd: f32) -> Self {
-        Self { kp, ki, kd, ..self }
+    pub const fn with_gains(mut self, kp: f32, ki: f32, kd: f32) -> Self {
+        self.parameters.kp = kp;
+        self.parameters.ki = ki;
+        self.parameters.kd = kd;
+        self
     }
 
     /// Returns `(kp, ki, kd)`.
     #[must_use]
     pub const fn gains(&self) -> (f32, f32, f32) {
-        (self.kp, self.ki, self.kd)
+        (self.parameters.kp, self.parameters.ki, self.parameters.kd)
     }
 
     /// Returns the ends of the output; ±`f32::MAX` without a limit.
     #[must_use]
     pub const fn output_range(&self) -> (f32, f32) {
-        (self.output_lower, self.output_upper)
+        (self.parameters.output_lower, self.parameters.output_upper)
     }
 
     /// Returns the period of the circle; zero without one.
@@ -209,25 +320,49 @@ impl PidConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, or reversed.
+    /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, or reversed; `r` with a period.
     pub const fn validate(&self) -> Result<(), ConfigError> {
-        check!(gains(self.kp, self.ki, self.kd));
-        check!(output_ends(self.output_lower, self.output_upper));
+        let p = &self.parameters;
+        check!(gains(p.kp, p.ki, p.kd));
+        check!(output_ends(p.output_lower, p.output_upper));
         check!(positive("integral_limit", self.integral_limit));
-        check!(positive("integral_separation", self.integral_separation));
-        check!(not_negative("variable_integral", self.full_rate_below));
-        if self.no_rate_above < Self::OFF || self.full_rate_below < Self::OFF {
-            check!(ordered("variable_integral", self.full_rate_below, self.no_rate_above));
+        if p.full_rate_below.to_bits() == p.no_rate_above.to_bits() {
+            check!(positive("integral_separation", p.full_rate_below));
         } else {
-            check!(positive("variable_integral", self.no_rate_above));
+            check!(not_negative("variable_integral", p.full_rate_below));
+            check!(ordered("variable_integral", p.full_rate_below, p.no_rate_above));
         }
-        check!(not_negative("dead_band", self.dead_band));
-        check!(not_negative("static_gain", self.static_gain));
-        check!(not_negative("velocity_gain", self.velocity_gain));
-        check!(positive("slew_limit", self.slew_per_s));
+        check!(not_negative("dead_band", p.dead_band));
+        check!(not_negative("static_gain", p.static_gain));
+        check!(not_negative("velocity_gain", p.velocity_gain));
+        check!(positive("slew_limit", p.slew_per_s));
         check!(off_or_positive("period", self.period));
-        check!(off_or_positive("derivative_filter", self.derivative_time_s));
-        off_or_positive("back_calculation", self.tracking_time_s)
+        check!(off_or_positive("derivative_filter", p.derivative_time_s));
+        check!(off_or_positive("back_calculation", p.drain_time_s));
+        if self.tracking_r > 0.0 && self.period > 0.0 {
+            return Err(ConfigError::new("r", ConfigFault::Conflict));
+        }
+        off_or_positive("r", self.tracking_r)
+    }
+
+    /// Returns the options that are in use.
+    pub(super) const fn options(&self) -> u16 {
+        const OFF: f32 = PidConfig::OFF;
+        const fn set(option: u16, is_on: bool) -> u16 {
+            if is_on { option } else { 0 }
+        }
+        let p = &self.parameters;
+        set(ASYMMETRIC, p.output_lower + p.output_upper != 0.0)
+            | set(INTEGRAL_WEIGHT, p.no_rate_above < OFF)
+            | set(DEAD_BAND, p.dead_band > 0.0)
+            | set(FEED_FORWARD, p.static_gain > 0.0 || p.velocity_gain > 0.0)
+            | set(SLEW_LIMIT, p.slew_per_s < OFF)
+            | set(PERIOD, self.period > 0.0)
+            | set(DERIVATIVE_FILTER, p.derivative_time_s > 0.0)
+            | set(DERIVATIVE_ON_ERROR, self.derivative_on_error)
+            | set(TRACKING, self.tracking_r > 0.0)
+            | set(BACK_CALCULATION, p.drain_time_s > 0.0 && p.ki > 0.0)
+            | set(INCREMENTAL, self.incremental)
     }
 }
 

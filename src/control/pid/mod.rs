@@ -1,14 +1,10 @@
-//! The positional and the incremental PID controller.
+//! The PID controller.
 
 mod config;
-mod cut;
+mod controller;
 mod gate;
-mod incremental;
-mod plain;
-mod positional;
-mod settings;
-mod work;
+mod law;
 
 pub use config::PidConfig;
-pub use incremental::{IncrementalPid, IncrementalPidConfig};
-pub use positional::{Pid, Terms};
+pub use controller::{Pid, Terms};
+pub(crate) use law::Input;

@@ -395,7 +395,7 @@ mod tests {
             let mut response = StepResponse::new(0.0, 1.0, 10.0, 0.05).unwrap();
             let mut measurement = 0.0;
             while !response.is_complete() {
-                measurement = plant.step(pid.update(1.0, measurement, DT_S));
+                measurement = plant.step(pid.step(1.0, measurement, &TimeStep::of(DT_S)));
                 response.record(measurement, DT_S);
             }
             let measures = response.measures();

@@ -1,6 +1,6 @@
 use super::Slot;
 use super::target::{Action, Duty};
-use crate::control::TimeStep;
+use crate::control::{Input, TimeStep};
 use crate::dji::command::{Outbox, free_to_raw, loop_to_raw, saturate};
 
 impl Slot {
@@ -18,18 +18,20 @@ impl Slot {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                match self.loops.position_mut().try_step_error(way, velocity, plain) {
-                    Some(goal) => goal,
-                    None => return self.update_carefully(step, sent),
+                let input = Input::Given { error: way, rate: velocity };
+                match self.loops.position_mut().step_plain(input, plain) {
+                    Ok(goal) => goal,
+                    Err(_) => return self.update_carefully(step, sent),
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             // Out of line too: a zero for these would be loaded in every update of every motor.
             Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
         };
-        match self.loops.speed_mut().try_step(goal, velocity, plain) {
-            Some(output) => free_to_raw(output, self.raw_per_unit),
-            None => self.follow_velocity(goal, velocity, step),
+        let input = Input::Measured { setpoint: goal, measurement: velocity };
+        match self.loops.speed_mut().step_plain(input, plain) {
+            Ok(output) => free_to_raw(output, self.raw_per_unit),
+            Err(_) => self.follow_velocity(goal, velocity, step),
         }
     }
 
@@ -37,7 +39,8 @@ impl Slot {
     #[cold]
     #[inline(never)]
     fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
-        loop_to_raw(self.loops.step_speed(goal, velocity, step), self.raw_per_unit, self.range)
+        let output = self.loops.speed_mut().step(goal, velocity, step);
+        loop_to_raw(output, self.raw_per_unit, self.range)
     }
 
     /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
@@ -66,7 +69,7 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.loops.step_position(way, velocity, step);
+        let goal = self.loops.position_mut().step_error(way, velocity, step);
         self.follow_velocity(goal * self.opened_part(), velocity, step)
     }
 
