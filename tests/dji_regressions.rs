@@ -776,3 +776,71 @@ fn a_jam_that_relaxes_does_so_again_where_the_motor_is_armed_again_at_once() {
     assert_eq!(jams_when_asked_always, 1);
     assert!(driven_when_asked_always * jams <= driven + jams, "as long as one of them");
 }
+
+/// A hostile reader found that new gains, set while the feedback was late, wrote the error of before into the integral.
+#[test]
+fn new_gains_for_a_late_motor_know_nothing_of_the_error_before() {
+    let run = |retunes: bool| {
+        let gains = |kp| PidConfig::new(kp, 1.0, 0.0);
+        let (mut bus, motor) = armed(at_once(1).speed_loop(gains(0.5)));
+        let mut word = 0;
+        for ms in 2..300 {
+            // Far off, then silent, then there.
+            let rpm = if ms < 100 { 0 } else { 1_920 };
+            if !(100..150).contains(&ms) {
+                hear(&mut bus, feedback(0x201, 0, rpm), ms * 1_000);
+                _ = bus.set_velocity(motor, AngularVelocity::from_rpm(100.0));
+            }
+            if ms == 140 && retunes {
+                bus.set_speed_loop(motor, gains(0.1)).unwrap();
+            }
+            step(&mut bus, ms * 1_000);
+            word = sent(&mut bus).last().map_or(word, |(_, words)| words[0]);
+        }
+        word
+    };
+    assert!((run(true) - run(false)).abs() <= 1, "{} and {}", run(true), run(false));
+}
+
+/// A hostile reader found that a refused target kept the integral over a rest of any length.
+#[test]
+fn a_target_that_is_not_finite_ends_the_integral() {
+    let (mut bus, motor) = armed(at_once(1).speed_loop(PidConfig::new(0.0, 10.0, 0.0)));
+    for ms in 2..400 {
+        hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
+        let rpm = match ms {
+            ..300 => 100.0,
+            300 => f32::NAN,
+            399 => 0.0,
+            _ => continue,
+        };
+        _ = bus.set_velocity(motor, AngularVelocity::from_rpm(rpm));
+        step(&mut bus, ms * 1_000);
+        let word = sent(&mut bus).last().map(|(_, words)| words[0]);
+        assert!(ms < 300 || word.is_none_or(|word| word == 0), "{word:?} at {ms} ms");
+    }
+}
+
+/// A hostile reader found that a device which is engaged beside a motor that tripped forgot the trip.
+#[test]
+fn engaging_the_others_keeps_the_trip_of_one() {
+    let mut bus: Bus = Bus::new();
+    let handles = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    for ms in 1..300 {
+        hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
+        if !(10..150).contains(&ms) {
+            hear(&mut bus, feedback(0x202, 0, 0), ms * 1_000);
+        }
+        if ms == 1 {
+            bus.arm(us(1_000)).unwrap();
+        }
+        if ms == 140 {
+            CanDevice::engage(&mut bus, us(140_000));
+        }
+        if ms >= 145 {
+            assert!(bus.arm(us(ms * 1_000)).is_err(), "asked in each tick, {ms}");
+        }
+        step(&mut bus, ms * 1_000);
+    }
+    assert!(bus.is_motor_armed(handles[0]) && !bus.is_motor_armed(handles[1]));
+}

@@ -202,9 +202,6 @@ impl<B> Bus<B> {
                 self.engage_all(place..place + 1, now);
             }
         }
-        if self.slots.iter().any(|slot| slot.guard.is_tripped()) {
-            self.guard.keep_trip();
-        }
         Ok(())
     }
 
@@ -214,6 +211,9 @@ impl<B> Bus<B> {
             if slot.is_some_and(|slot| self.guard.may_engage(&slot.guard, now)) {
                 self.change(motor, now, |slot| slot.engage(now.stamp()));
             }
+        }
+        if self.slots.iter().any(|slot| slot.guard.is_tripped()) {
+            self.guard.keep_trip();
         }
     }
 

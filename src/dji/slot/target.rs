@@ -160,6 +160,7 @@ impl Slot {
         let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
         let steep = steep::speed(&config, facts, self.rad_per_s_per_rpm);
+        self.rest_loops();
         let replaced = replace(self.loops.speed_mut(), config, limit, steep);
         self.settle();
         replaced
@@ -170,6 +171,7 @@ impl Slot {
         let facts = self.facts.ok_or(LoopError::Detached)?;
         let limit = super::no_load_velocity(facts, self.rad_per_s_per_rpm);
         let steep = steep::position(&config, facts);
+        self.rest_loops();
         let replaced = replace(self.loops.position_mut(), config, limit, steep);
         self.settle();
         replaced
@@ -239,14 +241,19 @@ impl Slot {
 
     /// What is asked for has an output from now on.
     pub(super) fn end_rest(&mut self) {
+        self.rest_loops();
+        self.acted = Action::Rest;
+        self.duty = Duty::Other;
+        self.settle();
+    }
+
+    /// Has the loops rest as the motor did.
+    fn rest_loops(&mut self) {
         match self.guard.end_rest() {
             Rest::Relaxed => self.loops.reset(),
             Rest::Pause => self.loops.interrupt(),
             Rest::None => {}
         }
-        self.acted = Action::Rest;
-        self.duty = Duty::Other;
-        self.settle();
     }
 
     /// What is asked for is done for the first time. The loops that have a part in it go on from what was done until now and

@@ -81,7 +81,8 @@ impl Standing {
                 let nowhere = AngularVelocity::from_rpm(f32::NAN);
                 let refused = self.bus.set_velocity(self.motor, nowhere);
                 assert_eq!(refused, Err(TargetError::NotFinite));
-                (self.asked, self.has_rested) = (call, true);
+                self.relax();
+                self.asked = call;
             }
             Call::Relax => {
                 self.bus.relax(self.motor);

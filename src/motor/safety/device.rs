@@ -189,7 +189,8 @@ impl<const N: usize> DeviceGuard<N> {
 
     /// Tells whether a motor's feedback is not fresh, as far as its stamp tells.
     pub(crate) fn misses(&self, motor: &MotorGuard, now: Instant) -> bool {
-        motor.listens() && (self.is_far(now) || motor.is_missing(now.stamp(), &self.timeouts))
+        let is_dated = self.is_running || motor.listens();
+        is_dated && self.is_far(now) || motor.is_missing(now.stamp(), &self.timeouts)
     }
 
     /// Tells whether a time lies so far after or before the last one that no stamp tells how far.

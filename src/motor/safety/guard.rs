@@ -114,7 +114,9 @@ impl Guard {
             self.change(now, MotorGuard::lose_time);
             return false;
         }
-        self.forget_bygones(before, now);
+        if self.device.is_running() || self.motor.listens() {
+            self.forget_bygones(before, now);
+        }
         self.device.run();
         let timeouts = *self.device.timeouts();
         self.change(now, |motor| {
@@ -371,6 +373,33 @@ mod tests {
         assert!(!guard.is_armed() && guard.is_stopped() && !guard.drives(at_ms(2)));
         guard.clear_emergency_stop();
         assert_eq!(guard.admit(true), Err(TargetError::Disarmed));
+    }
+
+    #[test]
+    fn a_range_that_nobody_asks_for_opens_and_stays_open() {
+        let mut guard = Guard::without_feedback();
+        assert!(guard.engage(at_ms(0)));
+        for minute in 1..=90 {
+            assert!(!guard.drives(at_ms(minute * 50_000)));
+        }
+        guard.admit(true).unwrap();
+        assert!(guard.drives(at_ms(90 * 50_000 + 1)));
+        assert_eq!(guard.share().to_bits(), 1.0_f32.to_bits());
+    }
+
+    #[test]
+    fn a_first_update_late_in_the_day_forgets_no_target() {
+        let mut guard = Guard::without_feedback();
+        assert!(guard.engage(at_ms(61_000)));
+        guard.admit(true).unwrap();
+        assert!(guard.drives(at_ms(61_001)) && guard.forgotten_targets() == 0);
+    }
+
+    #[test]
+    fn a_motor_without_feedback_is_not_engaged_an_age_of_the_stamps_ago() {
+        let mut guard = Guard::without_feedback();
+        assert!(!guard.drives(Instant::from_micros(5_000_000_000)));
+        assert!(!guard.engage(Instant::from_micros(5_000_000_000 - (1 << 32) + 99_000)));
     }
 
     #[test]

@@ -31,7 +31,8 @@
 //! | tripped | armed | | | disarmed |
 //!
 //! Latched and tripped differ in one thing: a motor that is latched takes targets again by itself when it is online, where
-//! [`Recovery::Resume`](super::Recovery) is configured. What leaves *armed* begins the pause of the gesture.
+//! [`Recovery::Resume`](super::Recovery) is configured. What latches or trips a motor, and the emergency stop, begins the pause of the
+//! gesture; to disarm does not.
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are judged together ([`Ages`]): nobody looks at a motor again
 //! before the oldest of them can have exceeded its limit.

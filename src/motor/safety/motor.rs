@@ -21,7 +21,7 @@ pub(crate) enum Arming {
 pub(crate) enum Rest {
     /// Not at all.
     None,
-    /// Its feedback was late, or its target refused: what was measured before says nothing of a rate.
+    /// Its feedback was late: what was measured before says nothing of a rate.
     Pause,
     /// Nothing was asked of it: the loops start afresh.
     Relaxed,
@@ -186,6 +186,8 @@ impl MotorGuard {
     /// Sees to what grew old; `false` when there may be more to see to at the next update, whatever comes or does not come
     /// until then.
     pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
+        // A range that opens for nobody is open, before its stamp repeats.
+        self.share(now);
         let is_settled = match self.link {
             Link::Unheard | Link::Offline => return true,
             Link::Online if self.is_fresh(now, timeouts) => true,
@@ -270,23 +272,19 @@ impl MotorGuard {
     fn refuse(&mut self, is_finite: bool) -> TargetError {
         if !is_finite {
             self.refused_targets = self.refused_targets.saturating_add(1);
-            self.drop_target();
+            self.relax();
             return TargetError::NotFinite;
         }
         match self.arming {
             Arming::Disarmed => TargetError::Disarmed,
             Arming::Latched | Arming::Tripped => TargetError::Relaxed,
             Arming::Armed => {
-                self.drop_target();
+                // Nothing for long: a motor that is late is offline soon.
+                self.has_target = false;
+                self.interrupt();
                 TargetError::NoFeedback
             }
         }
-    }
-
-    /// Takes the target away, and leaves the loops as they are.
-    fn drop_target(&mut self) {
-        self.has_target = false;
-        self.interrupt();
     }
 
     fn interrupt(&mut self) {
