@@ -202,12 +202,24 @@ fn ahead(now: u64, count: u64, random: &mut Random) -> u64 {
     now.saturating_add(if random.one_in(count) { random.below(AHEAD_US) } else { 0 })
 }
 
+/// Says where a trial failed.
+struct Place<'a>(&'a str, u64);
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("{}, clock {}", self.0, self.1);
+        }
+    }
+}
+
 /// Runs clocks of 60 updates each, every one on a device of its own.
 fn run<S: Subject<N>, const N: usize>(name: &str, clocks: u64, make: impl Fn() -> S) {
     let mut seen = Seen::default();
     for seed in 1..=clocks {
         let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let mut trial = Trial { seen, ..Trial::new(make()) };
+        let _place = Place(name, seed);
         trial.run(&mut random);
         seen = trial.seen;
     }
