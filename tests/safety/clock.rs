@@ -35,13 +35,22 @@ enum Kind {
     Right,
 }
 
+/// How far apart the updates are.
+enum Pace {
+    /// Any distance.
+    Any,
+    /// About as far as a program's.
+    Even,
+    /// Whole milliseconds, or one microsecond beside: the limits are met to the microsecond.
+    Grid,
+}
+
 /// Real time, and a clock that reads it.
 pub(super) struct Clock {
     kind: Kind,
     real: u64,
     read: u64,
-    /// Updates of any distance, or about as far apart as a program's.
-    is_even: bool,
+    pace: Pace,
 }
 
 impl Clock {
@@ -59,14 +68,20 @@ impl Clock {
         } else {
             random.below(1 << 33)
         };
-        Self { kind, real: start, read: 0, is_even: random.one_in(2) }
+        let pace = match random.below(3) {
+            0 => Pace::Any,
+            1 => Pace::Even,
+            _ => Pace::Grid,
+        };
+        Self { kind, real: start, read: 0, pace }
     }
 
     pub(super) fn next(&mut self, random: &mut Random) -> u64 {
-        self.real += 1 + match random.below(512) {
-            0 => 59_900_000 + random.below(200_000),
-            _ if self.is_even => random.below(16_000),
-            _ => random.of_any_size(4, 13),
+        self.real += match self.pace {
+            _ if random.one_in(512) => 59_900_000 + random.below(200_000),
+            Pace::Any => 1 + random.of_any_size(4, 13),
+            Pace::Even => 1 + random.below(16_000),
+            Pace::Grid => 1_000 * (1 + random.below(12)) + random.pick([0, 0, 0, 0, 0, 0, 1]),
         };
         self.read = match self.kind {
             Kind::Wraps(period) => self.real % period,
