@@ -1,0 +1,315 @@
+//! The devices that are held to the reference.
+
+use super::custom_motor::MyMotor;
+use super::reference::{BadStep, Rules};
+use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::encoder::Position;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{
+    ArmError, Condition, Devices, HealthConfig, Link, Own, Reaction, Recovery, TargetError,
+    VelocityDrive,
+};
+use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity, Current};
+use embedded_can::Frame;
+
+/// A device of `N` motors that all hear, and are set, together.
+pub(super) trait Subject<const N: usize> {
+    const RULES: [Rules; N];
+
+    fn hear(&mut self, now: Instant);
+    fn link(&self) -> [Link; N];
+    fn arm(&mut self, now: Instant) -> Result<(), ArmError>;
+    fn is_armed(&self) -> [bool; N];
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; N];
+    /// Tells for which motors there is such a call.
+    fn relax(&mut self) -> [bool; N];
+    fn disarm(&mut self);
+    fn stop(&mut self);
+    fn clear_stop(&mut self);
+    /// Runs an update and takes every frame; tells which motor is driven by one of them, or by an output.
+    fn drives(&mut self, tick: Tick) -> [bool; N];
+}
+
+const BUS: Rules = Rules {
+    late_us: Some(10_000),
+    resumes: false,
+    bad_step: BadStep::Repeats,
+    arms_later: false,
+    arms_again: true,
+};
+const OWN: Rules = Rules { bad_step: BadStep::Ages, arms_again: false, ..BUS };
+
+/// No motor here turns: that one stands in spite of its output is not looked for.
+static STANDS: HealthConfig =
+    HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Ignore);
+
+macro_rules! stops {
+    ($self:ident => $device:expr) => {
+        fn arm(&mut $self, now: Instant) -> Result<(), ArmError> {
+            Devices::arm(&mut $device, now)
+        }
+        fn disarm(&mut $self) {
+            Devices::disarm(&mut $device);
+        }
+        fn stop(&mut $self) {
+            Devices::emergency_stop(&mut $device);
+        }
+        fn clear_stop(&mut $self) {
+            Devices::clear_emergency_stop(&mut $device);
+        }
+    };
+}
+
+fn is_driving(frame: &CanFrame) -> bool {
+    frame.data().iter().any(|byte| *byte != 0)
+}
+
+/// One that takes targets again after a recovery, or not.
+pub(super) struct Wheel<const RESUMES: bool>(Bus, Handle<M3508>);
+
+impl<const RESUMES: bool> Wheel<RESUMES> {
+    pub(super) fn new() -> Self {
+        let recovery = if RESUMES { Recovery::Resume } else { Recovery::Rearm };
+        let config = Config::<M3508>::new(1)
+            .with_recovery(recovery)
+            .with_health(&STANDS)
+            .with_opening(Duration::ZERO);
+        let mut bus = Bus::new();
+        let wheel = bus.attach(config).unwrap();
+        Self(bus, wheel)
+    }
+}
+
+impl<const RESUMES: bool> Subject<1> for Wheel<RESUMES> {
+    const RULES: [Rules; 1] = [Rules { resumes: RESUMES, ..BUS }];
+
+    stops!(self => self.0);
+
+    fn hear(&mut self, now: Instant) {
+        _ = self.0.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.0.link(self.1).unwrap()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.0.is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [self.0.set_current(self.1, Current::from_amperes(5.0 * value))]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        self.0.relax(self.1);
+        [true]
+    }
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        self.0.update(tick);
+        [core::iter::from_fn(|| self.0.next_frame()).filter(is_driving).count() > 0]
+    }
+}
+
+/// A bus and a motor of one's own, as one device.
+pub(super) struct Both(Wheel<false>, Own<MyMotor>);
+
+impl Both {
+    pub(super) fn new() -> Self {
+        let own = Own::new(MyMotor::new(3).unwrap()).with_health(&STANDS).unwrap();
+        Self(Wheel::new(), own.with_opening(Duration::ZERO))
+    }
+}
+
+impl Subject<2> for Both {
+    const RULES: [Rules; 2] = [BUS, OWN];
+
+    stops!(self => (&mut self.0.0, &mut self.1));
+
+    fn hear(&mut self, now: Instant) {
+        let own = embedded_can::StandardId::new(0x143).unwrap();
+        for frame in
+            [CanFrame::standard(0x201, [0; 8]).unwrap(), CanFrame::new(own, &[0, 0, 30]).unwrap()]
+        {
+            _ = (&mut self.0.0, &mut self.1).ingest(&frame, now);
+        }
+    }
+    fn link(&self) -> [Link; 2] {
+        let [wheel] = self.0.link();
+        [wheel, self.1.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 2] {
+        let [wheel] = self.0.is_armed();
+        [wheel, self.1.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 2] {
+        let [wheel] = self.0.set(value);
+        [wheel, self.1.set_velocity((), AngularVelocity::from_rpm(100.0 * value))]
+    }
+    fn relax(&mut self) -> [bool; 2] {
+        let [wheel] = self.0.relax();
+        [wheel, false]
+    }
+    fn drives(&mut self, tick: Tick) -> [bool; 2] {
+        let mut both = (&mut self.0.0, &mut self.1);
+        both.update(tick);
+        let mut driven = [false; 2];
+        while let Some(frame) = both.next_frame(0) {
+            driven[usize::from(frame.header() != 0x200)] |= is_driving(&frame);
+        }
+        driven
+    }
+}
+
+pub(super) struct Snake(Joints, Joint);
+
+impl Snake {
+    pub(super) fn new() -> Self {
+        let mut joints = Joints::new();
+        let joint = joints.attach(snake::Config::new(5)).unwrap();
+        Self(joints, joint)
+    }
+}
+
+impl Subject<1> for Snake {
+    const RULES: [Rules; 1] =
+        [Rules { late_us: Some(40_000), bad_step: BadStep::RepeatsThenRelaxes, ..OWN }];
+
+    stops!(self => self.0);
+
+    fn hear(&mut self, now: Instant) {
+        let id = embedded_can::StandardId::new(5).unwrap();
+        let reply = Reply::new(Register::ActualPosition, 0).encode();
+        _ = self.0.ingest(&CanFrame::new(id, &reply).unwrap(), now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.0.link(self.1).unwrap()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.0.is_joint_armed(self.1)]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [self.0.set_position(self.1, Position::from_angle(Angle::from_degrees(5.0 * value)))]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        self.0.relax(self.1);
+        [true]
+    }
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        self.0.update(tick);
+        let is_safe =
+            |frame: &CanFrame| Command::decode(frame.data()).is_some_and(Command::is_safe);
+        let unsafe_frames =
+            core::iter::from_fn(|| self.0.next_frame()).filter(|frame| !is_safe(frame));
+        let asks = unsafe_frames.count() > 0;
+        [asks || self.0.state(self.1).is_some_and(|state| state.is_driven)]
+    }
+}
+
+#[cfg(feature = "hal")]
+pub(super) mod pins {
+    use super::*;
+    use drivetrain::pwm::{Brushed, BrushedConfig, OnePin, RcConfig, RcPwm};
+    use embedded_hal::{digital, pwm};
+    use std::convert::Infallible;
+
+    pub(crate) struct Pin(u16);
+
+    impl digital::ErrorType for Pin {
+        type Error = Infallible;
+    }
+    impl digital::OutputPin for Pin {
+        fn set_low(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+        fn set_high(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+    impl pwm::ErrorType for Pin {
+        type Error = Infallible;
+    }
+    impl pwm::SetDutyCycle for Pin {
+        fn max_duty_cycle(&self) -> u16 {
+            20_000
+        }
+        fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+            self.0 = duty;
+            Ok(())
+        }
+    }
+
+    macro_rules! stops {
+        () => {
+            fn link(&self) -> [Link; 1] {
+                [self.guard().link()]
+            }
+            fn is_armed(&self) -> [bool; 1] {
+                [Self::is_armed(self)]
+            }
+            fn relax(&mut self) -> [bool; 1] {
+                [false]
+            }
+            fn disarm(&mut self) {
+                Self::disarm(self);
+            }
+            fn stop(&mut self) {
+                self.emergency_stop();
+            }
+            fn clear_stop(&mut self) {
+                self.clear_emergency_stop();
+            }
+        };
+    }
+
+    /// The ESC takes no time to arm.
+    pub(crate) fn esc() -> RcPwm<Pin> {
+        let config = RcConfig::new().with_arming_time(Duration::ZERO).with_opening(Duration::ZERO);
+        RcPwm::new(Pin(0), config).unwrap()
+    }
+
+    impl Subject<1> for RcPwm<Pin> {
+        const RULES: [Rules; 1] =
+            [Rules { late_us: None, bad_step: BadStep::OpenLoop, arms_later: true, ..OWN }];
+
+        stops!();
+
+        fn hear(&mut self, _now: Instant) {}
+        fn arm(&mut self, _now: Instant) -> Result<(), ArmError> {
+            Self::arm(self)
+        }
+        fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+            [self.set_throttle(value)]
+        }
+        fn drives(&mut self, tick: Tick) -> [bool; 1] {
+            self.update(tick).unwrap();
+            [self.channel().0 != 1_500]
+        }
+    }
+
+    pub(crate) fn brushed() -> Brushed<Pin, OnePin<Pin>> {
+        let config = BrushedConfig::new(1)
+            .with_encoder(2_000.0, 16)
+            .with_health(&STANDS)
+            .with_opening(Duration::ZERO);
+        Brushed::new(Pin(0), OnePin(Pin(0)), config).unwrap()
+    }
+
+    impl Subject<1> for Brushed<Pin, OnePin<Pin>> {
+        const RULES: [Rules; 1] = [OWN];
+
+        stops!();
+
+        fn hear(&mut self, now: Instant) {
+            self.ingest_counts(0, now);
+        }
+        fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+            Self::arm(self, now)
+        }
+        fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+            [self.set_duty(value)]
+        }
+        fn drives(&mut self, tick: Tick) -> [bool; 1] {
+            self.update(tick).unwrap();
+            [self.channel().0 != 0]
+        }
+    }
+}
