@@ -826,18 +826,20 @@ fn a_target_that_is_not_finite_ends_the_integral() {
 fn engaging_the_others_keeps_the_trip_of_one() {
     let mut bus: Bus = Bus::new();
     let handles = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
-    for ms in 1..300 {
+    for ms in 1..500 {
         hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
-        if !(10..150).contains(&ms) {
+        if !(10..310).contains(&ms) {
             hear(&mut bus, feedback(0x202, 0, 0), ms * 1_000);
         }
         if ms == 1 {
             bus.arm(us(1_000)).unwrap();
         }
-        if ms == 140 {
-            CanDevice::engage(&mut bus, us(140_000));
+        if ms == 300 {
+            // A request that counts, and is refused: one motor is missing.
+            assert!(bus.arm(us(300_000)).is_err());
+            CanDevice::engage(&mut bus, us(300_000));
         }
-        if ms >= 145 {
+        if ms >= 320 {
             assert!(bus.arm(us(ms * 1_000)).is_err(), "asked in each tick, {ms}");
         }
         step(&mut bus, ms * 1_000);
