@@ -559,6 +559,7 @@ fn runner() {
     (|bus: Bus| Runner::new(Nb(Can), AnyClock, bus)).call();
     Shell::with_period.call();
     Shell::with_emergency_stop.call();
+    Shell::with_standstill_after.call();
     Shell::poll.call();
     (|runner: &mut Shell, budget: usize| {
         Runner::poll_with(runner, budget, |frame| {
