@@ -221,7 +221,7 @@ impl<M: OwnMotor> Own<M> {
                 return;
             }
         }
-        // A motor that is only late stays enabled, and nothing enables it meanwhile, not even a frame that still waits.
+        // A late motor whose target was not set anew stays enabled, and nothing enables it meanwhile, no frame that waits either.
         let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
         if stays && !may_drive {
             if self.switching.is_some() {
