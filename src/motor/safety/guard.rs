@@ -118,6 +118,8 @@ impl Guard {
             self.forget_bygones(before, now);
         }
         self.device.run();
+        // A range that opens for nobody is open before its stamp repeats.
+        self.motor.share(now.stamp());
         let timeouts = *self.device.timeouts();
         self.change(now, |motor| {
             motor.end_what_is_over();

@@ -186,8 +186,6 @@ impl MotorGuard {
     /// Sees to what grew old; `false` when there may be more to see to at the next update, whatever comes or does not come
     /// until then.
     pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
-        // A range that opens for nobody is open, before its stamp repeats.
-        self.share(now);
         let is_settled = match self.link {
             Link::Unheard | Link::Offline => return true,
             Link::Online if self.is_fresh(now, timeouts) => true,
