@@ -846,3 +846,22 @@ fn engaging_the_others_keeps_the_trip_of_one() {
     }
     assert!(bus.is_motor_armed(handles[0]) && !bus.is_motor_armed(handles[1]));
 }
+
+/// The fuzzer found that two motors which were armed together after a trip of both left the trip standing.
+#[test]
+fn motors_that_are_armed_together_after_a_trip_leave_none_behind() {
+    let mut bus: Bus = Bus::new();
+    let handles = bus.attach_all([1, 2].map(Config::<M3508>::new)).unwrap();
+    let motors = handles.map(Handle::erase);
+    for ms in 1..400 {
+        // Both silent for 110 ms.
+        if !(10..120).contains(&ms) {
+            hear(&mut bus, feedback(0x201, 0, 0), ms * 1_000);
+            hear(&mut bus, feedback(0x202, 0, 0), ms * 1_000);
+        }
+        if ms == 1 || ms >= 390 {
+            assert_eq!(bus.arm_only(&motors, us(ms * 1_000)), Ok(()), "{ms}");
+        }
+        step(&mut bus, ms * 1_000);
+    }
+}

@@ -365,6 +365,18 @@ impl Watched {
         }
     }
 
+    /// A motor that was refused alone knows nothing of the time at which the bus was armed: it starts anew where an update lies
+    /// before that.
+    fn forget_the_unknowing(&mut self) {
+        for index in 0..COUNT {
+            let knows = self.alone[index].has(Condition::ClockFault);
+            if self.motors[index].is_some() && !knows {
+                self.plug(index);
+                self.plug(index);
+            }
+        }
+    }
+
     /// What is known of each motor does not depend on the others.
     fn compare(&self) {
         for (motor, alone) in self.motors.iter().zip(&self.alone) {
@@ -487,6 +499,9 @@ impl CanDevice for Watched {
         self.gesture.update(step);
         self.noting_trips(|bus| bus.update(tick));
         self.each_alone(|alone| alone.update(tick));
+        if lost {
+            self.forget_the_unknowing();
+        }
         if self.updated.is_none() {
             self.pass(now, None);
         }

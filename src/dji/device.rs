@@ -70,6 +70,7 @@ impl<B> CanDevice for Bus<B> {
     fn engage(&mut self, now: Instant) {
         if !self.guard.is_far(now) && self.guard.begin_arming(now).is_ok() {
             self.engage_all(0..self.used, now);
+            self.keep_trip_of_others();
         }
     }
 
@@ -202,7 +203,15 @@ impl<B> Bus<B> {
                 self.engage_all(place..place + 1, now);
             }
         }
+        self.keep_trip_of_others();
         Ok(())
+    }
+
+    /// A motor that was left out still waits to be armed.
+    fn keep_trip_of_others(&mut self) {
+        if self.slots.iter().any(|slot| slot.guard.is_tripped()) {
+            self.guard.keep_trip();
+        }
     }
 
     fn engage_all(&mut self, motors: core::ops::Range<u8>, now: Instant) {
@@ -211,9 +220,6 @@ impl<B> Bus<B> {
             if slot.is_some_and(|slot| self.guard.may_engage(&slot.guard, now)) {
                 self.change(motor, now, |slot| slot.engage(now.stamp()));
             }
-        }
-        if self.slots.iter().any(|slot| slot.guard.is_tripped()) {
-            self.guard.keep_trip();
         }
     }
 
