@@ -103,6 +103,8 @@ const LATE_US: u64 = 10_000;
 const DEADLINE_US: u64 = 100_000;
 /// In which nobody may ask for arming after a trip.
 const PAUSE_US: u64 = 100_000;
+/// A gap between two updates is no more of that pause.
+const LONGEST_STEP_US: u64 = 20_000;
 /// In which the output range of a motor opens, but for the integrator.
 const OPENING_US: u64 = 200_000;
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
@@ -223,8 +225,8 @@ struct Soak {
     now_us: u64,
     /// A motor was relaxed since the last arming, other than by `disarm`.
     tripped: bool,
-    /// The last request to arm, or trip.
-    asked_us: u64,
+    /// The updates since the last request to arm, or trip.
+    quiet_us: u64,
     /// Of everything that was sent: I10.
     digest: u64,
 }
@@ -235,8 +237,8 @@ impl Soak {
         let motors = motors(&mut bus);
         let (books, random) = (Books::default(), Random(seed));
         let alone = Alone::new(chosen);
-        let (tripped, asked_us) = (false, 0);
-        Self { bus, alone, motors, books, random, now_us: 1, tripped, asked_us, digest: 0 }
+        let (tripped, quiet_us) = (false, 0);
+        Self { bus, alone, motors, books, random, now_us: 1, tripped, quiet_us, digest: 0 }
     }
 
     fn now(&self) -> Instant {
@@ -400,7 +402,7 @@ impl Soak {
     }
 
     fn trip(&mut self) {
-        (self.tripped, self.asked_us) = (true, self.now_us);
+        (self.tripped, self.quiet_us) = (true, 0);
     }
 
     /// Arming is a gesture: after a trip the application mostly waits until it may ask again.
@@ -408,12 +410,12 @@ impl Soak {
         let handles: Vec<AnyHandle> =
             which.iter().map(|index| self.motors[*index].handle).collect();
         self.look_who_rests();
-        let has_waited = self.now_us - self.asked_us >= PAUSE_US;
+        let has_waited = self.quiet_us >= PAUSE_US;
         if self.tripped && !has_waited && self.random.below(500) > 0 {
             return;
         }
         let armed = self.bus.arm_only(&handles, now);
-        self.asked_us = self.now_us;
+        self.quiet_us = 0;
         self.books.too_soon += u64::from(armed == Err(ArmError::NotReleased));
         if armed.is_err() {
             assert!(armed != Err(ArmError::NotReleased) || (self.tripped && !has_waited));
@@ -481,6 +483,8 @@ impl Soak {
         } else {
             0.001
         };
+        let step_us = self.now_us - before_us;
+        self.quiet_us = if step_us > 0 { self.quiet_us + step_us.min(LONGEST_STEP_US) } else { 0 };
         let tick = Tick::new(self.now(), dt_s);
         self.bus.update(tick);
         self.alone.update(tick);
