@@ -200,8 +200,12 @@ impl<B> Bus<B> {
     /// derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
-        if !self.takes_step(tick.dt_s()) || !self.takes_time(before) {
-            return self.update_without_step(before);
+        if !self.takes_step(tick.dt_s()) {
+            let moves_on = self.guard.moves_on(before);
+            return self.update_without_step(before, moves_on);
+        }
+        if !self.takes_time(before) {
+            return self.update_without_step(before, false);
         }
         self.check_one_slot();
         let step = self.step;

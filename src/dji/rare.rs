@@ -107,8 +107,7 @@ impl<B> Bus<B> {
     /// Ends an update whose time or time step is not usable.
     #[cold]
     #[inline(never)]
-    pub(super) fn update_without_step(&mut self, before: Instant) {
-        let moves_on = self.guard.moves_on(before);
+    pub(super) fn update_without_step(&mut self, before: Instant, moves_on: bool) {
         self.forget_bygones(before);
         match self.guard.hold(before, moves_on) {
             Hold::Keep => {}

@@ -86,11 +86,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
         let before = self.ticker.overruns();
         let next = self.ticker.due(now);
-        if next.is_some() {
-            self.watch.standstill.restart(now);
-        }
         let mut is_late = self.ticker.overruns() != before;
         if let Some(next) = next {
+            self.watch.standstill.restart(now);
             is_late |= self.waiting.is_some();
             self.waiting = Some(match self.waiting {
                 None => next,
@@ -254,5 +252,26 @@ mod tests {
         assert_eq!((one.statistics().overruns, other.statistics().overruns), (0, 0));
         assert_eq!(steps, [1_300; 2]);
         assert!(time_s.iter().all(|time_s| (time_s - 1.3_f32).abs() < 2e-3), "{time_s:?}");
+    }
+
+    #[test]
+    fn a_clock_that_repeats_itself_for_200_000_readings_stands() {
+        let clock = ManualClock::new(at_us(7));
+        let mut runner = Runner::new(Nb(Sink::default()), &clock, Bus::new());
+        let standstills = |runner: &mut TestRunner<'_>, readings| {
+            for _ in 0..readings {
+                if let Some(tick) = runner.due() {
+                    runner.tick(tick);
+                }
+            }
+            runner.statistics().clock_standstills
+        };
+        assert_eq!(standstills(&mut runner, 200_000), 0); // the first one is new
+        assert_eq!(standstills(&mut runner, 1), 1);
+        assert_eq!(standstills(&mut runner, 199_999), 1);
+        assert_eq!(standstills(&mut runner, 1), 2);
+        let edge = runner.next_edge().unwrap();
+        assert_eq!((edge.condition, edge.began), (BusCondition::ClockStandstill, true));
+        assert_eq!(runner.heartbeat(), 0);
     }
 }

@@ -110,8 +110,7 @@ impl Guard {
     pub fn drives(&mut self, now: Instant) -> bool {
         let before = self.device.begin(now);
         if !self.device.moves_on(before) {
-            self.device.hold(before, false);
-            self.change(now, MotorGuard::lose_time);
+            self.end_without_time(before, now);
             return false;
         }
         if self.device.is_running() || self.motor.listens() {
@@ -142,6 +141,10 @@ impl Guard {
     pub(crate) fn lose_time(&mut self, now: Instant) {
         let before = self.device.begin(now);
         self.device.moves_on(before);
+        self.end_without_time(before, now);
+    }
+
+    fn end_without_time(&mut self, before: Instant, now: Instant) {
         self.device.hold(before, false);
         self.change(now, MotorGuard::lose_time);
     }
