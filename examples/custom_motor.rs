@@ -220,7 +220,7 @@ mod simulation {
             let rad_per_s = target.as_rad_per_s() * order.share;
             CanFrame::of(standard(0x200 + u16::from(self.0.id)), rad_per_s.to_le_bytes())
         }
-        fn enable(&mut self) -> Option<CanFrame> {
+        fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
             Some(CanFrame::of(standard(0x200 + u16::from(self.0.id)), mit::ENABLE))
         }
         fn reset(&mut self) {}

@@ -141,7 +141,7 @@ impl OwnMotor for J4310 {
         self.effort = 0.0;
     }
 
-    fn enable(&mut self) -> Option<CanFrame> {
+    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
         Some(self.frame(mit::ENABLE))
     }
 

@@ -26,7 +26,6 @@ struct Tool {
     /// What the drive is told with one frame each, the last byte of it.
     enables: &'static [u8],
     disables: Option<u8>,
-    next: usize,
     report: Option<bool>,
     rest: (u16, Option<u8>),
     share: f32,
@@ -44,7 +43,6 @@ impl Tool {
         offers: ALL,
         enables: &[1],
         disables: Some(0),
-        next: 0,
         report: None,
         rest: (0x301, None),
         share: f32::NAN,
@@ -114,9 +112,8 @@ impl OwnMotor for Tool {
     fn reset(&mut self) {
         self.resets += 1;
     }
-    fn enable(&mut self) -> Option<CanFrame> {
-        let frame = self.enables.get(self.next % self.enables.len().max(1));
-        self.next += 1;
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        let frame = self.enables.get(usize::from(sent) % self.enables.len().max(1));
         frame.map(|byte| CanFrame::of(id(0x304), [*byte]))
     }
     fn disable(&mut self) -> Option<CanFrame> {
@@ -798,4 +795,16 @@ fn an_update_without_a_step_holds_no_command_from_before_a_rest() {
         assert_eq!(sent(0.001), [driven]);
         assert_eq!([0.0, 0.0].map(&mut sent), [[driven], [none]], "once");
     }
+}
+
+#[test]
+fn of_several_frames_that_enable_a_drive_the_one_given_back_comes_again() {
+    let tool = Tool { enables: &[7, 1], ..Tool::POWERED };
+    let mut bench = Bench::armed(tool, Report::Always(false));
+    for _ in 0..3 {
+        assert_eq!(bench.live()[0], CanFrame::of(id(0x304), [7]));
+        assert!(bench.own.requeue(&CanFrame::of(id(0x304), [7])));
+    }
+    let told: Vec<u8> = power(1..=35, || bench.live()).into_iter().map(|(_, byte)| byte).collect();
+    assert_eq!(told, [7, 1, 7, 1]);
 }

@@ -125,8 +125,8 @@ impl OwnMotor for EightZeros {
     fn reset(&mut self) {
         self.0.reset();
     }
-    fn enable(&mut self) -> Option<CanFrame> {
-        self.0.enable()
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        self.0.enable(sent)
     }
     fn disable(&mut self) -> Option<CanFrame> {
         self.0.disable()

@@ -30,6 +30,7 @@ use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
+    WrongSetting,
     ArmError, CanDevice, Claim, Condition, Devices, Edge, Ingest, Link, MotorName, TargetError,
     Timeouts, Visitor,
 };
@@ -579,6 +580,9 @@ impl CanDevice for Watched {
         self.bus.faulty()
     }
 
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        self.bus.wrong_setting()
+    }
     fn second_master(&self) -> Option<Claim> {
         self.bus.second_master()
     }

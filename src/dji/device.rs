@@ -5,6 +5,7 @@ use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
 use crate::motor::{
     ArmError, CanDevice, Claim, Devices, Edge, Ingest, Link, Missing, MotorName, Role, Visitor,
+    WrongSetting,
 };
 use crate::time::{Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
@@ -53,6 +54,10 @@ impl<B> CanDevice for Bus<B> {
 
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         self.slots.iter().filter(|slot| slot.is_faulty()).filter_map(Slot::name)
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        None
     }
 
     fn second_master(&self) -> Option<Claim> {

@@ -1,4 +1,4 @@
-use super::{Claim, MotorName};
+use super::{Claim, MotorName, WrongSetting};
 
 /// The motors that stand in the way of arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl core::fmt::Display for Missing {
 }
 
 /// Why a device was not armed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ArmError {
@@ -67,6 +67,8 @@ pub enum ArmError {
     SecondMaster(Claim),
     /// These motors report a fault, or run away, or share an id with another. Their `Health` has the code.
     Faulty(Missing),
+    /// The drive of a motor is not set up as the program expects.
+    Setting(WrongSetting),
     /// There is no motor to arm.
     NoMotors,
     /// The driver takes no frames.
@@ -83,6 +85,7 @@ impl core::fmt::Display for ArmError {
             Self::Clash(one, other) => write!(f, "{one} clashes with {other}"),
             Self::SecondMaster(claim) => write!(f, "another node sends the {claim}"),
             Self::Faulty(motors) => write!(f, "not fit to be driven, see health(): {motors}"),
+            Self::Setting(wrong) => write!(f, "{wrong}"),
             Self::Stopped => f.write_str("the emergency stop is set: call clear_emergency_stop"),
             Self::NoMotors => f.write_str("no motor is attached"),
             Self::BusDown => f.write_str("the CAN driver takes no frames"),

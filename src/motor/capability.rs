@@ -18,6 +18,8 @@ pub enum Capability {
     Angle,
     /// It takes a position over many turns.
     Position,
+    /// It takes a position, a velocity and a torque with a stiffness and a damping: [`Impedance`](super::Impedance).
+    Impedance,
     /// It reports what its shaft does, and so can be missing.
     Feedback,
     /// It reports its temperature.
@@ -30,7 +32,7 @@ pub enum Capability {
 
 impl Capability {
     /// All of them: the targets first.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Raw,
         Self::Current,
         Self::Voltage,
@@ -38,6 +40,7 @@ impl Capability {
         Self::Velocity,
         Self::Angle,
         Self::Position,
+        Self::Impedance,
         Self::Feedback,
         Self::Temperature,
         Self::ErrorCodes,
@@ -61,6 +64,7 @@ impl core::fmt::Display for Capability {
             Self::Velocity => "velocity",
             Self::Angle => "angle",
             Self::Position => "position",
+            Self::Impedance => "impedance",
             Self::Feedback => "feedback",
             Self::Temperature => "temperature",
             Self::ErrorCodes => "error codes",

@@ -116,6 +116,10 @@ impl Claim {
         self.role
     }
 
+    pub(super) const fn is_shared(&self) -> bool {
+        self.is_shared
+    }
+
     /// Returns the motor that it belongs to.
     #[must_use]
     pub const fn motor(&self) -> MotorName {

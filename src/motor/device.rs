@@ -1,4 +1,4 @@
-use super::{Claim, Edge, MotorName};
+use super::{Claim, Edge, MotorName, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
@@ -21,6 +21,7 @@ use crate::time::{Instant, Tick};
 ///     fn claims(&self) -> impl Iterator<Item = Claim> { core::iter::empty() }
 ///     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName> { core::iter::empty() }
 ///     // fn faulty(&self) -> impl Iterator<Item = MotorName>
+///     fn wrong_setting(&self) -> Option<WrongSetting> { None }
 ///     fn second_master(&self) -> Option<Claim> { None }
 ///     fn next_edge(&mut self) -> Option<Edge> { None }
 ///     fn ask(&mut self) -> bool { true }
@@ -62,6 +63,9 @@ pub trait CanDevice {
 
     /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say.
     fn faulty(&self) -> impl Iterator<Item = MotorName>;
+
+    /// Returns a setting of a drive that differs from what the device expects, or is not known yet.
+    fn wrong_setting(&self) -> Option<WrongSetting>;
 
     /// Returns a command of this device that another node has sent within the last second.
     fn second_master(&self) -> Option<Claim>;

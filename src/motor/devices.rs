@@ -140,8 +140,8 @@ pub trait Devices {
     /// first reading: one that is left on then arms nothing.
     ///
     /// # Errors
-    /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a set emergency stop, a
-    /// request that was not released since a trip.
+    /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a drive with other settings, a set emergency
+    /// stop, a request that was not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let granted = Ask::of(self);
         if self.is_stopped() {
@@ -154,8 +154,13 @@ pub trait Devices {
             return Err(ArmError::Clash(one, other));
         }
         let (missing, faulty) = (Missing::NONE, Missing::NONE);
-        let mut obstacles = Obstacles { now, missing, second_master: None, faulty };
+        let mut obstacles =
+            Obstacles { now, missing, second_master: None, faulty, wrong_setting: None };
         self.visit(&mut obstacles);
+        // A drive that is set up for other commands may answer none of ours.
+        if let Some(wrong) = obstacles.wrong_setting.filter(|wrong| wrong.found.is_some()) {
+            return Err(ArmError::Setting(wrong));
+        }
         if obstacles.missing.total() > 0 {
             return Err(ArmError::Missing(obstacles.missing));
         }
@@ -164,6 +169,9 @@ pub trait Devices {
         }
         if obstacles.faulty.total() > 0 {
             return Err(ArmError::Faulty(obstacles.faulty));
+        }
+        if let Some(wrong) = obstacles.wrong_setting {
+            return Err(ArmError::Setting(wrong));
         }
         if !granted {
             return Err(ArmError::NotReleased);

@@ -1,6 +1,6 @@
 //! What is done with every device of several: one visitor for each.
 
-use super::{CanDevice, Claim, Devices, Edge, Ingest, Missing, Role};
+use super::{CanDevice, Claim, Devices, Edge, Ingest, Missing, Role, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 use core::ops::Range;
@@ -139,6 +139,7 @@ pub(super) struct Obstacles {
     pub(super) missing: Missing,
     pub(super) second_master: Option<Claim>,
     pub(super) faulty: Missing,
+    pub(super) wrong_setting: Option<WrongSetting>,
 }
 
 impl Visitor for Obstacles {
@@ -146,6 +147,7 @@ impl Visitor for Obstacles {
     fn visit(&mut self, device: &mut impl CanDevice) {
         device.missing(self.now).for_each(|motor| self.missing.add(motor));
         device.faulty().for_each(|motor| self.faulty.add(motor));
+        self.wrong_setting = self.wrong_setting.or_else(|| device.wrong_setting());
         self.second_master = self.second_master.or_else(|| device.second_master());
     }
 }

@@ -2,7 +2,9 @@
 
 use super::{Joints, slot::Slot};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Devices, Edge, Guard, Ingest, MotorName, Role, Visitor};
+use crate::motor::{
+    CanDevice, Claim, Devices, Edge, Guard, Ingest, MotorName, Role, Visitor, WrongSetting,
+};
 use crate::time::{Instant, Tick};
 use embedded_can::StandardId;
 
@@ -45,6 +47,10 @@ impl CanDevice for Joints {
     /// A fault of a joint is over when it is armed again.
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         core::iter::empty()
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        None
     }
 
     fn second_master(&self) -> Option<Claim> {

@@ -3,7 +3,7 @@
 use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
-use drivetrain::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Visitor};
+use drivetrain::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Visitor, WrongSetting};
 use drivetrain::sim::{Rule, Violation};
 use drivetrain::time::{Duration, Instant, Tick};
 
@@ -98,6 +98,9 @@ impl CanDevice for Careless {
     }
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         self.0.faulty()
+    }
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        self.0.wrong_setting()
     }
     fn second_master(&self) -> Option<Claim> {
         self.0.second_master()
@@ -271,6 +274,9 @@ impl CanDevice for Slipping {
     }
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         self.wheels.bus().faulty().filter(|_| self.slip != Slip::ArmsFaulty)
+    }
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        self.wheels.bus().wrong_setting()
     }
     fn second_master(&self) -> Option<Claim> {
         self.wheels.bus().second_master().filter(|_| self.slip != Slip::ArmsBesideAnother)

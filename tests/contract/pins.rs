@@ -2,7 +2,7 @@
 
 use super::*;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor,
+    ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor, WrongSetting,
 };
 use drivetrain::pwm::{Brushed, BrushedConfig, Idle, OnePin, RcConfig, RcPwm};
 use drivetrain::time::{Duration, Instant, Tick};
@@ -177,6 +177,9 @@ impl<M: OnPins> CanDevice for Wired<M> {
     }
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         std::iter::empty()
+    }
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        None
     }
     fn second_master(&self) -> Option<Claim> {
         None

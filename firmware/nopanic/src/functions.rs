@@ -497,7 +497,7 @@ impl OwnMotor for AnyMotor {
         any()
     }
     fn reset(&mut self) {}
-    fn enable(&mut self) -> Option<CanFrame> {
+    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
         any()
     }
     fn disable(&mut self) -> Option<CanFrame> {

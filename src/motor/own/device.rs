@@ -3,7 +3,9 @@
 use super::{LONGEST_STEP_S, Own, OwnMotor};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Devices, Edge, Ingest, MotorName, Role, Visitor};
+use crate::motor::{
+    CanDevice, Claim, Devices, Edge, Ingest, MotorName, Role, Visitor, WrongSetting,
+};
 use crate::time::{Instant, Tick};
 use embedded_can::Frame;
 
@@ -18,6 +20,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
                 Role::Feedback => is_feedback = true,
                 Role::Command => command = Some(claim),
             }
+        }
+        if is_feedback && self.motor.decode_answer(frame) {
+            return Ingest::Taken;
         }
         let outcome = if is_feedback { self.motor.decode(frame) } else { Ingest::Unrelated };
         if outcome == Ingest::Taken {
@@ -37,21 +42,28 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let drives = self.guard.drives(tick.now());
         let may_drive = drives && !(step.is_hold() && self.held.is_none());
         self.switch(may_drive, tick.now());
+        self.inquire(tick.now());
         let command = self.act(may_drive, step, left);
         self.offer(command);
     }
 
     fn next_frame(&mut self) -> Option<CanFrame> {
-        self.switching.take().or_else(|| self.command.take())
+        self.switching.take().or_else(|| self.inquiry.take()).or_else(|| self.command.take())
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if it is still wanted.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         if self.switched == Some(*frame) {
             self.power.give_back();
+            self.enabling = self.enabling.saturating_sub(1);
         }
-        let mut commands =
-            self.motor.claims().into_iter().filter(|claim| claim.role() == Role::Command);
+        // Of an id that several motors send, only the frames that this one sent.
+        let is_known = [self.switched, self.asked].contains(&Some(*frame));
+        let mut commands = self
+            .motor
+            .claims()
+            .into_iter()
+            .filter(|claim| claim.role() == Role::Command && (is_known || !claim.is_shared()));
         let is_own = !frame.is_remote() && commands.any(|claim| claim.covers(frame.id()));
         self.superseded = self.superseded.wrapping_add(u32::from(is_own));
         is_own
@@ -73,6 +85,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.watch.is_faulty(&self.guard).then(|| self.motor.name()).into_iter()
     }
 
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        self.motor.wrong_setting()
+    }
+
     fn second_master(&self) -> Option<Claim> {
         self.rival.filter(|_| self.watch.has_rival())
     }
@@ -86,7 +102,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 
     fn engage(&mut self, now: Instant) {
-        if !self.watch.is_faulty(&self.guard) && self.guard.engage(now) {
+        let is_fit = !self.watch.is_faulty(&self.guard) && self.motor.wrong_setting().is_none();
+        if is_fit && self.guard.engage(now) {
             self.watch.start(&mut self.guard, now);
             self.relax();
         }

@@ -6,7 +6,7 @@ mod order;
 mod power;
 
 pub use motor::OwnMotor;
-pub use order::{Order, Target};
+pub use order::{Impedance, Order, Target};
 
 use super::{
     AngleDrive, Capabilities, Capability, Claim, Guard, Health, HealthConfig, Link, Severity,
@@ -21,6 +21,9 @@ use power::Power;
 
 /// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
 const LONGEST_STEP_S: f32 = 0.02;
+
+/// The time between two questions for a setting.
+const INQUIRY: Duration = Duration::from_millis(10);
 
 /// A motor of your own as a device of the runner, beside all others.
 ///
@@ -96,8 +99,15 @@ pub struct Own<M> {
     /// The frames that wait to be sent: one for the drive's power, and the command.
     switching: Option<CanFrame>,
     command: Option<CanFrame>,
+    /// The question for a setting that waits to be sent, and the time of the last one.
+    inquiry: Option<CanFrame>,
+    inquired: Instant,
+    /// The last question, sent or not.
+    asked: Option<CanFrame>,
     /// The last frame for the drive's power, sent or not.
     switched: Option<CanFrame>,
+    /// How many frames were sent to enable the drive since it was to be disabled.
+    enabling: u8,
     /// The drive has no frame of its own to disable it.
     rest_disables: bool,
     superseded: u32,
@@ -120,7 +130,11 @@ impl<M: OwnMotor> Own<M> {
             held: None,
             switching: None,
             command: None,
+            inquiry: None,
+            asked: None,
+            inquired: Instant::START,
             switched: None,
+            enabling: 0,
             rest_disables: false,
             superseded: 0,
             rival: None,
@@ -160,6 +174,12 @@ impl<M: OwnMotor> Own<M> {
         &self.motor
     }
 
+    /// Returns the motor, to change its gains or to ask for a setting of its drive. What is sent is unchanged until the next update.
+    #[must_use]
+    pub const fn motor_mut(&mut self) -> &mut M {
+        &mut self.motor
+    }
+
     /// Returns what decides whether it may be driven.
     #[must_use]
     pub const fn guard(&self) -> &Guard {
@@ -172,6 +192,15 @@ impl<M: OwnMotor> Own<M> {
     /// Says why the motor cannot take the target now. The value is then not kept for later.
     pub fn set_torque(&mut self, torque_nm: f32) -> Result<(), TargetError> {
         self.set(Capability::Torque, Target::Torque(torque_nm), torque_nm.is_finite())
+    }
+
+    /// Sets a spring and a damper at the output shaft, and a torque beside them.
+    ///
+    /// # Errors
+    /// Says why the motor cannot take the target now: [`TargetError::NotFinite`] also for a stiffness or a damping below zero. The
+    /// value is then not kept for later.
+    pub fn set_impedance(&mut self, target: Impedance) -> Result<(), TargetError> {
+        self.set(Capability::Impedance, Target::Impedance(target), target.is_finite())
     }
 
     fn set(
@@ -211,6 +240,22 @@ impl<M: OwnMotor> Own<M> {
         let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
         _ = self.watch.look(&mut self.guard, &vitals, now);
         self.guard.relax_until_armed();
+        self.motor.forget_settings();
+    }
+
+    /// Asks the drive for its settings as long as it is to be disabled.
+    fn inquire(&mut self, now: Instant) {
+        if self.guard.link() == Link::Offline {
+            self.motor.forget_settings();
+        }
+        let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
+        if self.power.is_on() || !is_due {
+            return;
+        }
+        self.inquired = now;
+        let inquiry = self.motor.inquire();
+        self.asked = inquiry;
+        self.replace(|own| &mut own.inquiry, inquiry);
     }
 
     /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
@@ -230,6 +275,9 @@ impl<M: OwnMotor> Own<M> {
             }
             return;
         }
+        if !self.power.is_on() {
+            self.enabling = 0;
+        }
         match self.power.step(may_drive, now) {
             Some(true) => self.enable(),
             Some(false) => self.disable(),
@@ -241,7 +289,12 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn enable(&mut self) {
-        let frame = self.motor.enable();
+        if self.motor.wrong_setting().is_some() {
+            self.guard.relax_until_armed();
+            return;
+        }
+        let frame = self.motor.enable(self.enabling);
+        self.enabling = self.enabling.saturating_add(1);
         if frame.is_some() {
             self.reopen();
         }
@@ -266,7 +319,8 @@ impl<M: OwnMotor> Own<M> {
         self.start = None;
     }
 
-    /// Returns the command that this step asks for, or rest; `None` if either would disable a drive that is being enabled.
+    /// Returns the command that this step asks for, or rest; what asks for feedback if either would disable a drive that is being
+    /// enabled.
     fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
             // A late motor keeps its integral, one without a target starts afresh.
@@ -275,7 +329,10 @@ impl<M: OwnMotor> Own<M> {
             }
             self.held = None;
             let is_enabling = may_drive && self.switched.is_some();
-            return (!is_enabling || !self.rest_disables).then(|| self.motor.rest());
+            if is_enabling && self.rest_disables {
+                return self.motor.poll();
+            }
+            return Some(self.motor.rest());
         }
         if step.is_hold() {
             return self.held.take();
@@ -295,6 +352,12 @@ impl<M: OwnMotor> Own<M> {
                 let start = *self.start.get_or_insert(measured);
                 let way = wrap_pi((target - start).as_radians());
                 Target::Angle(start + Angle::from_radians(way * opened))
+            }
+            (Target::Impedance(target), Some(measured)) if opened < 1.0 => {
+                let start = *self.start.get_or_insert(measured);
+                let way = (target.angle - start).as_radians();
+                let angle = start + Angle::from_radians(way * opened);
+                Target::Impedance(Impedance { angle, ..target })
             }
             (target, _) => target,
         }

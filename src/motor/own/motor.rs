@@ -2,7 +2,7 @@
 
 use super::Order;
 use crate::frame::CanFrame;
-use crate::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Vitals};
+use crate::motor::{Capabilities, Capability, Claim, Ingest, MotorName, Vitals, WrongSetting};
 use crate::units::{Angle, AngularVelocity};
 
 /// A motor of your own: its ids, its frames and its loop.
@@ -51,11 +51,12 @@ pub trait OwnMotor {
     ///
     /// [`Own`](super::Own) calls this when the motor may be driven and was not before. If [`is_enabled`](Self::is_enabled)
     /// reports, the call is repeated each 10 ms until the drive is enabled. Until then the drive gets [`rest`](Self::rest)
-    /// only, or nothing if `rest` would disable the drive. The output [opens](Order::share) from zero afterwards.
+    /// only, or [`poll`](Self::poll) if `rest` would disable the drive. The output [opens](Order::share) from zero afterwards.
     ///
-    /// If a drive needs several frames, return one after the other. If a drive goes on to its last target when enabled, replace
-    /// that target first. If a drive resets while driven, the motor trips and the drive is not enabled again.
-    fn enable(&mut self) -> Option<CanFrame> {
+    /// `sent` is how many of these frames were sent since the drive was to be disabled, up to 255. If a drive needs several frames,
+    /// return the one whose turn it is. If a drive goes on to its last target when enabled, replace that target first. If a drive resets while driven, the motor trips and the drive is not enabled again.
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        _ = sent;
         None
     }
 
@@ -68,10 +69,41 @@ pub trait OwnMotor {
         None
     }
 
+    /// Returns a frame that asks the drive for its feedback and changes nothing; `None`, unless said otherwise, for a drive that
+    /// reports by itself.
+    fn poll(&mut self) -> Option<CanFrame> {
+        None
+    }
+
     /// Returns whether the drive is enabled, by its last feedback; `None`, unless said otherwise, if it does not say.
     fn is_enabled(&self) -> Option<bool> {
         None
     }
+
+    /// Returns the next frame that asks the drive for one of its settings, or writes one; `None`, unless said otherwise, for a
+    /// drive without settings.
+    ///
+    /// [`Own`](super::Own) calls this each 10 ms while the drive is to be disabled, so a setting is read before the motor is
+    /// armed and again before it is armed next. The answer comes to [`decode_answer`](Self::decode_answer).
+    fn inquire(&mut self) -> Option<CanFrame> {
+        None
+    }
+
+    /// Takes the answer to what was [inquired](Self::inquire), a frame with an id of the motor's feedback; `false`, unless said
+    /// otherwise, for any other frame. An answer tells nothing of the shaft and does not count as feedback.
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        _ = frame;
+        false
+    }
+
+    /// Returns a setting of the drive that differs from what the motor expects or is not known yet: the motor is not armed then.
+    /// `None` unless said otherwise.
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        None
+    }
+
+    /// Forgets the settings of the drive: it was offline or has reset, and may be another one.
+    fn forget_settings(&mut self) {}
 
     /// Returns what the motor offers: velocities and feedback, unless said otherwise.
     fn capabilities(&self) -> Capabilities {

@@ -71,6 +71,12 @@ pub trait Subject {
         220
     }
 
+    /// Returns the milliseconds of feedback after which it can be armed, or driven after it had no target: 0, unless its drives are
+    /// asked for their settings or enabled first.
+    fn settle_ms(&self) -> u64 {
+        0
+    }
+
     /// Returns the milliseconds after which a target no longer counts, one tick included.
     fn command_ms(&self) -> u64 {
         101

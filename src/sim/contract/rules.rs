@@ -73,6 +73,7 @@ fn missing<S: Subject>(mut run: Run<S>) -> Outcome {
         run.expect(named && !armed, Rule::MissingAreNamed)?;
         run.hear(heard);
     }
+    run.settle()?;
     let now = run.now();
     let armed = run.subject.device().arm(now).is_ok();
     run.expect(armed, Rule::ArmedDrives)
@@ -169,8 +170,7 @@ fn old_target<S: Subject>(mut run: Run<S>) -> Outcome {
         let output = run.step()?;
         run.expect(output.driving == 0 || ms < run.subject.command_ms(), Rule::OldTargetsAreZero)?;
     }
-    let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
-    run.expect(again, Rule::OldTargetsAreZero)
+    run.drive_again(Rule::OldTargetsAreZero)
 }
 
 /// A stop that comes while the feedback is late.
@@ -194,8 +194,7 @@ fn refused<S: Subject>(mut run: Run<S>, share: f32) -> Outcome {
 
 fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
     for share in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let before = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
-        run.expect(before, Rule::ArmedDrives)?;
+        run.drive_again(Rule::ArmedDrives)?;
         let refused = run.subject.drive(share) == Err(TargetError::NotFinite);
         let output = run.step()?;
         run.expect(refused && output.driving == 0, Rule::NanIsZero)?;
@@ -221,8 +220,7 @@ fn bad_steps<S: Subject>(make: &impl Fn() -> S) -> Outcome {
         run.step_for(dt_s)?;
         let output = run.step_for(dt_s)?;
         run.expect(output.driving == 0, Rule::BadStepsAreZero)?;
-        let again = run.subject.drive(1.0).is_ok() && run.step()?.driving > 0;
-        run.expect(again, Rule::ArmedDrives)?;
+        run.drive_again(Rule::ArmedDrives)?;
     }
     Ok(())
 }
@@ -258,7 +256,8 @@ fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
         }
         let now = run.now();
         let outcome = run.subject.device().arm(now);
-        let refused = outcome == Err(ArmError::NotReleased) || (stalls && outcome.is_err());
+        let is_early = matches!(outcome, Err(ArmError::NotReleased | ArmError::Setting(_)));
+        let refused = is_early || (stalls && outcome.is_err());
         _ = run.subject.drive(1.0);
         let output = run.step()?;
         run.expect(refused && output.driving == 0, rule)?;

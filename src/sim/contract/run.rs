@@ -1,4 +1,4 @@
-use super::{Rule, Subject, Violation};
+use super::{Outcome, Rule, Subject, Violation};
 use crate::frame::CanFrame;
 use crate::motor::{Devices, Ingest, Role};
 use crate::time::{Instant, Tick};
@@ -34,8 +34,17 @@ impl<S: Subject> Run<S> {
     pub(super) fn driving(subject: S) -> Result<Self, Violation> {
         let mut run = Self::new(subject);
         run.step()?;
+        run.settle()?;
         run.arm_and_open(Rule::ArmedDrives)?;
         Ok(run)
+    }
+
+    /// Waits until it can be armed.
+    pub(super) fn settle(&mut self) -> Outcome {
+        for _ in 0..self.subject.settle_ms() {
+            self.step()?;
+        }
+        Ok(())
     }
 
     /// Arms, waits until the output range is open, and drives.
@@ -51,6 +60,18 @@ impl<S: Subject> Run<S> {
         }
         let driven = self.subject.drive(1.0).is_ok();
         self.expect(driven, rule)
+    }
+
+    /// Drives after there was no target: the drives may have to be enabled.
+    pub(super) fn drive_again(&mut self, rule: Rule) -> Outcome {
+        for _ in 0..=self.subject.settle_ms() {
+            let is_taken = self.subject.drive(1.0).is_ok();
+            self.expect(is_taken, rule)?;
+            if self.step()?.driving > 0 {
+                return Ok(());
+            }
+        }
+        self.expect(false, rule)
     }
 
     pub(super) fn now(&self) -> Instant {

@@ -1,0 +1,41 @@
+use super::MotorName;
+
+/// A setting of a drive that keeps its motor from being armed: it differs from what the program was written for, or is not known.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{MotorName, WrongSetting};
+///
+/// let wrong = WrongSetting {
+///     motor: MotorName::new("DM-J4310", 1),
+///     setting: "CTRL_MODE",
+///     expected: 1.0,
+///     found: Some(2.0),
+/// };
+/// assert_eq!(wrong.to_string(), "DM-J4310 #1 has CTRL_MODE 2, the program needs 1: write it, or change the configuration");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WrongSetting {
+    /// The motor.
+    pub motor: MotorName,
+    /// The name of the setting in the manual of the drive.
+    pub setting: &'static str,
+    /// The value that the configuration of the motor has, in the unit of the manual.
+    pub expected: f32,
+    /// The value in the drive; `None` if the drive has not answered yet.
+    pub found: Option<f32>,
+}
+
+impl core::fmt::Display for WrongSetting {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { motor, setting, expected, found } = self;
+        match found {
+            Some(found) => write!(
+                f,
+                "{motor} has {setting} {found}, the program needs {expected}: write it, or change the configuration"
+            ),
+            None => write!(f, "{motor} has not answered yet what its {setting} is"),
+        }
+    }
+}
