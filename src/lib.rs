@@ -22,6 +22,7 @@ pub mod motor;
 pub mod wire;
 
 // F3: device families and their simulation
+pub mod damiao;
 pub mod dji;
 #[cfg(feature = "hal")]
 pub mod pwm;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 14] = [
+const FLOORS: [(&str, u32); 15] = [
     ("units", 0),
     ("time", 0),
     ("math", 0),
@@ -17,6 +17,7 @@ const FLOORS: [(&str, u32); 14] = [
     ("motor", 20),
     ("wire", 20),
     ("chassis", 21),
+    ("damiao", 30),
     ("dji", 30),
     ("snake", 30),
     ("pwm", 30),

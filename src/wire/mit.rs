@@ -154,6 +154,17 @@ impl Ranges {
         }
     }
 
+    /// Takes ranges that are known to be valid.
+    pub(crate) const fn of(position_rad: f32, velocity_rad_per_s: f32, torque_nm: f32) -> Self {
+        Self {
+            position: Range { lower: -position_rad, upper: position_rad },
+            velocity: Range { lower: -velocity_rad_per_s, upper: velocity_rad_per_s },
+            kp: Range::KP,
+            kd: Range::KD,
+            torque: Range { lower: -torque_nm, upper: torque_nm },
+        }
+    }
+
     /// Sets the largest gains, in Nm/rad and Nm s/rad.
     ///
     /// # Errors
@@ -163,6 +174,12 @@ impl Ranges {
             (Ok(kp), Ok(kd)) => Ok(Self { kp, kd, ..self }),
             (Err(error), _) | (_, Err(error)) => Err(error),
         }
+    }
+
+    /// Returns the range of the position, in rad.
+    #[must_use]
+    pub const fn position_rad(&self) -> f32 {
+        self.position.upper
     }
 
     /// Returns the range of the torque, in Nm.

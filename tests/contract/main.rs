@@ -5,6 +5,7 @@
 #![expect(clippy::duplicate_mod, reason = "each example brings its own output")]
 
 mod careless;
+mod damiao;
 mod dji;
 mod joints;
 mod mit;

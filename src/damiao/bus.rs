@@ -1,0 +1,416 @@
+//! Which frame belongs to a motor, and what is sent when.
+
+use super::command::{CLEAR_ERROR, Command, Inquiry, REGISTERS, standard};
+use super::config::{Mode, sealed};
+use super::feedback::Answer;
+use super::{ConfigError, Feedback, Model, Register, Status};
+use crate::frame::CanFrame;
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
+    Vitals, WrongSetting,
+};
+use crate::time::Duration;
+use crate::units::{Angle, AngularVelocity};
+use crate::wire::mit;
+
+/// The time-out of the drive unless configured otherwise.
+const TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Units of the register TIMEOUT in a millisecond.
+const TIMEOUT_UNITS_PER_MS: u32 = 20;
+
+/// The largest share by which a range may differ from that of the model: rounding of the drive's display.
+const RANGE_TOLERANCE: f32 = 1e-4;
+
+/// The registers that have to be as configured.
+const CHECKED: [Register; 4] = [
+    Register::ControlMode,
+    Register::PositionRange,
+    Register::VelocityRange,
+    Register::TorqueRange,
+];
+
+/// A motor of this family, in the control mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::damiao::{Model, Motor, Velocity};
+/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let motor = Motor::new(Model::H6215, 2, mode)?.with_master_id(0x010)?;
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims, [
+///     "command of DM-H6215 #2 on 0x202",
+///     "command of DM-H6215 #2 on 0x7FF", // registers: shared by all drives
+///     "feedback of DM-H6215 #2 on 0x10",
+/// ]);
+/// # Ok::<(), drivetrain::damiao::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    model: Model,
+    id: u8,
+    master_id: u16,
+    timeout_ms: u32,
+    mode: M,
+    /// The last feedback; `None` before the first.
+    drive: Option<Feedback>,
+    effort: f32,
+    settings: Settings,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the model, the id of the drive, 1 to 15, and the control mode. The master id is `id + 0x10`, as the manual advises.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+        if !matches!(id, 1..=15) {
+            return Err(ConfigError::Id(id.into()));
+        }
+        mode.check(&model)?;
+        Ok(Self {
+            model,
+            id,
+            master_id: u16::from(id) + 0x10,
+            timeout_ms: 0,
+            mode,
+            drive: None,
+            effort: 0.0,
+            settings: Settings::UNKNOWN,
+        }
+        .with_timeout_ms(TIMEOUT))
+    }
+
+    /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which may be that of other drives too.
+    ///
+    /// # Errors
+    /// [`ConfigError::MasterId`] for another id, and for that of the motor's own commands.
+    pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
+        if master_id > 0x7FE || master_id == self.command_id() {
+            return Err(ConfigError::MasterId(master_id));
+        }
+        Ok(Self { master_id, ..self })
+    }
+
+    /// Sets the time without a command after which the drive disables itself: 1 ms to 60 s, 100 ms at first.
+    ///
+    /// # Errors
+    /// [`ConfigError::Timeout`] for another time.
+    pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
+        let ms = timeout.as_micros() / 1_000;
+        if matches!(ms, 1..=60_000) {
+            Ok(self.with_timeout_ms(timeout))
+        } else {
+            Err(ConfigError::Timeout(ms))
+        }
+    }
+
+    fn with_timeout_ms(self, timeout: Duration) -> Self {
+        let timeout_ms = u32::try_from(timeout.as_micros() / 1_000).unwrap_or(60_000);
+        Self { timeout_ms, ..self }
+    }
+
+    /// Returns the last feedback of the drive; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the control mode, to change its gains.
+    #[must_use]
+    pub const fn mode_mut(&mut self) -> &mut M {
+        &mut self.mode
+    }
+
+    /// Asks the drive for a register. While the motor is disarmed the frame goes out within some 10 ms, and again until
+    /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
+    pub const fn read(&mut self, register: Register) {
+        self.settings.request = Some(Inquiry::Read(register));
+    }
+
+    /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read).
+    ///
+    /// # Errors
+    /// [`ConfigError::Register`] if the register is read only, or cannot hold the value.
+    pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
+        if !register.is_writable() || !register.holds(value) {
+            return Err(ConfigError::Register(register, value));
+        }
+        self.settings.request = Some(Inquiry::Write(register, value));
+        Ok(())
+    }
+
+    /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
+    pub const fn store(&mut self) {
+        self.settings.request = Some(Inquiry::Store);
+    }
+
+    /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the register and its value in the drive.
+    #[must_use]
+    pub const fn register(&self) -> Option<(Register, f32)> {
+        match self.settings.answer {
+            Some(Answer { register, value }) => Some((register, value)),
+            None => None,
+        }
+    }
+
+    const fn command_id(&self) -> u16 {
+        <M as sealed::Mode>::BASE + self.id as u16
+    }
+
+    fn frame(&self, data: [u8; 8]) -> CanFrame {
+        CanFrame::of(standard(self.command_id()), data)
+    }
+
+    fn frame_of(&self, command: Command) -> CanFrame {
+        self.frame(command.encode(self.model.ranges()))
+    }
+
+    /// Returns the value that a register has to have.
+    fn expected(&self, register: Register) -> f32 {
+        match register {
+            Register::PositionRange => self.model.pmax_rad(),
+            Register::VelocityRange => self.model.vmax_rad_per_s(),
+            Register::TorqueRange => self.model.tmax_nm(),
+            Register::Timeout => (self.timeout_ms * TIMEOUT_UNITS_PER_MS) as f32,
+            _ => <M as sealed::Mode>::NUMBER.into(),
+        }
+    }
+
+    /// Tells whether a value in the drive is the expected one.
+    fn is_right(&self, register: Register, found: f32) -> bool {
+        let expected = self.expected(register);
+        (found - expected).abs() <= RANGE_TOLERANCE * expected
+    }
+
+    fn confirm_timeout(&self) -> Inquiry {
+        Inquiry::Write(Register::Timeout, self.expected(Register::Timeout))
+    }
+}
+
+impl<M: Mode> OwnMotor for Motor<M> {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name(), self.id)
+    }
+
+    /// All drives of the family share the id of the registers.
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |id, role| Claim::new(standard(id), role, self.name());
+        [
+            claim(self.command_id(), Role::Command),
+            claim(REGISTERS, Role::Command).shared(),
+            claim(self.master_id, Role::Feedback).shared(),
+        ]
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        if frame.length() != 8 {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let data = frame.bytes();
+        let [head, ..] = *data;
+        if head & 0xF != self.id {
+            return Ingest::Unrelated;
+        }
+        let Some(feedback) = Feedback::decode(data, self.model.ranges()) else {
+            return Ingest::Malformed(Malformed::Field);
+        };
+        self.drive = Some(feedback);
+        Ingest::Taken
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        let velocity = self.drive.map_or(0.0, |drive| drive.measured.velocity_rad_per_s);
+        AngularVelocity::from_rad_per_s(velocity)
+    }
+
+    fn angle(&self) -> Option<Angle> {
+        let drive = self.drive.filter(|drive| !drive.is_at_end)?;
+        Some(Angle::from_radians(drive.measured.position_rad))
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        match <M as sealed::Mode>::REST {
+            Some(command) => self.frame_of(command),
+            None => self.off(),
+        }
+    }
+
+    fn control(&mut self, order: Order) -> CanFrame {
+        let command = self.drive.and_then(|drive| self.mode.command(order, &drive, &self.model));
+        let Some((command, effort)) = command else {
+            self.effort = 0.0;
+            return self.rest();
+        };
+        self.effort = effort;
+        self.frame_of(command)
+    }
+
+    fn reset(&mut self) {
+        self.effort = 0.0;
+        self.mode.reset();
+    }
+
+    /// First a target where the shaft is, then the time-out until the drive has confirmed it, then the frame that enables it.
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        let stay = self.drive.and_then(|drive| self.mode.stay(&drive));
+        if let (Some(stay), 0) = (stay, sent) {
+            return Some(self.frame_of(stay));
+        }
+        if !self.settings.is_timeout_set {
+            let inquiry = self.confirm_timeout();
+            return Some(self.settings.ask(inquiry, self.id));
+        }
+        Some(self.frame(mit::ENABLE))
+    }
+
+    fn disable(&mut self) -> Option<CanFrame> {
+        self.settings.is_timeout_set = false;
+        <M as sealed::Mode>::REST.map(|_| self.off())
+    }
+
+    fn poll(&mut self) -> Option<CanFrame> {
+        Some(Inquiry::Refresh.frame(self.id))
+    }
+
+    fn is_enabled(&self) -> Option<bool> {
+        self.drive.map(|drive| drive.status == Status::Enabled)
+    }
+
+    fn inquire(&mut self) -> Option<CanFrame> {
+        self.settings.is_timeout_set = false;
+        let inquiry = self.settings.next()?;
+        Some(self.settings.ask(inquiry, self.id))
+    }
+
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        let timeout = self.expected(Register::Timeout);
+        frame.length() == 8 && self.settings.hear(frame.bytes(), self.id, timeout)
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        CHECKED.iter().zip(self.settings.found).find_map(|(register, found)| {
+            let is_wrong = found.is_none_or(|found| !self.is_right(*register, found));
+            is_wrong.then(|| WrongSetting {
+                motor: self.name(),
+                setting: name_of(*register),
+                expected: self.expected(*register),
+                found,
+            })
+        })
+    }
+
+    fn forget_settings(&mut self) {
+        self.settings = Settings { request: self.settings.request, ..Settings::UNKNOWN };
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.mode
+            .capabilities()
+            .with(Capability::Feedback)
+            .with(Capability::Temperature)
+            .with(Capability::ErrorCodes)
+            .with(Capability::AbsoluteAngle)
+    }
+
+    fn vitals(&self) -> Vitals {
+        let Some(drive) = self.drive else { return Vitals::default() };
+        Vitals {
+            temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
+            error: drive.status.is_error().then_some(Severity::Fault),
+            error_code: drive.status.error_code(),
+            effort: self.effort,
+            speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
+            current: drive.measured.torque_nm / self.model.tmax_nm(),
+        }
+    }
+}
+
+impl<M: Mode> Motor<M> {
+    /// Disables the drive; where it reports an error, clears that, which leaves it disabled.
+    fn off(&self) -> CanFrame {
+        let has_error = self.drive.is_some_and(|drive| drive.status.is_error());
+        self.frame(if has_error { CLEAR_ERROR } else { mit::DISABLE })
+    }
+}
+
+const fn name_of(register: Register) -> &'static str {
+    match register {
+        Register::PositionRange => "PMAX",
+        Register::VelocityRange => "VMAX",
+        Register::TorqueRange => "TMAX",
+        _ => "CTRL_MODE",
+    }
+}
+
+/// What is known of the registers of the drive.
+#[derive(Debug, Clone, Copy)]
+struct Settings {
+    /// The values of the [checked](CHECKED) registers in the drive.
+    found: [Option<f32>; CHECKED.len()],
+    /// Which of them is asked for next.
+    turn: u8,
+    /// The question whose answer is awaited.
+    asked: Option<Inquiry>,
+    /// What the application asks for, until it is answered, and the answer.
+    request: Option<Inquiry>,
+    answer: Option<Answer>,
+    /// The drive has confirmed its time-out since it was disabled.
+    is_timeout_set: bool,
+}
+
+impl Settings {
+    const UNKNOWN: Self = Self {
+        found: [None; CHECKED.len()],
+        turn: 0,
+        asked: None,
+        request: None,
+        answer: None,
+        is_timeout_set: false,
+    };
+
+    /// Returns what to ask next: each second time what the application asks for.
+    fn next(&mut self) -> Option<Inquiry> {
+        self.turn = self.turn.wrapping_add(1);
+        match self.request {
+            Some(request) if self.turn.is_multiple_of(2) => {
+                if request == Inquiry::Store {
+                    self.request = None;
+                }
+                Some(request)
+            }
+            _ => {
+                let unknown = self.found.iter().position(Option::is_none);
+                let turn = unknown.unwrap_or(usize::from(self.turn / 2) % CHECKED.len());
+                CHECKED.get(turn).map(|register| Inquiry::Read(*register))
+            }
+        }
+    }
+
+    fn ask(&mut self, inquiry: Inquiry, id: u8) -> CanFrame {
+        self.asked = Some(inquiry);
+        inquiry.frame(id)
+    }
+
+    /// Takes the answer that is awaited; `false` for any other frame.
+    fn hear(&mut self, data: &[u8; 8], id: u8, timeout: f32) -> bool {
+        let answer = self.asked.and_then(|inquiry| Answer::decode(data, id, inquiry));
+        let Some(Answer { register, value }) = answer else { return false };
+        let asked = self.asked.take();
+        for (checked, found) in CHECKED.iter().zip(&mut self.found) {
+            if *checked == register {
+                *found = Some(value);
+            }
+        }
+        if register == Register::Timeout {
+            self.is_timeout_set = value.to_bits() == timeout.to_bits();
+        }
+        if self.request == asked {
+            (self.request, self.answer) = (None, answer);
+        }
+        true
+    }
+}

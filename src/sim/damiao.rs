@@ -1,0 +1,329 @@
+//! A drive of Damiao with its shaft, written from the manual: fields are cut out of the frame as one number of 64 bits.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "fields of a frame and of its registers, which saturate"
+)]
+
+use crate::frame::CanFrame;
+use embedded_can::{Frame, Id, StandardId};
+
+const ENABLE: u64 = 0xFFFF_FFFF_FFFF_FFFC;
+const DISABLE: u64 = 0xFFFF_FFFF_FFFF_FFFD;
+const SET_ZERO: u64 = 0xFFFF_FFFF_FFFF_FFFE;
+const CLEAR_ERROR: u64 = 0xFFFF_FFFF_FFFF_FFFB;
+
+/// Error of a drive that gets no commands.
+const COMMUNICATION_LOST: u8 = 0xD;
+
+/// Numbers of the registers that the drive has, in the order of their places.
+const REGISTERS: [u8; 7] = [7, 8, 9, 10, 21, 22, 23];
+const TIMEOUT: usize = 2;
+const MODE: usize = 3;
+const PMAX: usize = 4;
+const VMAX: usize = 5;
+const TMAX: usize = 6;
+
+/// A drive of Damiao and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+///
+/// It stands beside the [`World`](super::World): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
+/// Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is
+/// discarded without an answer. The shaft is an inertia with viscous friction.
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::sim::DamiaoDrive;
+///
+/// let mut drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]); // PMAX, VMAX, TMAX of a DM-J4310
+/// let enable = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
+/// let answer = CanFrame::standard(1, enable).and_then(|frame| drive.hear(&frame)).ok_or("no answer")?;
+/// assert_eq!((answer.header(), answer.bytes()[0]), (0x11, 0x11)); // enabled, id 1
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct DamiaoDrive {
+    id: u8,
+    values: [f64; REGISTERS.len()],
+    stored: [f64; REGISTERS.len()],
+    is_enabled: bool,
+    error: u8,
+    /// Since the last frame of the drive's own.
+    silence_s: f64,
+    command: Command,
+    angle_rad: f64,
+    velocity_rad_per_s: f64,
+    torque_nm: f64,
+    load_nm: f64,
+    inertia_kg_m2: f64,
+    friction_nm_s: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Command {
+    None,
+    Mit {
+        position: f64,
+        velocity: f64,
+        kp: f64,
+        kd: f64,
+        torque: f64,
+    },
+    /// Position, velocity limit, torque limit.
+    Position(f64, f64, f64),
+    Velocity(f64),
+}
+
+impl DamiaoDrive {
+    /// Makes a drive with the id of its commands, 1 to 15, that of its feedback, and the registers PMAX in rad, VMAX in rad/s and
+    /// TMAX in Nm: in MIT mode, without a time-out, with an inertia of 0.01 kg m².
+    #[must_use]
+    pub fn new(id: u8, master_id: u16, [pmax, vmax, tmax]: [f32; 3]) -> Self {
+        let values = [master_id.into(), id.into(), 0.0, 1.0, pmax.into(), vmax.into(), tmax.into()];
+        Self {
+            id,
+            values,
+            stored: values,
+            is_enabled: false,
+            error: 0,
+            silence_s: 0.0,
+            command: Command::None,
+            angle_rad: 0.0,
+            velocity_rad_per_s: 0.0,
+            torque_nm: 0.0,
+            load_nm: 0.0,
+            inertia_kg_m2: 0.01,
+            friction_nm_s: 0.01,
+        }
+    }
+
+    /// Sets a register, also over a loss of the supply; one that the drive does not have is left out.
+    #[must_use]
+    pub fn with_register(mut self, number: u8, value: f32) -> Self {
+        self.write(number, value.into());
+        self.stored = self.values;
+        self
+    }
+
+    /// Sets the inertia at the output shaft in kg m² and the viscous friction in Nm s/rad, both above zero.
+    #[must_use]
+    pub fn with_shaft(self, inertia_kg_m2: f32, friction_nm_s: f32) -> Self {
+        let (inertia_kg_m2, friction_nm_s) = (inertia_kg_m2.into(), friction_nm_s.into());
+        Self { inertia_kg_m2, friction_nm_s, ..self }
+    }
+
+    /// Sets a torque from outside, in Nm: the weight of an arm, say.
+    pub fn set_load(&mut self, torque_nm: f32) {
+        self.load_nm = torque_nm.into();
+    }
+
+    /// Sets the angle of the output shaft in rad.
+    pub fn set_angle(&mut self, angle_rad: f32) {
+        self.angle_rad = angle_rad.into();
+    }
+
+    /// Has the drive report an error, 8 to 14, and switch itself off.
+    pub fn fail(&mut self, error: u8) {
+        self.error = error & 0xF;
+        self.is_enabled = false;
+    }
+
+    /// Takes the supply away for a moment: the drive is disabled, and what was written but not stored is lost.
+    pub fn lose_supply(&mut self) {
+        self.values = self.stored;
+        (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
+    }
+
+    /// Returns the angle of the output shaft in rad.
+    #[must_use]
+    pub fn angle_rad(&self) -> f32 {
+        single(self.angle_rad)
+    }
+
+    /// Returns the velocity of the output shaft in rad/s.
+    #[must_use]
+    pub fn velocity_rad_per_s(&self) -> f32 {
+        single(self.velocity_rad_per_s)
+    }
+
+    /// Returns the torque of the drive in the last step, in Nm.
+    #[must_use]
+    pub fn torque_nm(&self) -> f32 {
+        single(self.torque_nm)
+    }
+
+    /// Tells whether the drive follows commands.
+    #[must_use]
+    pub const fn is_enabled(&self) -> bool {
+        self.is_enabled
+    }
+
+    /// Returns the error that the drive reports, 8 to 14; 0 for none.
+    #[must_use]
+    pub const fn error(&self) -> u8 {
+        self.error
+    }
+
+    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let id = standard(frame)?;
+        if id == 0x7FF {
+            return self.hear_inquiry(frame.bytes());
+        }
+        let mode = (self.value(MODE) as u16).saturating_sub(1);
+        let own = u16::from(self.id);
+        let bits = u64::from_be_bytes(*frame.bytes());
+        let is_for_mode = id == own + (mode << 8);
+        match bits {
+            ENABLE | DISABLE | SET_ZERO | CLEAR_ERROR if is_for_mode || id == own => {
+                self.switch(bits);
+            }
+            _ if is_for_mode => self.command = self.read(mode, frame.bytes()),
+            _ => return None,
+        }
+        self.silence_s = 0.0;
+        Some(self.feedback())
+    }
+
+    /// Moves on by a time in s.
+    pub fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        let timeout_s = self.value(TIMEOUT) * 50e-6;
+        if self.is_enabled && timeout_s > 0.0 && self.silence_s > timeout_s {
+            self.fail(COMMUNICATION_LOST);
+        }
+        let most = self.value(TMAX);
+        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
+        self.torque_nm = wanted.clamp(-most, most);
+        let sum = self.torque_nm + self.load_nm - self.friction_nm_s * self.velocity_rad_per_s;
+        self.velocity_rad_per_s += sum / self.inertia_kg_m2 * dt_s;
+        self.angle_rad += self.velocity_rad_per_s * dt_s;
+    }
+
+    fn wanted_nm(&self) -> f64 {
+        let speed_loop =
+            |velocity: f64| 100.0 * self.inertia_kg_m2 * (velocity - self.velocity_rad_per_s);
+        match self.command {
+            Command::None => 0.0,
+            Command::Mit { position, velocity, kp, kd, torque } => {
+                kp * (position - self.angle_rad)
+                    + kd * (velocity - self.velocity_rad_per_s)
+                    + torque
+            }
+            Command::Position(position, most, limit) => {
+                let velocity = (5.0 * (position - self.angle_rad)).clamp(-most, most);
+                speed_loop(velocity).clamp(-limit, limit)
+            }
+            Command::Velocity(velocity) => speed_loop(velocity),
+        }
+    }
+
+    fn switch(&mut self, bits: u64) {
+        match bits {
+            ENABLE => self.is_enabled = self.error == 0,
+            DISABLE => self.is_enabled = false,
+            CLEAR_ERROR => self.error = 0,
+            _ => self.angle_rad = 0.0,
+        }
+    }
+
+    fn read(&self, mode: u16, data: &[u8; 8]) -> Command {
+        let [a, b, c, d, e, f, g, h] = *data;
+        let float = |bytes| f64::from(f32::from_le_bytes(bytes)).clamp(-1e6, 1e6);
+        let (first, second) = (float([a, b, c, d]), float([e, f, g, h]));
+        match mode {
+            1 => Command::Position(first, second.abs(), f64::MAX),
+            2 => Command::Velocity(first),
+            3 => {
+                let (velocity, share) = (u16::from_le_bytes([e, f]), u16::from_le_bytes([g, h]));
+                let limit = f64::from(share) / 10_000.0 * self.value(TMAX);
+                Command::Position(first, f64::from(velocity) / 100.0, limit)
+            }
+            _ => {
+                let bits = u64::from_be_bytes(*data);
+                let field = |lowest: u32, width: u32, least: f64, most: f64| {
+                    let top = (1_u64 << width) - 1;
+                    (bits >> lowest & top) as f64 * (most - least) / top as f64 + least
+                };
+                let (pmax, vmax, tmax) = (self.value(PMAX), self.value(VMAX), self.value(TMAX));
+                Command::Mit {
+                    position: field(48, 16, -pmax, pmax),
+                    velocity: field(36, 12, -vmax, vmax),
+                    kp: field(24, 12, 0.0, 500.0),
+                    kd: field(12, 12, 0.0, 5.0),
+                    torque: field(0, 12, -tmax, tmax),
+                }
+            }
+        }
+    }
+
+    fn feedback(&self) -> CanFrame {
+        let field = |value: f64, most: f64, width: u32| {
+            let top = ((1_u64 << width) - 1) as f64;
+            ((value.clamp(-most, most) + most) * top / (2.0 * most)) as u64
+        };
+        let status = if self.error > 0 { self.error } else { u8::from(self.is_enabled) };
+        let bits = u64::from(status << 4 | self.id & 0xF) << 56
+            | field(self.angle_rad, self.value(PMAX), 16) << 40
+            | field(self.velocity_rad_per_s, self.value(VMAX), 12) << 28
+            | field(self.torque_nm, self.value(TMAX), 12) << 16
+            | 35 << 8
+            | 30;
+        self.answer(bits.to_be_bytes())
+    }
+
+    fn answer(&self, data: [u8; 8]) -> CanFrame {
+        let master_id = StandardId::new(self.value(0) as u16).unwrap_or(StandardId::ZERO);
+        CanFrame::of(Id::Standard(master_id), data)
+    }
+
+    fn hear_inquiry(&mut self, data: &[u8; 8]) -> Option<CanFrame> {
+        let [low, high, verb, number, a, b, c, d] = *data;
+        if (low, high) != (self.id, 0) {
+            return None;
+        }
+        let is_float = number >= 21;
+        match verb {
+            0x33 => {}
+            0x55 if is_float => self.write(number, f32::from_le_bytes([a, b, c, d]).into()),
+            0x55 => self.write(number, u32::from_le_bytes([a, b, c, d]).into()),
+            0xAA if !self.is_enabled => self.stored = self.values,
+            0xCC => return Some(self.feedback()),
+            _ => return None,
+        }
+        let value = REGISTERS.iter().position(|register| *register == number);
+        let value = value.map(|place| self.value(place));
+        let [a, b, c, d] = match value {
+            Some(value) if is_float => single(value).to_le_bytes(),
+            Some(value) => (value as u32).to_le_bytes(),
+            None if verb == 0xAA => [0; 4],
+            None => return None,
+        };
+        Some(self.answer([self.id, 0, verb, number, a, b, c, d]))
+    }
+
+    fn value(&self, place: usize) -> f64 {
+        self.values.get(place).copied().unwrap_or_default()
+    }
+
+    fn write(&mut self, number: u8, value: f64) {
+        for (register, place) in REGISTERS.iter().zip(&mut self.values) {
+            if *register == number {
+                *place = value;
+            }
+        }
+    }
+}
+
+fn standard(frame: &CanFrame) -> Option<u16> {
+    match frame.id() {
+        Id::Standard(id) if frame.is_data_frame() && frame.length() == 8 => Some(id.as_raw()),
+        _ => None,
+    }
+}
+
+fn single(value: f64) -> f32 {
+    value as f32
+}

@@ -1,0 +1,107 @@
+//! Motors of Damiao in each control mode, with drives that are asked for their registers before they are armed.
+
+use super::*;
+use drivetrain::control::PidConfig;
+use drivetrain::damiao::{ForcePosition, Mit, Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::motor::{AngleDrive, Impedance};
+use drivetrain::sim::DamiaoDrive;
+use drivetrain::units::Angle;
+use std::cell::{Cell, RefCell};
+
+type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+
+/// A motor, and a drive whose shaft stands.
+struct Joint<M: Mode> {
+    motor: Own<Motor<M>>,
+    drive: RefCell<DamiaoDrive>,
+    /// An answer about a register, which the motor takes before all else.
+    answer: Cell<Option<CanFrame>>,
+    set: Drive<M>,
+}
+
+impl<M: Mode> Joint<M> {
+    fn new(mode: M, number: f32, set: Drive<M>) -> Self {
+        let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+        Self {
+            motor: Own::new(Motor::new(Model::J4310, 1, mode).unwrap()),
+            drive: RefCell::new(drive),
+            answer: Cell::new(None),
+            set,
+        }
+    }
+
+    fn refresh() -> CanFrame {
+        CanFrame::of(id(0x7FF), [1, 0, 0xCC, 0, 0, 0, 0, 0])
+    }
+}
+
+impl<M: Mode> Subject for Joint<M> {
+    type Device = Own<Motor<M>>;
+    fn device(&mut self) -> &mut Self::Device {
+        if let Some(answer) = self.answer.take() {
+            self.motor.motor_mut().decode_answer(&answer);
+        }
+        &mut self.motor
+    }
+    fn motors(&self) -> usize {
+        1
+    }
+    fn feedback(&self, _motor: usize) -> Option<CanFrame> {
+        self.drive.borrow_mut().hear(&Self::refresh())
+    }
+    fn fault(&self, _motor: usize) -> Option<CanFrame> {
+        let mut overloaded = *self.drive.borrow();
+        overloaded.fail(14);
+        overloaded.hear(&Self::refresh())
+    }
+    fn drive(&mut self, share: f32) -> Result<(), TargetError> {
+        (self.set)(&mut self.motor, share)
+    }
+    /// The drive hears what is sent. A frame that leaves it disabled, or in MIT mode without gains and torque, asks for nothing.
+    fn is_zero(&self, command: &CanFrame) -> bool {
+        let mut drive = self.drive.borrow_mut();
+        let answer = drive.hear(command);
+        if command.header() == 0x7FF {
+            self.answer.set(answer);
+            return true;
+        }
+        let mut turned = *drive;
+        turned.step(1e-6);
+        let is_enabling = command.bytes() == &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
+        !is_enabling && (!drive.is_enabled() || turned.torque_nm().abs() <= 10.0 / 4095.0)
+    }
+    fn settle_ms(&self) -> u64 {
+        100
+    }
+    fn opening_ms(&self) -> u64 {
+        260
+    }
+}
+
+fn kept<M: Mode>(mode: M, number: f32, set: Drive<M>) {
+    assert_eq!(check_contract(|| Joint::new(mode, number, set)), Ok(RULES), "{mode:?}");
+}
+
+#[test]
+fn motors_of_damiao_keep_the_contract_in_each_mode_with_each_kind_of_target() {
+    let quick = AngularVelocity::from_rad_per_s(10.0);
+    let mit = Mit::new(3.0).with_gains(20.0, 0.6).unwrap();
+    let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
+    let loops = mit.with_loops(position, PidConfig::new(0.5, 2.0, 0.0)).unwrap();
+    for mode in [mit, loops] {
+        kept(mode, 1.0, |motor, share| motor.set_torque(3.0 * share));
+        kept(mode, 1.0, |motor, share| motor.set_velocity((), velocity(share)));
+        kept(mode, 1.0, |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share)));
+        kept(mode, 1.0, |motor, share| {
+            let angle = Angle::from_turns(0.25 * share);
+            motor.set_impedance(Impedance { angle, stiffness: 20.0, ..Impedance::FREE })
+        });
+    }
+    kept(Velocity::new(quick), 3.0, |motor, share| motor.set_velocity((), velocity(share)));
+    let turn: Drive<PositionVelocity> =
+        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(PositionVelocity::new(quick), 2.0, turn);
+    let push: Drive<ForcePosition> =
+        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(ForcePosition::new(quick, 2.0), 4.0, push);
+}

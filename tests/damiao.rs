@@ -1,0 +1,354 @@
+//! Motors of Damiao with a drive that is written from the manual: settings, arming, targets, limits, rest, and a drive that stops
+//! by itself.
+
+#![cfg(test)]
+
+use drivetrain::control::PidConfig;
+use drivetrain::damiao::{
+    ConfigError, ForcePosition, Mit, Mode, Model, Motor, PositionVelocity, Register, Status,
+    Velocity,
+};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{
+    AngleDrive, ArmError, Devices, Impedance, Own, TargetError, VelocityDrive,
+};
+use drivetrain::sim::DamiaoDrive;
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::{Angle, AngularVelocity};
+
+const J4310: [f32; 3] = [12.5, 30.0, 10.0];
+
+/// A motor and its drive on a bus that loses nothing.
+struct Bench<M: Mode> {
+    own: Own<Motor<M>>,
+    drive: DamiaoDrive,
+    now_us: u64,
+    /// The frames of the last update.
+    frames: Vec<CanFrame>,
+    is_cut: bool,
+}
+
+impl<M: Mode> Bench<M> {
+    fn new(mode: M, number: f32) -> Self {
+        let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
+        let drive = DamiaoDrive::new(1, 0x11, J4310).with_register(10, number);
+        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false }
+    }
+
+    fn now(&self) -> Instant {
+        Instant::from_micros(self.now_us)
+    }
+
+    fn step(&mut self) {
+        self.now_us += 1_000;
+        let now = self.now();
+        self.own.update(Tick::new(now, 0.001));
+        self.frames.clear();
+        while let Some(frame) = self.own.next_frame(0) {
+            self.frames.push(frame);
+            if self.is_cut {
+                continue;
+            }
+            if let Some(answer) = self.drive.hear(&frame) {
+                let outcome = Devices::ingest(&mut self.own, &answer, now);
+                assert_eq!(outcome, drivetrain::motor::Ingest::Taken, "{answer:?}");
+            }
+        }
+        for _ in 0..10 {
+            self.drive.step(1e-4);
+        }
+    }
+
+    fn steps(&mut self, steps: u32, mut each: impl FnMut(&mut Self)) {
+        for _ in 0..steps {
+            self.step();
+            each(self);
+        }
+    }
+
+    fn armed(mode: M, number: f32) -> Self {
+        let mut bench = Self::new(mode, number);
+        bench.steps(100, |_| {});
+        bench.own.arm(bench.now()).unwrap();
+        bench
+    }
+}
+
+fn mit() -> Mit {
+    Mit::new(3.0).with_gains(20.0, 0.6).unwrap()
+}
+
+#[test]
+fn a_motor_is_armed_when_its_settings_have_been_read() {
+    let mut bench = Bench::new(mit(), 1.0);
+    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    assert_eq!(refused(&mut bench), "no feedback from DM-J4310 #1");
+    bench.steps(5, |_| {});
+    assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
+    bench.steps(60, |_| {});
+    assert_eq!(bench.own.arm(bench.now()), Ok(()));
+}
+
+#[test]
+fn a_drive_in_another_mode_or_with_other_ranges_is_not_armed_and_the_register_is_named() {
+    for (number, value, text) in [
+        (10, 2.0, "CTRL_MODE 2, the program needs 1"),
+        (21, 12.566, "PMAX 12.566, the program needs 12.5"),
+        (22, 45.0, "VMAX 45, the program needs 30"),
+        (23, 20.0, "TMAX 20, the program needs 10"),
+    ] {
+        let mut bench = Bench::new(mit(), 1.0);
+        bench.drive = bench.drive.with_register(number, value);
+        bench.steps(100, |_| {});
+        let refused = bench.own.arm(bench.now()).unwrap_err();
+        assert!(
+            matches!(refused, ArmError::Setting(_)) && refused.to_string().contains(text),
+            "{refused}"
+        );
+        // The one who arms it all the same is refused too.
+        let now = bench.now();
+        drivetrain::motor::CanDevice::engage(&mut bench.own, now);
+        assert!(!Devices::is_armed(&mut bench.own));
+        // Written, it is armed.
+        let right =
+            [1.0, 12.5, 30.0, 10.0][[10, 21, 22, 23].iter().position(|it| *it == number).unwrap()];
+        let register = [
+            Register::ControlMode,
+            Register::PositionRange,
+            Register::VelocityRange,
+            Register::TorqueRange,
+        ];
+        let register = register.into_iter().find(|it| it.number() == number).unwrap();
+        bench.own.motor_mut().write(register, right).unwrap();
+        bench.steps(150, |_| {});
+        assert_eq!(bench.own.motor().register(), Some((register, right)));
+        assert_eq!(bench.own.arm(bench.now()), Ok(()), "{register:?}");
+    }
+}
+
+#[test]
+fn a_write_is_lost_with_the_supply_unless_it_was_stored_and_noticed_before_arming() {
+    for stores in [false, true] {
+        let mut bench = Bench::new(mit(), 2.0);
+        bench.own.motor_mut().write(Register::ControlMode, 1.0).unwrap();
+        bench.steps(100, |_| {});
+        if stores {
+            bench.own.motor_mut().store();
+            bench.steps(50, |_| {});
+        }
+        bench.drive.lose_supply();
+        bench.steps(150, |_| {});
+        assert_eq!(bench.own.arm(bench.now()).is_ok(), stores);
+    }
+}
+
+#[test]
+fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
+    let wheel = AngularVelocity::from_rad_per_s(6.0);
+    let mut velocity = Bench::armed(Velocity::new(AngularVelocity::from_rad_per_s(20.0)), 3.0);
+    velocity.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
+    assert!((velocity.drive.velocity_rad_per_s() - 6.0).abs() < 0.2);
+    rests(velocity);
+
+    let mut damped = Bench::armed(mit(), 1.0);
+    damped.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
+    assert!((damped.drive.velocity_rad_per_s() - 6.0).abs() < 0.2);
+    rests(damped);
+
+    let loops = Mit::new(3.0).with_loops(
+        PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0),
+        PidConfig::new(0.5, 2.0, 0.0),
+    );
+    let mut looped = Bench::armed(loops.unwrap(), 1.0);
+    looped.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
+    assert!((looped.drive.velocity_rad_per_s() - 6.0).abs() < 0.1);
+    looped.steps(1_500, |bench| bench.own.set_angle((), Angle::from_radians(1.0)).unwrap());
+    assert!((looped.drive.angle_rad() - 1.0).abs().rem_euclid(core::f32::consts::TAU) < 0.02);
+    rests(looped);
+
+    let quick = AngularVelocity::from_rad_per_s(10.0);
+    let joint = Angle::from_radians(1.0);
+    let mut position = Bench::armed(PositionVelocity::new(quick), 2.0);
+    position.steps(2_000, |bench| bench.own.set_angle((), joint).unwrap());
+    assert!((position.drive.angle_rad() - 1.0).abs() < 0.02);
+    rests(position);
+
+    let mut force = Bench::armed(ForcePosition::new(quick, 2.0), 4.0);
+    force.steps(2_000, |bench| {
+        bench.own.set_angle((), joint).unwrap();
+        assert!(bench.drive.torque_nm().abs() <= 2.001);
+    });
+    assert!((force.drive.angle_rad() - 1.0).abs() < 0.02);
+    rests(force);
+}
+
+/// Disarmed, the drive gives no torque from the next frames on, and is disabled.
+fn rests<M: Mode>(mut bench: Bench<M>) {
+    bench.own.disarm();
+    bench.step();
+    bench.steps(50, |bench| assert!(bench.drive.torque_nm().abs() < 0.003, "{:?}", bench.frames));
+    assert!(!bench.drive.is_enabled());
+}
+
+#[test]
+fn an_impedance_holds_a_weight_at_its_angle_and_never_asks_for_more_than_the_limit() {
+    let mut bench = Bench::armed(Mit::new(3.0), 1.0);
+    bench.drive = bench.drive.with_shaft(0.05, 0.05);
+    bench.drive.set_load(-1.0);
+    let far = Impedance {
+        angle: Angle::from_radians(2.0),
+        stiffness: 30.0,
+        damping: 2.0,
+        torque_nm: 1.0,
+        ..Impedance::FREE
+    };
+    bench.steps(3_000, |bench| {
+        bench.own.set_impedance(far).unwrap();
+        assert!(
+            bench.drive.torque_nm().abs() < 3.3,
+            "a count of torque, and what one cycle changes"
+        );
+    });
+    assert!((bench.drive.angle_rad() - 2.0).abs() < 0.01, "{}", bench.drive.angle_rad());
+    for wrong in [
+        Impedance { stiffness: -1.0, ..far },
+        Impedance { damping: f32::NAN, ..far },
+        Impedance { torque_nm: f32::INFINITY, ..far },
+    ] {
+        assert_eq!(bench.own.set_impedance(wrong), Err(TargetError::NotFinite));
+    }
+}
+
+#[test]
+fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
+    let quick = AngularVelocity::from_rad_per_s(10.0);
+    let there = Angle::from_radians(-1.5);
+    let mut position = Bench::new(PositionVelocity::new(quick), 2.0);
+    position.drive.set_angle(1.5);
+    position.steps(100, |_| {});
+    position.own.arm(position.now()).unwrap();
+    position.steps(60, |bench| bench.own.set_angle((), there).unwrap());
+    let near = position.drive.angle_rad();
+    assert!((near - 1.5).abs() < 0.05, "60 ms after arming at {near}");
+    let mut spring = Bench::new(mit(), 1.0);
+    spring.drive.set_angle(1.5);
+    spring.steps(100, |_| {});
+    spring.own.arm(spring.now()).unwrap();
+    spring.steps(30, |bench| {
+        bench.own.set_angle((), there).unwrap();
+        assert!(bench.drive.torque_nm().abs() < 0.3, "{}", bench.drive.torque_nm());
+    });
+}
+
+#[test]
+fn the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time() {
+    let mut bench = Bench::armed(mit(), 1.0);
+    let drive = |bench: &mut Bench<_>| {
+        _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
+    };
+    bench.steps(500, drive);
+    assert!(bench.drive.is_enabled());
+    bench.is_cut = true;
+    bench.steps(95, drive);
+    assert!(bench.drive.is_enabled(), "the time-out is 100 ms");
+    bench.steps(10, drive);
+    assert!(!bench.drive.is_enabled() && bench.drive.error() == Status::CommunicationLost as u8);
+    // Its supply fails too, so it forgets the time-out. Back on the bus, arming writes it anew.
+    bench.drive.lose_supply();
+    bench.is_cut = false;
+    bench.steps(300, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    bench.steps(300, drive);
+    assert!(bench.drive.is_enabled());
+    bench.is_cut = true;
+    bench.steps(110, drive);
+    assert!(!bench.drive.is_enabled());
+}
+
+#[test]
+fn a_drive_that_does_not_confirm_its_time_out_is_never_enabled() {
+    let mut bench = Bench::armed(mit(), 1.0);
+    for _ in 0..300 {
+        bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0)).unwrap();
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            let answer = bench.drive.hear(&frame);
+            // Whatever is asked is answered with its feedback alone.
+            if let Some(answer) = answer.filter(|_| frame.header() != 0x7FF) {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+        assert!(!bench.drive.is_enabled());
+    }
+}
+
+#[test]
+fn an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itself() {
+    let mut bench = Bench::armed(mit(), 1.0);
+    let drive = |bench: &mut Bench<_>| {
+        _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
+    };
+    bench.steps(300, drive);
+    bench.drive.fail(Status::Overload as u8);
+    bench.steps(300, drive);
+    assert!(!bench.drive.is_enabled() && bench.drive.error() == 0, "cleared, and still disabled");
+    assert!(!Devices::is_armed(&mut bench.own));
+    bench.steps(150, |_| {});
+    assert_eq!(bench.own.arm(bench.now()), Ok(()));
+    bench.steps(300, drive);
+    assert!(bench.drive.is_enabled());
+}
+
+#[test]
+fn two_motors_with_one_master_id_are_told_apart() {
+    let mode = mit();
+    let motor =
+        |id| Own::new(Motor::new(Model::J4310, id, mode).unwrap().with_master_id(0x10).unwrap());
+    let mut robot = [motor(1), motor(2)];
+    let mut drives = [DamiaoDrive::new(1, 0x10, J4310), DamiaoDrive::new(2, 0x10, J4310)];
+    let mut now = Instant::from_micros(0);
+    for ms in 0..1_200_u64 {
+        now = Instant::from_micros(1_000 * (ms + 1));
+        robot.update(Tick::new(now, 0.001));
+        while let Some(frame) = robot.next_frame(0) {
+            for drive in &mut drives {
+                if let Some(answer) = drive.hear(&frame) {
+                    assert_eq!(robot.ingest(&answer, now), drivetrain::motor::Ingest::Taken);
+                }
+            }
+        }
+        drives.iter_mut().for_each(|drive| drive.step(0.001));
+        if ms == 100 {
+            robot.arm(now).unwrap();
+        }
+        if ms > 100 {
+            robot[0].set_velocity((), AngularVelocity::from_rad_per_s(3.0)).unwrap();
+            robot[1].set_velocity((), AngularVelocity::from_rad_per_s(-5.0)).unwrap();
+        }
+    }
+    assert!(robot.is_armed() && now > Instant::START + Duration::from_millis(1_000));
+    let speeds = drives.map(|drive| drive.velocity_rad_per_s());
+    assert!((speeds[0] - 3.0).abs() < 0.2 && (speeds[1] + 5.0).abs() < 0.2, "{speeds:?}");
+}
+
+#[test]
+fn bad_configurations_are_refused_with_the_limit() {
+    let text = |outcome: Result<Motor<Mit>, ConfigError>| outcome.unwrap_err().to_string();
+    assert_eq!(text(Motor::new(Model::J4310, 0, Mit::new(1.0))), "id 0: 1 to 15 are allowed");
+    assert_eq!(text(Motor::new(Model::J4310, 16, Mit::new(1.0))), "id 16: 1 to 15 are allowed");
+    let motor = |limit| Motor::new(Model::J4310, 1, Mit::new(limit));
+    for limit in [0.0, -1.0, 10.001, f32::NAN] {
+        assert!(text(motor(limit)).ends_with("above 0 and at most TMAX, 10 Nm"), "{limit}");
+    }
+    assert!(motor(1.0).unwrap().with_master_id(1).is_err());
+    assert!(motor(1.0).unwrap().with_timeout(Duration::ZERO).is_err());
+    assert!(
+        Mit::new(1.0).with_gains(501.0, 0.0).is_err()
+            && Mit::new(1.0).with_gains(0.0, 5.1).is_err()
+    );
+    let mut motor = motor(1.0).unwrap();
+    let refused = motor.write(Register::GearRatio, 10.0).unwrap_err();
+    assert_eq!(refused.to_string(), "register 20 (GearRatio) is read only");
+}
