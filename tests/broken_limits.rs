@@ -7,9 +7,9 @@
 mod own;
 
 use drivetrain::chassis::{
-    BufferError, Chassis, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
-    Kinematics, LimitError, ModeConfig, ModeError, Modes, OmniThree, OmniThreeWheels, PowerBuffer,
-    PowerError, PowerFit, PowerModel, Swerve, WheelLoad,
+    Chassis, ChassisError, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
+    Kinematics, ModeConfig, Modes, OmniThree, OmniThreeWheels, PowerBuffer, PowerFit, PowerModel,
+    Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, LoopError, M3508};
@@ -89,7 +89,7 @@ fn a_power_buffer_allows_with_a_limit_that_is_none_what_it_allows_with_zero() {
 #[test]
 fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     let gains = PidConfig::new(2.0, 0.0, 0.0);
-    let refused = |name| Err(BufferError::Value(PowerError::Negative(name)));
+    let refused = |name| Err(ChassisError::Negative(name));
     for bad in NOT_FINITE.into_iter().chain([-0.1]) {
         assert_eq!(PowerBuffer::new(bad, gains), refused("reserve_j"), "{bad}");
         let buffer = PowerBuffer::new(20.0, gains).unwrap();
@@ -97,12 +97,12 @@ fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     }
     for bad in NOT_FINITE {
         let limited = PowerBuffer::new(20.0, gains.with_output_limit(bad));
-        assert!(matches!(limited, Err(BufferError::Pid(_))), "{bad}");
+        assert!(matches!(limited, Err(ChassisError::Loop(_, _))), "{bad}");
         for parameter in 0..4 {
             let [mut k0, mut k1, mut k2, mut k3] = [1.0; 4];
             *[&mut k0, &mut k1, &mut k2, &mut k3][parameter] = bad;
             let name = ["k0", "k1", "k2", "k3"][parameter];
-            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(PowerError::Negative(name)), "{bad}");
+            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(ChassisError::Negative(name)), "{bad}");
         }
     }
 }
@@ -165,14 +165,14 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
             (limits.with_wheel_speed(speed(bad)), "wheel speed"),
             (limits.with_command_timeout(bad), "command timeout"),
         ] {
-            assert_eq!(limits.validate(), Err(LimitError::NotPositive(name)), "{bad}");
-            assert_eq!(chassis.set_limits(limits), Err(LimitError::NotPositive(name)), "{bad}");
+            assert_eq!(limits.validate(), Err(ChassisError::NotAboveZero(name)), "{bad}");
+            assert_eq!(chassis.set_limits(limits), Err(ChassisError::NotAboveZero(name)), "{bad}");
         }
     }
     // For ever, or as good as that: a dead program would drive on.
     for too_long_s in [f32::INFINITY, f32::MAX, 3_600.0, 1.000_001] {
         let limits = limits.with_command_timeout(too_long_s);
-        let refused = LimitError::TooLong("command timeout");
+        let refused = ChassisError::TooLong("command timeout");
         assert_eq!(limits.validate(), Err(refused), "{too_long_s}");
         assert_eq!(chassis.set_limits(limits), Err(refused), "{too_long_s}");
     }
@@ -201,10 +201,10 @@ fn modes_refuse_what_is_none() {
             (config.with_gimbal_timeout(bad, then), "the gimbal's timeout"),
             (config.with_transition(bad), "the transition"),
         ] {
-            assert_eq!(Modes::new(config).err(), Some(ModeError::Negative(name)), "{bad}");
+            assert_eq!(Modes::new(config).err(), Some(ChassisError::Negative(name)), "{bad}");
         }
         let limited = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(bad));
-        assert!(matches!(Modes::new(limited), Err(ModeError::Follow(_))), "{bad}");
+        assert!(matches!(Modes::new(limited), Err(ChassisError::Loop(_, _))), "{bad}");
     }
 }
 

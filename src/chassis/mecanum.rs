@@ -1,6 +1,6 @@
 use super::error::positive;
 use super::least_squares::MAX_CONDITION;
-use super::{GeometryError, Kinematics, MecanumWheels};
+use super::{ChassisError, Kinematics, MecanumWheels};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 use core::f32::consts::SQRT_2;
@@ -16,7 +16,7 @@ use core::marker::PhantomData;
 /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.15 };
 /// let turning = Mecanum::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
 /// assert!((turning.front_right.as_rad_per_s() - (0.2 + 0.15) * 2.0 / 0.1).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -84,7 +84,7 @@ impl sealed::Sealed for FloorX {
 /// let wheels = mecanum.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((wheels.front_left.as_rad_per_s() - (1.0 - 0.5 - 0.5 * 2.0) / 0.1).abs() < 1e-4);
 /// assert!((wheels.front_right.as_rad_per_s() - (1.0 + 0.5 + 0.5 * 2.0) / 0.1).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -104,7 +104,7 @@ impl Mecanum {
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
+    pub const fn new(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
         Self::with_rollers(geometry)
     }
 }
@@ -113,7 +113,7 @@ impl<M: RollerMounting> Mecanum<M> {
     /// Takes the dimensions, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for [`FloorX`] when half track and
+    /// Names the length that is not above zero and finite. [`ChassisError::Singular`] for [`FloorX`] when half track and
     /// half wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
     ///
     /// # Examples
@@ -124,9 +124,9 @@ impl<M: RollerMounting> Mecanum<M> {
     /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.1, half_track_m: 0.3 };
     /// let wheels = Mecanum::<FloorX>::with_rollers(geometry)?.inverse(Twist::new(0.0, 1.0, 0.0));
     /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-5); // to the left, the other way round
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
-    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
+    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
         let MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m } = geometry;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
@@ -141,7 +141,7 @@ impl<M: RollerMounting> Mecanum<M> {
         // The condition number of its normal equations, of which translation has two parts.
         let reach_m2 = half_track_m * half_track_m + half_wheelbase_m * half_wheelbase_m;
         if arm_m * arm_m * MAX_CONDITION < SQRT_2 * reach_m2 {
-            return Err(GeometryError::Singular("rotation: the chassis is square"));
+            return Err(ChassisError::Singular("rotation: the chassis is square"));
         }
         Ok(Self {
             per_linear: 1.0 / wheel_radius_m,
@@ -301,16 +301,16 @@ mod tests {
     #[test]
     fn with_the_other_rollers_a_square_chassis_is_refused() {
         let error = Mecanum::<FloorX>::with_rollers(SQUARE);
-        assert!(matches!(error, Err(GeometryError::Singular(_))));
+        assert!(matches!(error, Err(ChassisError::Singular(_))));
     }
 
     #[test]
     fn a_length_of_zero_nan_or_infinity_is_named() {
         for bad in [0.0, -0.1, f32::NAN, f32::INFINITY] {
             let radius = Mecanum::new(MecanumGeometry { wheel_radius_m: bad, ..SQUARE });
-            assert_eq!(radius, Err(GeometryError::NotPositive("wheel_radius_m")));
+            assert_eq!(radius, Err(ChassisError::NotPositive("wheel_radius_m")));
             let track = Mecanum::new(MecanumGeometry { half_track_m: bad, ..SQUARE });
-            assert_eq!(track, Err(GeometryError::NotPositive("half_track_m")));
+            assert_eq!(track, Err(ChassisError::NotPositive("half_track_m")));
         }
     }
 

@@ -11,7 +11,7 @@
 //! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
-//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
+//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ChassisError`].
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
 //!
@@ -69,15 +69,15 @@ mod wheels;
 pub use base::Chassis;
 pub use differential::{Differential, DifferentialGeometry};
 pub use drive::{ModuleMotors, WheelDrive};
-pub use error::GeometryError;
+pub use error::ChassisError;
 pub use kinematics::{Kinematics, WheelSpeed};
-pub use limits::{ChassisLimits, LimitError};
+pub use limits::ChassisLimits;
 pub use mecanum::{FloorO, FloorX, Mecanum, MecanumGeometry, RollerMounting};
-pub use mode::{GimbalEdge, Mode, ModeConfig, ModeError, Modes, Spin, WithoutGimbal};
+pub use mode::{GimbalEdge, Mode, ModeConfig, Modes, Spin, WithoutGimbal};
 pub use odometry::Odometry;
 pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
-pub use power::{PowerCut, PowerError, PowerModel, WheelLoad};
-pub use power_buffer::{BufferError, PowerBuffer};
+pub use power::{PowerCut, PowerModel, WheelLoad};
+pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
 pub use status::{ChassisStatus, MotionSource};
 pub use steering::{SteeringConfig, SwerveSteering};

@@ -1,5 +1,6 @@
+use super::ChassisError;
 use super::clock::DeadClock;
-use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
+use crate::control::{Pid, PidConfig, TimeStep};
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
 use crate::units::Angle;
@@ -132,31 +133,6 @@ impl ModeConfig {
     }
 }
 
-/// Why modes cannot be made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum ModeError {
-    /// The follow loop's parameters.
-    Follow(ConfigError),
-    /// The named value must be finite and zero or more.
-    Negative(&'static str),
-    /// The swing of the rotor is larger than its base: it would change direction.
-    SwingAboveBase,
-}
-
-impl core::fmt::Display for ModeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Follow(error) => write!(f, "the follow loop: {error}"),
-            Self::Negative(name) => write!(f, "{name} must be finite and zero or more"),
-            Self::SwingAboveBase => f.write_str("the rotor's swing is larger than its base"),
-        }
-    }
-}
-
-impl core::error::Error for ModeError {}
-
 /// Turns the driver's command into a motion of the body, by mode.
 ///
 /// The yaw is the turn of the gimbal against the chassis, counter-clockwise positive, any number of turns.
@@ -200,7 +176,7 @@ impl Modes {
     ///
     /// # Errors
     /// Names the value that cannot be used.
-    pub fn new(config: ModeConfig) -> Result<Self, ModeError> {
+    pub fn new(config: ModeConfig) -> Result<Self, ChassisError> {
         let named = [
             (config.rotor_rad_s, "the rotor's base"),
             (config.swing_rad_s, "the rotor's swing"),
@@ -210,15 +186,16 @@ impl Modes {
         ];
         for (value, name) in named {
             if !value.is_finite() || value < 0.0 {
-                return Err(ModeError::Negative(name));
+                return Err(ChassisError::Negative(name));
             }
         }
         if config.swing_rad_s > config.rotor_rad_s {
-            return Err(ModeError::SwingAboveBase);
+            return Err(ChassisError::SwingAboveBase);
         }
         Ok(Self {
             config,
-            follow: Pid::new(config.follow.with_period(TAU)).map_err(ModeError::Follow)?,
+            follow: Pid::new(config.follow.with_period(TAU))
+                .map_err(|error| ChassisError::Loop("the follow loop", error))?,
             mode: Mode::Relax,
             acting: Mode::Relax,
             yaw: None,
@@ -586,10 +563,10 @@ mod tests {
     #[test]
     fn configurations_that_cannot_work_are_named() {
         let swing = config().with_rotor(1.0, 2.0, 1.0);
-        assert_eq!(Modes::new(swing), Err(ModeError::SwingAboveBase));
+        assert_eq!(Modes::new(swing), Err(ChassisError::SwingAboveBase));
         let nan = config().with_transition(f32::NAN);
-        assert_eq!(Modes::new(nan), Err(ModeError::Negative("the transition")));
+        assert_eq!(Modes::new(nan), Err(ChassisError::Negative("the transition")));
         let gains = ModeConfig::new(PidConfig::new(f32::NAN, 0.0, 0.0));
-        assert!(matches!(Modes::new(gains), Err(ModeError::Follow(_))));
+        assert!(matches!(Modes::new(gains), Err(ChassisError::Loop(_, _))));
     }
 }

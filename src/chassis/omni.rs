@@ -1,6 +1,6 @@
 use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
-use super::{GeometryError, Kinematics, OmniFourWheels, OmniThreeWheels};
+use super::{ChassisError, Kinematics, OmniFourWheels, OmniThreeWheels};
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::units::{Angle, AngularVelocity};
 
@@ -16,7 +16,7 @@ use crate::units::{Angle, AngularVelocity};
 /// assert!((left.as_rad_per_s() - (1.0 - 0.2) / 0.05).abs() < 1e-4);
 /// assert!((right.as_rad_per_s() - (1.0 + 0.2) / 0.05).abs() < 1e-4);
 /// assert!((rear.as_rad_per_s() + 0.2 / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -65,7 +65,7 @@ impl OmniWheel {
 /// let five = Omni::new(0.05, [0.0, 72.0, 144.0, 216.0, 288.0].map(wheel))?;
 /// let [front, ..] = five.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((front.as_rad_per_s() - (0.5 + 0.2 * 2.0) / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Omni<const N: usize> {
@@ -79,22 +79,22 @@ impl<const N: usize> Omni<N> {
     /// Takes the radius of the wheels in m and the wheels.
     ///
     /// # Errors
-    /// Names the value that is not finite or not above zero. [`GeometryError::Singular`] when the wheels leave some
+    /// Names the value that is not finite or not above zero. [`ChassisError::Singular`] when the wheels leave some
     /// motion undetermined, or nearly: fewer than three, all parallel, all pointing at one centre, or all so far on one
     /// side of the origin that a turn looks like a straight way (some 20 times their distance from their centre).
-    pub fn new(wheel_radius_m: f32, wheels: [OmniWheel; N]) -> Result<Self, GeometryError> {
+    pub fn new(wheel_radius_m: f32, wheels: [OmniWheel; N]) -> Result<Self, ChassisError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !wheels.iter().all(|wheel| wheel.position_m.is_finite()) {
-            return Err(GeometryError::NotFinite("position_m"));
+            return Err(ChassisError::NotFinite("position_m"));
         }
         if !wheels.iter().all(|wheel| wheel.direction.is_finite()) {
-            return Err(GeometryError::NotFinite("direction"));
+            return Err(ChassisError::NotFinite("direction"));
         }
         let rows = wheels.map(|wheel| {
             let direction = Rotation2::new(wheel.direction).apply(Vec2::new(1.0, 0.0));
             Row::new(direction, wheel.position_m)
         });
-        let inverse = Normal::of(rows).inverse().ok_or(GeometryError::Singular("every motion"))?;
+        let inverse = Normal::of(rows).inverse().ok_or(ChassisError::Singular("every motion"))?;
         let shares = rows.map(|row| inverse.share(row) * wheel_radius_m);
         Ok(Self { rows, shares, wheel_radius_m, per_radius: 1.0 / wheel_radius_m })
     }
@@ -172,7 +172,7 @@ macro_rules! named_omni {
             ///
             /// # Errors
             /// Names the length that is not above zero and finite.
-            pub fn new(wheel_radius_m: f32, distance_m: f32) -> Result<Self, GeometryError> {
+            pub fn new(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ChassisError> {
                 let distance_m = positive(distance_m, "distance_m")?;
                 let wheel = |degrees| {
                     OmniWheel::tangential(Angle::from_degrees(degrees), distance_m)
@@ -240,7 +240,7 @@ named_omni! {
     /// let wheels = OmniThree::new(0.05, 0.2)?.inverse(Twist::new(0.0, 1.0, 0.0)); // to the left
     /// assert!((wheels.rear.as_rad_per_s() + 20.0).abs() < 1e-4);
     /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
     OmniThree, OmniThreeWheels, 3, [60.0, -60.0, 180.0]
 }
@@ -256,7 +256,7 @@ named_omni! {
     /// let slow = core::f32::consts::FRAC_1_SQRT_2 / 0.05; // the rollers take the rest
     /// assert!((wheels.front_left.as_rad_per_s() + slow).abs() < 1e-4);
     /// assert!((wheels.front_right.as_rad_per_s() - slow).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
     OmniFour, OmniFourWheels, 4, [45.0, -45.0, 135.0, -135.0]
 }
@@ -314,17 +314,17 @@ mod tests {
             position_m: Vec2::new(x, y),
             direction: Angle::from_degrees(degrees),
         };
-        let singular = Err(GeometryError::Singular("every motion"));
+        let singular = Err(ChassisError::Singular("every motion"));
         let parallel = [wheel(0.2, 0.2, 0.0), wheel(0.2, -0.2, 0.0), wheel(-0.2, 0.2, 180.0)];
         assert_eq!(Omni::new(0.05, parallel), singular);
         let radial = [wheel(0.2, 0.0, 0.0), wheel(0.0, 0.2, 90.0), wheel(-0.2, 0.0, 180.0)];
         assert_eq!(Omni::new(0.05, radial), singular);
         let two = [wheel(0.2, 0.0, 90.0), wheel(0.0, 0.2, 180.0)];
-        assert_eq!(Omni::new(0.05, two), Err(GeometryError::Singular("every motion")));
+        assert_eq!(Omni::new(0.05, two), Err(ChassisError::Singular("every motion")));
         let nan = [wheel(f32::NAN, 0.0, 90.0), wheel(0.0, 0.2, 180.0), wheel(0.0, 0.3, 30.0)];
-        assert_eq!(Omni::new(0.05, nan), Err(GeometryError::NotFinite("position_m")));
-        assert_eq!(OmniThree::new(0.0, 0.2), Err(GeometryError::NotPositive("wheel_radius_m")));
-        assert_eq!(OmniThree::new(0.05, -0.2), Err(GeometryError::NotPositive("distance_m")));
+        assert_eq!(Omni::new(0.05, nan), Err(ChassisError::NotFinite("position_m")));
+        assert_eq!(OmniThree::new(0.0, 0.2), Err(ChassisError::NotPositive("wheel_radius_m")));
+        assert_eq!(OmniThree::new(0.05, -0.2), Err(ChassisError::NotPositive("distance_m")));
     }
 
     #[test]

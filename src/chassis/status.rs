@@ -25,7 +25,7 @@ pub enum MotionSource {
 /// let status = chassis.status();
 /// assert_eq!((status.source, status.lost_wheels), (MotionSource::Unknown, 3));
 /// assert_eq!(status.blind_s, 0.001);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

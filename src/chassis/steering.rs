@@ -15,7 +15,7 @@ use core::f32::consts::{FRAC_PI_2, PI};
 /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
 /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
 /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -104,7 +104,7 @@ impl Default for SteeringConfig {
 /// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
 /// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
 /// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwerveSteering<const N: usize>([Module; N]);
@@ -154,7 +154,7 @@ impl<const N: usize> Swerve<N> {
     /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
     /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
     pub fn steer(
         &self,
