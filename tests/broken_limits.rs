@@ -192,13 +192,12 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
 #[test]
 fn modes_refuse_what_is_none() {
     let config = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1));
-    let then = drivetrain::chassis::WithoutGimbal::Relax;
     for bad in NOT_FINITE.into_iter().chain([-0.1]) {
         for (config, name) in [
             (config.with_rotor(bad, 0.0, 0.0), "the rotor's base"),
             (config.with_rotor(6.0, bad, 0.0), "the rotor's swing"),
             (config.with_rotor(6.0, 0.0, bad), "the rotor's frequency"),
-            (config.with_gimbal_timeout(bad, then), "the gimbal's timeout"),
+            (config.with_gimbal_timeout(bad), "the gimbal's timeout"),
             (config.with_transition(bad), "the transition"),
         ] {
             assert_eq!(Modes::new(config).err(), Some(ChassisError::Negative(name)), "{bad}");

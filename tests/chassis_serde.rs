@@ -6,8 +6,8 @@
 use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
-    ModeConfig, Modes, ModuleState, OmniFourWheels, OmniThreeWheels, OmniWheel, PowerModel, Spin,
-    SteeringConfig, Swerve, SwerveSteering, WheelLoad, WithoutGimbal,
+    ModeConfig, Modes, ModuleState, OmniFourWheels, OmniThreeWheels, OmniWheel, PowerModel,
+    SteeringConfig, Swerve, SwerveSteering, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -90,8 +90,8 @@ fn values_of_the_chassis_survive_a_file() {
     round(SteeringConfig::new().with_hysteresis(Angle::from_degrees(9.0)));
     round(SteeringConfig::new().without_cosine_compensation().with_hold_below(speed));
     let modes = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0));
-    round(modes.with_rotor(6.0, 2.0, 3.0).with_spin(Spin::Alternate));
-    round(modes.with_gimbal_timeout(0.05, WithoutGimbal::Relax).with_transition(0.1));
+    round(modes.with_rotor(6.0, 2.0, 3.0).with_alternating_rotor());
+    round(modes.with_gimbal_timeout(0.05).with_relax_without_gimbal().with_transition(0.1));
     for mode in [Mode::Relax, Mode::FollowGimbal, Mode::Rotor, Mode::Independent] {
         round(mode);
     }

@@ -4,8 +4,8 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
-    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, OmniWheel, Spin, SteeringConfig,
-    Swerve, SwerveSteering, WheelSpeed, WithoutGimbal,
+    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, OmniWheel, SteeringConfig, Swerve,
+    SwerveSteering, WheelSpeed,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
@@ -187,10 +187,10 @@ fn modes(mut input: Input) {
     }
     let timeout_s = input.positive();
     let instead = if input.coin() { Mode::Relax } else { Mode::Independent };
-    config = config.with_spin(Spin::Alternate).with_gimbal_timeout(
-        timeout_s,
-        if instead == Mode::Relax { WithoutGimbal::Relax } else { WithoutGimbal::Independent },
-    );
+    config = config.with_alternating_rotor().with_gimbal_timeout(timeout_s);
+    if instead == Mode::Relax {
+        config = config.with_relax_without_gimbal();
+    }
     let Ok(mut modes) = Modes::new(config) else { return };
     // Seconds since the gimbal told its yaw.
     let mut age_s = f64::MAX;

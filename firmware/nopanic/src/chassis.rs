@@ -85,8 +85,10 @@ pub fn call_all() {
     ChassisLimits::validate.call();
     ModeConfig::new.call();
     ModeConfig::with_rotor.call();
-    ModeConfig::with_spin.call();
+    ModeConfig::with_clockwise_rotor.call();
+    ModeConfig::with_alternating_rotor.call();
     ModeConfig::with_gimbal_timeout.call();
+    ModeConfig::with_relax_without_gimbal.call();
     ModeConfig::with_transition.call();
     Modes::new.call();
     Modes::set_mode.call();
