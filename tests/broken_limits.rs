@@ -8,8 +8,7 @@ mod own;
 
 use drivetrain::chassis::{
     Chassis, ChassisError, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
-    Kinematics, ModeConfig, Modes, OmniThree, OmniThreeWheels, PowerBuffer, PowerFit, PowerModel,
-    Swerve, WheelLoad,
+    Kinematics, ModeConfig, Modes, Omni, PowerBuffer, PowerFit, PowerModel, Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, LoopError, M3508};
@@ -131,7 +130,7 @@ fn a_forgetting_factor_that_is_none_is_one() {
 fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
     let geometry = DifferentialGeometry { wheel_radius_m: 0.05, half_track_m: 0.2 };
     let two = Differential::new(geometry).unwrap();
-    let three = OmniThree::new(0.05, 0.2).unwrap();
+    let three = Omni::three(0.05, 0.2).unwrap();
     let swerve = Swerve::new(0.05, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)]).unwrap();
     let twist = Twist::new(1.0, 0.0, -1.0);
     let limit = AngularVelocity::from_rad_per_s;
@@ -141,7 +140,7 @@ fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
         assert_eq!(two.desaturate(wheels, limit(bad)), DifferentialWheels::splat(still), "{bad}");
         assert_eq!(wheels.desaturate(limit(bad)), DifferentialWheels::splat(still), "{bad}");
         let wheels = three.inverse(twist);
-        assert_eq!(three.desaturate(wheels, limit(bad)), OmniThreeWheels::splat(still), "{bad}");
+        assert_eq!(three.desaturate(wheels, limit(bad)), [still; 3], "{bad}");
         let modules = swerve.inverse(twist);
         let told = swerve.desaturate(modules, limit(bad));
         assert!(told.iter().all(|module| module.velocity == still), "{bad}: {told:?}");

@@ -6,8 +6,7 @@
 use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
-    ModeConfig, Modes, ModuleState, OmniFourWheels, OmniThreeWheels, OmniWheel, PowerModel,
-    SteeringConfig, Swerve, SwerveSteering, WheelLoad,
+    ModeConfig, Modes, ModuleState, PowerModel, SteeringConfig, Swerve, SwerveSteering, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -78,10 +77,9 @@ fn values_of_the_chassis_survive_a_file() {
     let speed = AngularVelocity::from_rad_per_s(-3.5);
     round(MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 });
     round(DifferentialGeometry { wheel_radius_m: 0.076, half_track_m: 0.18 });
-    round(OmniWheel::tangential(Angle::from_degrees(60.0), 0.2));
+    round(Pose2::<Body>::tangential(Angle::from_degrees(60.0), 0.2));
     round(MecanumWheels { front_left: 1_u8, front_right: 2, rear_left: 3, rear_right: 4 });
-    round(OmniThreeWheels { front_left: speed, front_right: speed * 2.0, rear: speed });
-    round(OmniFourWheels::splat(speed));
+    round(MecanumWheels::splat(speed));
     round(DifferentialWheels { left: Some(speed), right: None });
     round(ModuleState::new(speed, Angle::from_degrees(700.0)));
     round(WheelLoad { torque: -2.0, speed_rad_s: 30.0 });

@@ -4,7 +4,7 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
-    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, OmniWheel, SteeringConfig, Swerve,
+    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, SteeringConfig, Swerve,
     SwerveSteering, WheelSpeed,
 };
 use drivetrain::control::PidConfig;
@@ -37,7 +37,7 @@ fuzz_target!(|data: &[u8]| {
         }
         3 => {
             let wheel = |input: &mut Input| {
-                OmniWheel::tangential(Angle::from_radians(input.float()), input.positive())
+                Pose2::tangential(Angle::from_radians(input.float()), input.positive())
             };
             let wheels = [wheel(&mut input), wheel(&mut input), wheel(&mut input)];
             let Ok(layout) = Omni::<3>::new(radius, wheels) else { return };

@@ -6,8 +6,8 @@
 //! | layout | wheels | remarks |
 //! |---|---|---|
 //! | [`Mecanum`] | [`MecanumWheels`] | both roller mountings |
-//! | [`OmniThree`], [`OmniFour`] | [`OmniThreeWheels`], [`OmniFourWheels`] | positive rolls counter-clockwise |
 //! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
+//! | [`Omni::three`], [`Omni::four`] | an array, front left first | positive rolls counter-clockwise |
 //! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
@@ -75,11 +75,11 @@ pub use limits::ChassisLimits;
 pub use mecanum::{FloorO, FloorX, Mecanum, MecanumGeometry, RollerMounting};
 pub use mode::{Mode, ModeConfig, Modes};
 pub use odometry::Odometry;
-pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
+pub use omni::Omni;
 pub use power::{PowerCut, PowerModel, WheelLoad};
 pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
 pub use status::ChassisStatus;
 pub use steering::{SteeringConfig, SwerveSteering};
 pub use swerve::{ModuleState, Swerve};
-pub use wheels::{DifferentialWheels, MecanumWheels, OmniFourWheels, OmniThreeWheels};
+pub use wheels::{DifferentialWheels, MecanumWheels};

@@ -4,11 +4,11 @@ use crate::motor::TargetError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Chassis, OmniThree, OmniThreeWheels};
+/// use drivetrain::chassis::{Chassis, Omni};
 /// use drivetrain::time::{Instant, Tick};
 ///
-/// let mut chassis = Chassis::new(OmniThree::new(0.05, 0.2)?);
-/// let _ = chassis.update(OmniThreeWheels::splat(None), Tick::new(Instant::from_micros(1_000), 0.001));
+/// let mut chassis = Chassis::new(Omni::three(0.05, 0.2)?);
+/// let _ = chassis.update([None; 3], Tick::new(Instant::from_micros(1_000), 0.001));
 /// let status = chassis.status();
 /// assert_eq!((status.motion_known, status.lost_wheels), (false, 3));
 /// assert_eq!(status.blind_s, 0.001);

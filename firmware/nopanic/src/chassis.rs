@@ -15,16 +15,11 @@ pub fn call_all() {
     Mecanum::<FloorO>::with_rollers.call();
     Mecanum::<FloorO>::inverse.call();
     Mecanum::<FloorX>::forward.call();
-    OmniWheel::tangential.call();
     Omni::<4>::new.call();
     Omni::<4>::inverse.call();
     Omni::<4>::forward.call();
-    OmniThree::new.call();
-    OmniThree::inverse.call();
-    OmniThree::forward.call();
-    OmniFour::new.call();
-    OmniFour::inverse.call();
-    OmniFour::forward.call();
+    Omni::three.call();
+    Omni::four.call();
     SteeringConfig::new.call();
     SteeringConfig::with_hysteresis.call();
     SteeringConfig::with_hold_below.call();
@@ -115,7 +110,7 @@ pub fn call_all() {
     PowerFit::rejected.call();
     (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
         .call();
-    wheels!(DifferentialWheels MecanumWheels OmniThreeWheels OmniFourWheels);
+    wheels!(DifferentialWheels MecanumWheels);
 }
 
 /// What a macro gives to every set of wheels, which it calls `name`.
