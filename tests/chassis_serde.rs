@@ -6,7 +6,7 @@
 use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
-    ModeConfig, Modes, ModuleState, PowerModel, SteeringConfig, Swerve, SwerveSteering, WheelLoad,
+    ModeConfig, Modes, ModuleState, PowerModel, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -85,8 +85,6 @@ fn values_of_the_chassis_survive_a_file() {
     round(WheelLoad { torque: -2.0, speed_rad_s: 30.0 });
     round(PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap());
     round(ChassisLimits::new().with_acceleration(3.0, 20.0).with_wheel_speed(speed.abs()));
-    round(SteeringConfig::new().with_hysteresis(Angle::from_degrees(9.0)));
-    round(SteeringConfig::new().without_cosine_compensation().with_hold_below(speed));
     let modes = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0));
     round(modes.with_rotor(6.0, 2.0, 3.0).with_alternating_rotor());
     round(modes.with_gimbal_timeout(0.05).with_relax_without_gimbal().with_transition(0.1));
@@ -139,20 +137,6 @@ fn a_power_model_with_a_negative_loss_is_refused() {
     let model = PowerModel::new(1.0, 0.5, 0.25, 0.0).unwrap();
     let error = read::<PowerModel>(&spoiled(model, "\"k2\":0.25", "\"k2\":-0.25")).unwrap_err();
     assert!(error.starts_with("k2 must be finite and zero or more"), "{error}");
-}
-
-#[test]
-fn a_steering_configuration_with_a_negative_hysteresis_is_the_positive_one() {
-    let config = SteeringConfig::new().with_hysteresis(Angle::from_radians(0.5));
-    let read = read::<SteeringConfig>(&spoiled(config, "0.5", "-0.5")).unwrap();
-    assert_eq!(read, config);
-    // With a hysteresis below zero the drive would flip to and fro.
-    let places = [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)];
-    let swerve = Swerve::new(0.05, places).unwrap().with_steering(read);
-    let wanted = ModuleState::new(AngularVelocity::from_rad_per_s(1.0), Angle::from_degrees(95.0));
-    let measured = [Some(Angle::ZERO); 2];
-    let [module, _] = swerve.steer(&mut SwerveSteering::new(), [wanted; 2], measured);
-    assert!((module.angle.as_degrees() - 95.0).abs() < 1e-3);
 }
 
 #[test]

@@ -4,8 +4,8 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
-    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, SteeringConfig, Swerve,
-    SwerveSteering, WheelSpeed,
+    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, Swerve, SwerveSteering,
+    WheelSpeed,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
@@ -46,8 +46,7 @@ fuzz_target!(|data: &[u8]| {
         4 => {
             let places = [vec2(&mut input), vec2(&mut input), vec2(&mut input), vec2(&mut input)];
             let Ok(layout) = Swerve::<4>::new(radius, places) else { return };
-            let config = SteeringConfig::new().with_hysteresis(Angle::from_radians(input.float()));
-            let layout = layout.with_steering(config);
+            let layout = layout.with_hysteresis(Angle::from_radians(input.float()));
             let mut steering = SwerveSteering::new();
             drive(layout, input, |input| {
                 let wanted = core::array::from_fn(|_| {

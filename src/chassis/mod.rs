@@ -80,6 +80,6 @@ pub use power::{PowerCut, PowerModel, WheelLoad};
 pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
 pub use status::ChassisStatus;
-pub use steering::{SteeringConfig, SwerveSteering};
+pub use steering::SwerveSteering;
 pub use swerve::{ModuleState, Swerve};
 pub use wheels::{DifferentialWheels, MecanumWheels};

@@ -1,7 +1,8 @@
 use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
 use super::omni::zip_arrays;
-use super::{ChassisError, Kinematics, SteeringConfig, SwerveSteering, WheelSpeed};
+use super::steering::Steering;
+use super::{ChassisError, Kinematics, SwerveSteering, WheelSpeed};
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
 use crate::units::{Angle, AngularVelocity};
@@ -88,7 +89,7 @@ pub struct Swerve<const N: usize> {
     shares: [[Twist<Body>; 2]; N],
     wheel_radius_m: f32,
     per_radius: f32,
-    steering: SteeringConfig,
+    pub(super) steering: Steering,
 }
 
 /// What a module sees of a motion: the velocity of its place forward, and to the left.
@@ -113,18 +114,8 @@ impl<const N: usize> Swerve<N> {
             .ok_or(ChassisError::Singular("the rotation"))?;
         let shares = positions_m
             .map(|position| rows(position).map(|row| inverse.share(row) * wheel_radius_m));
-        let (per_radius, steering) = (1.0 / wheel_radius_m, SteeringConfig::new());
+        let (per_radius, steering) = (1.0 / wheel_radius_m, Steering::new());
         Ok(Self { positions_m, shares, wheel_radius_m, per_radius, steering })
-    }
-
-    /// Sets how the modules are steered; [`SteeringConfig::new`] otherwise.
-    #[must_use]
-    pub const fn with_steering(self, steering: SteeringConfig) -> Self {
-        Self { steering, ..self }
-    }
-
-    pub(super) const fn steering_config(&self) -> SteeringConfig {
-        self.steering
     }
 
     /// Returns the places of the modules in m.
