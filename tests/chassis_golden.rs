@@ -3,7 +3,7 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Differential, DifferentialGeometry, DifferentialWheels, FloorX, Mecanum, MecanumGeometry,
+    Differential, DifferentialGeometry, DifferentialWheels, Mecanum, MecanumGeometry,
     MecanumWheels, ModuleState, Omni, Swerve,
 };
 use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
@@ -74,7 +74,7 @@ fn mecanum_with_both_roller_mountings() {
         |wheels| usual.forward(MecanumWheels::from_array(wheels)),
     );
     let wide = MecanumGeometry { half_wheelbase_m: 0.1, half_track_m: 0.3, ..geometry };
-    let other = Mecanum::<FloorX>::with_rollers(wide).unwrap();
+    let other = Mecanum::<'X'>::with_rollers(wide).unwrap();
     compare(
         "mecanum_x",
         |twist| other.inverse(twist).into_array(),

@@ -4,8 +4,8 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Differential, DifferentialGeometry, FloorX, Kinematics, Mecanum, MecanumGeometry, ModuleState,
-    Omni, Swerve, WheelSpeed,
+    Differential, DifferentialGeometry, Kinematics, Mecanum, MecanumGeometry, ModuleState, Omni,
+    Swerve, WheelSpeed,
 };
 use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -168,7 +168,7 @@ proptest! {
         // With the other rollers the lever arm is the difference.
         let reach_m = (half_track_m - half_wheelbase_m).abs();
         if reach_m > 0.05 && reach_m > 0.04 * half_track_m.hypot(half_wheelbase_m) {
-            laws(&Mecanum::<FloorX>::with_rollers(geometry).unwrap(), &case, reach_m, EXACT)?;
+            laws(&Mecanum::<'X'>::with_rollers(geometry).unwrap(), &case, reach_m, EXACT)?;
         }
     }
 

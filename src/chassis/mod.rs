@@ -72,7 +72,7 @@ pub use drive::{ModuleMotors, WheelDrive};
 pub use error::ChassisError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::ChassisLimits;
-pub use mecanum::{FloorO, FloorX, Mecanum, MecanumGeometry, RollerMounting};
+pub use mecanum::{Mecanum, MecanumGeometry};
 pub use mode::{Mode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::Omni;

@@ -11,10 +11,10 @@ pub fn call_all() {
     Differential::new.call();
     Differential::inverse.call();
     Differential::forward.call();
-    Mecanum::<FloorO>::new.call();
-    Mecanum::<FloorO>::with_rollers.call();
-    Mecanum::<FloorO>::inverse.call();
-    Mecanum::<FloorX>::forward.call();
+    Mecanum::<'O'>::new.call();
+    Mecanum::<'O'>::with_rollers.call();
+    Mecanum::<'O'>::inverse.call();
+    Mecanum::<'X'>::forward.call();
     Omni::<4>::new.call();
     Omni::<4>::inverse.call();
     Omni::<4>::forward.call();
