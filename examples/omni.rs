@@ -9,7 +9,7 @@
 mod course;
 
 use course::Sample;
-use drivetrain::chassis::{Chassis, ChassisLimits, OmniThree, OmniThreeWheels};
+use drivetrain::chassis::{Chassis, ChassisLimits, Omni};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::Vec2;
@@ -37,21 +37,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     course::judge(&samples)
 }
 
-type Wheels = OmniThreeWheels<Handle<M3508>>;
+/// Front left, front right, rear.
+type Wheels = [Handle<M3508>; 3];
 
 /// The robot, and the floor under it: each wheel rolls counter-clockwise round the centre.
 fn robot(world: &World) -> Result<(Bus, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new().with_load_ceiling(0.9);
     let mut floor = Vec::new();
-    let places =
-        OmniThreeWheels { front_left: (1, 60.0), front_right: (2, -60.0), rear: (3, 180.0) };
-    let wheels = places.try_map(|(id, degrees)| -> Result<_, Box<dyn Error>> {
+    let mut wheel = |id, degrees: f32| -> Result<_, Box<dyn Error>> {
         let motor = world.attach(MotorConfig::new(Model::M3508, id))?;
-        let (sine, cosine) = f32::to_radians(degrees).sin_cos();
+        let (sine, cosine) = degrees.to_radians().sin_cos();
         let place = Vec2::new(cosine, sine) * DISTANCE_M;
         floor.push(Wheel::omni(motor, WHEEL_RADIUS_M, place, Angle::from_degrees(degrees + 90.0)));
         Ok(bus.attach(Config::<M3508>::new(id).speed_loop(SPEED))?)
-    })?;
+    };
+    let wheels = [wheel(1, 60.0)?, wheel(2, -60.0)?, wheel(3, 180.0)?];
     world.attach_chassis(ChassisConfig::new(&floor).with_mass_kg(15.0))?;
     Ok((bus, wheels))
 }
@@ -59,7 +59,7 @@ fn robot(world: &World) -> Result<(Bus, Wheels), Box<dyn Error>> {
 fn drive(world: &World) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
     let (bus, wheels) = robot(world)?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    let mut chassis = Chassis::new(OmniThree::new(WHEEL_RADIUS_M, DISTANCE_M)?);
+    let mut chassis = Chassis::new(Omni::three(WHEEL_RADIUS_M, DISTANCE_M)?);
     let limits = ChassisLimits::new()
         .with_acceleration(4.0, 20.0)
         .with_wheel_speed(AngularVelocity::from_rpm(450.0));
@@ -86,8 +86,8 @@ fn drive(world: &World) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
             planned_m: course::plan(time_s).0,
             driven_m,
             believed_m: course::place(chassis.pose()),
-            target_rpm: targets.map(AngularVelocity::as_rpm).into_array(),
-            measured_rpm: wheels.map(rpm).into_array(),
+            target_rpm: targets.map(AngularVelocity::as_rpm),
+            measured_rpm: wheels.map(rpm),
         });
         runner.tick(tick);
     }

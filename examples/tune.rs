@@ -11,7 +11,7 @@ mod arguments;
 mod console;
 
 use drivetrain::control::{
-    Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse, TuningRule,
+    Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepResponse, TuningRule,
 };
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::runner::{Nb, Runner};
@@ -113,7 +113,7 @@ fn identify<M: Model>(plan: &Plan<M>) -> Outcome<Oscillation> {
     }
 }
 
-fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepMeasures, Curve)> {
+fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepResponse, Curve)> {
     let mut response = StepResponse::new(0.0, plan.step_to, 1.0, 0.05)?;
     let (mut curve, mut time_s) = (Curve::new(), 0.0);
     run(plan, speed, 2, |bus, motor, speed, dt_s| {
@@ -124,7 +124,7 @@ fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepMeasures, Cu
             time_s += dt_s;
         }
     })?;
-    Ok((response.measures(), curve))
+    Ok((response, curve))
 }
 
 fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
@@ -138,23 +138,23 @@ fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
     ));
     let (before, before_curve) = step(plan, plan.guessed)?;
     report("guessed", plan.guessed, &before);
-    let gains = found.gains(plan.rule);
-    let (after, after_curve) = step(plan, gains.config())?;
-    report(&format!("{:?}", gains.rule), gains.config(), &after);
+    let gains = found.pid(plan.rule);
+    let (after, after_curve) = step(plan, gains)?;
+    report(&format!("{:?}", plan.rule), gains, &after);
     Ok(Tuned { name: plan.name, target: plan.step_to, before: before_curve, after: after_curve })
 }
 
-fn report(title: &str, speed: PidConfig, measures: &StepMeasures) {
+fn report(title: &str, speed: PidConfig, measures: &StepResponse) {
     let ms = |time_s: Option<f32>| time_s.map_or("never".into(), |s| format!("{:.0} ms", 1e3 * s));
     let (kp, ki, _) = speed.gains();
     console::line(format_args!(
         "  {title:<15} kp {:.3}  ki {:.2}   rise {}, overshoot {:.1} %, settled (5 %) {}, steady error {:+.3} rad/s",
         kp,
         ki,
-        ms(measures.rise_time_s),
-        100.0 * measures.overshoot,
-        ms(measures.settling_time_s),
-        measures.steady_error,
+        ms(measures.rise_time_s()),
+        100.0 * measures.overshoot(),
+        ms(measures.settling_time_s()),
+        measures.steady_error(),
     ));
 }
 

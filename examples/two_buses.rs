@@ -7,9 +7,7 @@
 
 mod console;
 
-use drivetrain::chassis::{
-    Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels, MotionSource,
-};
+use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
@@ -202,9 +200,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             before = truth.twist.linear().norm();
         }
         if ms % 250 == 249 {
-            let heard = match status.source {
-                MotionSource::Unknown => "a bus is down".into(),
-                _ => format!("{:5.2} m/s, x {:4.2} m", robot.chassis.measured().vx_m_s, pose.x_m),
+            let heard = if status.motion_known {
+                format!("{:5.2} m/s, x {:4.2} m", robot.chassis.measured().vx_m_s, pose.x_m)
+            } else {
+                "a bus is down".into()
             };
             let (vx_m_s, x_m) = (truth.twist.vx_m_s, truth.x_m);
             console::line(format_args!(

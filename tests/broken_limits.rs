@@ -7,9 +7,8 @@
 mod own;
 
 use drivetrain::chassis::{
-    BufferError, Chassis, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
-    Kinematics, LimitError, ModeConfig, ModeError, Modes, OmniThree, OmniThreeWheels, PowerBuffer,
-    PowerError, PowerFit, PowerModel, Swerve, WheelLoad,
+    Chassis, ChassisError, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
+    Kinematics, ModeConfig, Modes, Omni, PowerBuffer, PowerFit, PowerModel, Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, LoopError, M3508};
@@ -89,7 +88,7 @@ fn a_power_buffer_allows_with_a_limit_that_is_none_what_it_allows_with_zero() {
 #[test]
 fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     let gains = PidConfig::new(2.0, 0.0, 0.0);
-    let refused = |name| Err(BufferError::Value(PowerError::Negative(name)));
+    let refused = |name| Err(ChassisError::Negative(name));
     for bad in NOT_FINITE.into_iter().chain([-0.1]) {
         assert_eq!(PowerBuffer::new(bad, gains), refused("reserve_j"), "{bad}");
         let buffer = PowerBuffer::new(20.0, gains).unwrap();
@@ -97,12 +96,12 @@ fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     }
     for bad in NOT_FINITE {
         let limited = PowerBuffer::new(20.0, gains.with_output_limit(bad));
-        assert!(matches!(limited, Err(BufferError::Pid(_))), "{bad}");
+        assert!(matches!(limited, Err(ChassisError::Loop(_, _))), "{bad}");
         for parameter in 0..4 {
             let [mut k0, mut k1, mut k2, mut k3] = [1.0; 4];
             *[&mut k0, &mut k1, &mut k2, &mut k3][parameter] = bad;
             let name = ["k0", "k1", "k2", "k3"][parameter];
-            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(PowerError::Negative(name)), "{bad}");
+            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(ChassisError::Negative(name)), "{bad}");
         }
     }
 }
@@ -131,7 +130,7 @@ fn a_forgetting_factor_that_is_none_is_one() {
 fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
     let geometry = DifferentialGeometry { wheel_radius_m: 0.05, half_track_m: 0.2 };
     let two = Differential::new(geometry).unwrap();
-    let three = OmniThree::new(0.05, 0.2).unwrap();
+    let three = Omni::three(0.05, 0.2).unwrap();
     let swerve = Swerve::new(0.05, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)]).unwrap();
     let twist = Twist::new(1.0, 0.0, -1.0);
     let limit = AngularVelocity::from_rad_per_s;
@@ -141,7 +140,7 @@ fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
         assert_eq!(two.desaturate(wheels, limit(bad)), DifferentialWheels::splat(still), "{bad}");
         assert_eq!(wheels.desaturate(limit(bad)), DifferentialWheels::splat(still), "{bad}");
         let wheels = three.inverse(twist);
-        assert_eq!(three.desaturate(wheels, limit(bad)), OmniThreeWheels::splat(still), "{bad}");
+        assert_eq!(three.desaturate(wheels, limit(bad)), [still; 3], "{bad}");
         let modules = swerve.inverse(twist);
         let told = swerve.desaturate(modules, limit(bad));
         assert!(told.iter().all(|module| module.velocity == still), "{bad}: {told:?}");
@@ -165,14 +164,14 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
             (limits.with_wheel_speed(speed(bad)), "wheel speed"),
             (limits.with_command_timeout(bad), "command timeout"),
         ] {
-            assert_eq!(limits.validate(), Err(LimitError::NotPositive(name)), "{bad}");
-            assert_eq!(chassis.set_limits(limits), Err(LimitError::NotPositive(name)), "{bad}");
+            assert_eq!(limits.validate(), Err(ChassisError::NotAboveZero(name)), "{bad}");
+            assert_eq!(chassis.set_limits(limits), Err(ChassisError::NotAboveZero(name)), "{bad}");
         }
     }
     // For ever, or as good as that: a dead program would drive on.
     for too_long_s in [f32::INFINITY, f32::MAX, 3_600.0, 1.000_001] {
         let limits = limits.with_command_timeout(too_long_s);
-        let refused = LimitError::TooLong("command timeout");
+        let refused = ChassisError::TooLong("command timeout");
         assert_eq!(limits.validate(), Err(refused), "{too_long_s}");
         assert_eq!(chassis.set_limits(limits), Err(refused), "{too_long_s}");
     }
@@ -192,19 +191,18 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
 #[test]
 fn modes_refuse_what_is_none() {
     let config = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1));
-    let then = drivetrain::chassis::WithoutGimbal::Relax;
     for bad in NOT_FINITE.into_iter().chain([-0.1]) {
         for (config, name) in [
             (config.with_rotor(bad, 0.0, 0.0), "the rotor's base"),
             (config.with_rotor(6.0, bad, 0.0), "the rotor's swing"),
             (config.with_rotor(6.0, 0.0, bad), "the rotor's frequency"),
-            (config.with_gimbal_timeout(bad, then), "the gimbal's timeout"),
+            (config.with_gimbal_timeout(bad), "the gimbal's timeout"),
             (config.with_transition(bad), "the transition"),
         ] {
-            assert_eq!(Modes::new(config).err(), Some(ModeError::Negative(name)), "{bad}");
+            assert_eq!(Modes::new(config).err(), Some(ChassisError::Negative(name)), "{bad}");
         }
         let limited = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(bad));
-        assert!(matches!(Modes::new(limited), Err(ModeError::Follow(_))), "{bad}");
+        assert!(matches!(Modes::new(limited), Err(ChassisError::Loop(_, _))), "{bad}");
     }
 }
 

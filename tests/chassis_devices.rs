@@ -4,8 +4,7 @@
 #![cfg(feature = "sim")]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumGeometry, MecanumWheels, MotionSource,
-    WheelDrive,
+    Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumGeometry, MecanumWheels, WheelDrive,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -225,9 +224,10 @@ fn with_a_lost_bus(mut each: impl FnMut(&mut TwoBuses, u32)) {
 fn the_wheels_of_a_lost_bus_refuse_and_the_others_are_driven() {
     let mut refusals = Vec::new();
     with_a_lost_bus(|robot, ms| {
-        let ChassisStatus { refused, refusal, lost_wheels, source, .. } = *robot.chassis.status();
+        let ChassisStatus { refused, refusal, lost_wheels, motion_known, .. } =
+            *robot.chassis.status();
         if ms > 20 {
-            refusals.push((refused, refusal, lost_wheels, source));
+            refusals.push((refused, refusal, lost_wheels, motion_known));
         }
         if ms == 1_500 {
             let [front_left, front_right, rear_left, rear_right] = robot.amperes();
@@ -236,14 +236,10 @@ fn the_wheels_of_a_lost_bus_refuse_and_the_others_are_driven() {
         }
     });
     refusals.dedup();
-    let lost = |why| (2, Some(why), 2, MotionSource::Unknown);
+    let lost = |why| (2, Some(why), 2, false);
     assert_eq!(
         refusals,
-        [
-            (0, None, 0, MotionSource::AllWheels),
-            lost(TargetError::NoFeedback),
-            lost(TargetError::Relaxed)
-        ]
+        [(0, None, 0, true), lost(TargetError::NoFeedback), lost(TargetError::Relaxed)]
     );
 }
 

@@ -3,11 +3,10 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Differential, DifferentialGeometry, DifferentialWheels, FloorX, Mecanum, MecanumGeometry,
-    MecanumWheels, ModuleState, Omni, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels,
-    OmniWheel, Swerve,
+    Differential, DifferentialGeometry, DifferentialWheels, Mecanum, MecanumGeometry,
+    MecanumWheels, ModuleState, Omni, Swerve,
 };
-use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
 
 const GOLDEN: &str = include_str!("data/chassis/golden.txt");
@@ -75,7 +74,7 @@ fn mecanum_with_both_roller_mountings() {
         |wheels| usual.forward(MecanumWheels::from_array(wheels)),
     );
     let wide = MecanumGeometry { half_wheelbase_m: 0.1, half_track_m: 0.3, ..geometry };
-    let other = Mecanum::<FloorX>::with_rollers(wide).unwrap();
+    let other = Mecanum::<'X'>::with_rollers(wide).unwrap();
     compare(
         "mecanum_x",
         |twist| other.inverse(twist).into_array(),
@@ -85,22 +84,11 @@ fn mecanum_with_both_roller_mountings() {
 
 #[test]
 fn omni_with_three_four_and_scattered_wheels() {
-    let three = OmniThree::new(0.05, 0.2).unwrap();
-    compare(
-        "omni_three",
-        |twist| three.inverse(twist).into_array(),
-        |wheels| three.forward(OmniThreeWheels::from_array(wheels)),
-    );
-    let four = OmniFour::new(0.05, 0.25).unwrap();
-    compare(
-        "omni_four",
-        |twist| four.inverse(twist).into_array(),
-        |wheels| four.forward(OmniFourWheels::from_array(wheels)),
-    );
-    let wheel = |x, y, degrees| OmniWheel {
-        position_m: Vec2::new(x, y),
-        direction: Angle::from_degrees(degrees),
-    };
+    let three = Omni::three(0.05, 0.2).unwrap();
+    compare("omni_three", |twist| three.inverse(twist), |wheels| three.forward(wheels));
+    let four = Omni::four(0.05, 0.25).unwrap();
+    compare("omni_four", |twist| four.inverse(twist), |wheels| four.forward(wheels));
+    let wheel = |x, y, degrees| Pose2::new(x, y, Angle::from_degrees(degrees));
     let scattered = [
         wheel(0.3, 0.1, 100.0),
         wheel(0.0, -0.2, 10.0),

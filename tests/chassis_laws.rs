@@ -4,10 +4,10 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Differential, DifferentialGeometry, FloorX, Kinematics, Mecanum, MecanumGeometry, ModuleState,
-    Omni, OmniFour, OmniThree, OmniWheel, Swerve, WheelSpeed,
+    Differential, DifferentialGeometry, Kinematics, Mecanum, MecanumGeometry, ModuleState, Omni,
+    Swerve, WheelSpeed,
 };
-use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
 use proptest::prelude::*;
 
@@ -143,13 +143,13 @@ fn radius() -> impl Strategy<Value = f32> {
 }
 
 /// Wheels all round, none at its place exactly: `N` of them determine every motion well.
-fn omni<const N: usize>(jitters: [(f32, f32, f32); N]) -> [OmniWheel; N] {
+fn omni<const N: usize>(jitters: [(f32, f32, f32); N]) -> [Pose2<Body>; N] {
     let step = core::f32::consts::TAU / f32::from(u8::try_from(N).unwrap());
     let mut angle = 0.0;
     jitters.map(|(shift, distance, turn)| {
         angle += step;
-        let mut wheel = OmniWheel::tangential(Angle::from_radians(angle + shift), distance);
-        wheel.direction = wheel.direction + Angle::from_radians(turn);
+        let mut wheel = Pose2::tangential(Angle::from_radians(angle + shift), distance);
+        wheel.angle = wheel.angle + Angle::from_radians(turn);
         wheel
     })
 }
@@ -168,7 +168,7 @@ proptest! {
         // With the other rollers the lever arm is the difference.
         let reach_m = (half_track_m - half_wheelbase_m).abs();
         if reach_m > 0.05 && reach_m > 0.04 * half_track_m.hypot(half_wheelbase_m) {
-            laws(&Mecanum::<FloorX>::with_rollers(geometry).unwrap(), &case, reach_m, EXACT)?;
+            laws(&Mecanum::<'X'>::with_rollers(geometry).unwrap(), &case, reach_m, EXACT)?;
         }
     }
 
@@ -177,8 +177,8 @@ proptest! {
         case in cases(), radius in radius(), distance in length(),
         three in jitters::<3>(), four in jitters::<4>(), five in jitters::<5>()
     ) {
-        laws(&OmniThree::new(radius, distance).unwrap(), &case, distance, EXACT)?;
-        laws(&OmniFour::new(radius, distance).unwrap(), &case, distance, EXACT)?;
+        laws(&Omni::three(radius, distance).unwrap(), &case, distance, EXACT)?;
+        laws(&Omni::four(radius, distance).unwrap(), &case, distance, EXACT)?;
         laws(&Omni::new(radius, omni(three)).unwrap(), &case, 0.1, EXACT)?;
         laws(&Omni::new(radius, omni(four)).unwrap(), &case, 0.1, EXACT)?;
         laws(&Omni::new(radius, omni(five)).unwrap(), &case, 0.1, EXACT)?;

@@ -4,9 +4,7 @@
 #![cfg(test)]
 
 use core::f32::consts::FRAC_1_SQRT_2;
-use drivetrain::chassis::{
-    Mecanum, MecanumGeometry, MecanumWheels, OmniFour, PowerModel, WheelLoad,
-};
+use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels, Omni, PowerModel, WheelLoad};
 use drivetrain::geometry::{Heading, Twist, World};
 use drivetrain::math::{wrap, wrap_positive};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -62,7 +60,7 @@ fn degrees_and_radians_are_one_angle() {
 // y forward; its wheels 1 to 4 stand rear right, rear left, front left, front right.
 #[test]
 fn the_third_seeds_rows_with_a_heading_turn_the_whole_command() {
-    let layout = OmniFour::new(0.05, 0.2).unwrap();
+    let layout = Omni::four(0.05, 0.2).unwrap();
     for degrees in [0.0_f32, 30.0, 90.0, 135.0, -160.0] {
         let (x, y, w) = (0.3, 0.8, 1.5);
         let (sine, cosine) = degrees.to_radians().sin_cos();
@@ -71,12 +69,13 @@ fn the_third_seeds_rows_with_a_heading_turn_the_whole_command() {
         let row =
             |sign_x: f32, sign_y: f32| FRAC_1_SQRT_2 * (sign_x * across + sign_y * ahead) + 0.2 * w;
         let heading = Heading::new(Angle::from_degrees(degrees));
-        let ours = layout.inverse(Twist::<World>::new(y, -x, w).to_body(heading));
+        let [front_left, front_right, rear_left, rear_right] =
+            layout.inverse(Twist::<World>::new(y, -x, w).to_body(heading));
         let pairs = [
-            (ours.rear_right, row(1.0, 1.0)),
-            (ours.rear_left, row(1.0, -1.0)),
-            (ours.front_left, row(-1.0, -1.0)),
-            (ours.front_right, row(-1.0, 1.0)),
+            (rear_right, row(1.0, 1.0)),
+            (rear_left, row(1.0, -1.0)),
+            (front_left, row(-1.0, -1.0)),
+            (front_right, row(-1.0, 1.0)),
         ];
         for (is, should) in pairs {
             let is = is.as_rad_per_s() * 0.05;

@@ -6,8 +6,7 @@
 use core::fmt::Debug;
 use drivetrain::chassis::{
     ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
-    ModeConfig, Modes, ModuleState, OmniFourWheels, OmniThreeWheels, OmniWheel, PowerModel, Spin,
-    SteeringConfig, Swerve, SwerveSteering, WheelLoad, WithoutGimbal,
+    ModeConfig, Modes, ModuleState, PowerModel, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -78,20 +77,17 @@ fn values_of_the_chassis_survive_a_file() {
     let speed = AngularVelocity::from_rad_per_s(-3.5);
     round(MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 });
     round(DifferentialGeometry { wheel_radius_m: 0.076, half_track_m: 0.18 });
-    round(OmniWheel::tangential(Angle::from_degrees(60.0), 0.2));
+    round(Pose2::<Body>::tangential(Angle::from_degrees(60.0), 0.2));
     round(MecanumWheels { front_left: 1_u8, front_right: 2, rear_left: 3, rear_right: 4 });
-    round(OmniThreeWheels { front_left: speed, front_right: speed * 2.0, rear: speed });
-    round(OmniFourWheels::splat(speed));
+    round(MecanumWheels::splat(speed));
     round(DifferentialWheels { left: Some(speed), right: None });
     round(ModuleState::new(speed, Angle::from_degrees(700.0)));
     round(WheelLoad { torque: -2.0, speed_rad_s: 30.0 });
     round(PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap());
     round(ChassisLimits::new().with_acceleration(3.0, 20.0).with_wheel_speed(speed.abs()));
-    round(SteeringConfig::new().with_hysteresis(Angle::from_degrees(9.0)));
-    round(SteeringConfig::new().without_cosine_compensation().with_hold_below(speed));
     let modes = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0));
-    round(modes.with_rotor(6.0, 2.0, 3.0).with_spin(Spin::Alternate));
-    round(modes.with_gimbal_timeout(0.05, WithoutGimbal::Relax).with_transition(0.1));
+    round(modes.with_rotor(6.0, 2.0, 3.0).with_alternating_rotor());
+    round(modes.with_gimbal_timeout(0.05).with_relax_without_gimbal().with_transition(0.1));
     for mode in [Mode::Relax, Mode::FollowGimbal, Mode::Rotor, Mode::Independent] {
         round(mode);
     }
@@ -141,20 +137,6 @@ fn a_power_model_with_a_negative_loss_is_refused() {
     let model = PowerModel::new(1.0, 0.5, 0.25, 0.0).unwrap();
     let error = read::<PowerModel>(&spoiled(model, "\"k2\":0.25", "\"k2\":-0.25")).unwrap_err();
     assert!(error.starts_with("k2 must be finite and zero or more"), "{error}");
-}
-
-#[test]
-fn a_steering_configuration_with_a_negative_hysteresis_is_the_positive_one() {
-    let config = SteeringConfig::new().with_hysteresis(Angle::from_radians(0.5));
-    let read = read::<SteeringConfig>(&spoiled(config, "0.5", "-0.5")).unwrap();
-    assert_eq!(read, config);
-    // With a hysteresis below zero the drive would flip to and fro.
-    let places = [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)];
-    let swerve = Swerve::new(0.05, places).unwrap().with_steering(read);
-    let wanted = ModuleState::new(AngularVelocity::from_rad_per_s(1.0), Angle::from_degrees(95.0));
-    let measured = [Some(Angle::ZERO); 2];
-    let [module, _] = swerve.steer(&mut SwerveSteering::new(), [wanted; 2], measured);
-    assert!((module.angle.as_degrees() - 95.0).abs() < 1e-3);
 }
 
 #[test]

@@ -62,6 +62,14 @@ macro_rules! subjects {
 #[derive(Debug)]
 struct ByError(PositionActuator);
 
+/// A [`Window`] that is asked for its mean.
+#[derive(Debug)]
+struct Mean(Window<5>);
+
+/// A [`Window`] that is asked for its median.
+#[derive(Debug)]
+struct Median(Window<5>);
+
 subjects! {
     Pid, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.rejected();
     Cascade, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.position().rejected().max(it.speed().rejected());
@@ -73,12 +81,12 @@ subjects! {
     LowPass, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     SlewLimiter, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     Biquad, 1, it, [a, ..], _ => it.update(a), it.rejected();
-    MovingAverage<5>, 1, it, [a, ..], _ => it.update(a), it.rejected();
-    Median<5>, 1, it, [a, ..], _ => it.update(a), it.rejected();
+    Mean, 1, it, [a, ..], _ => it.0.push(a).mean(), it.0.rejected();
+    Median, 1, it, [a, ..], _ => it.0.push(a).median(), it.0.rejected();
     RelayTuner, 2, it, [a, b, _], dt_s => it.update(a, b, dt_s), it.rejected();
     StepResponse, 1, it, [a, ..], dt_s => {
         it.record(a, dt_s);
-        it.measures().overshoot
+        it.overshoot()
     }, it.rejected();
 }
 
@@ -139,8 +147,8 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (StartsAnew, Box::new(RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).unwrap())),
         (NoTime, Box::new(Biquad::low_pass(30.0, Biquad::BUTTERWORTH, 1000.0).unwrap())),
         (NoTime, Box::new(Biquad::notch(60.0, 2.0, 1000.0).unwrap())),
-        (NoTime, Box::new(MovingAverage::<5>::new())),
-        (NoTime, Box::new(Median::<5>::new())),
+        (NoTime, Box::new(Mean(Window::new()))),
+        (NoTime, Box::new(Median(Window::new()))),
     ]
 }
 
@@ -433,7 +441,7 @@ fn a_positive_kd_damps_in_every_controller_by_every_way_in() {
 #[test]
 fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
     const SPEED: SpeedActuatorConfig = SpeedActuatorConfig::new(GAINS).with_feedback_filter(100.0);
-    const MADE: [bool; 16] = [
+    const MADE: [bool; 15] = [
         Pid::new(every_option()).is_ok(),
         Pid::new(GAINS.with_incremental_form().with_tracking(5.0)).is_ok(),
         Cascade::new(GAINS, GAINS).is_ok(),
@@ -444,14 +452,13 @@ fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
         LowPass::new(10.0).is_ok(),
         Biquad::low_pass(30.0, Biquad::BUTTERWORTH, 1000.0).is_ok(),
         Biquad::notch(60.0, 2.0, 1000.0).is_ok(),
-        MovingAverage::<5>::new().rejected() == 0,
-        Median::<5>::new().rejected() == 0,
+        Window::<5>::new().rejected() == 0,
         SlewLimiter::new(1.0, 2.0).is_ok() && MotionLimits::new(1.0, 1.0).validate().is_ok(),
         FeedForward::new(0.3, 0.05, 0.01).is_ok(),
         RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).is_ok(),
         StepResponse::new(0.0, 1.0, 1.0, 0.02).is_ok(),
     ];
-    assert_eq!(MADE, [true; 16]);
+    assert_eq!(MADE, [true; 15]);
 }
 
 #[test]
@@ -460,15 +467,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
     let rows: String = source.lines().filter(|line| line.starts_with("//! |")).collect();
     let public = source.split("pub use ").skip(1).filter_map(|rest| rest.split(';').next());
     let names = public.flat_map(|uses| uses.split(|letter: char| !letter.is_alphanumeric()));
-    let parts = [
-        "Terms",
-        "TimeStep",
-        "Gains",
-        "Oscillation",
-        "StepMeasures",
-        "MotionLimits",
-        "ProfileState",
-    ];
+    let parts = ["Terms", "TimeStep", "Oscillation", "MotionLimits", "ProfileState"];
     let mut seen = 0;
     for name in names.filter(|name| name.starts_with(char::is_uppercase)) {
         let is_part = ["Config", "Error", "Fault", "Failure"].iter().any(|end| name.ends_with(end));
@@ -477,7 +476,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 17);
+    assert_eq!(seen, 16);
 }
 
 #[test]

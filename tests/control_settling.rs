@@ -3,7 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::control::{Pid, PidConfig, StepMeasures, StepResponse, TimeStep};
+use drivetrain::control::{Pid, PidConfig, StepResponse, TimeStep};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Model, MotorConfig, World};
@@ -14,7 +14,7 @@ const TARGET: f32 = 30.0; // rad/s
 const LIMIT: f32 = 6.0; // A
 
 /// Steps the speed of a motor from rest; `control` gets setpoint, speed and time step, and gives amperes.
-fn step_response(mut control: impl FnMut(f32, f32, f32) -> f32) -> StepMeasures {
+fn step_response(mut control: impl FnMut(f32, f32, f32) -> f32) -> StepResponse {
     let world = World::new(1);
     world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
     let mut bus = Bus::new();
@@ -35,7 +35,7 @@ fn step_response(mut control: impl FnMut(f32, f32, f32) -> f32) -> StepMeasures 
         }
         runner.tick(tick);
     }
-    response.measures()
+    response
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn after_a_step_that_saturates_the_incremental_form_settles_as_fast_as_the_posit
             incremental.step(setpoint, speed, &TimeStep::of(dt_s))
         });
         assert!((most - LIMIT).abs() < 1e-6, "{most}"); // the step does saturate
-        let settled = |measures: &StepMeasures| measures.settling_time_s.unwrap_or(f32::INFINITY);
+        let settled = |measures: &StepResponse| measures.settling_time_s().unwrap_or(f32::INFINITY);
         assert!(settled(&expected) < 3.0, "kp {kp}, ki {ki}: {expected:?}");
         assert!(
             settled(&measured) <= 1.2 * settled(&expected),

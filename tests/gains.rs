@@ -5,7 +5,7 @@
 
 use drivetrain::chassis::{
     Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, Mecanum,
-    MecanumGeometry, MecanumWheels, OmniFour, OmniFourWheels, OmniThree, OmniThreeWheels,
+    MecanumGeometry, MecanumWheels, Omni,
 };
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model as _};
@@ -81,13 +81,9 @@ impl Layout {
                 robot.run(mecanum(), wheels, mass_kg, m_s)
             }
             Self::OmniThree => {
-                let places = OmniThreeWheels {
-                    front_left: (1, 60.0),
-                    front_right: (2, -60.0),
-                    rear: (3, 180.0),
-                };
+                let places = [(1, 60.0), (2, -60.0), (3, 180.0)];
                 let wheels = places.map(|(id, degrees)| robot.omni(id, degrees));
-                robot.run(OmniThree::new(RADIUS_M, 0.22).unwrap(), wheels, mass_kg, m_s)
+                robot.run(Omni::three(RADIUS_M, 0.22).unwrap(), wheels, mass_kg, m_s)
             }
         }
     }
@@ -309,13 +305,13 @@ fn the_wheels_that_count_are_those_that_turn() {
     }
     let differential = DifferentialGeometry { wheel_radius_m: RADIUS_M, half_track_m: 0.18 };
     let differential = Differential::new(differential).unwrap();
-    let three = OmniThree::new(RADIUS_M, 0.22).unwrap();
-    let four = OmniFour::new(RADIUS_M, 0.25).unwrap();
+    let three = Omni::three(RADIUS_M, 0.22).unwrap();
+    let four = Omni::four(RADIUS_M, 0.25).unwrap();
     let of = |layout: Layout| layout.tuning(20.0).driven_wheels;
     for (counted, expected) in [
         (count(&mecanum(), |w| MecanumWheels::into_array(w).to_vec()), of(Layout::Mecanum)),
-        (count(&three, |w| OmniThreeWheels::into_array(w).to_vec()), of(Layout::OmniThree)),
-        (count(&four, |w| OmniFourWheels::into_array(w).to_vec()), 2.0),
+        (count(&three, |w| w.to_vec()), of(Layout::OmniThree)),
+        (count(&four, |w| w.to_vec()), 2.0),
         (count(&differential, |w| DifferentialWheels::into_array(w).to_vec()), 2.0),
     ] {
         assert!((counted - expected).abs() < 1e-4, "{counted} and not {expected}");

@@ -5,7 +5,7 @@
 
 use drivetrain::chassis::{
     Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, ModuleMotors,
-    OmniFour, OmniFourWheels, Swerve,
+    Omni, Swerve,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
@@ -90,8 +90,8 @@ fn four_omni_wheels_on_the_corners_go_where_they_are_told() {
         });
         world.attach_chassis(ChassisConfig::new(&floor)).unwrap();
         let wanted = Twist::new(vx, vy, wz);
-        let layout = OmniFour::new(RADIUS_M, 0.25).unwrap();
-        let state = drive(&world, layout, OmniFourWheels::from_array, [1, 2, 3, 4], wanted);
+        let layout = Omni::four(RADIUS_M, 0.25).unwrap();
+        let state = drive(&world, layout, |wheels| wheels, [1, 2, 3, 4], wanted);
         assert_moves(state, wanted);
     }
 }

@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Kinematics, ModuleMotors, ModuleState, SteeringConfig, Swerve,
-    SwerveSteering, WheelSpeed,
+    Chassis, ChassisLimits, Kinematics, ModuleMotors, ModuleState, Swerve, SwerveSteering,
+    WheelSpeed,
 };
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{AngleDrive, TargetError, VelocityDrive};
@@ -27,8 +27,8 @@ fn module(rad_per_s: f32, angle: f32) -> ModuleState {
     ModuleState::new(AngularVelocity::from_rad_per_s(rad_per_s), degrees(angle))
 }
 
-fn swerve(config: SteeringConfig) -> Swerve<4> {
-    Swerve::new(RADIUS_M, CORNERS).unwrap().with_steering(config)
+fn swerve() -> Swerve<4> {
+    Swerve::new(RADIUS_M, CORNERS).unwrap()
 }
 
 /// Four modules that are told the same, and what is remembered of them.
@@ -40,8 +40,7 @@ struct Modules {
 impl Modules {
     /// With a hysteresis of 5 degrees, without cosine compensation, nothing remembered.
     fn new() -> Self {
-        let config = SteeringConfig::new().without_cosine_compensation();
-        Self { swerve: swerve(config), steering: SwerveSteering::new() }
+        Self { swerve: swerve().without_cosine_compensation(), steering: SwerveSteering::new() }
     }
 
     /// Reversed, pointing at `here`: told to drive straight back.
@@ -113,8 +112,7 @@ fn a_command_that_dithers_about_ninety_degrees_does_not_flip_a_reversed_drive() 
 #[test]
 fn the_width_of_the_hysteresis_is_the_same_in_both_directions() {
     for width in [0.0_f32, 1.0, 5.0, 30.0, 80.0] {
-        let config = SteeringConfig::new().with_hysteresis(degrees(width));
-        let swerve = swerve(config.without_cosine_compensation());
+        let swerve = swerve().with_hysteresis(degrees(width)).without_cosine_compensation();
         for reversed in [false, true] {
             for side in [1.0, -1.0] {
                 let flips_at = (0..1_800_u16).map(|step| f32::from(step) * 0.1).find(|off| {
@@ -189,7 +187,7 @@ fn the_lock_takes_the_direction_that_it_took_before() {
 
 #[test]
 fn a_reversed_drive_is_compensated_with_the_cosine_of_its_own_error() {
-    let swerve = swerve(SteeringConfig::new());
+    let swerve = swerve();
     for (direction, here, angle) in [(170.0, 30.0, -10.0), (-170.0, -30.0, 10.0)] {
         let mut steering = SwerveSteering::new();
         let told =
@@ -253,7 +251,7 @@ impl Bench {
 
 #[test]
 fn a_chassis_that_drives_back_turns_its_wheels_backward_and_its_pose_goes_back() {
-    let mut chassis = Chassis::new(swerve(SteeringConfig::new()));
+    let mut chassis = Chassis::new(swerve());
     let mut bench = Bench::new([0.0; 4]);
     for _ in 0..1_001 {
         chassis.set_body(Twist::new(-0.5, 0.0, 0.0));
@@ -272,7 +270,7 @@ fn a_chassis_that_drives_back_turns_its_wheels_backward_and_its_pose_goes_back()
 /// The chassis remembers for each module on its own, and over standing still and the lock.
 #[test]
 fn a_chassis_keeps_the_modules_reversed_that_are() {
-    let mut chassis = Chassis::new(swerve(SteeringConfig::new()));
+    let mut chassis = Chassis::new(swerve());
     // Forward is 10 degrees off for two of them, and nearly behind the two others.
     let mut bench = Bench::new([10.0, -10.0, 170.0, -170.0]);
     let mut go = |bench: &mut Bench, direction: f32, speed: f32| {
@@ -304,7 +302,7 @@ fn a_chassis_keeps_the_modules_reversed_that_are() {
 #[test]
 fn the_wheel_limit_slows_a_chassis_that_drives_back_as_one_that_drives_forward() {
     let limit = AngularVelocity::from_rad_per_s(4.0);
-    let mut chassis = Chassis::new(swerve(SteeringConfig::new()));
+    let mut chassis = Chassis::new(swerve());
     chassis.set_limits(ChassisLimits::new().with_wheel_speed(limit)).unwrap();
     let mut bench = Bench::new([0.0; 4]);
     for _ in 0..3 {
@@ -317,7 +315,7 @@ fn the_wheel_limit_slows_a_chassis_that_drives_back_as_one_that_drives_forward()
         bench.speeds
     );
     // So does the layout's own function, for modules that are reversed already.
-    let swerve = swerve(SteeringConfig::new());
+    let swerve = swerve();
     let told = swerve.desaturate([-8.0, 2.0, -4.0, 1.0].map(|speed| module(speed, 30.0)), limit);
     for (told, speed) in told.into_iter().zip([-4.0, 1.0, -2.0, 0.5]) {
         assert!(near(told.velocity.as_rad_per_s(), speed), "{told:?}");
@@ -334,7 +332,7 @@ proptest! {
         turned in proptest::array::uniform4(any::<bool>()),
         lost in proptest::array::uniform4(any::<bool>()),
     ) {
-        let swerve = swerve(SteeringConfig::new());
+        let swerve = swerve();
         let mut index = 0..4;
         let one = speeds.map(|speed| module(speed, angles[index.next().unwrap()]));
         let mut index = 0..4;

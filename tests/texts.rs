@@ -3,7 +3,7 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    BufferError, ChassisLimits, DifferentialGeometry, Mecanum, MecanumGeometry, ModeConfig, Modes,
+    ChassisError, ChassisLimits, DifferentialGeometry, Mecanum, MecanumGeometry, ModeConfig, Modes,
     PowerBuffer, PowerModel,
 };
 use drivetrain::control::PidConfig;
@@ -44,7 +44,7 @@ fn the_power_buffer_names_its_loop_or_its_value() {
     says(&PowerBuffer::new(-1.0, pid).unwrap_err(), &["reserve_j"]);
     let buffer = PowerBuffer::new(20.0, pid).unwrap();
     let error = buffer.with_blind_share(f32::NAN).unwrap_err();
-    assert!(matches!(error, BufferError::Value(_)));
+    assert!(matches!(error, ChassisError::Negative(_)));
     says(&error, &["blind_share"]);
     let spoilt = PowerBuffer::new(20.0, PidConfig::new(-1.0, 0.0, 0.0)).unwrap_err();
     says(&spoilt, &["buffer's loop", "kp"]);

@@ -33,7 +33,7 @@ SKIPPED = {"StdClock"}
 # Writes decimals with core::fmt, which has panic paths of its own.
 FORMATTING = {"text_line"}
 # What a macro calls the type that it makes, in the sources; and how the list names one of them.
-MACROS = {"quantity": r"\$quantity", "name": r"\$name|OmniThree"}
+MACROS = {"quantity": r"\$quantity", "name": r"\$name"}
 SKIPPED_FOLDERS = {"sim"}
 
 

@@ -4,8 +4,8 @@
 
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
-    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, OmniWheel, Spin, SteeringConfig,
-    Swerve, SwerveSteering, WheelSpeed, WithoutGimbal,
+    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, Swerve, SwerveSteering,
+    WheelSpeed,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
@@ -37,7 +37,7 @@ fuzz_target!(|data: &[u8]| {
         }
         3 => {
             let wheel = |input: &mut Input| {
-                OmniWheel::tangential(Angle::from_radians(input.float()), input.positive())
+                Pose2::tangential(Angle::from_radians(input.float()), input.positive())
             };
             let wheels = [wheel(&mut input), wheel(&mut input), wheel(&mut input)];
             let Ok(layout) = Omni::<3>::new(radius, wheels) else { return };
@@ -46,8 +46,7 @@ fuzz_target!(|data: &[u8]| {
         4 => {
             let places = [vec2(&mut input), vec2(&mut input), vec2(&mut input), vec2(&mut input)];
             let Ok(layout) = Swerve::<4>::new(radius, places) else { return };
-            let config = SteeringConfig::new().with_hysteresis(Angle::from_radians(input.float()));
-            let layout = layout.with_steering(config);
+            let layout = layout.with_hysteresis(Angle::from_radians(input.float()));
             let mut steering = SwerveSteering::new();
             drive(layout, input, |input| {
                 let wanted = core::array::from_fn(|_| {
@@ -187,10 +186,10 @@ fn modes(mut input: Input) {
     }
     let timeout_s = input.positive();
     let instead = if input.coin() { Mode::Relax } else { Mode::Independent };
-    config = config.with_spin(Spin::Alternate).with_gimbal_timeout(
-        timeout_s,
-        if instead == Mode::Relax { WithoutGimbal::Relax } else { WithoutGimbal::Independent },
-    );
+    config = config.with_alternating_rotor().with_gimbal_timeout(timeout_s);
+    if instead == Mode::Relax {
+        config = config.with_relax_without_gimbal();
+    }
     let Ok(mut modes) = Modes::new(config) else { return };
     // Seconds since the gimbal told its yaw.
     let mut age_s = f64::MAX;

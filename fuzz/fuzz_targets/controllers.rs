@@ -2,10 +2,9 @@
 #![no_main]
 
 use drivetrain::control::{
-    Biquad, LinearDifferentiator, LowPass, Median, MotionLimits, MovingAverage,
-    OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig, Profile,
-    RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse,
-    TimeStep,
+    Biquad, LinearDifferentiator, LowPass, MotionLimits, OptimalDifferentiator, Pid, PidConfig,
+    PositionActuator, PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter,
+    SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep, Window,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -324,12 +323,12 @@ fn slew(mut input: Input) {
 }
 
 fn windows(mut input: Input) {
-    let mut average = Observed::new(MovingAverage::<5>::new());
-    let mut median = Observed::new(Median::<5>::new());
+    let mut average = Observed::new(Window::<5>::new());
+    let mut median = Observed::new(Window::<5>::new());
     while !input.is_empty() {
         let sample = input.float();
-        average.step(ANY, MovingAverage::rejected, |filter| filter.update(sample));
-        median.step(ANY, Median::rejected, |filter| filter.update(sample));
+        average.step(ANY, Window::rejected, |window| window.push(sample).mean());
+        median.step(ANY, Window::rejected, |window| window.push(sample).median());
     }
 }
 
@@ -382,11 +381,14 @@ fn step_response(mut input: Input) {
     let Ok(mut response) = response else { return };
     while !input.is_empty() {
         let (value, dt_s) = (input.float(), input.step_s());
-        let before = (response.rejected(), response.is_complete(), response.measures());
+        let said = |response: &StepResponse| {
+            let times = (response.rise_time_s(), response.settling_time_s());
+            (response.is_complete(), times, response.overshoot(), response.steady_error())
+        };
+        let (rejected, before) = (response.rejected(), said(&response));
         response.record(value, dt_s);
-        if response.rejected() != before.0 {
-            let after = (response.is_complete(), response.measures());
-            assert_eq!(after, (before.1, before.2), "I5");
+        if response.rejected() != rejected {
+            assert_eq!(said(&response), before, "I5");
         }
     }
 }

@@ -1,8 +1,7 @@
 use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
 use super::{
-    ChassisLimits, ChassisStatus, Kinematics, LimitError, MotionSource, Odometry, WheelDrive,
-    WheelSpeed,
+    ChassisError, ChassisLimits, ChassisStatus, Kinematics, Odometry, WheelDrive, WheelSpeed,
 };
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::time::Tick;
@@ -37,7 +36,7 @@ use crate::units::Angle;
 /// let targets = chassis.update(measured, Tick::new(Instant::from_micros(1_000), 0.001));
 /// assert!((targets.front_left.as_rad_per_s() - 10.0).abs() < 1e-5);
 /// assert!((chassis.pose().x_m - 0.001).abs() < 1e-9);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chassis<K: Kinematics> {
@@ -83,7 +82,7 @@ impl<K: Kinematics> Chassis<K> {
             measured: Twist::ZERO,
             odometry: Odometry::new(Pose2::ORIGIN),
             status: ChassisStatus {
-                source: MotionSource::Unknown,
+                motion_known: false,
                 lost_wheels: 0,
                 blind_s: 0.0,
                 slip_m_s: None,
@@ -100,7 +99,7 @@ impl<K: Kinematics> Chassis<K> {
     ///
     /// # Errors
     /// Names the value that is not above zero, or too long. The limits then stay as they were.
-    pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), LimitError> {
+    pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), ChassisError> {
         limits.validate()?;
         self.limits = limits;
         Ok(())
@@ -224,11 +223,7 @@ impl<K: Kinematics> Chassis<K> {
             _ => self.kinematics.forward_partial(wheels),
         };
         let motion = motion.filter(|twist| twist.is_finite());
-        self.status.source = match motion {
-            Some(_) if lost == 0 => MotionSource::AllWheels,
-            Some(_) => MotionSource::SomeWheels,
-            None => MotionSource::Unknown,
-        };
+        self.status.motion_known = motion.is_some();
         self.measured = motion.unwrap_or(Twist::ZERO);
         let (before, had_gyro) = (self.odometry.heading(), self.odometry.has_gyro());
         let counted = self.odometry.advance(self.measured, self.gyro.take(), dt_s);
@@ -576,12 +571,13 @@ mod tests {
         let mut chassis = Chassis::new(mecanum());
         let rolling = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
         chassis.update(MecanumWheels { rear_left: None, ..rolling }, TICK);
-        assert_eq!(chassis.status().source, MotionSource::SomeWheels);
+        let status = chassis.status();
+        assert!(status.motion_known && status.lost_wheels > 0, "{status:?}");
         assert_eq!(chassis.status().lost_wheels, 1);
         assert!((chassis.pose().x_m - 0.001).abs() < 1e-7);
         let nan = Some(AngularVelocity::from_rad_per_s(f32::NAN));
         chassis.update(MecanumWheels { rear_left: None, front_left: nan, ..rolling }, TICK);
-        assert_eq!(chassis.status().source, MotionSource::Unknown);
+        assert!(!chassis.status().motion_known);
         assert_eq!(chassis.status().lost_wheels, 2);
         assert!((chassis.pose().x_m - 0.001).abs() < 1e-7);
         assert!((chassis.status().blind_s - 0.001).abs() < 1e-7);
@@ -656,7 +652,7 @@ mod tests {
             let mut chassis = Chassis::new(swerve);
             chassis.update(rolling, TICK);
             let status = chassis.status();
-            assert_eq!((status.source, status.lost_wheels), (MotionSource::SomeWheels, 1));
+            assert_eq!((status.motion_known, status.lost_wheels), (true, 1));
             assert!((chassis.pose().x_m - 0.001).abs() < 1e-6, "{:?}", chassis.pose());
         }
     }
@@ -939,7 +935,7 @@ mod tests {
         );
         let status = modules.chassis.status();
         assert_eq!((status.refused, status.refusal), (1, Some(TargetError::Relaxed)));
-        assert_eq!((status.lost_wheels, status.source), (1, MotionSource::SomeWheels));
+        assert_eq!((status.lost_wheels, status.motion_known), (1, true));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use super::error::positive;
-use super::{DifferentialWheels, GeometryError, Kinematics};
+use super::{ChassisError, DifferentialWheels, Kinematics};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 
@@ -13,7 +13,7 @@ use crate::units::AngularVelocity;
 /// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
 /// let turning = Differential::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
 /// assert!((turning.right.as_rad_per_s() - 0.25 * 2.0 / 0.1).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -41,7 +41,7 @@ pub struct DifferentialGeometry {
 /// let wheels = Differential::new(geometry)?.inverse(Twist::new(1.0, 0.0, 2.0)); // ahead and to the left
 /// assert!((wheels.left.as_rad_per_s() - 5.0).abs() < 1e-5);
 /// assert!((wheels.right.as_rad_per_s() - 15.0).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -57,7 +57,7 @@ impl Differential {
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(geometry: DifferentialGeometry) -> Result<Self, GeometryError> {
+    pub const fn new(geometry: DifferentialGeometry) -> Result<Self, ChassisError> {
         let DifferentialGeometry { wheel_radius_m, half_track_m } = geometry;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
@@ -172,6 +172,6 @@ mod tests {
     #[test]
     fn a_length_of_zero_is_named() {
         let flat = DifferentialGeometry { half_track_m: 0.0, ..GEOMETRY };
-        assert_eq!(Differential::new(flat), Err(GeometryError::NotPositive("half_track_m")));
+        assert_eq!(Differential::new(flat), Err(ChassisError::NotPositive("half_track_m")));
     }
 }

@@ -9,7 +9,7 @@ use core::fmt::Debug;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{GeometryError, Kinematics, OmniFour, OmniThree};
+/// use drivetrain::chassis::{ChassisError, Kinematics, Omni};
 /// use drivetrain::geometry::{Body, Twist};
 ///
 /// /// How far the motion that is read back is from the one that was asked for, in m/s.
@@ -18,9 +18,9 @@ use core::fmt::Debug;
 /// }
 ///
 /// let motion = Twist::new(1.0, -0.5, 2.0);
-/// assert!(error_m_s(OmniThree::new(0.05, 0.2)?, motion) < 1e-5);
-/// assert!(error_m_s(OmniFour::new(0.05, 0.2)?, motion) < 1e-5);
-/// # Ok::<(), GeometryError>(())
+/// assert!(error_m_s(Omni::three(0.05, 0.2)?, motion) < 1e-5);
+/// assert!(error_m_s(Omni::four(0.05, 0.2)?, motion) < 1e-5);
+/// # Ok::<(), ChassisError>(())
 /// ```
 pub trait Kinematics {
     /// One `T` for each wheel, under the wheel's name.

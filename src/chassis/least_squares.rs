@@ -140,14 +140,15 @@ pub(super) fn fit(measured: impl Iterator<Item = (Row, f32)> + Clone) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{GeometryError, Omni, OmniWheel, Swerve};
+    use crate::chassis::{ChassisError, Omni, Swerve};
+    use crate::geometry::Pose2;
     use crate::units::Angle;
 
     /// Three wheels at 0.2 m from a centre that lies `ahead_m` before the origin of the body.
-    fn three(ahead_m: f32) -> Result<Omni<3>, GeometryError> {
+    fn three(ahead_m: f32) -> Result<Omni<3>, ChassisError> {
         let wheel = |degrees| {
-            let wheel = OmniWheel::tangential(Angle::from_degrees(degrees), 0.2);
-            OmniWheel { position_m: wheel.position_m + Vec2::new(ahead_m, 0.0), ..wheel }
+            let wheel = Pose2::<Body>::tangential(Angle::from_degrees(degrees), 0.2);
+            Pose2::new(wheel.x_m + ahead_m, wheel.y_m, wheel.angle)
         };
         Omni::new(0.05, [60.0, -60.0, 180.0].map(wheel))
     }
@@ -156,11 +157,11 @@ mod tests {
     #[test]
     fn wheels_whose_centre_is_ten_metres_off_are_refused() {
         assert!(three(0.0).is_ok() && three(0.5).is_ok() && three(3.0).is_ok());
-        assert_eq!(three(10.0), Err(GeometryError::Singular("every motion")));
+        assert_eq!(three(10.0), Err(ChassisError::Singular("every motion")));
         let far = |y| Vec2::new(10.0, y);
         assert!(Swerve::new(0.05, [far(3.0), far(-3.0)]).is_ok());
         let near = Swerve::new(0.05, [far(0.3), far(-0.3)]);
-        assert_eq!(near, Err(GeometryError::Singular("the rotation")));
+        assert_eq!(near, Err(ChassisError::Singular("the rotation")));
     }
 
     #[test]
@@ -186,7 +187,7 @@ mod tests {
     fn places_beyond_all_numbers_are_refused() {
         let far = [Vec2::new(1e20, 0.0), Vec2::new(-1e20, 0.0)];
         assert!(Swerve::new(0.05, far).is_err());
-        let there = OmniWheel::tangential(Angle::ZERO, 1e-25);
+        let there = Pose2::tangential(Angle::ZERO, 1e-25);
         assert!(Omni::new(0.05, [there; 3]).is_err());
     }
 }

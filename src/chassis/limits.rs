@@ -1,3 +1,4 @@
+use super::ChassisError;
 use crate::geometry::{Twist, World};
 use crate::units::AngularVelocity;
 
@@ -62,7 +63,7 @@ impl ChassisLimits {
     /// # Errors
     /// Names the first value that is not above zero, or a command timeout above 1 s: with an infinite one, a chassis whose
     /// program is dead drives on for ever.
-    pub fn validate(&self) -> Result<(), LimitError> {
+    pub fn validate(&self) -> Result<(), ChassisError> {
         let named = [
             (self.linear_m_s2, "linear_m_s2"),
             (self.angular_rad_s2, "angular_rad_s2"),
@@ -71,11 +72,11 @@ impl ChassisLimits {
         ];
         for (value, name) in named {
             if value.is_nan() || value <= 0.0 {
-                return Err(LimitError::NotPositive(name));
+                return Err(ChassisError::NotAboveZero(name));
             }
         }
         if self.command_timeout_s > MAX_COMMAND_TIMEOUT_S {
-            return Err(LimitError::TooLong("command timeout"));
+            return Err(ChassisError::TooLong("command timeout"));
         }
         Ok(())
     }
@@ -111,25 +112,3 @@ impl Default for ChassisLimits {
         Self::new()
     }
 }
-
-/// Why limits cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum LimitError {
-    /// The named value must be above zero.
-    NotPositive(&'static str),
-    /// The named value must be at most 1 s.
-    TooLong(&'static str),
-}
-
-impl core::fmt::Display for LimitError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NotPositive(name) => write!(f, "{name} must be above zero"),
-            Self::TooLong(name) => write!(f, "{name} must be at most 1 s"),
-        }
-    }
-}
-
-impl core::error::Error for LimitError {}

@@ -1,10 +1,9 @@
 use super::error::positive;
 use super::least_squares::MAX_CONDITION;
-use super::{GeometryError, Kinematics, MecanumWheels};
+use super::{ChassisError, Kinematics, MecanumWheels};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 use core::f32::consts::SQRT_2;
-use core::marker::PhantomData;
 
 /// The dimensions of a mecanum chassis: all in m, above zero.
 ///
@@ -16,7 +15,7 @@ use core::marker::PhantomData;
 /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.15 };
 /// let turning = Mecanum::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
 /// assert!((turning.front_right.as_rad_per_s() - (0.2 + 0.15) * 2.0 / 0.1).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -30,38 +29,6 @@ pub struct MecanumGeometry {
     pub half_track_m: f32,
 }
 
-/// How the rollers of the four wheels lie: [`FloorO`] or [`FloorX`].
-pub trait RollerMounting: sealed::Sealed {}
-
-mod sealed {
-    pub trait Sealed {
-        /// The sign of the sideways part, and of the half wheelbase in the lever arm.
-        const SIDE: f32;
-    }
-}
-
-/// The rollers that touch the floor form an O: the usual mounting. From above the visible rollers form an X.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum FloorO {}
-
-/// The rollers that touch the floor form an X. The lever arm for turning is the difference of half track and half
-/// wheelbase, so a square chassis cannot turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum FloorX {}
-
-impl RollerMounting for FloorO {}
-impl RollerMounting for FloorX {}
-
-impl sealed::Sealed for FloorO {
-    const SIDE: f32 = 1.0;
-}
-
-impl sealed::Sealed for FloorX {
-    const SIDE: f32 = -1.0;
-}
-
 /// The kinematics of four mecanum wheels.
 ///
 /// With the lever arm `L = half track + half wheelbase` and the wheel radius `r`:
@@ -72,7 +39,17 @@ impl sealed::Sealed for FloorX {
 /// ```
 ///
 /// A positive wheel velocity rolls forward on every wheel; how its motor is mounted is the motor's business.
-/// The other mounting of the rollers changes the sign of vy, and `L` to half track - half wheelbase.
+///
+/// `FLOOR` is the letter that the rollers form which touch the floor. `'O'` is the usual mounting; from above, the visible
+/// rollers then form an X. With `'X'` the sign of vy changes, and `L` is half track - half wheelbase, so a square chassis
+/// cannot turn. Another letter does not compile:
+///
+/// ```compile_fail
+/// use drivetrain::chassis::{Mecanum, MecanumGeometry};
+///
+/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.3, half_track_m: 0.2 };
+/// let mecanum = Mecanum::<'Y'>::with_rollers(geometry);
+/// ```
 ///
 /// # Examples
 /// ```
@@ -84,11 +61,11 @@ impl sealed::Sealed for FloorX {
 /// let wheels = mecanum.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((wheels.front_left.as_rad_per_s() - (1.0 - 0.5 - 0.5 * 2.0) / 0.1).abs() < 1e-4);
 /// assert!((wheels.front_right.as_rad_per_s() - (1.0 + 0.5 + 0.5 * 2.0) / 0.1).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Mecanum<M = FloorO> {
+pub struct Mecanum<const FLOOR: char = 'O'> {
     /// Wheel velocity for 1 m/s in any direction, and for 1 rad/s.
     per_linear: f32,
     per_yaw: f32,
@@ -96,7 +73,6 @@ pub struct Mecanum<M = FloorO> {
     linear_per: f32,
     yaw_per: f32,
     wheel_radius_m: f32,
-    mounting: PhantomData<M>,
 }
 
 impl Mecanum {
@@ -104,29 +80,35 @@ impl Mecanum {
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
+    pub const fn new(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
         Self::with_rollers(geometry)
     }
 }
 
-impl<M: RollerMounting> Mecanum<M> {
+impl<const FLOOR: char> Mecanum<FLOOR> {
+    /// The sign of the sideways part, and of the half wheelbase in the lever arm.
+    const SIDE: f32 = {
+        assert!(matches!(FLOOR, 'O' | 'X'), "the rollers on the floor form an O or an X");
+        if FLOOR == 'O' { 1.0 } else { -1.0 }
+    };
+
     /// Takes the dimensions, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`GeometryError::Singular`] for [`FloorX`] when half track and
+    /// Names the length that is not above zero and finite. [`ChassisError::Singular`] for `'X'` when half track and
     /// half wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::chassis::{FloorX, Mecanum, MecanumGeometry};
+    /// use drivetrain::chassis::{Mecanum, MecanumGeometry};
     /// use drivetrain::geometry::Twist;
     ///
     /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.1, half_track_m: 0.3 };
-    /// let wheels = Mecanum::<FloorX>::with_rollers(geometry)?.inverse(Twist::new(0.0, 1.0, 0.0));
+    /// let wheels = Mecanum::<'X'>::with_rollers(geometry)?.inverse(Twist::new(0.0, 1.0, 0.0));
     /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-5); // to the left, the other way round
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
-    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, GeometryError> {
+    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
         let MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m } = geometry;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
@@ -137,18 +119,17 @@ impl<M: RollerMounting> Mecanum<M> {
         if let Err(error) = positive(half_track_m, "half_track_m") {
             return Err(error);
         }
-        let arm_m = half_track_m + M::SIDE * half_wheelbase_m;
+        let arm_m = half_track_m + Self::SIDE * half_wheelbase_m;
         // The condition number of its normal equations, of which translation has two parts.
         let reach_m2 = half_track_m * half_track_m + half_wheelbase_m * half_wheelbase_m;
         if arm_m * arm_m * MAX_CONDITION < SQRT_2 * reach_m2 {
-            return Err(GeometryError::Singular("rotation: the chassis is square"));
+            return Err(ChassisError::Singular("rotation: the chassis is square"));
         }
         Ok(Self {
             per_linear: 1.0 / wheel_radius_m,
             per_yaw: arm_m / wheel_radius_m,
             linear_per: 0.25 * wheel_radius_m,
             yaw_per: 0.25 * wheel_radius_m / arm_m,
-            mounting: PhantomData,
             wheel_radius_m,
         })
     }
@@ -158,7 +139,7 @@ impl<M: RollerMounting> Mecanum<M> {
     #[inline]
     pub const fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
         let x = twist.vx_m_s * self.per_linear;
-        let y = M::SIDE * twist.vy_m_s * self.per_linear;
+        let y = Self::SIDE * twist.vy_m_s * self.per_linear;
         let yaw = twist.wz_rad_s * self.per_yaw;
         let (falling, rising) = (x - y, x + y);
         MecanumWheels {
@@ -181,13 +162,13 @@ impl<M: RollerMounting> Mecanum<M> {
         let (falling_yaw, rising_yaw) = (rear_right - front_left, front_right - rear_left);
         Twist::new(
             (rising + falling) * self.linear_per,
-            M::SIDE * (rising - falling) * self.linear_per,
+            Self::SIDE * (rising - falling) * self.linear_per,
             (rising_yaw + falling_yaw) * self.yaw_per,
         )
     }
 }
 
-impl<M: RollerMounting> Kinematics for Mecanum<M> {
+impl<const FLOOR: char> Kinematics for Mecanum<FLOOR> {
     type Wheels<T: Copy> = MecanumWheels<T>;
     type Speed = AngularVelocity;
     type Steering = ();
@@ -242,7 +223,7 @@ mod tests {
     const OBLONG: MecanumGeometry =
         MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.5 };
 
-    fn wheels<M: RollerMounting>(mecanum: &Mecanum<M>, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
+    fn wheels<const FLOOR: char>(mecanum: &Mecanum<FLOOR>, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
         mecanum.inverse(Twist::new(vx, vy, wz)).map(AngularVelocity::as_rad_per_s).into_array()
     }
 
@@ -293,24 +274,24 @@ mod tests {
 
     #[test]
     fn with_the_other_rollers_strafe_left_turns_front_left_forward() {
-        let other = Mecanum::<FloorX>::with_rollers(OBLONG).unwrap();
+        let other = Mecanum::<'X'>::with_rollers(OBLONG).unwrap();
         assert_eq!(wheels(&other, 0.0, 1.0, 0.0), [2.0, -2.0, -2.0, 2.0]);
         assert_eq!(wheels(&other, 0.0, 0.0, 4.0), [-2.0, 2.0, -2.0, 2.0]);
     }
 
     #[test]
     fn with_the_other_rollers_a_square_chassis_is_refused() {
-        let error = Mecanum::<FloorX>::with_rollers(SQUARE);
-        assert!(matches!(error, Err(GeometryError::Singular(_))));
+        let error = Mecanum::<'X'>::with_rollers(SQUARE);
+        assert!(matches!(error, Err(ChassisError::Singular(_))));
     }
 
     #[test]
     fn a_length_of_zero_nan_or_infinity_is_named() {
         for bad in [0.0, -0.1, f32::NAN, f32::INFINITY] {
             let radius = Mecanum::new(MecanumGeometry { wheel_radius_m: bad, ..SQUARE });
-            assert_eq!(radius, Err(GeometryError::NotPositive("wheel_radius_m")));
+            assert_eq!(radius, Err(ChassisError::NotPositive("wheel_radius_m")));
             let track = Mecanum::new(MecanumGeometry { half_track_m: bad, ..SQUARE });
-            assert_eq!(track, Err(GeometryError::NotPositive("half_track_m")));
+            assert_eq!(track, Err(ChassisError::NotPositive("half_track_m")));
         }
     }
 

@@ -6,12 +6,12 @@
 //! | layout | wheels | remarks |
 //! |---|---|---|
 //! | [`Mecanum`] | [`MecanumWheels`] | both roller mountings |
-//! | [`OmniThree`], [`OmniFour`] | [`OmniThreeWheels`], [`OmniFourWheels`] | positive rolls counter-clockwise |
 //! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
+//! | [`Omni::three`], [`Omni::four`] | an array, front left first | positive rolls counter-clockwise |
 //! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
-//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`GeometryError`].
+//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ChassisError`].
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
 //!
@@ -69,17 +69,17 @@ mod wheels;
 pub use base::Chassis;
 pub use differential::{Differential, DifferentialGeometry};
 pub use drive::{ModuleMotors, WheelDrive};
-pub use error::GeometryError;
+pub use error::ChassisError;
 pub use kinematics::{Kinematics, WheelSpeed};
-pub use limits::{ChassisLimits, LimitError};
-pub use mecanum::{FloorO, FloorX, Mecanum, MecanumGeometry, RollerMounting};
-pub use mode::{GimbalEdge, Mode, ModeConfig, ModeError, Modes, Spin, WithoutGimbal};
+pub use limits::ChassisLimits;
+pub use mecanum::{Mecanum, MecanumGeometry};
+pub use mode::{Mode, ModeConfig, Modes};
 pub use odometry::Odometry;
-pub use omni::{Omni, OmniFour, OmniThree, OmniWheel};
-pub use power::{PowerCut, PowerError, PowerModel, WheelLoad};
-pub use power_buffer::{BufferError, PowerBuffer};
+pub use omni::Omni;
+pub use power::{PowerCut, PowerModel, WheelLoad};
+pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
-pub use status::{ChassisStatus, MotionSource};
-pub use steering::{SteeringConfig, SwerveSteering};
+pub use status::ChassisStatus;
+pub use steering::SwerveSteering;
 pub use swerve::{ModuleState, Swerve};
-pub use wheels::{DifferentialWheels, MecanumWheels, OmniFourWheels, OmniThreeWheels};
+pub use wheels::{DifferentialWheels, MecanumWheels};

@@ -1,5 +1,6 @@
+use super::ChassisError;
 use super::clock::DeadClock;
-use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
+use crate::control::{Pid, PidConfig, TimeStep};
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
 use crate::units::Angle;
@@ -21,51 +22,15 @@ pub enum Mode {
     Independent,
 }
 
-/// What takes the place of a mode that needs the gimbal's yaw while there is none.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum WithoutGimbal {
-    /// Drives as in [`Mode::Independent`].
-    #[default]
-    Independent,
-    /// Relaxes.
-    Relax,
-}
-
-/// Which way the rotor spins. A direction once taken is kept until the mode is left.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Spin {
-    /// To the left.
-    #[default]
-    CounterClockwise,
-    /// To the right.
-    Clockwise,
-    /// The other way each time the mode is entered; to the left first.
-    Alternate,
-}
-
-/// Something that happened to the gimbal's yaw while a mode needed it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum GimbalEdge {
-    /// There was none for longer than the timeout: the configured replacement drives.
-    Lost,
-    /// There is one again: the mode goes on.
-    Back,
-}
-
 /// What the modes are made from.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{chassis::{Mode, ModeConfig, Modes, Spin}, control::PidConfig, geometry::Twist, units::Angle};
+/// use drivetrain::{chassis::{Mode, ModeConfig, Modes}, control::PidConfig, geometry::Twist, units::Angle};
 ///
 /// let config = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0))
 ///     .with_rotor(6.0, 2.0, 3.0)
-///     .with_spin(Spin::Clockwise)
+///     .with_clockwise_rotor()
 ///     .with_transition(0.0);
 /// let mut modes = Modes::new(config)?;
 /// modes.set_mode(Mode::Rotor);
@@ -81,9 +46,10 @@ pub struct ModeConfig {
     rotor_rad_s: f32,
     swing_rad_s: f32,
     swing_frequency_rad_s: f32,
-    spin: Spin,
+    clockwise: bool,
+    alternating: bool,
     gimbal_timeout_s: f32,
-    without_gimbal: WithoutGimbal,
+    relaxes_without_gimbal: bool,
     transition_s: f32,
 }
 
@@ -98,9 +64,10 @@ impl ModeConfig {
             rotor_rad_s: 6.0,
             swing_rad_s: 0.0,
             swing_frequency_rad_s: 0.0,
-            spin: Spin::CounterClockwise,
+            clockwise: false,
+            alternating: false,
             gimbal_timeout_s: 0.03,
-            without_gimbal: WithoutGimbal::Independent,
+            relaxes_without_gimbal: false,
             transition_s: 0.2,
         }
     }
@@ -113,16 +80,29 @@ impl ModeConfig {
         Self { rotor_rad_s: base, swing_rad_s: swing, swing_frequency_rad_s: frequency, ..self }
     }
 
-    /// Sets the direction of the rotor.
+    /// Spins the rotor clockwise; counter-clockwise otherwise. A direction once taken is kept until the mode is left.
     #[must_use]
-    pub const fn with_spin(self, spin: Spin) -> Self {
-        Self { spin, ..self }
+    pub const fn with_clockwise_rotor(self) -> Self {
+        Self { clockwise: true, ..self }
     }
 
-    /// Sets for how many seconds the last yaw of the gimbal is used, zero or more, and what comes then.
+    /// Spins the rotor the other way each time the mode is entered; the configured way first.
     #[must_use]
-    pub const fn with_gimbal_timeout(self, timeout_s: f32, then: WithoutGimbal) -> Self {
-        Self { gimbal_timeout_s: timeout_s, without_gimbal: then, ..self }
+    pub const fn with_alternating_rotor(self) -> Self {
+        Self { alternating: true, ..self }
+    }
+
+    /// Sets for how many seconds the last yaw of the gimbal is used, zero or more. Then the chassis drives as in
+    /// [`Mode::Independent`].
+    #[must_use]
+    pub const fn with_gimbal_timeout(self, timeout_s: f32) -> Self {
+        Self { gimbal_timeout_s: timeout_s, ..self }
+    }
+
+    /// Relaxes while a mode lacks the gimbal's yaw, instead of driving as in [`Mode::Independent`].
+    #[must_use]
+    pub const fn with_relax_without_gimbal(self) -> Self {
+        Self { relaxes_without_gimbal: true, ..self }
     }
 
     /// Sets over how many seconds the motion goes over from one mode to the next, zero or more.
@@ -131,31 +111,6 @@ impl ModeConfig {
         Self { transition_s, ..self }
     }
 }
-
-/// Why modes cannot be made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum ModeError {
-    /// The follow loop's parameters.
-    Follow(ConfigError),
-    /// The named value must be finite and zero or more.
-    Negative(&'static str),
-    /// The swing of the rotor is larger than its base: it would change direction.
-    SwingAboveBase,
-}
-
-impl core::fmt::Display for ModeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Follow(error) => write!(f, "the follow loop: {error}"),
-            Self::Negative(name) => write!(f, "{name} must be finite and zero or more"),
-            Self::SwingAboveBase => f.write_str("the rotor's swing is larger than its base"),
-        }
-    }
-}
-
-impl core::error::Error for ModeError {}
 
 /// Turns the driver's command into a motion of the body, by mode.
 ///
@@ -186,7 +141,7 @@ pub struct Modes {
     yaw_age_s: f32,
     clock: DeadClock,
     gimbal_lost: bool,
-    edges: [Option<GimbalEdge>; 2],
+    edges: [Option<Mode>; 2],
     clockwise: bool,
     entered_rotor: bool,
     swing_rad: f32,
@@ -200,7 +155,7 @@ impl Modes {
     ///
     /// # Errors
     /// Names the value that cannot be used.
-    pub fn new(config: ModeConfig) -> Result<Self, ModeError> {
+    pub fn new(config: ModeConfig) -> Result<Self, ChassisError> {
         let named = [
             (config.rotor_rad_s, "the rotor's base"),
             (config.swing_rad_s, "the rotor's swing"),
@@ -210,15 +165,16 @@ impl Modes {
         ];
         for (value, name) in named {
             if !value.is_finite() || value < 0.0 {
-                return Err(ModeError::Negative(name));
+                return Err(ChassisError::Negative(name));
             }
         }
         if config.swing_rad_s > config.rotor_rad_s {
-            return Err(ModeError::SwingAboveBase);
+            return Err(ChassisError::SwingAboveBase);
         }
         Ok(Self {
             config,
-            follow: Pid::new(config.follow.with_period(TAU)).map_err(ModeError::Follow)?,
+            follow: Pid::new(config.follow.with_period(TAU))
+                .map_err(|error| ChassisError::Loop("the follow loop", error))?,
             mode: Mode::Relax,
             acting: Mode::Relax,
             yaw: None,
@@ -242,10 +198,10 @@ impl Modes {
         }
         self.mode = mode;
         if mode == Mode::Rotor {
-            self.clockwise = match self.config.spin {
-                Spin::CounterClockwise => false,
-                Spin::Clockwise => true,
-                Spin::Alternate => self.entered_rotor && !self.clockwise,
+            self.clockwise = if self.config.alternating && self.entered_rotor {
+                !self.clockwise
+            } else {
+                self.config.clockwise
             };
             self.entered_rotor = true;
             self.swing_rad = 0.0;
@@ -264,8 +220,11 @@ impl Modes {
         self.acting
     }
 
-    /// Returns what happened to the gimbal's yaw since the last call, the oldest first. Call it until it gives `None`.
-    pub const fn take_edge(&mut self) -> Option<GimbalEdge> {
+    /// Returns the mode that took over because the gimbal's yaw was lost, or because it is back; the oldest change first.
+    ///
+    /// A lost yaw gives the replacement, [`Mode::Independent`] or [`Mode::Relax`]; a yaw that is back gives the chosen mode.
+    /// Each change is returned once. Call it until it returns `None`.
+    pub const fn take_edge(&mut self) -> Option<Mode> {
         let [first, second] = self.edges;
         self.edges = [second, None];
         first
@@ -330,22 +289,22 @@ impl Modes {
             return self.mode;
         }
         let lost = self.yaw.is_none() || self.yaw_age_s > self.config.gimbal_timeout_s;
+        let allowed = match (lost, self.config.relaxes_without_gimbal) {
+            (false, _) => self.mode,
+            (true, false) => Mode::Independent,
+            (true, true) => Mode::Relax,
+        };
         if lost != self.gimbal_lost {
             self.gimbal_lost = lost;
-            let edge = if lost { GimbalEdge::Lost } else { GimbalEdge::Back };
             let last = match self.edges {
                 [None, _] => 0,
                 _ => 1,
             };
             if let Some(slot) = self.edges.get_mut(last) {
-                *slot = Some(edge);
+                *slot = Some(allowed);
             }
         }
-        match (lost, self.config.without_gimbal) {
-            (false, _) => self.mode,
-            (true, WithoutGimbal::Independent) => Mode::Independent,
-            (true, WithoutGimbal::Relax) => Mode::Relax,
-        }
+        allowed
     }
 
     fn act(&mut self, mode: Mode) {
@@ -452,7 +411,7 @@ mod tests {
     // The fifth seed draws a random direction and never uses it.
     #[test]
     fn the_rotors_direction_is_kept_and_alternates_with_each_entry() {
-        let mut rotor = modes(config().with_spin(Spin::Alternate), Mode::Rotor);
+        let mut rotor = modes(config().with_alternating_rotor(), Mode::Rotor);
         for side in [1.0, -1.0, 1.0] {
             for _ in 0..5 {
                 rotor.set_mode(Mode::Rotor);
@@ -462,7 +421,7 @@ mod tests {
             settled(&mut rotor, 0.0);
             rotor.set_mode(Mode::Rotor);
         }
-        let mut clockwise = modes(config().with_spin(Spin::Clockwise), Mode::Rotor);
+        let mut clockwise = modes(config().with_clockwise_rotor(), Mode::Rotor);
         assert!(settled(&mut clockwise, 0.0).wz_rad_s < -3.0);
     }
 
@@ -523,11 +482,11 @@ mod tests {
         }
         assert_eq!(modes.acting(), Mode::Independent);
         assert_eq!(modes.output, Twist::new(1.0, 0.0, 0.5));
-        assert_eq!((modes.take_edge(), modes.take_edge()), (Some(GimbalEdge::Lost), None));
+        assert_eq!((modes.take_edge(), modes.take_edge()), (Some(Mode::Independent), None));
         settled(&mut modes, 90.0);
         assert_eq!(
             (modes.acting(), modes.take_edge()),
-            (Mode::FollowGimbal, Some(GimbalEdge::Back))
+            (Mode::FollowGimbal, Some(Mode::FollowGimbal))
         );
     }
 
@@ -557,10 +516,10 @@ mod tests {
         let mut independent = modes(config(), Mode::FollowGimbal);
         assert!(independent.update(AHEAD, None, DT).is_some());
         assert_eq!(independent.acting(), Mode::Independent);
-        let relaxing = config().with_gimbal_timeout(0.05, WithoutGimbal::Relax);
+        let relaxing = config().with_gimbal_timeout(0.05).with_relax_without_gimbal();
         let mut relaxed = modes(relaxing, Mode::Rotor);
         assert_eq!(relaxed.update(AHEAD, None, DT), None);
-        assert_eq!(relaxed.take_edge(), Some(GimbalEdge::Lost));
+        assert_eq!(relaxed.take_edge(), Some(Mode::Relax));
     }
 
     #[test]
@@ -586,10 +545,10 @@ mod tests {
     #[test]
     fn configurations_that_cannot_work_are_named() {
         let swing = config().with_rotor(1.0, 2.0, 1.0);
-        assert_eq!(Modes::new(swing), Err(ModeError::SwingAboveBase));
+        assert_eq!(Modes::new(swing), Err(ChassisError::SwingAboveBase));
         let nan = config().with_transition(f32::NAN);
-        assert_eq!(Modes::new(nan), Err(ModeError::Negative("the transition")));
+        assert_eq!(Modes::new(nan), Err(ChassisError::Negative("the transition")));
         let gains = ModeConfig::new(PidConfig::new(f32::NAN, 0.0, 0.0));
-        assert!(matches!(Modes::new(gains), Err(ModeError::Follow(_))));
+        assert!(matches!(Modes::new(gains), Err(ChassisError::Loop(_, _))));
     }
 }

@@ -1,71 +1,31 @@
 use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
-use super::{GeometryError, Kinematics, OmniFourWheels, OmniThreeWheels};
-use crate::geometry::{Body, Rotation2, Twist, Vec2};
+use super::{ChassisError, Kinematics};
+use crate::geometry::{Body, Pose2, Rotation2, Twist, Vec2};
 use crate::units::{Angle, AngularVelocity};
-
-/// One omni wheel: where it touches the floor, and which way it rolls.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{Omni, OmniWheel}, geometry::{Twist, Vec2}, units::Angle};
-///
-/// let wheel = |x, y, degrees| OmniWheel { position_m: Vec2::new(x, y), direction: Angle::from_degrees(degrees) };
-/// let layout = Omni::new(0.05, [wheel(0.0, 0.2, 0.0), wheel(0.0, -0.2, 0.0), wheel(-0.2, 0.0, 90.0)])?;
-/// let [left, right, rear] = layout.inverse(Twist::new(1.0, 0.0, 1.0)); // ahead and to the left
-/// assert!((left.as_rad_per_s() - (1.0 - 0.2) / 0.05).abs() < 1e-4);
-/// assert!((right.as_rad_per_s() - (1.0 + 0.2) / 0.05).abs() < 1e-4);
-/// assert!((rear.as_rad_per_s() + 0.2 / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct OmniWheel {
-    /// The point of contact from the origin of the body, in m.
-    pub position_m: Vec2,
-    /// The direction of rolling for a positive wheel velocity, counter-clockwise from forward.
-    pub direction: Angle,
-}
-
-impl OmniWheel {
-    /// Takes the angle and the distance at which the wheel stands; positive rolls counter-clockwise round the origin.
-    ///
-    /// At the angle `a` and the distance `R` its surface speed is `-sin(a) vx + cos(a) vy + R wz`.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::OmniWheel, units::Angle};
-    ///
-    /// let left = OmniWheel::tangential(Angle::from_degrees(90.0), 0.2);
-    /// assert!((left.position_m.y - 0.2).abs() < 1e-6);
-    /// assert_eq!(left.direction.as_degrees(), 180.0); // backward
-    /// ```
-    #[must_use]
-    pub const fn tangential(angle: Angle, distance_m: f32) -> Self {
-        let rotation = Rotation2::new(angle);
-        Self {
-            position_m: rotation.apply(Vec2::new(distance_m, 0.0)),
-            direction: Angle::from_radians(angle.as_radians() + core::f32::consts::FRAC_PI_2),
-        }
-    }
-}
 
 /// The kinematics of `N` omni wheels of one radius, at any places and in any directions.
 ///
 /// A wheel at `p` that rolls along the unit vector `d` has the surface speed `d . v + (p x d) wz`. The motion is the
 /// least-squares fit to all wheels. The values of the wheels come in the order in which the wheels were given;
-/// [`OmniThree`] and [`OmniFour`] have names for them.
+/// [`three`](Self::three) and [`four`](Self::four) are the usual layouts.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{chassis::{Omni, OmniWheel}, geometry::Twist, units::Angle};
+/// use drivetrain::{chassis::Omni, geometry::{Pose2, Twist}, units::Angle};
 ///
-/// let wheel = |degrees| OmniWheel::tangential(Angle::from_degrees(degrees), 0.2);
+/// let wheel = |x, y, degrees| Pose2::new(x, y, Angle::from_degrees(degrees));
+/// let layout = Omni::new(0.05, [wheel(0.0, 0.2, 0.0), wheel(0.0, -0.2, 0.0), wheel(-0.2, 0.0, 90.0)])?;
+/// let [left, right, rear] = layout.inverse(Twist::new(1.0, 0.0, 1.0)); // ahead and to the left
+/// assert!((left.as_rad_per_s() - (1.0 - 0.2) / 0.05).abs() < 1e-4);
+/// assert!((right.as_rad_per_s() - (1.0 + 0.2) / 0.05).abs() < 1e-4);
+/// assert!((rear.as_rad_per_s() + 0.2 / 0.05).abs() < 1e-4);
+///
+/// let wheel = |degrees| Pose2::tangential(Angle::from_degrees(degrees), 0.2);
 /// let five = Omni::new(0.05, [0.0, 72.0, 144.0, 216.0, 288.0].map(wheel))?;
 /// let [front, ..] = five.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((front.as_rad_per_s() - (0.5 + 0.2 * 2.0) / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Omni<const N: usize> {
@@ -76,27 +36,39 @@ pub struct Omni<const N: usize> {
 }
 
 impl<const N: usize> Omni<N> {
-    /// Takes the radius of the wheels in m and the wheels.
+    /// Takes the radius of the wheels in m, and for each wheel its point of contact in m and the direction in which it rolls
+    /// for a positive velocity, counter-clockwise from forward.
     ///
     /// # Errors
-    /// Names the value that is not finite or not above zero. [`GeometryError::Singular`] when the wheels leave some
+    /// Names the value that is not finite or not above zero. [`ChassisError::Singular`] when the wheels leave some
     /// motion undetermined, or nearly: fewer than three, all parallel, all pointing at one centre, or all so far on one
     /// side of the origin that a turn looks like a straight way (some 20 times their distance from their centre).
-    pub fn new(wheel_radius_m: f32, wheels: [OmniWheel; N]) -> Result<Self, GeometryError> {
+    pub fn new(wheel_radius_m: f32, wheels: [Pose2<Body>; N]) -> Result<Self, ChassisError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
-        if !wheels.iter().all(|wheel| wheel.position_m.is_finite()) {
-            return Err(GeometryError::NotFinite("position_m"));
+        if !wheels.iter().all(|wheel| wheel.position().to_vec().is_finite()) {
+            return Err(ChassisError::NotFinite("position_m"));
         }
-        if !wheels.iter().all(|wheel| wheel.direction.is_finite()) {
-            return Err(GeometryError::NotFinite("direction"));
+        if !wheels.iter().all(|wheel| wheel.angle.is_finite()) {
+            return Err(ChassisError::NotFinite("direction"));
         }
         let rows = wheels.map(|wheel| {
-            let direction = Rotation2::new(wheel.direction).apply(Vec2::new(1.0, 0.0));
-            Row::new(direction, wheel.position_m)
+            let direction = Rotation2::new(wheel.angle).apply(Vec2::new(1.0, 0.0));
+            Row::new(direction, wheel.position().to_vec())
         });
-        let inverse = Normal::of(rows).inverse().ok_or(GeometryError::Singular("every motion"))?;
+        let inverse = Normal::of(rows).inverse().ok_or(ChassisError::Singular("every motion"))?;
         let shares = rows.map(|row| inverse.share(row) * wheel_radius_m);
         Ok(Self { rows, shares, wheel_radius_m, per_radius: 1.0 / wheel_radius_m })
+    }
+
+    /// Wheels at these angles, at one distance from the centre.
+    fn round(
+        wheel_radius_m: f32,
+        distance_m: f32,
+        degrees: [f32; N],
+    ) -> Result<Self, ChassisError> {
+        let distance_m = positive(distance_m, "distance_m")?;
+        let wheel = |degrees| Pose2::tangential(Angle::from_degrees(degrees), distance_m);
+        Self::new(wheel_radius_m, degrees.map(wheel))
     }
 
     /// Returns the wheel velocities for the motion `twist` of the body.
@@ -119,6 +91,52 @@ impl<const N: usize> Omni<N> {
             wheel.map(|velocity| (row, velocity.as_rad_per_s() * self.wheel_radius_m))
         });
         fit(known)
+    }
+}
+
+impl Omni<3> {
+    /// Three wheels at 60, -60 and 180 degrees: front left, front right, rear. Positive rolls counter-clockwise.
+    ///
+    /// Takes the radius of the wheels and their distance from the centre, in m.
+    ///
+    /// # Errors
+    /// Names the length that is not above zero and finite.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{chassis::Omni, geometry::Twist};
+    ///
+    /// let [front_left, _, rear] = Omni::three(0.05, 0.2)?.inverse(Twist::new(0.0, 1.0, 0.0)); // to the left
+    /// assert!((rear.as_rad_per_s() + 20.0).abs() < 1e-4);
+    /// assert!((front_left.as_rad_per_s() - 10.0).abs() < 1e-4);
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// ```
+    pub fn three(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ChassisError> {
+        Self::round(wheel_radius_m, distance_m, [60.0, -60.0, 180.0])
+    }
+}
+
+impl Omni<4> {
+    /// Four wheels on the corners of a square, at 45, -45, 135 and -135 degrees: front left, front right, rear left, rear
+    /// right. Positive rolls counter-clockwise.
+    ///
+    /// Takes the radius of the wheels and their distance from the centre, in m.
+    ///
+    /// # Errors
+    /// Names the length that is not above zero and finite.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{chassis::Omni, geometry::Twist};
+    ///
+    /// let [front_left, front_right, ..] = Omni::four(0.05, 0.2)?.inverse(Twist::new(1.0, 0.0, 0.0));
+    /// let slow = core::f32::consts::FRAC_1_SQRT_2 / 0.05; // the rollers take the rest
+    /// assert!((front_left.as_rad_per_s() + slow).abs() < 1e-4);
+    /// assert!((front_right.as_rad_per_s() - slow).abs() < 1e-4);
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// ```
+    pub fn four(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ChassisError> {
+        Self::round(wheel_radius_m, distance_m, [45.0, -45.0, 135.0, -135.0])
     }
 }
 
@@ -160,119 +178,18 @@ impl<const N: usize> Kinematics for Omni<N> {
     }
 }
 
-/// Gives a layout its named wheels around an [`Omni`].
-macro_rules! named_omni {
-    ($(#[$doc:meta])* $name:ident, $wheels:ident, $count:literal, $degrees:expr) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub struct $name(Omni<$count>);
-
-        impl $name {
-            /// Takes the radius of the wheels and their distance from the centre, in m.
-            ///
-            /// # Errors
-            /// Names the length that is not above zero and finite.
-            pub fn new(wheel_radius_m: f32, distance_m: f32) -> Result<Self, GeometryError> {
-                let distance_m = positive(distance_m, "distance_m")?;
-                let wheel = |degrees| {
-                    OmniWheel::tangential(Angle::from_degrees(degrees), distance_m)
-                };
-                Omni::new(wheel_radius_m, $degrees.map(wheel)).map(Self)
-            }
-
-            /// Returns the wheel velocities for the motion `twist` of the body.
-            #[must_use]
-            pub fn inverse(&self, twist: Twist<Body>) -> $wheels<AngularVelocity> {
-                $wheels::from_array(self.0.inverse(twist))
-            }
-
-            /// Returns the motion of the body that fits the wheel velocities best (least squares).
-            #[must_use]
-            pub fn forward(&self, wheels: $wheels<AngularVelocity>) -> Twist<Body> {
-                self.0.forward(wheels.into_array())
-            }
-        }
-
-        impl Kinematics for $name {
-            type Wheels<T: Copy> = $wheels<T>;
-            type Speed = AngularVelocity;
-            type Steering = ();
-
-            const UNSTEERED: () = ();
-
-            fn inverse(&self, twist: Twist<Body>) -> $wheels<AngularVelocity> {
-                self.inverse(twist)
-            }
-
-            fn forward(&self, wheels: $wheels<AngularVelocity>) -> Twist<Body> {
-                self.forward(wheels)
-            }
-
-            fn forward_partial(
-                &self,
-                wheels: $wheels<Option<AngularVelocity>>,
-            ) -> Option<Twist<Body>> {
-                self.0.forward_partial(wheels.into_array())
-            }
-
-            fn wheel_radius_m(&self) -> f32 {
-                self.0.wheel_radius_m
-            }
-
-            fn map<T: Copy, U: Copy>(wheels: $wheels<T>, f: impl FnMut(T) -> U) -> $wheels<U> {
-                wheels.map(f)
-            }
-
-            fn zip<T: Copy, U: Copy>(a: $wheels<T>, b: $wheels<U>) -> $wheels<(T, U)> {
-                a.zip(b)
-            }
-        }
-    };
-}
-
-named_omni! {
-    /// Three omni wheels at 60, -60 and 180 degrees: two in front, one behind; positive rolls counter-clockwise.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::OmniThree, geometry::Twist};
-    ///
-    /// let wheels = OmniThree::new(0.05, 0.2)?.inverse(Twist::new(0.0, 1.0, 0.0)); // to the left
-    /// assert!((wheels.rear.as_rad_per_s() + 20.0).abs() < 1e-4);
-    /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
-    /// ```
-    OmniThree, OmniThreeWheels, 3, [60.0, -60.0, 180.0]
-}
-
-named_omni! {
-    /// Four omni wheels on the corners of a square, at 45, -45, 135 and -135 degrees; positive rolls counter-clockwise.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::OmniFour, geometry::Twist};
-    ///
-    /// let wheels = OmniFour::new(0.05, 0.2)?.inverse(Twist::new(1.0, 0.0, 0.0));
-    /// let slow = core::f32::consts::FRAC_1_SQRT_2 / 0.05; // the rollers take the rest
-    /// assert!((wheels.front_left.as_rad_per_s() + slow).abs() < 1e-4);
-    /// assert!((wheels.front_right.as_rad_per_s() - slow).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
-    /// ```
-    OmniFour, OmniFourWheels, 4, [45.0, -45.0, 135.0, -135.0]
-}
-
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "signs are exact")]
 mod tests {
     use super::*;
 
-    fn four() -> OmniFour {
-        OmniFour::new(0.05, 0.2).unwrap()
+    fn four() -> Omni<4> {
+        Omni::four(0.05, 0.2).unwrap()
     }
 
     fn signs(vx: f32, vy: f32, wz: f32) -> [f32; 4] {
         let speeds = four().inverse(Twist::new(vx, vy, wz));
-        speeds.map(|speed| speed.as_rad_per_s().signum()).into_array()
+        speeds.map(|speed| speed.as_rad_per_s().signum())
     }
 
     #[test]
@@ -298,45 +215,43 @@ mod tests {
     #[test]
     fn the_third_seeds_rows_hold_once_the_root_of_one_half_is_back() {
         let (x, y, w) = (0.3_f32, 0.8, 1.5); // its axes: x right, y forward
-        let ours = four().inverse(Twist::new(y, -x, w)).map(|speed| speed.as_rad_per_s() * 0.05);
+        let [front_left, front_right, rear_left, rear_right] =
+            four().inverse(Twist::new(y, -x, w)).map(|speed| speed.as_rad_per_s() * 0.05);
         let half = core::f32::consts::FRAC_1_SQRT_2;
         let is_near =
             |ours: f32, theirs: f32| assert!((ours - theirs).abs() < 1e-6, "{ours} {theirs}");
-        is_near(ours.front_right, half * (-x + y) + w * 0.2);
-        is_near(ours.rear_right, half * (x + y) + w * 0.2);
-        is_near(ours.rear_left, half * (x - y) + w * 0.2);
-        is_near(ours.front_left, half * (-x - y) + w * 0.2);
+        is_near(front_right, half * (-x + y) + w * 0.2);
+        is_near(rear_right, half * (x + y) + w * 0.2);
+        is_near(rear_left, half * (x - y) + w * 0.2);
+        is_near(front_left, half * (-x - y) + w * 0.2);
     }
 
     #[test]
     fn wheels_that_leave_a_motion_undetermined_are_refused() {
-        let wheel = |x, y, degrees| OmniWheel {
-            position_m: Vec2::new(x, y),
-            direction: Angle::from_degrees(degrees),
-        };
-        let singular = Err(GeometryError::Singular("every motion"));
+        let wheel = |x, y, degrees| Pose2::new(x, y, Angle::from_degrees(degrees));
+        let singular = Err(ChassisError::Singular("every motion"));
         let parallel = [wheel(0.2, 0.2, 0.0), wheel(0.2, -0.2, 0.0), wheel(-0.2, 0.2, 180.0)];
         assert_eq!(Omni::new(0.05, parallel), singular);
         let radial = [wheel(0.2, 0.0, 0.0), wheel(0.0, 0.2, 90.0), wheel(-0.2, 0.0, 180.0)];
         assert_eq!(Omni::new(0.05, radial), singular);
         let two = [wheel(0.2, 0.0, 90.0), wheel(0.0, 0.2, 180.0)];
-        assert_eq!(Omni::new(0.05, two), Err(GeometryError::Singular("every motion")));
+        assert_eq!(Omni::new(0.05, two), Err(ChassisError::Singular("every motion")));
         let nan = [wheel(f32::NAN, 0.0, 90.0), wheel(0.0, 0.2, 180.0), wheel(0.0, 0.3, 30.0)];
-        assert_eq!(Omni::new(0.05, nan), Err(GeometryError::NotFinite("position_m")));
-        assert_eq!(OmniThree::new(0.0, 0.2), Err(GeometryError::NotPositive("wheel_radius_m")));
-        assert_eq!(OmniThree::new(0.05, -0.2), Err(GeometryError::NotPositive("distance_m")));
+        assert_eq!(Omni::new(0.05, nan), Err(ChassisError::NotFinite("position_m")));
+        assert_eq!(Omni::three(0.0, 0.2), Err(ChassisError::NotPositive("wheel_radius_m")));
+        assert_eq!(Omni::three(0.05, -0.2), Err(ChassisError::NotPositive("distance_m")));
     }
 
     #[test]
     fn four_wheels_may_lose_one_and_three_may_not() {
         let motion = Twist::new(0.5, -0.25, 1.0);
         let mut partial = four().inverse(motion).map(Some);
-        partial.rear_left = None;
+        partial[2] = None; // rear left
         let error = four().forward_partial(partial).unwrap() - motion;
         assert!(error.linear().norm() < 1e-5 && error.wz_rad_s.abs() < 1e-4, "{error:?}");
-        let three = OmniThree::new(0.05, 0.2).unwrap();
+        let three = Omni::three(0.05, 0.2).unwrap();
         let mut partial = three.inverse(motion).map(Some);
-        partial.rear = None;
+        partial[2] = None; // rear
         assert_eq!(three.forward_partial(partial), None);
     }
 
@@ -345,7 +260,7 @@ mod tests {
         let rolling = four().inverse(Twist::new(0.5, -0.25, 1.0));
         assert!(four().slip_m_s(rolling) < 1e-5);
         let mut lifted = rolling;
-        lifted.rear_left = lifted.rear_left + AngularVelocity::from_rad_per_s(8.0);
+        lifted[2] = lifted[2] + AngularVelocity::from_rad_per_s(8.0);
         assert!((four().slip_m_s(lifted) - 8.0 * 0.05 / 4.0).abs() < 1e-5);
     }
 }

@@ -1,3 +1,5 @@
+use super::ChassisError;
+use super::error::not_negative;
 use crate::math::sqrt;
 
 /// What one wheel is asked for: torque at its shaft, and the speed it turns at.
@@ -9,7 +11,7 @@ use crate::math::sqrt;
 /// let mechanical = PowerModel::new(0.0, 1.0, 0.0, 0.0)?;
 /// let braking = WheelLoad { torque: -2.0, speed_rad_s: 30.0 };
 /// assert_eq!(mechanical.power_w(braking), -60.0); // fed back
-/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -34,7 +36,7 @@ pub struct WheelLoad {
 /// let model = PowerModel::new(1.0, 1.0, 2.0, 0.001)?;
 /// let load = WheelLoad { torque: 2.0, speed_rad_s: 10.0 };
 /// assert!((model.power_w(load) - (1.0 + 20.0 + 8.0 + 0.1)).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -46,25 +48,6 @@ pub struct PowerModel {
     pub(super) k2: f32,
     pub(super) k3: f32,
 }
-
-/// Why a power model or buffer cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum PowerError {
-    /// The named value must be finite and zero or more.
-    Negative(&'static str),
-}
-
-impl core::fmt::Display for PowerError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Negative(name) => write!(f, "{name} must be finite and zero or more"),
-        }
-    }
-}
-
-impl core::error::Error for PowerError {}
 
 /// The coefficients as they stand in a file, where anybody may have changed them.
 #[cfg(feature = "serde")]
@@ -79,15 +62,11 @@ struct Stored {
 
 #[cfg(feature = "serde")]
 impl TryFrom<Stored> for PowerModel {
-    type Error = PowerError;
+    type Error = ChassisError;
 
-    fn try_from(Stored { k0, k1, k2, k3 }: Stored) -> Result<Self, PowerError> {
+    fn try_from(Stored { k0, k1, k2, k3 }: Stored) -> Result<Self, ChassisError> {
         Self::new(k0, k1, k2, k3)
     }
-}
-
-pub(super) fn not_negative(value: f32, name: &'static str) -> Result<f32, PowerError> {
-    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(PowerError::Negative(name)) }
 }
 
 /// How the torques are to be cut.
@@ -100,7 +79,7 @@ pub(super) fn not_negative(value: f32, name: &'static str) -> Result<f32, PowerE
 /// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
 /// let cut = model.cut([stalled; 4], 10.0); // the electronics alone take 20 W
 /// assert_eq!((cut.scale, cut.power_w, cut.within), (0.0, 20.0, false));
-/// # Ok::<(), drivetrain::chassis::PowerError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -118,7 +97,7 @@ impl PowerModel {
     ///
     /// # Errors
     /// Names the coefficient that is not finite and zero or more.
-    pub fn new(k0: f32, k1: f32, k2: f32, k3: f32) -> Result<Self, PowerError> {
+    pub fn new(k0: f32, k1: f32, k2: f32, k3: f32) -> Result<Self, ChassisError> {
         Ok(Self {
             k0: not_negative(k0, "k0")?,
             k1: not_negative(k1, "k1")?,
@@ -151,7 +130,7 @@ impl PowerModel {
     /// let wheel = WheelLoad { torque: 2.0, speed_rad_s: 6.0 }; // 12 W and 8 W of heat
     /// let cut = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
     /// assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within);
-    /// # Ok::<(), drivetrain::chassis::PowerError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
     #[must_use]
     pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> PowerCut {
@@ -289,8 +268,8 @@ mod tests {
 
     #[test]
     fn a_coefficient_that_is_negative_or_nan_is_named() {
-        assert_eq!(PowerModel::new(0.0, 1.0, -1.0, 0.0), Err(PowerError::Negative("k2")));
-        assert_eq!(PowerModel::new(f32::NAN, 1.0, 1.0, 0.0), Err(PowerError::Negative("k0")));
+        assert_eq!(PowerModel::new(0.0, 1.0, -1.0, 0.0), Err(ChassisError::Negative("k2")));
+        assert_eq!(PowerModel::new(f32::NAN, 1.0, 1.0, 0.0), Err(ChassisError::Negative("k0")));
     }
 
     proptest! {

@@ -1,6 +1,7 @@
+use super::ChassisError;
 use super::clock::DeadClock;
-use super::power::{PowerError, not_negative};
-use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
+use super::error::not_negative;
+use crate::control::{Pid, PidConfig, TimeStep};
 
 /// Spends an energy buffer down to a reserve, and lets it fill up again: the power to allow from its charge.
 ///
@@ -19,7 +20,7 @@ use crate::control::{ConfigError, Pid, PidConfig, TimeStep};
 /// assert_eq!(buffer.allowance_w(80.0, Some(20.0), 0.01), 80.0); // at the reserve
 /// assert_eq!(buffer.allowance_w(80.0, Some(0.0), 0.01), 40.0); // to fill up
 /// assert_eq!(buffer.allowance_w(80.0, None, 0.01), 72.0);
-/// # Ok::<(), drivetrain::chassis::BufferError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PowerBuffer {
@@ -29,38 +30,16 @@ pub struct PowerBuffer {
     blind_share: f32,
 }
 
-/// Why a buffer controller cannot be made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum BufferError {
-    /// The loop's parameters.
-    Pid(ConfigError),
-    /// The reserve or the blind share.
-    Value(PowerError),
-}
-
-impl core::fmt::Display for BufferError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Pid(error) => write!(f, "the buffer's loop: {error}"),
-            Self::Value(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for BufferError {}
-
 impl PowerBuffer {
     /// Takes the charge to keep in J, and the loop from J to W.
     ///
     /// # Errors
     /// Names the value that cannot be used.
-    pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, BufferError> {
+    pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, ChassisError> {
         Ok(Self {
-            pid: Pid::new(pid).map_err(BufferError::Pid)?,
+            pid: Pid::new(pid).map_err(|error| ChassisError::Loop("the buffer's loop", error))?,
             clock: DeadClock::new(),
-            reserve_j: not_negative(reserve_j, "reserve_j").map_err(BufferError::Value)?,
+            reserve_j: not_negative(reserve_j, "reserve_j")?,
             blind_share: 0.9,
         })
     }
@@ -68,9 +47,9 @@ impl PowerBuffer {
     /// Sets the share of the limit that is allowed without a reading: zero or more.
     ///
     /// # Errors
-    /// [`BufferError::Value`] when it is negative or not finite.
-    pub fn with_blind_share(self, share: f32) -> Result<Self, BufferError> {
-        let blind_share = not_negative(share, "blind_share").map_err(BufferError::Value)?;
+    /// [`ChassisError::Negative`] when it is negative or not finite.
+    pub fn with_blind_share(self, share: f32) -> Result<Self, ChassisError> {
+        let blind_share = not_negative(share, "blind_share")?;
         Ok(Self { blind_share, ..self })
     }
 
@@ -201,10 +180,10 @@ mod tests {
     #[test]
     fn values_that_cannot_work_are_named() {
         let reserve = PowerBuffer::new(-1.0, PidConfig::new(1.0, 0.0, 0.0));
-        assert_eq!(reserve, Err(BufferError::Value(PowerError::Negative("reserve_j"))));
+        assert_eq!(reserve, Err(ChassisError::Negative("reserve_j")));
         assert!(matches!(
             PowerBuffer::new(1.0, PidConfig::new(f32::NAN, 0.0, 0.0)),
-            Err(BufferError::Pid(_))
+            Err(ChassisError::Loop(_, _))
         ));
     }
 }

@@ -1,37 +1,25 @@
 use crate::motor::TargetError;
 
-/// Where the measured motion of the last tick comes from.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum MotionSource {
-    /// From all wheels.
-    AllWheels,
-    /// From some wheels: the others gave no feedback, and the rest suffices.
-    SomeWheels,
-    /// From none: too few wheels gave feedback. The position stands still; a gyroscope's heading goes on.
-    #[default]
-    Unknown,
-}
-
 /// What went on in a chassis, besides the motion.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Chassis, MotionSource, OmniThree, OmniThreeWheels};
+/// use drivetrain::chassis::{Chassis, Omni};
 /// use drivetrain::time::{Instant, Tick};
 ///
-/// let mut chassis = Chassis::new(OmniThree::new(0.05, 0.2)?);
-/// let _ = chassis.update(OmniThreeWheels::splat(None), Tick::new(Instant::from_micros(1_000), 0.001));
+/// let mut chassis = Chassis::new(Omni::three(0.05, 0.2)?);
+/// let _ = chassis.update([None; 3], Tick::new(Instant::from_micros(1_000), 0.001));
 /// let status = chassis.status();
-/// assert_eq!((status.source, status.lost_wheels), (MotionSource::Unknown, 3));
+/// assert_eq!((status.motion_known, status.lost_wheels), (false, 3));
 /// assert_eq!(status.blind_s, 0.001);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChassisStatus {
-    /// How the motion of the last tick was measured.
-    pub source: MotionSource,
+    /// The motion of the last tick was measured: by all wheels, or by the others while [`lost_wheels`](Self::lost_wheels) is
+    /// above zero. With too few wheels it is unknown: the position stands still; a gyroscope's heading goes on.
+    pub motion_known: bool,
     /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
     pub lost_wheels: u8,
     /// Seconds for which the position could not be followed, in all.

@@ -5,88 +5,62 @@ use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::{FRAC_PI_2, PI};
 
 /// How the modules of a swerve chassis are steered.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{SteeringConfig, Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
-///
-/// let config = SteeringConfig::new().with_hysteresis(Angle::from_degrees(20.0));
-/// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?.with_steering(config);
-/// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
-/// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
-/// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "Stored"))]
-pub struct SteeringConfig {
+pub(super) struct Steering {
     hysteresis: Angle,
     hold_below: AngularVelocity,
     cosine_compensation: bool,
 }
 
-/// The configuration as it stands in a file, where anybody may have changed it.
-#[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-#[serde(rename = "SteeringConfig")]
-struct Stored {
-    hysteresis: Angle,
-    hold_below: AngularVelocity,
-    cosine_compensation: bool,
-}
-
-#[cfg(feature = "serde")]
-impl From<Stored> for SteeringConfig {
-    fn from(stored: Stored) -> Self {
-        let config =
-            Self::new().with_hysteresis(stored.hysteresis).with_hold_below(stored.hold_below);
-        Self { cosine_compensation: stored.cosine_compensation, ..config }
-    }
-}
-
-impl SteeringConfig {
-    /// A hysteresis of 5 degrees, angles held below 0.1 rad/s, cosine compensation on.
-    #[must_use]
-    pub const fn new() -> Self {
+impl Steering {
+    pub(super) const fn new() -> Self {
         Self {
             hysteresis: Angle::from_degrees(5.0),
             hold_below: AngularVelocity::from_rad_per_s(0.1),
             cosine_compensation: true,
         }
     }
+}
 
+/// How the modules are steered: a hysteresis of 5 degrees, angles held below 0.1 rad/s, cosine compensation on.
+impl<const N: usize> Swerve<N> {
     /// Sets how far beyond 90 degrees a module must be off before its drive reverses. The sign does not matter; NaN counts as 0.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{chassis::{Swerve, SwerveSteering}, geometry::{Twist, Vec2}, units::Angle};
+    ///
+    /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?
+    ///     .with_hysteresis(Angle::from_degrees(20.0));
+    /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
+    /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
+    /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// ```
     #[must_use]
-    pub const fn with_hysteresis(self, hysteresis: Angle) -> Self {
-        let hysteresis = Angle::from_radians(size(hysteresis.as_radians()));
-        Self { hysteresis, ..self }
+    pub const fn with_hysteresis(mut self, hysteresis: Angle) -> Self {
+        self.steering.hysteresis = Angle::from_radians(size(hysteresis.as_radians()));
+        self
     }
 
     /// Sets the wheel speed below which a module stands still and keeps its angle. The sign does not matter; NaN counts as 0.
     #[must_use]
-    pub const fn with_hold_below(self, speed: AngularVelocity) -> Self {
-        let hold_below = AngularVelocity::from_rad_per_s(size(speed.as_rad_per_s()));
-        Self { hold_below, ..self }
+    pub const fn with_hold_below(mut self, speed: AngularVelocity) -> Self {
+        self.steering.hold_below = AngularVelocity::from_rad_per_s(size(speed.as_rad_per_s()));
+        self
     }
 
     /// Lets a module drive at full speed while it still points elsewhere.
     #[must_use]
-    pub const fn without_cosine_compensation(self) -> Self {
-        Self { cosine_compensation: false, ..self }
+    pub const fn without_cosine_compensation(mut self) -> Self {
+        self.steering.cosine_compensation = false;
+        self
     }
 }
 
 /// Without a sign; with NaN no comparison would hold, and a module at zero command would turn to 0.
 const fn size(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.abs() }
-}
-
-impl Default for SteeringConfig {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 /// What is remembered of the modules of a [`Swerve`] from one tick to the next: where each was told to point.
@@ -104,7 +78,7 @@ impl Default for SteeringConfig {
 /// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
 /// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
 /// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::GeometryError>(())
+/// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwerveSteering<const N: usize>([Module; N]);
@@ -154,7 +128,7 @@ impl<const N: usize> Swerve<N> {
     /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
     /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
-    /// # Ok::<(), drivetrain::chassis::GeometryError>(())
+    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
     pub fn steer(
         &self,
@@ -162,7 +136,7 @@ impl<const N: usize> Swerve<N> {
         wanted: [ModuleState; N],
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
-        let config = self.steering_config();
+        let config = self.steering;
         let mut inputs = wanted.into_iter().zip(measured);
         steering.0.each_mut().map(|module| match inputs.next() {
             Some((wanted, measured)) => module.steer(config, wanted, measured),
@@ -179,7 +153,7 @@ impl<const N: usize> Swerve<N> {
         steering: &mut SwerveSteering<N>,
         measured: [Option<Angle>; N],
     ) -> [ModuleState; N] {
-        let config = self.steering_config();
+        let config = self.steering;
         let mut inputs = self.positions_m().iter().zip(measured);
         steering.0.each_mut().map(|module| match inputs.next() {
             Some((&position, measured)) => module.lock(config, position, measured),
@@ -191,7 +165,7 @@ impl<const N: usize> Swerve<N> {
 impl Module {
     fn steer(
         &mut self,
-        config: SteeringConfig,
+        config: Steering,
         wanted: ModuleState,
         measured: Option<Angle>,
     ) -> ModuleState {
@@ -212,7 +186,7 @@ impl Module {
     }
 
     /// The turn from `here` to a direction or against it, whichever is nearer; in the hysteresis, the one taken last.
-    fn shorter(&mut self, config: SteeringConfig, here: f32, direction: Angle) -> f32 {
+    fn shorter(&mut self, config: Steering, here: f32, direction: Angle) -> f32 {
         let ahead = wrap_pi(direction.as_radians() - here);
         let behind = wrap_pi(ahead + PI);
         let (kept, other) = if self.reversed { (behind, ahead) } else { (ahead, behind) };
@@ -240,12 +214,7 @@ impl Module {
         }
     }
 
-    fn lock(
-        &mut self,
-        config: SteeringConfig,
-        position: Vec2,
-        measured: Option<Angle>,
-    ) -> ModuleState {
+    fn lock(&mut self, config: Steering, position: Vec2, measured: Option<Angle>) -> ModuleState {
         let away = Angle::from_radians(atan2(position.y, position.x));
         let Some(here) = known(measured) else {
             return self.blind(away);
@@ -288,9 +257,7 @@ mod tests {
     }
 
     impl One {
-        fn new(config: SteeringConfig) -> Self {
-            let places = [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3)];
-            let swerve = Swerve::new(0.05, places).unwrap().with_steering(config);
+        fn new(swerve: Swerve<2>) -> Self {
             Self { swerve, steering: SwerveSteering::new() }
         }
 
@@ -302,12 +269,16 @@ mod tests {
         }
     }
 
+    fn swerve() -> Swerve<2> {
+        Swerve::new(0.05, [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3)]).unwrap()
+    }
+
     fn steered(one: &mut One, wanted: f32, measured: f32) -> (f32, f32) {
         one.steer(go(wanted), Some(measured))
     }
 
     fn fresh() -> One {
-        One::new(SteeringConfig::new().without_cosine_compensation())
+        One::new(swerve().without_cosine_compensation())
     }
 
     // The fifth seed's system and librm drive to angle 0 at zero command.
@@ -383,9 +354,9 @@ mod tests {
 
     #[test]
     fn a_module_across_the_way_does_not_push() {
-        let (_, velocity) = steered(&mut One::new(SteeringConfig::new()), 92.0, 0.0);
+        let (_, velocity) = steered(&mut One::new(swerve()), 92.0, 0.0);
         assert!(velocity.abs() < 1e-6);
-        let (_, velocity) = steered(&mut One::new(SteeringConfig::new()), 60.0, 0.0);
+        let (_, velocity) = steered(&mut One::new(swerve()), 60.0, 0.0);
         assert!((velocity - 5.0).abs() < 1e-5);
     }
 
@@ -399,7 +370,7 @@ mod tests {
 
     #[test]
     fn the_lock_makes_an_x_by_the_shorter_way() {
-        let One { swerve, mut steering } = One::new(SteeringConfig::new());
+        let One { swerve, mut steering } = One::new(swerve());
         let measured = [0.0, 170.0].map(|degrees| Some(Angle::from_degrees(degrees)));
         let [left, right] = swerve.lock(&mut steering, measured);
         assert!((left.angle.as_degrees() - 45.0).abs() < 0.3);
@@ -412,7 +383,7 @@ mod tests {
 
     #[test]
     fn a_module_across_the_lock_is_not_turned_to_and_fro_by_the_noise_of_its_encoder() {
-        let One { swerve, mut steering } = One::new(SteeringConfig::new());
+        let One { swerve, mut steering } = One::new(swerve());
         let mut lock = |noise: f32| {
             let measured = [135.0 + noise; 2].map(|degrees| Some(Angle::from_degrees(degrees)));
             swerve.lock(&mut steering, measured)[0].angle.as_degrees()
@@ -438,15 +409,25 @@ mod tests {
     #[test]
     fn a_configuration_of_nan_counts_as_zero() {
         let nan = f32::NAN;
-        let config = SteeringConfig::new()
+        let swerve = swerve()
             .with_hold_below(AngularVelocity::from_rad_per_s(nan))
             .with_hysteresis(Angle::from_radians(nan))
             .without_cosine_compensation();
-        let mut one = One::new(config);
+        let mut one = One::new(swerve);
         let (angle, velocity) = steered(&mut one, 91.0, 0.0);
         assert!((angle + 89.0).abs() < 1e-3 && velocity < 0.0, "{angle} {velocity}");
         let (angle, velocity) = one.steer(ModuleState::default(), Some(-89.0));
         assert!((angle + 89.0).abs() < 1e-3 && velocity.abs() < 1e-9, "{angle} {velocity}");
+    }
+
+    #[test]
+    fn a_negative_hysteresis_is_the_positive_one() {
+        let width = Angle::from_radians(0.5);
+        let swerve = swerve().with_hysteresis(-width);
+        assert_eq!(swerve, super::tests::swerve().with_hysteresis(width));
+        // With a hysteresis below zero the drive would flip to and fro.
+        let (angle, _) = steered(&mut One::new(swerve), 95.0, 0.0);
+        assert!((angle - 95.0).abs() < 1e-3);
     }
 
     #[test]

@@ -126,49 +126,6 @@ named_wheels! {
 }
 
 named_wheels! {
-    /// One value for each wheel of [`OmniThree`](super::OmniThree).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::{chassis::OmniThreeWheels, units::AngularVelocity};
-    ///
-    /// let rpm = OmniThreeWheels { front_left: -300.0, front_right: 300.0, rear: 0.0 };
-    /// let limited = rpm.map(AngularVelocity::from_rpm).desaturate(AngularVelocity::from_rpm(200.0));
-    /// assert!((limited.front_left.as_rpm() + 200.0).abs() < 1e-3);
-    /// ```
-    OmniThreeWheels, 3 {
-        /// Front left, at 60 degrees.
-        front_left,
-        /// Front right, at -60 degrees.
-        front_right,
-        /// Rear, at 180 degrees.
-        rear
-    }
-}
-
-named_wheels! {
-    /// One value for each wheel of [`OmniFour`](super::OmniFour).
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::chassis::OmniFourWheels;
-    ///
-    /// let ids = OmniFourWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
-    /// assert_eq!(ids.map(|id| 0x200 + id).into_array(), [0x202, 0x201, 0x203, 0x204]);
-    /// ```
-    OmniFourWheels, 4 {
-        /// Front left, at 45 degrees.
-        front_left,
-        /// Front right, at -45 degrees.
-        front_right,
-        /// Rear left, at 135 degrees.
-        rear_left,
-        /// Rear right, at -135 degrees.
-        rear_right
-    }
-}
-
-named_wheels! {
     /// One value for each side of a [`Differential`](super::Differential) chassis.
     ///
     /// # Examples

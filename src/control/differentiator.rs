@@ -1,4 +1,4 @@
-use super::error::{ConfigError, ConfigFault, check, positive};
+use super::error::{ConfigError, check, positive};
 use super::number::{Sum, finite};
 use super::step::TimeStep;
 use crate::math;
@@ -45,7 +45,7 @@ impl LinearDifferentiator {
         check!(positive("r", r));
         check!(positive("max_step", max_step_s));
         if r * max_step_s > 1.0 {
-            return Err(ConfigError::new("r", ConfigFault::Unstable));
+            return Err(ConfigError::Unstable("r"));
         }
         Ok(Self { r, follower: Follower::new(max_step_s) })
     }
@@ -128,7 +128,7 @@ impl OptimalDifferentiator {
         check!(positive("h0", h0_s));
         check!(positive("max_step", max_step_s));
         if h0_s < Self::LEAST_STEPS * max_step_s {
-            return Err(ConfigError::new("h0", ConfigFault::Unstable));
+            return Err(ConfigError::Unstable("h0"));
         }
         Ok(Self { r, h0_s, follower: Follower::new(max_step_s) })
     }
@@ -244,7 +244,7 @@ mod tests {
             match LinearDifferentiator::new(r, DT_S) {
                 Err(error) => {
                     assert!(tenths > 10);
-                    assert_eq!((error.parameter(), error.fault()), ("r", ConfigFault::Unstable));
+                    assert_eq!(error, ConfigError::Unstable("r"));
                 }
                 Ok(mut follow) => {
                     assert!(tenths <= 10);
@@ -270,7 +270,7 @@ mod tests {
             );
         }
         let narrow = OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).unwrap_err();
-        assert_eq!((narrow.parameter(), narrow.fault()), ("h0", ConfigFault::Unstable));
+        assert_eq!(narrow, ConfigError::Unstable("h0"));
     }
 
     #[test]
@@ -391,7 +391,7 @@ mod tests {
                 assert_eq!(arrives((r, width * DT_S), 0.0, target, times), Ok(()), "{width}");
             }
             let refused = OptimalDifferentiator::new(r, DT_S, DT_S).unwrap_err();
-            assert_eq!((refused.parameter(), refused.fault()), ("h0", ConfigFault::Unstable));
+            assert_eq!(refused, ConfigError::Unstable("h0"));
         }
     }
 

@@ -1,76 +1,82 @@
 use core::fmt;
 
-/// A parameter of a controller, filter or profile that cannot work.
+/// A parameter of a controller, filter, profile or tuner that cannot work, by its name.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{Pid, PidConfig};
+/// use drivetrain::control::{ConfigError, Pid, PidConfig};
 ///
 /// let reversed = PidConfig::new(1.0, 0.0, 0.0).with_output_range(5.0, -4.0);
 /// let error = Pid::new(reversed).unwrap_err();
+/// assert_eq!(error, ConfigError::Reversed("output_range"));
 /// assert_eq!(error.parameter(), "output_range");
 /// assert_eq!(error.to_string(), "output_range: the lower end must lie below the upper one");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ConfigError {
-    parameter: &'static str,
-    fault: ConfigFault,
-}
-
-/// What is wrong with the parameter that a [`ConfigError`] names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum ConfigFault {
+pub enum ConfigError {
     /// It is negative, NaN or infinite, and must be zero or more.
-    Negative,
+    Negative(&'static str),
     /// It is zero, negative, NaN or infinite, and must be more than zero.
-    NotPositive,
+    NotPositive(&'static str),
     /// Its lower end is not below its upper end, or one of them is NaN or infinite.
-    Reversed,
+    Reversed(&'static str),
     /// It is too fast for the time step: the result would overshoot or grow without bound.
-    Unstable,
+    Unstable(&'static str),
     /// It is NaN or infinite.
-    NotFinite,
+    NotFinite(&'static str),
     /// It does not go together with another parameter.
-    Conflict,
+    Conflict(&'static str),
     /// It is where the change starts, so that there is none.
-    NoChange,
+    NoChange(&'static str),
     /// It is outside of the range that the documentation gives, where `f32` is not exact enough.
-    OutOfRange,
+    OutOfRange(&'static str),
+    /// A [`RelayTuner`](super::RelayTuner) saw no steady swing within this time: too small an amplitude, a bias that does not
+    /// hold, or too much hysteresis.
+    OutOfTime(&'static str),
+    /// A half-period has fewer than [`RelayTuner::LEAST_SAMPLES`](super::RelayTuner::LEAST_SAMPLES) samples: take more of
+    /// this, less amplitude or a faster loop.
+    TooFewSamples(&'static str),
+    /// The swing is no larger than this, or beyond `f32`, so that no gain follows from it.
+    NoGain(&'static str),
 }
 
 impl ConfigError {
-    pub(crate) const fn new(parameter: &'static str, fault: ConfigFault) -> Self {
-        Self { parameter, fault }
-    }
-
     /// Returns the name of the parameter, as it stands in the `with_*` method or the constructor.
     #[must_use]
     pub const fn parameter(&self) -> &'static str {
-        self.parameter
-    }
-
-    /// Returns what is wrong with it.
-    #[must_use]
-    pub const fn fault(&self) -> ConfigFault {
-        self.fault
+        match *self {
+            Self::Negative(parameter)
+            | Self::NotPositive(parameter)
+            | Self::Reversed(parameter)
+            | Self::Unstable(parameter)
+            | Self::NotFinite(parameter)
+            | Self::Conflict(parameter)
+            | Self::NoChange(parameter)
+            | Self::OutOfRange(parameter)
+            | Self::OutOfTime(parameter)
+            | Self::TooFewSamples(parameter)
+            | Self::NoGain(parameter) => parameter,
+        }
     }
 }
 
 impl fmt::Display for ConfigError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.parameter)?;
-        formatter.write_str(match self.fault {
-            ConfigFault::Negative => ": must be zero or more, and finite",
-            ConfigFault::NotPositive => ": must be more than zero, and finite",
-            ConfigFault::Reversed => ": the lower end must lie below the upper one",
-            ConfigFault::Unstable => ": too fast for this time step",
-            ConfigFault::NotFinite => ": must be finite",
-            ConfigFault::Conflict => ": does not go together with another parameter",
-            ConfigFault::NoChange => ": must differ from the start",
-            ConfigFault::OutOfRange => ": outside of the range in which f32 is exact enough",
+        formatter.write_str(self.parameter())?;
+        formatter.write_str(match self {
+            Self::Negative(_) => ": must be zero or more, and finite",
+            Self::NotPositive(_) => ": must be more than zero, and finite",
+            Self::Reversed(_) => ": the lower end must lie below the upper one",
+            Self::Unstable(_) => ": too fast for this time step",
+            Self::NotFinite(_) => ": must be finite",
+            Self::Conflict(_) => ": does not go together with another parameter",
+            Self::NoChange(_) => ": must differ from the start",
+            Self::OutOfRange(_) => ": outside of the range in which f32 is exact enough",
+            Self::OutOfTime(_) => ": no steady swing within the time limit",
+            Self::TooFewSamples(_) => ": fewer than 8 samples in half a period of the swing",
+            Self::NoGain(_) => ": the swing is not larger than the hysteresis, or beyond f32",
         })
     }
 }
@@ -89,20 +95,12 @@ pub(crate) use check;
 
 /// Refuses what is negative, NaN or infinite.
 pub(crate) const fn not_negative(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
-    if value >= 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(ConfigError::new(parameter, ConfigFault::Negative))
-    }
+    if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(ConfigError::Negative(parameter)) }
 }
 
 /// Refuses what is zero, negative, NaN or infinite.
 pub(crate) const fn positive(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(ConfigError::new(parameter, ConfigFault::NotPositive))
-    }
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(ConfigError::NotPositive(parameter)) }
 }
 
 /// As [`positive`], for an option that is off when zero.
@@ -115,11 +113,7 @@ pub(crate) const fn off_or_positive(
 
 /// Refuses what is NaN or infinite.
 pub(crate) const fn finite(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(ConfigError::new(parameter, ConfigFault::NotFinite))
-    }
+    if value.is_finite() { Ok(()) } else { Err(ConfigError::NotFinite(parameter)) }
 }
 
 /// Refuses the gains of a controller when one is negative, NaN or infinite.
@@ -138,7 +132,7 @@ pub(crate) const fn ordered(
     if lower < upper && lower.is_finite() && upper.is_finite() {
         Ok(())
     } else {
-        Err(ConfigError::new(parameter, ConfigFault::Reversed))
+        Err(ConfigError::Reversed(parameter))
     }
 }
 

@@ -13,8 +13,8 @@
 //! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
 //! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
 //! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
-//! | single wrong samples | [`Median`] of 3 | |
-//! | a disturbance of a known period | [`MovingAverage`] of that many samples | |
+//! | single wrong samples | the median of a [`Window`] of 3 | |
+//! | a disturbance of a known period | the mean of a [`Window`] of that many samples | |
 //! | the rate of a noisy signal | [`LinearDifferentiator`], [`OptimalDifferentiator`] | |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
 //! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
@@ -53,13 +53,12 @@ pub use actuator::{
     Cascade, PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig,
 };
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
-pub use error::{ConfigError, ConfigFault};
-pub use filter::{Biquad, LowPass, Median, MovingAverage};
+pub use error::ConfigError;
+pub use filter::{Biquad, LowPass, Window};
 pub(crate) use pid::Input;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
 pub use tuning::{
-    Gains, Oscillation, RelayFailure, RelayTuner, RelayTunerConfig, StepMeasures, StepResponse,
-    TuningRule, WheelTuning,
+    Oscillation, RelayTuner, RelayTunerConfig, StepResponse, TuningRule, WheelTuning,
 };

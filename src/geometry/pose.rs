@@ -40,6 +40,23 @@ impl<F> Pose2<F> {
         Self { x_m, y_m, angle, frame: PhantomData }
     }
 
+    /// Takes an angle and a distance in m from the origin; the pose faces counter-clockwise round the origin there.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{geometry::{Body, Pose2}, units::Angle};
+    ///
+    /// let left = Pose2::<Body>::tangential(Angle::from_degrees(90.0), 0.2);
+    /// assert!((left.y_m - 0.2).abs() < 1e-6);
+    /// assert_eq!(left.angle.as_degrees(), 180.0); // backward
+    /// ```
+    #[must_use]
+    pub const fn tangential(angle: Angle, distance_m: f32) -> Self {
+        let place = Rotation2::new(angle).apply(Vec2::new(distance_m, 0.0));
+        let direction = Angle::from_radians(angle.as_radians() + core::f32::consts::FRAC_PI_2);
+        Self::new(place.x, place.y, direction)
+    }
+
     /// Returns the position.
     #[must_use]
     pub const fn position(self) -> Point2<F> {

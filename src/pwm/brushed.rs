@@ -2,8 +2,8 @@ mod config;
 mod drive;
 mod health;
 
+use super::Direction;
 use super::rc::duty;
-use super::{Direction, Way};
 use crate::control::{Pid, TimeStep};
 use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
 use crate::time::{Instant, Tick};
@@ -19,6 +19,14 @@ enum Target {
     Rest,
     Duty(f32),
     Velocity(f32),
+}
+
+/// Which way the pins tell the bridge to drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Coast,
+    Forward,
+    Backward,
 }
 
 /// A pin that failed.
@@ -227,7 +235,12 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm)?;
             // A pin that fails may have changed or not: the next call sets both again.
             self.way = Way::Coast;
-            self.direction.set(way).map_err(BrushedError::Direction)?;
+            let set = match way {
+                Way::Coast => self.direction.coast(),
+                Way::Forward => self.direction.forward(),
+                Way::Backward => self.direction.backward(),
+            };
+            set.map_err(BrushedError::Direction)?;
             self.way = way;
         }
         self.channel
@@ -238,7 +251,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Stops by both ways that there are, whether one of them fails or not.
     fn coast(&mut self) -> Result<(), BrushedError<P::Error, D::Error>> {
         let off = self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm);
-        let set = self.direction.set(Way::Coast).map_err(BrushedError::Direction);
+        let set = self.direction.coast().map_err(BrushedError::Direction);
         self.way = Way::Coast;
         off.and(set)
     }

@@ -1,23 +1,12 @@
 use embedded_hal::digital::{ErrorType, OutputPin};
 
-/// Which way a bridge drives its motor.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Way {
-    /// Not at all: the motor coasts where the bridge can do that.
-    #[default]
-    Coast,
-    /// The positive direction.
-    Forward,
-    /// The negative direction.
-    Backward,
-}
-
-/// The pins that tell a bridge which way to drive.
+/// The pins that tell a bridge which way to drive: [`OnePin`], or a tuple of two pins.
+///
+/// A tuple is IN1 and IN2 of a bridge like the L298N or TB6612FNG: at most one pin is high, and both low let the motor coast.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::pwm::{Direction, OnePin, Way};
+/// use drivetrain::pwm::{Direction, OnePin};
 /// # use embedded_hal::digital::*;
 /// # struct Pin(bool);
 /// # impl ErrorType for Pin { type Error = core::convert::Infallible; }
@@ -25,22 +14,38 @@ pub enum Way {
 /// #     fn set_low(&mut self) -> Result<(), Self::Error> { self.0 = false; Ok(()) }
 /// #     fn set_high(&mut self) -> Result<(), Self::Error> { self.0 = true; Ok(()) }
 /// # }
-/// # let pin = Pin(false);
+/// # let (pin, in1, in2) = (Pin(false), Pin(false), Pin(false));
 ///
 /// let mut direction = OnePin(pin);
-/// direction.set(Way::Backward)?;
+/// direction.backward()?;
 /// assert!(direction.0.0); // high
+///
+/// let mut pins = (in1, in2);
+/// pins.backward()?;
+/// assert!(!pins.0.0 && pins.1.0);
 /// # Ok::<(), core::convert::Infallible>(())
 /// ```
 pub trait Direction {
     /// What can go wrong with a pin.
     type Error: core::fmt::Debug;
 
-    /// Tells the bridge which way to drive.
+    /// Lets the motor coast, where the bridge can do that.
     ///
     /// # Errors
     /// That of the pin.
-    fn set(&mut self, way: Way) -> Result<(), Self::Error>;
+    fn coast(&mut self) -> Result<(), Self::Error>;
+
+    /// Drives in the positive direction.
+    ///
+    /// # Errors
+    /// That of the pin.
+    fn forward(&mut self) -> Result<(), Self::Error>;
+
+    /// Drives in the negative direction.
+    ///
+    /// # Errors
+    /// That of the pin.
+    fn backward(&mut self) -> Result<(), Self::Error>;
 }
 
 /// One pin: low is forward, high is backward; coasting leaves it as it is.
@@ -50,37 +55,35 @@ pub struct OnePin<P>(pub P);
 impl<P: OutputPin> Direction for OnePin<P> {
     type Error = P::Error;
 
-    fn set(&mut self, way: Way) -> Result<(), Self::Error> {
-        match way {
-            Way::Coast => Ok(()),
-            Way::Forward => self.0.set_low(),
-            Way::Backward => self.0.set_high(),
-        }
+    fn coast(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    fn forward(&mut self) -> Result<(), Self::Error> {
+        self.0.set_low()
+    }
+
+    fn backward(&mut self) -> Result<(), Self::Error> {
+        self.0.set_high()
     }
 }
 
-/// Two pins, IN1 and IN2 of a bridge like the L298N or TB6612FNG: one is high at most, and both low let it coast.
-#[derive(Debug, Clone, Copy)]
-pub struct TwoPins<A, B>(pub A, pub B);
-
-impl<A: OutputPin, B: OutputPin + ErrorType<Error = A::Error>> Direction for TwoPins<A, B> {
+/// Lowers a pin before it raises the other one: both are never high.
+impl<A: OutputPin, B: OutputPin + ErrorType<Error = A::Error>> Direction for (A, B) {
     type Error = A::Error;
 
-    /// Lowers a pin before it raises the other one: both are never high.
-    fn set(&mut self, way: Way) -> Result<(), Self::Error> {
-        match way {
-            Way::Coast => {
-                let first = self.0.set_low();
-                self.1.set_low().and(first)
-            }
-            Way::Forward => {
-                self.1.set_low()?;
-                self.0.set_high()
-            }
-            Way::Backward => {
-                self.0.set_low()?;
-                self.1.set_high()
-            }
-        }
+    fn coast(&mut self) -> Result<(), Self::Error> {
+        let first = self.0.set_low();
+        self.1.set_low().and(first)
+    }
+
+    fn forward(&mut self) -> Result<(), Self::Error> {
+        self.1.set_low()?;
+        self.0.set_high()
+    }
+
+    fn backward(&mut self) -> Result<(), Self::Error> {
+        self.0.set_low()?;
+        self.1.set_high()
     }
 }

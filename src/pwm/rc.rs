@@ -10,17 +10,6 @@ use embedded_hal::pwm::SetDutyCycle;
 /// Nothing is integrated here.
 const ANY_STEP_S: f32 = f32::INFINITY;
 
-/// What an [`RcPwm`] sends when it is not to move.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Idle {
-    /// The neutral pulse: an ESC stops and stays armed, a servo goes to its centre.
-    #[default]
-    Neutral,
-    /// No pulse: a servo goes limp. Not for an ESC: most disarm then, and would have to see neutral again.
-    Off,
-}
-
 /// How an RC ESC or servo wants its pulses.
 ///
 /// # Examples
@@ -44,7 +33,7 @@ pub struct RcConfig {
     neutral_us: u16,
     high_us: u16,
     period_us: u64,
-    idle: Idle,
+    off_at_rest: bool,
     arming: Duration,
     full_speed: Option<AngularVelocity>,
     timeouts: Timeouts,
@@ -61,7 +50,7 @@ impl RcConfig {
             neutral_us: 1_500,
             high_us: 2_000,
             period_us: 20_000,
-            idle: Idle::Neutral,
+            off_at_rest: false,
             arming: Duration::from_secs(2),
             full_speed: None,
             timeouts: Timeouts::new(),
@@ -87,10 +76,13 @@ impl RcConfig {
         Self { period_us: period.as_micros(), ..self }
     }
 
-    /// Sets what is sent when it is not to move.
+    /// Sends no pulse, instead of the neutral one, when it is not to move: a servo goes limp.
+    ///
+    /// Not for an ESC: most disarm then, and would have to see neutral again. With the neutral pulse an ESC stops and stays
+    /// armed, and a servo goes to its centre.
     #[must_use]
-    pub const fn with_idle(self, idle: Idle) -> Self {
-        Self { idle, ..self }
+    pub const fn with_off_at_rest(self) -> Self {
+        Self { off_at_rest: true, ..self }
     }
 
     /// Sets how long the neutral pulse is sent before targets are taken: what the ESC waits for. 2 s at first, counted
@@ -293,7 +285,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         if drives && self.held_steps < 2 {
             let pulse_us = self.pulse_us();
             self.send(pulse_us)
-        } else if self.config.idle == Idle::Off {
+        } else if self.config.off_at_rest {
             self.channel.set_duty_cycle_fully_off()
         } else {
             self.send(self.config.neutral_us.into())

@@ -2,7 +2,7 @@
 
 use crate::{PAUSE_MS, at_ms};
 use drivetrain::motor::{ArmError, TargetError};
-use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm, TwoPins};
+use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
 use drivetrain::time::Tick;
 use embedded_hal::{digital, pwm};
 
@@ -38,14 +38,14 @@ impl pwm::SetDutyCycle for Pin {
 }
 
 struct Bench {
-    motor: Brushed<Pin, TwoPins<Pin, Pin>>,
+    motor: Brushed<Pin, (Pin, Pin)>,
     ms: u64,
 }
 
 impl Bench {
     fn new() -> Self {
         let config = BrushedConfig::new(3).with_encoder(1_320.0, 16);
-        let pins = TwoPins(Pin::default(), Pin::default());
+        let pins = (Pin::default(), Pin::default());
         Self { motor: Brushed::new(Pin::default(), pins, config).unwrap(), ms: 1_000 }
     }
 

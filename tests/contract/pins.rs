@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::motor::{
     ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor, WrongSetting,
 };
-use drivetrain::pwm::{Brushed, BrushedConfig, Idle, OnePin, RcConfig, RcPwm};
+use drivetrain::pwm::{Brushed, BrushedConfig, OnePin, RcConfig, RcPwm};
 use drivetrain::time::{Duration, Instant, Tick};
 use embedded_hal::{digital, pwm};
 use std::cell::Cell;
@@ -266,5 +266,5 @@ fn motors_on_pins_keep_the_contract() {
     assert_eq!(check_contract(|| brushed(wheel)), Ok(RULES));
     assert_eq!(check_contract(|| brushed(wheel.reversed().with_limit(0.3))), Ok(RULES));
     assert_eq!(check_contract(|| rc(RcConfig::new(), 1_500)), Ok(RULES));
-    assert_eq!(check_contract(|| rc(RcConfig::new().with_idle(Idle::Off), 0)), Ok(RULES));
+    assert_eq!(check_contract(|| rc(RcConfig::new().with_off_at_rest(), 0)), Ok(RULES));
 }

@@ -284,13 +284,13 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
 
 #[cfg_attr(test, test)]
 fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
-    use drivetrain::chassis::{GimbalEdge, Mode, ModeConfig, Modes, WithoutGimbal};
+    use drivetrain::chassis::{Mode, ModeConfig, Modes};
     use drivetrain::geometry::Twist;
-    for (then, acting) in
-        [(WithoutGimbal::Independent, Mode::Independent), (WithoutGimbal::Relax, Mode::Relax)]
+    let follow = PidConfig::new(5.0, 0.0, 0.0);
+    let config = ModeConfig::new(follow).with_gimbal_timeout(0.1).with_transition(0.0);
+    for (config, acting) in
+        [(config, Mode::Independent), (config.with_relax_without_gimbal(), Mode::Relax)]
     {
-        let follow = PidConfig::new(5.0, 0.0, 0.0);
-        let config = ModeConfig::new(follow).with_gimbal_timeout(0.1, then).with_transition(0.0);
         let mut modes = Modes::new(config).unwrap();
         modes.set_mode(Mode::FollowGimbal);
         let mut edges = Vec::new();
@@ -316,7 +316,7 @@ fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
             }
         }
         assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
-        let (lost, back) = (GimbalEdge::Lost, GimbalEdge::Back);
+        let (lost, back) = (acting, Mode::FollowGimbal);
         assert_eq!(edges, [lost, back, lost, back], "each once");
         saw(format!("{acting:?}, edges {edges:?}"));
     }

@@ -11,30 +11,23 @@ pub fn call_all() {
     Differential::new.call();
     Differential::inverse.call();
     Differential::forward.call();
-    Mecanum::<FloorO>::new.call();
-    Mecanum::<FloorO>::with_rollers.call();
-    Mecanum::<FloorO>::inverse.call();
-    Mecanum::<FloorX>::forward.call();
-    OmniWheel::tangential.call();
+    Mecanum::<'O'>::new.call();
+    Mecanum::<'O'>::with_rollers.call();
+    Mecanum::<'O'>::inverse.call();
+    Mecanum::<'X'>::forward.call();
     Omni::<4>::new.call();
     Omni::<4>::inverse.call();
     Omni::<4>::forward.call();
-    OmniThree::new.call();
-    OmniThree::inverse.call();
-    OmniThree::forward.call();
-    OmniFour::new.call();
-    OmniFour::inverse.call();
-    OmniFour::forward.call();
-    SteeringConfig::new.call();
-    SteeringConfig::with_hysteresis.call();
-    SteeringConfig::with_hold_below.call();
-    SteeringConfig::without_cosine_compensation.call();
+    Omni::three.call();
+    Omni::four.call();
+    Swerve::<4>::with_hysteresis.call();
+    Swerve::<4>::with_hold_below.call();
+    Swerve::<4>::without_cosine_compensation.call();
     SwerveSteering::<4>::new.call();
     ModuleState::new.call();
     <AngularVelocity as WheelSpeed>::is_finite.call();
     <ModuleState as WheelSpeed>::is_finite.call();
     Swerve::<4>::new.call();
-    Swerve::<4>::with_steering.call();
     Swerve::<4>::steer.call();
     Swerve::<4>::lock.call();
     Swerve::<4>::positions_m.call();
@@ -85,8 +78,10 @@ pub fn call_all() {
     ChassisLimits::validate.call();
     ModeConfig::new.call();
     ModeConfig::with_rotor.call();
-    ModeConfig::with_spin.call();
+    ModeConfig::with_clockwise_rotor.call();
+    ModeConfig::with_alternating_rotor.call();
     ModeConfig::with_gimbal_timeout.call();
+    ModeConfig::with_relax_without_gimbal.call();
     ModeConfig::with_transition.call();
     Modes::new.call();
     Modes::set_mode.call();
@@ -113,7 +108,7 @@ pub fn call_all() {
     PowerFit::rejected.call();
     (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
         .call();
-    wheels!(DifferentialWheels MecanumWheels OmniThreeWheels OmniFourWheels);
+    wheels!(DifferentialWheels MecanumWheels);
 }
 
 /// What a macro gives to every set of wheels, which it calls `name`.

@@ -25,6 +25,7 @@ pub fn call_all() {
     Point3::<Body>::to_vec.call();
     Point3::<Body>::from_vec.call();
     Pose2::<World>::new.call();
+    Pose2::<World>::tangential.call();
     Pose2::<World>::position.call();
     Pose2::<World>::heading.call();
     Pose2::<World>::to_transform::<Body>.call();

@@ -41,7 +41,7 @@ impl digital::OutputPin for Pin {
 
 pub fn call_all() {
     brushed::<OnePin<Pin>>();
-    brushed::<TwoPins<Pin, Pin>>();
+    brushed::<(Pin, Pin)>();
     BrushedConfig::new.call();
     BrushedConfig::with_encoder.call();
     BrushedConfig::with_velocity_filter.call();
@@ -57,7 +57,7 @@ pub fn call_all() {
     RcConfig::with_id.call();
     RcConfig::with_pulses_us.call();
     RcConfig::with_period.call();
-    RcConfig::with_idle.call();
+    RcConfig::with_off_at_rest.call();
     RcConfig::with_arming_time.call();
     RcConfig::with_full_speed.call();
     RcConfig::with_timeouts.call();

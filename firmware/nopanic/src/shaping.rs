@@ -55,16 +55,12 @@ pub fn call_all() {
     LowPass::reset_to.call();
     LowPass::value.call();
     LowPass::rejected.call();
-    MovingAverage::<8>::new.call();
-    MovingAverage::<8>::update.call();
-    MovingAverage::<8>::reset.call();
-    MovingAverage::<8>::value.call();
-    MovingAverage::<8>::rejected.call();
-    Median::<5>::new.call();
-    Median::<5>::update.call();
-    Median::<5>::reset.call();
-    Median::<5>::value.call();
-    Median::<5>::rejected.call();
+    Window::<8>::new.call();
+    Window::<8>::push.call();
+    Window::<8>::mean.call();
+    Window::<8>::median.call();
+    Window::<8>::reset.call();
+    Window::<8>::rejected.call();
     Pid::interrupt.call();
     FeedForward::new.call();
     FeedForward::effort.call();
@@ -81,7 +77,6 @@ pub fn call_all() {
     SlewLimiter::reset_to.call();
     SlewLimiter::value.call();
     SlewLimiter::rejected.call();
-    Gains::config.call();
     Oscillation::gains.call();
     RelayTunerConfig::new.call();
     RelayTunerConfig::with_bias.call();
@@ -98,6 +93,9 @@ pub fn call_all() {
     StepResponse::new.call();
     StepResponse::record.call();
     StepResponse::is_complete.call();
-    StepResponse::measures.call();
+    StepResponse::rise_time_s.call();
+    StepResponse::overshoot.call();
+    StepResponse::settling_time_s.call();
+    StepResponse::steady_error.call();
     StepResponse::rejected.call();
 }

@@ -5,10 +5,10 @@ use crate::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
-    Biquad, Cascade, ConfigError, FeedForward, LinearDifferentiator, LowPass, Median, MotionLimits,
-    MovingAverage, OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig,
-    Profile, ProfileState, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
-    SpeedActuatorConfig, StepResponse, TimeStep,
+    Biquad, Cascade, ConfigError, FeedForward, LinearDifferentiator, LowPass, MotionLimits,
+    OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig, Profile,
+    ProfileState, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
+    StepResponse, TimeStep, Window,
 };
 
 const DT_S: f32 = 0.001;
@@ -32,8 +32,8 @@ functions! {
     control_position(actuator: &mut PositionActuator, setpoint, angle, speed, dt_s) -> f32 = actuator.step(setpoint, angle, speed, &TimeStep::of(dt_s));
     control_low_pass(filter: &mut LowPass, input, dt_s) -> f32 = filter.update(input, dt_s);
     control_biquad(filter: &mut Biquad, input) -> f32 = filter.update(input);
-    control_moving_average(filter: &mut MovingAverage<8>, sample) -> f32 = filter.update(sample);
-    control_median(filter: &mut Median<5>, sample) -> f32 = filter.update(sample);
+    control_moving_average(window: &mut Window<8>, sample) -> f32 = window.push(sample).mean();
+    control_median(window: &mut Window<5>, sample) -> f32 = window.push(sample).median();
     control_linear(differentiator: &mut LinearDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
     control_optimal(differentiator: &mut OptimalDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
     control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
@@ -61,8 +61,8 @@ pub fn rows() {
     timed("low_pass", control_low_pass, &mut filter);
     let mut filter = Biquad::low_pass(black_box(30.0), 0.7, 1_000.0).unwrap();
     sampled("biquad", control_biquad, &mut filter);
-    sampled("moving_average_8", control_moving_average, &mut MovingAverage::new());
-    sampled("median_5", control_median, &mut Median::new());
+    sampled("moving_average_8", control_moving_average, &mut Window::new());
+    sampled("median_5", control_median, &mut Window::new());
     let mut differentiator = LinearDifferentiator::new(black_box(100.0), 0.005).unwrap();
     timed("differentiator_linear", control_linear, &mut differentiator);
     let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.006, 0.004).unwrap();

@@ -17,7 +17,7 @@ pub use cascade::Cascade;
 pub use position::{PositionActuator, PositionActuatorConfig};
 pub use speed::{SpeedActuator, SpeedActuatorConfig};
 
-use super::error::ConfigError;
+use super::error::{ConfigError, positive};
 use super::filter::LowPass;
 use super::step::TimeStep;
 
@@ -31,9 +31,9 @@ impl OptionalFilter {
     const fn new(name: &'static str, cutoff_hz: Option<f32>) -> Result<Self, ConfigError> {
         match cutoff_hz {
             None => Ok(Self(None)),
-            Some(cutoff_hz) => match LowPass::new(cutoff_hz) {
-                Ok(filter) => Ok(Self(Some(filter))),
-                Err(error) => Err(ConfigError::new(name, error.fault())),
+            Some(cutoff_hz) => match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
+                (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
+                (Err(error), _) | (_, Err(error)) => Err(error),
             },
         }
     }

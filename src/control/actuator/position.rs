@@ -1,6 +1,6 @@
 use super::speed::{SpeedActuatorConfig, SpeedFilters};
 use super::{Cascade, OptionalFilter};
-use crate::control::error::{ConfigError, ConfigFault};
+use crate::control::error::ConfigError;
 use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 
@@ -101,10 +101,10 @@ impl PositionActuator {
     /// is NaN, infinite, zero or negative, `angle_filter` when the angle loop has a period, `outer_divider` when zero.
     pub const fn new(config: PositionActuatorConfig) -> Result<Self, ConfigError> {
         if config.outer_divider == 0 {
-            return Err(ConfigError::new("outer_divider", ConfigFault::NotPositive));
+            return Err(ConfigError::NotPositive("outer_divider"));
         }
         if config.angle_cutoff_hz.is_some() && config.angle.period() > 0.0 {
-            return Err(ConfigError::new("angle_filter", ConfigFault::Conflict));
+            return Err(ConfigError::Conflict("angle_filter"));
         }
         let filter = match OptionalFilter::new("angle_filter", config.angle_cutoff_hz) {
             Ok(filter) => filter,

@@ -1,4 +1,4 @@
-use crate::control::error::{ConfigError, ConfigFault, check, positive};
+use crate::control::error::{ConfigError, check, positive};
 use crate::math;
 
 /// A second-order filter for samples at a fixed rate: low-pass or notch.
@@ -157,11 +157,11 @@ const fn check_all(
     // Nearer to the ends, and at other qualities, the poles round onto the unit circle or past it.
     let part = frequency_hz / sample_hz;
     if part > 0.499 {
-        Err(ConfigError::new(name, ConfigFault::Unstable))
+        Err(ConfigError::Unstable(name))
     } else if part < 0.001 {
-        Err(ConfigError::new(name, ConfigFault::OutOfRange))
+        Err(ConfigError::OutOfRange(name))
     } else if q < 0.01 || q > 100.0 {
-        Err(ConfigError::new("q", ConfigFault::OutOfRange))
+        Err(ConfigError::OutOfRange("q"))
     } else {
         Ok(())
     }
@@ -233,14 +233,14 @@ mod tests {
             assert_eq!(Biquad::notch(10.0, bad, 1000.0).unwrap_err().parameter(), "q");
             assert_eq!(Biquad::notch(10.0, 1.0, bad).unwrap_err().parameter(), "sample_hz");
         }
-        let out_of_range = ConfigError::new("cutoff", ConfigFault::OutOfRange);
+        let out_of_range = ConfigError::OutOfRange("cutoff");
         assert_eq!(Biquad::low_pass(0.03, 0.7, 1000.0), Err(out_of_range)); // once grew to 1e38
         for q in [0.009, 101.0, 1e-44, f32::MAX] {
-            let error = ConfigError::new("q", ConfigFault::OutOfRange);
+            let error = ConfigError::OutOfRange("q");
             assert_eq!(Biquad::notch(50.0, q, 1000.0), Err(error));
         }
         for near_half in [499.1, 499.99, 500.0, 1e30] {
-            let error = ConfigError::new("center", ConfigFault::Unstable);
+            let error = ConfigError::Unstable("center");
             assert_eq!(Biquad::notch(near_half, 1.0, 1000.0), Err(error));
         }
     }

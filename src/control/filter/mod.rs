@@ -4,8 +4,8 @@
 //! |---|---|---|---|
 //! | [`LowPass`] | noise, gently | its time constant | any, from call to call |
 //! | [`Biquad`] | noise, steeply; one resonance | about `0.2 / cutoff` | fixed |
-//! | [`MovingAverage`] | noise, and a disturbance of exactly `N` samples | `(N - 1) / 2` samples | fixed |
-//! | [`Median`] | single wrong samples | `(N - 1) / 2` samples | fixed |
+//! | [`Window::mean`] | noise, and a disturbance of exactly `N` samples | `(N - 1) / 2` samples | fixed |
+//! | [`Window::median`] | single wrong samples | `(N - 1) / 2` samples | fixed |
 //!
 //! A filter starts at rest on its first sample, so that there is no transient from zero. A sample that is NaN or infinite
 //! changes nothing: the last output is returned and the sample is counted.
@@ -16,4 +16,4 @@ mod window;
 
 pub use biquad::Biquad;
 pub use low_pass::LowPass;
-pub use window::{Median, MovingAverage};
+pub use window::Window;

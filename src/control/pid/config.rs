@@ -1,6 +1,5 @@
 use crate::control::error::{
-    ConfigError, ConfigFault, check, gains, not_negative, off_or_positive, ordered, output_ends,
-    positive,
+    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
 };
 
 const ASYMMETRIC: u16 = 1;
@@ -340,7 +339,7 @@ impl PidConfig {
         check!(off_or_positive("derivative_filter", p.derivative_time_s));
         check!(off_or_positive("back_calculation", p.drain_time_s));
         if self.tracking_r > 0.0 && self.period > 0.0 {
-            return Err(ConfigError::new("r", ConfigFault::Conflict));
+            return Err(ConfigError::Conflict("r"));
         }
         off_or_positive("r", self.tracking_r)
     }

@@ -338,8 +338,8 @@ impl Pid {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
+    use crate::control::TimeStep;
     use crate::control::pid::config::FEED_FORWARD;
-    use crate::control::{ConfigFault, TimeStep};
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -476,38 +476,38 @@ mod tests {
     fn a_limit_that_is_zero_or_reversed_is_named() {
         let new = PidConfig::new(1.0, 1.0, 1.0);
         let cases = [
-            (PidConfig::new(-1.0, 0.0, 0.0), "kp", ConfigFault::Negative),
-            (PidConfig::new(0.0, f32::NAN, 0.0), "ki", ConfigFault::Negative),
-            (PidConfig::new(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
-            (new.with_output_limit(0.0), "output_limit", ConfigFault::NotPositive),
-            (new.with_output_limit(-1.0), "output_limit", ConfigFault::NotPositive),
-            (new.with_output_limit(f32::NAN), "output_limit", ConfigFault::NotPositive),
-            (new.with_output_limit(f32::INFINITY), "output_limit", ConfigFault::NotPositive),
-            (new.with_output_range(1.0, f32::NAN), "output_range", ConfigFault::Reversed),
-            (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
-            (new.with_integral_limit(0.0), "integral_limit", ConfigFault::NotPositive),
-            (new.with_integral_separation(-1.0), "integral_separation", ConfigFault::NotPositive),
-            (new.with_variable_integral(2.0, 1.0), "variable_integral", ConfigFault::Reversed),
-            (new.with_variable_integral(-1.0, 1.0), "variable_integral", ConfigFault::Negative),
-            (new.with_variable_integral(1.0, f32::NAN), "variable_integral", ConfigFault::Reversed),
-            (new.with_back_calculation(0.0), "back_calculation", ConfigFault::NotPositive),
-            (new.with_back_calculation(f32::NAN), "back_calculation", ConfigFault::NotPositive),
-            (new.with_dead_band(-1.0), "dead_band", ConfigFault::Negative),
-            (new.with_feed_forward(-1.0, 0.0), "static_gain", ConfigFault::Negative),
-            (new.with_feed_forward(0.0, f32::NAN), "velocity_gain", ConfigFault::Negative),
-            (new.with_slew_limit(0.0), "slew_limit", ConfigFault::NotPositive),
-            (new.with_period(0.0), "period", ConfigFault::NotPositive),
-            (new.with_period(-360.0), "period", ConfigFault::NotPositive),
-            (new.with_period(f32::INFINITY), "period", ConfigFault::NotPositive),
-            (new.with_derivative_filter(0.0), "derivative_filter", ConfigFault::NotPositive),
-            (new.with_derivative_filter(-5.0), "derivative_filter", ConfigFault::NotPositive),
-            (new.with_derivative_filter(BAD[0]), "derivative_filter", ConfigFault::NotPositive),
-            (new.with_derivative_filter(BAD[1]), "derivative_filter", ConfigFault::NotPositive),
-            (new.with_back_calculation(BAD[1]), "back_calculation", ConfigFault::NotPositive),
-            (new.with_period(1e-40), "period", ConfigFault::NotPositive),
+            (PidConfig::new(-1.0, 0.0, 0.0), ConfigError::Negative("kp")),
+            (PidConfig::new(0.0, f32::NAN, 0.0), ConfigError::Negative("ki")),
+            (PidConfig::new(0.0, 0.0, f32::INFINITY), ConfigError::Negative("kd")),
+            (new.with_output_limit(0.0), ConfigError::NotPositive("output_limit")),
+            (new.with_output_limit(-1.0), ConfigError::NotPositive("output_limit")),
+            (new.with_output_limit(f32::NAN), ConfigError::NotPositive("output_limit")),
+            (new.with_output_limit(f32::INFINITY), ConfigError::NotPositive("output_limit")),
+            (new.with_output_range(1.0, f32::NAN), ConfigError::Reversed("output_range")),
+            (new.with_output_range(2.0, 1.0), ConfigError::Reversed("output_range")),
+            (new.with_integral_limit(0.0), ConfigError::NotPositive("integral_limit")),
+            (new.with_integral_separation(-1.0), ConfigError::NotPositive("integral_separation")),
+            (new.with_variable_integral(2.0, 1.0), ConfigError::Reversed("variable_integral")),
+            (new.with_variable_integral(-1.0, 1.0), ConfigError::Negative("variable_integral")),
+            (new.with_variable_integral(1.0, f32::NAN), ConfigError::Reversed("variable_integral")),
+            (new.with_back_calculation(0.0), ConfigError::NotPositive("back_calculation")),
+            (new.with_back_calculation(f32::NAN), ConfigError::NotPositive("back_calculation")),
+            (new.with_dead_band(-1.0), ConfigError::Negative("dead_band")),
+            (new.with_feed_forward(-1.0, 0.0), ConfigError::Negative("static_gain")),
+            (new.with_feed_forward(0.0, f32::NAN), ConfigError::Negative("velocity_gain")),
+            (new.with_slew_limit(0.0), ConfigError::NotPositive("slew_limit")),
+            (new.with_period(0.0), ConfigError::NotPositive("period")),
+            (new.with_period(-360.0), ConfigError::NotPositive("period")),
+            (new.with_period(f32::INFINITY), ConfigError::NotPositive("period")),
+            (new.with_derivative_filter(0.0), ConfigError::NotPositive("derivative_filter")),
+            (new.with_derivative_filter(-5.0), ConfigError::NotPositive("derivative_filter")),
+            (new.with_derivative_filter(BAD[0]), ConfigError::NotPositive("derivative_filter")),
+            (new.with_derivative_filter(BAD[1]), ConfigError::NotPositive("derivative_filter")),
+            (new.with_back_calculation(BAD[1]), ConfigError::NotPositive("back_calculation")),
+            (new.with_period(1e-40), ConfigError::NotPositive("period")),
         ];
-        for (config, parameter, fault) in cases {
-            assert_eq!(Pid::new(config), Err(ConfigError::new(parameter, fault)));
+        for (config, error) in cases {
+            assert_eq!(Pid::new(config), Err(error));
             let mut running = pid(new);
             assert!(running.set_config(config).is_err());
             assert_eq!(running, pid(new));
@@ -1136,7 +1136,7 @@ mod tests {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod incremental {
     use super::*;
-    use crate::control::{ConfigFault, LinearDifferentiator, TimeStep};
+    use crate::control::{LinearDifferentiator, TimeStep};
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -1204,16 +1204,16 @@ mod incremental {
     #[test]
     fn a_limit_that_is_zero_or_reversed_is_named() {
         let new = incremental(1.0, 1.0, 1.0);
-        for (config, parameter, fault) in [
-            (incremental(f32::NAN, 0.0, 0.0), "kp", ConfigFault::Negative),
-            (incremental(0.0, -1.0, 0.0), "ki", ConfigFault::Negative),
-            (incremental(0.0, 0.0, f32::INFINITY), "kd", ConfigFault::Negative),
-            (new.with_output_limit(0.0), "output_limit", ConfigFault::NotPositive),
-            (new.with_output_range(2.0, 1.0), "output_range", ConfigFault::Reversed),
-            (new.with_tracking(0.0), "r", ConfigFault::NotPositive),
-            (new.with_tracking(20.0).with_period(360.0), "r", ConfigFault::Conflict),
+        for (config, error) in [
+            (incremental(f32::NAN, 0.0, 0.0), ConfigError::Negative("kp")),
+            (incremental(0.0, -1.0, 0.0), ConfigError::Negative("ki")),
+            (incremental(0.0, 0.0, f32::INFINITY), ConfigError::Negative("kd")),
+            (new.with_output_limit(0.0), ConfigError::NotPositive("output_limit")),
+            (new.with_output_range(2.0, 1.0), ConfigError::Reversed("output_range")),
+            (new.with_tracking(0.0), ConfigError::NotPositive("r")),
+            (new.with_tracking(20.0).with_period(360.0), ConfigError::Conflict("r")),
         ] {
-            assert_eq!(Pid::new(config), Err(ConfigError::new(parameter, fault)));
+            assert_eq!(Pid::new(config), Err(error));
         }
     }
 

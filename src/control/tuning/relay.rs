@@ -4,7 +4,6 @@ use crate::control::number::{self, Sum};
 use crate::control::step::TimeStep;
 use crate::math;
 use core::f32::consts::PI;
-use core::fmt;
 
 /// What a [`RelayTuner`] is made from.
 ///
@@ -82,7 +81,7 @@ impl RelayTunerConfig {
 /// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned,
 /// nothing changes and [`rejected`](Self::rejected) grows. The first call starts the measurement, whenever it comes; a `dt_s` above
 /// [`TimeStep::MAX_S`] spoils it: it starts anew. When done or failed, the output is the bias. A swing faster than
-/// [`LEAST_SAMPLES`](Self::LEAST_SAMPLES) a half-period, one within the hysteresis and one beyond `f32` are a [`RelayFailure`].
+/// [`LEAST_SAMPLES`](Self::LEAST_SAMPLES) a half-period, one within the hysteresis and one beyond `f32` are a [`failure`](Self::failure).
 ///
 /// # Examples
 /// ```
@@ -99,8 +98,8 @@ impl RelayTunerConfig {
 /// }
 /// let found = tuner.oscillation().ok_or("did not swing")?;
 /// assert!((found.ultimate_period_s - 0.044).abs() < 0.002); // four times the delay
-/// let gains = found.gains(TuningRule::TyreusLuybenPi);
-/// assert!(gains.kp > 0.5 && gains.kp < 1.0);
+/// let (kp, ..) = found.pid(TuningRule::TyreusLuybenPi).gains();
+/// assert!(kp > 0.5 && kp < 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,32 +123,6 @@ pub struct RelayTuner {
     coarse: bool,
     state: State,
 }
-
-/// Why a [`RelayTuner`] that is complete has no result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum RelayFailure {
-    /// No steady swing within the time limit: too small an amplitude, a bias that does not hold, or too much hysteresis.
-    OutOfTime,
-    /// A half-period has fewer than [`RelayTuner::LEAST_SAMPLES`] samples: take more hysteresis, less amplitude or a faster loop.
-    TooFewSamples,
-    /// The swing is no larger than the hysteresis, or beyond `f32`, so that no gain follows from it.
-    NoGain,
-}
-
-impl fmt::Display for RelayFailure {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::OutOfTime => "no steady swing within the time limit",
-            Self::TooFewSamples => "fewer than 8 samples in half a period of the swing",
-            Self::NoGain => "the swing is not larger than the hysteresis, or beyond f32",
-        })
-    }
-}
-
-impl core::error::Error for RelayFailure {}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -284,11 +257,13 @@ impl RelayTuner {
         matches!(self.state, State::Done | State::TooFast | State::OutOfTime)
     }
 
-    /// Returns why there is no result; `None` while it runs, and when there is one.
+    /// Returns why there is no result, with the parameter to change; `None` while it runs, and when there is a result.
+    ///
+    /// [`ConfigError::OutOfTime`], [`ConfigError::TooFewSamples`] or [`ConfigError::NoGain`].
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{RelayFailure, RelayTuner, RelayTunerConfig};
+    /// use drivetrain::control::{ConfigError, RelayTuner, RelayTunerConfig};
     ///
     /// // A speed that follows at once: it swings from one sample to the next.
     /// let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.0))?;
@@ -296,17 +271,19 @@ impl RelayTuner {
     /// while !tuner.is_complete() {
     ///     speed = tuner.update(0.0, speed, 0.001);
     /// }
-    /// assert_eq!((tuner.oscillation(), tuner.failure()), (None, Some(RelayFailure::TooFewSamples)));
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// let failure = tuner.failure().ok_or("it swung")?;
+    /// assert_eq!((tuner.oscillation(), failure), (None, ConfigError::TooFewSamples("hysteresis")));
+    /// assert_eq!(failure.to_string(), "hysteresis: fewer than 8 samples in half a period of the swing");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn failure(&self) -> Option<RelayFailure> {
+    pub fn failure(&self) -> Option<ConfigError> {
         match self.state {
             State::Idle | State::Swinging => None,
             State::Done if self.oscillation().is_some() => None,
-            State::Done => Some(RelayFailure::NoGain),
-            State::TooFast => Some(RelayFailure::TooFewSamples),
-            State::OutOfTime => Some(RelayFailure::OutOfTime),
+            State::Done => Some(ConfigError::NoGain("hysteresis")),
+            State::TooFast => Some(ConfigError::TooFewSamples("hysteresis")),
+            State::OutOfTime => Some(ConfigError::OutOfTime("time_limit")),
         }
     }
 
@@ -390,7 +367,7 @@ mod tests {
             (TuningRule::TyreusLuybenPi, 0.15),
             (TuningRule::TyreusLuybenPid, 0.35),
         ] {
-            let mut pid = Pid::new(found.gains(rule).config()).unwrap();
+            let mut pid = Pid::new(found.pid(rule)).unwrap();
             let mut plant = lags();
             let mut response = StepResponse::new(0.0, 1.0, 10.0, 0.05).unwrap();
             let mut measurement = 0.0;
@@ -398,10 +375,10 @@ mod tests {
                 measurement = plant.step(pid.step(1.0, measurement, &TimeStep::of(DT_S)));
                 response.record(measurement, DT_S);
             }
-            let measures = response.measures();
-            assert!(measures.overshoot < most, "{rule:?} {measures:?}");
+            let measures = response;
+            assert!(measures.overshoot() < most, "{rule:?} {measures:?}");
             assert!(
-                measures.steady_error.abs() < 0.01 && measures.settling_time_s.is_some(),
+                measures.steady_error().abs() < 0.01 && measures.settling_time_s().is_some(),
                 "{rule:?} {measures:?}"
             );
         }
@@ -427,7 +404,7 @@ mod tests {
         }
         assert!((499..=501).contains(&steps));
         assert_eq!((tuner.oscillation(), tuner.output()), (None, 0.0));
-        assert_eq!(tuner.failure(), Some(RelayFailure::OutOfTime));
+        assert_eq!(tuner.failure(), Some(ConfigError::OutOfTime("time_limit")));
     }
 
     /// An integrator seen `delay` samples late, swung to the end.
@@ -455,7 +432,11 @@ mod tests {
                     results += 1;
                 }
                 None => {
-                    assert_eq!(tuner.failure(), Some(RelayFailure::TooFewSamples), "{delay}");
+                    assert_eq!(
+                        tuner.failure(),
+                        Some(ConfigError::TooFewSamples("hysteresis")),
+                        "{delay}"
+                    );
                     assert!(delay < 5, "{delay}");
                 }
             }
@@ -487,7 +468,10 @@ mod tests {
     fn a_swing_within_the_hysteresis_has_no_gain() {
         let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, f32::MAX)).unwrap();
         tuner.state = State::Done;
-        assert_eq!((tuner.oscillation(), tuner.failure()), (None, Some(RelayFailure::NoGain)));
+        assert_eq!(
+            (tuner.oscillation(), tuner.failure()),
+            (None, Some(ConfigError::NoGain("hysteresis")))
+        );
     }
 
     #[test]

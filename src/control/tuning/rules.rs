@@ -1,28 +1,5 @@
 use crate::control::pid::PidConfig;
 
-/// The gains of a PID, in its units: `kp`, `ki` a second, `kd` seconds; and the rule that they follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Gains {
-    /// Proportional gain.
-    pub kp: f32,
-    /// Integral gain, 1/s times the unit of `kp`.
-    pub ki: f32,
-    /// Derivative gain, s times the unit of `kp`.
-    pub kd: f32,
-    /// What they follow from the ultimate gain and period by.
-    pub rule: TuningRule,
-}
-
-impl Gains {
-    /// Returns a configuration with these gains and no option.
-    #[must_use]
-    pub const fn config(self) -> PidConfig {
-        PidConfig::new(self.kp, self.ki, self.kd)
-    }
-}
-
 /// How gains follow from the ultimate gain `Ku` and period `Tu` of a plant.
 ///
 /// | rule | kp | integral time | derivative time | character |
@@ -60,9 +37,8 @@ pub enum TuningRule {
 /// use drivetrain::control::{Oscillation, TuningRule};
 ///
 /// let found = Oscillation { ultimate_gain: 10.0, ultimate_period_s: 0.2 };
-/// let gains = found.gains(TuningRule::ZieglerNicholsPid);
-/// assert_eq!((gains.kp, gains.ki, gains.kd), (6.0, 60.0, 0.15));
-/// assert_eq!(gains.rule, TuningRule::ZieglerNicholsPid);
+/// let speed = found.pid(TuningRule::ZieglerNicholsPid).with_output_limit(20.0);
+/// assert_eq!(speed.gains(), (6.0, 60.0, 0.15)); // kp, ki, kd
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -75,9 +51,9 @@ pub struct Oscillation {
 }
 
 impl Oscillation {
-    /// Returns the gains by `rule`.
+    /// Returns a configuration with the gains by `rule`, and no option.
     #[must_use]
-    pub const fn gains(&self, rule: TuningRule) -> Gains {
+    pub const fn pid(&self, rule: TuningRule) -> PidConfig {
         let (ku, tu) = (self.ultimate_gain, self.ultimate_period_s);
         let (kp, ki, kd) = match rule {
             TuningRule::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
@@ -86,6 +62,6 @@ impl Oscillation {
             TuningRule::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
             TuningRule::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
         };
-        Gains { kp, ki, kd, rule }
+        PidConfig::new(kp, ki, kd)
     }
 }

@@ -1,21 +1,6 @@
-use crate::control::error::{self, ConfigError, ConfigFault, check, positive};
+use crate::control::error::{self, ConfigError, check, positive};
 use crate::control::number::{Sum, finite};
 use crate::control::step::TimeStep;
-
-/// How well a loop follows a step of its setpoint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct StepMeasures {
-    /// Seconds from 10 % to 90 % of the step; `None` when 90 % was not reached.
-    pub rise_time_s: Option<f32>,
-    /// How far the value went past the target, as a part of the step: 0.2 is 20 %. Never negative.
-    pub overshoot: f32,
-    /// Seconds after which the value stayed within the tolerance; `None` when it was outside at the end.
-    pub settling_time_s: Option<f32>,
-    /// Target minus value, averaged over the samples of the last tenth of the time, in units of the value; zero before that.
-    pub steady_error: f32,
-}
 
 /// Measures the answer of a loop to a step, sample by sample, without storing it.
 ///
@@ -35,10 +20,9 @@ pub struct StepMeasures {
 ///     value += (5.0 - value) * 0.001 / 0.1;
 ///     response.record(value, 0.001);
 /// }
-/// let measures = response.measures();
-/// assert!((measures.rise_time_s.unwrap_or(0.0) - 0.22).abs() < 0.002);
-/// assert!((measures.settling_time_s.unwrap_or(0.0) - 0.39).abs() < 0.003);
-/// assert_eq!(measures.overshoot, 0.0);
+/// assert!((response.rise_time_s().unwrap_or(0.0) - 0.22).abs() < 0.002);
+/// assert!((response.settling_time_s().unwrap_or(0.0) - 0.39).abs() < 0.003);
+/// assert_eq!(response.overshoot(), 0.0);
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +57,7 @@ impl StepResponse {
     ) -> Result<Self, ConfigError> {
         check!(error::finite("target", target - start));
         if target - start == 0.0 {
-            return Err(ConfigError::new("target", ConfigFault::NoChange));
+            return Err(ConfigError::NoChange("target"));
         }
         check!(positive("duration", duration_s));
         check!(positive("tolerance", tolerance));
@@ -132,19 +116,32 @@ impl StepResponse {
         self.passed.value() >= self.duration_s
     }
 
-    /// Returns the measures of what was recorded so far.
+    /// Returns the seconds from 10 % to 90 % of the step so far; `None` while 90 % is not reached.
     #[must_use]
-    pub fn measures(&self) -> StepMeasures {
-        let rise_time_s = match (self.tenth_at_s, self.nine_tenths_at_s) {
+    pub fn rise_time_s(&self) -> Option<f32> {
+        match (self.tenth_at_s, self.nine_tenths_at_s) {
             (Some(tenth), Some(nine_tenths)) => Some(nine_tenths - tenth),
             _ => None,
-        };
-        StepMeasures {
-            rise_time_s,
-            overshoot: if self.peak > 1.0 { self.peak - 1.0 } else { 0.0 },
-            settling_time_s: if self.inside { Some(self.outside_until_s) } else { None },
-            steady_error: self.late_error,
         }
+    }
+
+    /// Returns how far the value went past the target so far, as a part of the step: 0.2 is 20 %. Never negative.
+    #[must_use]
+    pub fn overshoot(&self) -> f32 {
+        if self.peak > 1.0 { self.peak - 1.0 } else { 0.0 }
+    }
+
+    /// Returns the seconds after which the value stayed within the tolerance; `None` while it is outside.
+    #[must_use]
+    pub const fn settling_time_s(&self) -> Option<f32> {
+        if self.inside { Some(self.outside_until_s) } else { None }
+    }
+
+    /// Returns target minus value, averaged over the samples of the last tenth of the time, in units of the value; zero before
+    /// that.
+    #[must_use]
+    pub const fn steady_error(&self) -> f32 {
+        self.late_error
     }
 
     /// Returns the number of samples that were left out; stays at 65535.
@@ -161,7 +158,7 @@ mod tests {
     use std::string::ToString;
 
     /// The step response of `w² / (s² + 2 z w s + w²)` with w = 10 rad/s, scaled.
-    fn second_order(damping: f32, start: f32, target: f32) -> StepMeasures {
+    fn second_order(damping: f32, start: f32, target: f32) -> StepResponse {
         let mut response = StepResponse::new(start, target, 5.0, 0.02).unwrap();
         let (mut position, mut rate) = (0.0_f32, 0.0_f32);
         while !response.is_complete() {
@@ -169,7 +166,7 @@ mod tests {
             position += rate * 1e-4;
             response.record(start + (target - start) * position, 1e-4);
         }
-        response.measures()
+        response
     }
 
     #[test]
@@ -177,11 +174,11 @@ mod tests {
         // exp(-pi z / sqrt(1 - z²)): 16.3 % for z = 0.5.
         for (start, target) in [(0.0, 1.0), (3.0, -2.0)] {
             let measures = second_order(0.5, start, target);
-            assert!((measures.overshoot - 0.163).abs() < 0.003, "{measures:?}");
-            assert!((measures.settling_time_s.unwrap() - 0.81).abs() < 0.03, "{measures:?}");
-            assert!(measures.steady_error.abs() < 1e-3);
+            assert!((measures.overshoot() - 0.163).abs() < 0.003, "{measures:?}");
+            assert!((measures.settling_time_s().unwrap() - 0.81).abs() < 0.03, "{measures:?}");
+            assert!(measures.steady_error().abs() < 1e-3);
         }
-        assert_eq!(second_order(1.0, 0.0, 1.0).overshoot, 0.0);
+        assert_eq!(second_order(1.0, 0.0, 1.0).overshoot(), 0.0);
     }
 
     #[test]
@@ -190,9 +187,9 @@ mod tests {
         for _ in 0..1001 {
             response.record(8.0, 0.001);
         }
-        let measures = response.measures();
-        assert_eq!((measures.rise_time_s, measures.settling_time_s), (None, None));
-        assert!(response.is_complete() && (measures.steady_error - 2.0).abs() < 1e-6);
+        let measures = response;
+        assert_eq!((measures.rise_time_s(), measures.settling_time_s()), (None, None));
+        assert!(response.is_complete() && (measures.steady_error() - 2.0).abs() < 1e-6);
     }
 
     #[test]

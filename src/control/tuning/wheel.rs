@@ -95,7 +95,7 @@ impl WheelTuning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{ConfigFault, Pid, TimeStep};
+    use crate::control::{Pid, TimeStep};
 
     const WHEEL: WheelTuning = WheelTuning {
         mass_kg: 20.0,
@@ -152,7 +152,7 @@ mod tests {
                 (WheelTuning { current_limit_a: bad, ..WHEEL }, "current_limit_a"),
             ] {
                 let error = wheel.speed_loop().unwrap_err();
-                assert_eq!((error.parameter(), error.fault()), (name, ConfigFault::NotPositive));
+                assert_eq!(error, ConfigError::NotPositive(name));
             }
         }
         for wheel in [

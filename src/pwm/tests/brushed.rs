@@ -6,10 +6,10 @@ const SPEED: PidConfig = PidConfig::new(0.02, 0.4, 0.0);
 const WHEEL: BrushedConfig =
     BrushedConfig::at_once(3).with_encoder(1_320.0, 16).with_speed_loop(SPEED);
 
-type Motor<'a> = Brushed<Pin<'a>, TwoPins<Pin<'a>, Pin<'a>>>;
+type Motor<'a> = Brushed<Pin<'a>, (Pin<'a>, Pin<'a>)>;
 
 fn motor(log: &Log, config: BrushedConfig) -> Motor<'_> {
-    let pins = TwoPins(pin("in1", log), pin("in2", log));
+    let pins = (pin("in1", log), pin("in2", log));
     Brushed::new(pin("pwm", log), pins, config).unwrap()
 }
 

@@ -2,12 +2,12 @@
 
 use super::*;
 
-type Motor<'a> = Brushed<Pin<'a>, TwoPins<Pin<'a>, Pin<'a>>>;
+type Motor<'a> = Brushed<Pin<'a>, (Pin<'a>, Pin<'a>)>;
 type Work = fn(&mut Motor<'_>);
 
 /// Armed; its speed loop does nothing but integrate.
 fn integrator(log: &Log) -> Motor<'_> {
-    let pins = TwoPins(pin("in1", log), pin("in2", log));
+    let pins = (pin("in1", log), pin("in2", log));
     let integral = PidConfig::new(0.0, 0.001, 0.0);
     let config = BrushedConfig::at_once(1).with_encoder(2_000.0, 16).with_speed_loop(integral);
     let mut motor = Brushed::new(pin("pwm", log), pins, config).unwrap();
@@ -29,7 +29,7 @@ fn an_update_without_a_step_holds_no_duty_from_before_a_rest() {
     ];
     for rest in resting {
         let log = Log::default();
-        let pins = TwoPins(pin("in1", &log), pin("in2", &log));
+        let pins = (pin("in1", &log), pin("in2", &log));
         let mut motor = Brushed::new(pin("pwm", &log), pins, BrushedConfig::at_once(1)).unwrap();
         motor.arm(at_ms(0)).unwrap();
         motor.set_duty(1.0).unwrap();
@@ -133,7 +133,7 @@ fn a_speed_loop_does_not_go_on_from_before_a_duty_or_a_rest() {
 #[test]
 fn a_blocked_motor_stays_relaxed_however_often_it_is_armed() {
     let log = Log::default();
-    let pins = TwoPins(pin("in1", &log), pin("in2", &log));
+    let pins = (pin("in1", &log), pin("in2", &log));
     let speed = PidConfig::new(0.02, 0.4, 0.0);
     let wheel = BrushedConfig::at_once(3).with_encoder(1_320.0, 16).with_speed_loop(speed);
     let mut motor = Brushed::new(pin("pwm", &log), pins, wheel).unwrap();

@@ -99,7 +99,7 @@ fn old_targets_nan_and_stops_give_neutral() {
 #[test]
 fn a_servo_without_a_pulse_when_idle_goes_limp_and_never_to_its_centre() {
     let log = Log::default();
-    let mut servo = armed(&log, RcConfig::at_once().with_idle(Idle::Off));
+    let mut servo = armed(&log, RcConfig::at_once().with_off_at_rest());
     servo.set_throttle(0.4).unwrap();
     for (ms, pulse) in [(105, 1_700), (106, 0)] {
         servo.update(tick(ms)).unwrap();
