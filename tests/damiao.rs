@@ -5,12 +5,11 @@
 
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{
-    ConfigError, ForcePosition, Mit, Mode, Model, Motor, PositionVelocity, Register, Status,
-    Velocity,
+    ConfigError, ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Status, Velocity,
 };
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, Devices, Impedance, Own, TargetError, VelocityDrive,
+    AngleDrive, ArmError, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DamiaoDrive;
 use drivetrain::time::{Duration, Instant, Tick};
@@ -74,8 +73,8 @@ impl<M: Mode> Bench<M> {
     }
 }
 
-fn mit() -> Mit {
-    Mit::new(3.0).with_gains(20.0, 0.6).unwrap()
+fn mit() -> ImpedanceControl {
+    ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap()
 }
 
 #[test]
@@ -155,7 +154,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     assert!((damped.drive.velocity_rad_per_s() - 6.0).abs() < 0.2);
     rests(damped);
 
-    let loops = Mit::new(3.0).with_loops(
+    let loops = ImpedanceControl::new(3.0).unwrap().with_loops(
         PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0),
         PidConfig::new(0.5, 2.0, 0.0),
     );
@@ -192,7 +191,7 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 
 #[test]
 fn an_impedance_holds_a_weight_at_its_angle_and_never_asks_for_more_than_the_limit() {
-    let mut bench = Bench::armed(Mit::new(3.0), 1.0);
+    let mut bench = Bench::armed(ImpedanceControl::new(3.0).unwrap(), 1.0);
     bench.drive = bench.drive.with_shaft(0.05, 0.05);
     bench.drive.set_load(-1.0);
     let far = Impedance {
@@ -335,18 +334,29 @@ fn two_motors_with_one_master_id_are_told_apart() {
 
 #[test]
 fn bad_configurations_are_refused_with_the_limit() {
-    let text = |outcome: Result<Motor<Mit>, ConfigError>| outcome.unwrap_err().to_string();
-    assert_eq!(text(Motor::new(Model::J4310, 0, Mit::new(1.0))), "id 0: 1 to 15 are allowed");
-    assert_eq!(text(Motor::new(Model::J4310, 16, Mit::new(1.0))), "id 16: 1 to 15 are allowed");
-    let motor = |limit| Motor::new(Model::J4310, 1, Mit::new(limit));
-    for limit in [0.0, -1.0, 10.001, f32::NAN] {
-        assert!(text(motor(limit)).ends_with("above 0 and at most TMAX, 10 Nm"), "{limit}");
+    let text =
+        |outcome: Result<Motor<ImpedanceControl>, ConfigError>| outcome.unwrap_err().to_string();
+    assert_eq!(
+        text(Motor::new(Model::J4310, 0, ImpedanceControl::new(1.0).unwrap())),
+        "id 0: 1 to 15 are allowed"
+    );
+    assert_eq!(
+        text(Motor::new(Model::J4310, 16, ImpedanceControl::new(1.0).unwrap())),
+        "id 16: 1 to 15 are allowed"
+    );
+    let motor = |limit| {
+        let mode = ImpedanceControl::new(limit).map_err(|_| ConfigError::Timeout(0))?;
+        Motor::new(Model::J4310, 1, mode)
+    };
+    assert!(text(motor(10.001)).ends_with("above 0 and at most TMAX, 10 Nm"));
+    for limit in [0.0, -1.0, f32::INFINITY, f32::NAN] {
+        assert!(ImpedanceControl::new(limit).is_err(), "{limit}");
     }
     assert!(motor(1.0).unwrap().with_master_id(1).is_err());
     assert!(motor(1.0).unwrap().with_timeout(Duration::ZERO).is_err());
     assert!(
-        Mit::new(1.0).with_gains(501.0, 0.0).is_err()
-            && Mit::new(1.0).with_gains(0.0, 5.1).is_err()
+        ImpedanceControl::new(1.0).unwrap().with_gains(-1.0, 0.0).is_err()
+            && ImpedanceControl::new(1.0).unwrap().with_gains(0.0, f32::NAN).is_err()
     );
     let mut motor = motor(1.0).unwrap();
     let refused = motor.write(Register::GearRatio, 10.0).unwrap_err();

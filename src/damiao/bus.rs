@@ -1,13 +1,13 @@
 //! Which frame belongs to a motor, and what is sent when.
 
-use super::command::{CLEAR_ERROR, Command, Inquiry, REGISTERS, standard};
+use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
 use super::config::{Mode, sealed};
-use super::feedback::Answer;
+use super::feedback::answer;
 use super::{ConfigError, Feedback, Model, Register, Status};
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
-    Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
+    Settings, Severity, Vitals, WrongSetting,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -57,8 +57,9 @@ pub struct Motor<M> {
     mode: M,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
-    effort: f32,
-    settings: Settings,
+    settings: Settings<Register, { CHECKED.len() }>,
+    /// The drive has confirmed its time-out since it was disabled.
+    is_timeout_set: bool,
 }
 
 impl<M: Mode> Motor<M> {
@@ -78,8 +79,8 @@ impl<M: Mode> Motor<M> {
             timeout_ms: 0,
             mode,
             drive: None,
-            effort: 0.0,
-            settings: Settings::UNKNOWN,
+            settings: Settings::new(CHECKED),
+            is_timeout_set: false,
         }
         .with_timeout_ms(TIMEOUT))
     }
@@ -128,7 +129,7 @@ impl<M: Mode> Motor<M> {
     /// Asks the drive for a register. While the motor is disarmed the frame goes out within some 10 ms, and again until
     /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
     pub const fn read(&mut self, register: Register) {
-        self.settings.request = Some(Inquiry::Read(register));
+        self.settings.request(Inquiry::Read(register));
     }
 
     /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read).
@@ -139,22 +140,19 @@ impl<M: Mode> Motor<M> {
         if !register.is_writable() || !register.holds(value) {
             return Err(ConfigError::Register(register, value));
         }
-        self.settings.request = Some(Inquiry::Write(register, value));
+        self.settings.request(Inquiry::Write(register, value));
         Ok(())
     }
 
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
     pub const fn store(&mut self) {
-        self.settings.request = Some(Inquiry::Store);
+        self.settings.request(Inquiry::Store);
     }
 
     /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the register and its value in the drive.
     #[must_use]
     pub const fn register(&self) -> Option<(Register, f32)> {
-        match self.settings.answer {
-            Some(Answer { register, value }) => Some((register, value)),
-            None => None,
-        }
+        self.settings.answer()
     }
 
     const fn command_id(&self) -> u16 {
@@ -184,10 +182,6 @@ impl<M: Mode> Motor<M> {
     fn is_right(&self, register: Register, found: f32) -> bool {
         let expected = self.expected(register);
         (found - expected).abs() <= RANGE_TOLERANCE * expected
-    }
-
-    fn confirm_timeout(&self) -> Inquiry {
-        Inquiry::Write(Register::Timeout, self.expected(Register::Timeout))
     }
 }
 
@@ -228,8 +222,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn angle(&self) -> Option<Angle> {
-        let drive = self.drive.filter(|drive| !drive.is_at_end)?;
-        Some(Angle::from_radians(drive.measured.position_rad))
+        self.drive?.angle()
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -241,16 +234,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn control(&mut self, order: Order) -> CanFrame {
         let command = self.drive.and_then(|drive| self.mode.command(order, &drive, &self.model));
-        let Some((command, effort)) = command else {
-            self.effort = 0.0;
-            return self.rest();
-        };
-        self.effort = effort;
-        self.frame_of(command)
+        command.map_or_else(|| self.off(), |command| self.frame_of(command))
     }
 
     fn reset(&mut self) {
-        self.effort = 0.0;
         self.mode.reset();
     }
 
@@ -260,20 +247,20 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if let (Some(stay), 0) = (stay, sent) {
             return Some(self.frame_of(stay));
         }
-        if !self.settings.is_timeout_set {
-            let inquiry = self.confirm_timeout();
-            return Some(self.settings.ask(inquiry, self.id));
+        if !self.is_timeout_set {
+            let timeout = Inquiry::Write(Register::Timeout, self.expected(Register::Timeout));
+            return Some(inquiry(self.id, self.settings.ask(timeout)));
         }
         Some(self.frame(mit::ENABLE))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
-        self.settings.is_timeout_set = false;
+        self.is_timeout_set = false;
         <M as sealed::Mode>::REST.map(|_| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        Some(Inquiry::Refresh.frame(self.id))
+        Some(refresh(self.id))
     }
 
     fn is_enabled(&self) -> Option<bool> {
@@ -281,30 +268,34 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.settings.is_timeout_set = false;
-        let inquiry = self.settings.next()?;
-        Some(self.settings.ask(inquiry, self.id))
+        self.is_timeout_set = false;
+        self.settings.inquire().map(|asked| inquiry(self.id, asked))
     }
 
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
-        let timeout = self.expected(Register::Timeout);
-        frame.length() == 8 && self.settings.hear(frame.bytes(), self.id, timeout)
+        let Some(asked) = self.settings.asked().filter(|_| frame.length() == 8) else {
+            return false;
+        };
+        let Some(value) = answer(frame.bytes(), self.id, asked) else { return false };
+        if matches!(asked, Inquiry::Write(Register::Timeout, _)) {
+            self.is_timeout_set = value.to_bits() == self.expected(Register::Timeout).to_bits();
+        }
+        self.settings.take(asked, value)
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
-        CHECKED.iter().zip(self.settings.found).find_map(|(register, found)| {
-            let is_wrong = found.is_none_or(|found| !self.is_right(*register, found));
-            is_wrong.then(|| WrongSetting {
-                motor: self.name(),
-                setting: name_of(*register),
-                expected: self.expected(*register),
-                found,
-            })
+        let is_right = |register, found| self.is_right(register, found);
+        self.settings.wrong(is_right).map(|(register, found)| WrongSetting {
+            motor: self.name(),
+            setting: name_of(register),
+            expected: self.expected(register),
+            found,
         })
     }
 
     fn forget_settings(&mut self) {
-        self.settings = Settings { request: self.settings.request, ..Settings::UNKNOWN };
+        self.settings.forget();
+        self.is_timeout_set = false;
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -322,7 +313,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
             error: drive.status.is_error().then_some(Severity::Fault),
             error_code: drive.status.error_code(),
-            effort: self.effort,
+            effort: self.mode.effort(),
             speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
             current: drive.measured.torque_nm / self.model.tmax_nm(),
         }
@@ -343,74 +334,5 @@ const fn name_of(register: Register) -> &'static str {
         Register::VelocityRange => "VMAX",
         Register::TorqueRange => "TMAX",
         _ => "CTRL_MODE",
-    }
-}
-
-/// What is known of the registers of the drive.
-#[derive(Debug, Clone, Copy)]
-struct Settings {
-    /// The values of the [checked](CHECKED) registers in the drive.
-    found: [Option<f32>; CHECKED.len()],
-    /// Which of them is asked for next.
-    turn: u8,
-    /// The question whose answer is awaited.
-    asked: Option<Inquiry>,
-    /// What the application asks for, until it is answered, and the answer.
-    request: Option<Inquiry>,
-    answer: Option<Answer>,
-    /// The drive has confirmed its time-out since it was disabled.
-    is_timeout_set: bool,
-}
-
-impl Settings {
-    const UNKNOWN: Self = Self {
-        found: [None; CHECKED.len()],
-        turn: 0,
-        asked: None,
-        request: None,
-        answer: None,
-        is_timeout_set: false,
-    };
-
-    /// Returns what to ask next: each second time what the application asks for.
-    fn next(&mut self) -> Option<Inquiry> {
-        self.turn = self.turn.wrapping_add(1);
-        match self.request {
-            Some(request) if self.turn.is_multiple_of(2) => {
-                if request == Inquiry::Store {
-                    self.request = None;
-                }
-                Some(request)
-            }
-            _ => {
-                let unknown = self.found.iter().position(Option::is_none);
-                let turn = unknown.unwrap_or(usize::from(self.turn / 2) % CHECKED.len());
-                CHECKED.get(turn).map(|register| Inquiry::Read(*register))
-            }
-        }
-    }
-
-    fn ask(&mut self, inquiry: Inquiry, id: u8) -> CanFrame {
-        self.asked = Some(inquiry);
-        inquiry.frame(id)
-    }
-
-    /// Takes the answer that is awaited; `false` for any other frame.
-    fn hear(&mut self, data: &[u8; 8], id: u8, timeout: f32) -> bool {
-        let answer = self.asked.and_then(|inquiry| Answer::decode(data, id, inquiry));
-        let Some(Answer { register, value }) = answer else { return false };
-        let asked = self.asked.take();
-        for (checked, found) in CHECKED.iter().zip(&mut self.found) {
-            if *checked == register {
-                *found = Some(value);
-            }
-        }
-        if register == Register::Timeout {
-            self.is_timeout_set = value.to_bits() == timeout.to_bits();
-        }
-        if self.request == asked {
-            (self.request, self.answer) = (None, answer);
-        }
-        true
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Register;
 use crate::frame::CanFrame;
+use crate::motor::Inquiry;
 use crate::wire::mit;
 use embedded_can::{Id, StandardId};
 
@@ -71,34 +72,25 @@ const fn count(value: f32) -> u16 {
     value as u16
 }
 
-/// What a drive is asked about its registers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Inquiry {
-    Read(Register),
-    Write(Register, f32),
-    /// Keeps all registers over a loss of the supply.
-    Store,
-    /// Asks for feedback.
-    Refresh,
+/// Asks for feedback.
+pub(super) fn refresh(id: u8) -> CanFrame {
+    CanFrame::of(standard(REGISTERS), [id, 0, 0xCC, 0, 0, 0, 0, 0])
 }
 
-impl Inquiry {
-    /// Returns the frame.
-    ///
-    /// ```text
-    /// byte 0 .. 1    2                               3                4 ..  7
-    /// id, low first  0x33 read, 0x55 write, 0xAA store, 0xCC feedback register number  value, low first
-    /// ```
-    pub(super) fn frame(self, id: u8) -> CanFrame {
-        let (verb, number, value) = match self {
-            Self::Read(register) => (0x33, register.number(), [0; 4]),
-            Self::Write(register, value) => (0x55, register.number(), register.bytes_of(value)),
-            Self::Store => (0xAA, 1, [0; 4]),
-            Self::Refresh => (0xCC, 0, [0; 4]),
-        };
-        let [a, b, c, d] = value;
-        CanFrame::of(standard(REGISTERS), [id, 0, verb, number, a, b, c, d])
-    }
+/// Asks about a register.
+///
+/// ```text
+/// byte 0 .. 1    2                                              3                4 ..  7
+/// id, low first  0x33 read, 0x55 write, 0xAA store, 0xCC feedback  register number  value, low first
+/// ```
+pub(super) fn inquiry(id: u8, inquiry: Inquiry<Register>) -> CanFrame {
+    let (verb, number, value) = match inquiry {
+        Inquiry::Read(register) => (0x33, register.number(), [0; 4]),
+        Inquiry::Write(register, value) => (0x55, register.number(), register.bytes_of(value)),
+        Inquiry::Store => (0xAA, 1, [0; 4]),
+    };
+    let [a, b, c, d] = value;
+    CanFrame::of(standard(REGISTERS), [id, 0, verb, number, a, b, c, d])
 }
 
 pub(super) fn standard(raw: u16) -> Id {

@@ -18,8 +18,6 @@ pub enum ConfigError {
     TorqueLimit(f32, f32),
     /// A velocity limit that is not above zero and at most VMAX: the limit, and VMAX, in rad/s.
     VelocityLimit(f32, f32),
-    /// A gain that is negative, not finite, or above the range of its field: its name, and the value.
-    Gain(&'static str, f32),
     /// A time-out of the drive that is not between 1 ms and 60 s, in ms.
     Timeout(u64),
     /// A register that is read only, or cannot hold the value.
@@ -40,10 +38,6 @@ impl core::fmt::Display for ConfigError {
             Self::VelocityLimit(limit, most) => {
                 write!(f, "velocity limit {limit} rad/s: above 0 and at most VMAX, {most} rad/s")
             }
-            Self::Gain(name, value) => write!(
-                f,
-                "{name} {value}: 0 to 500 Nm/rad are allowed for a stiffness, 0 to 5 Nm s/rad for a damping"
-            ),
             Self::Register(register, _) if !register.is_writable() => {
                 write!(f, "register {} ({register:?}) is read only", register.number())
             }

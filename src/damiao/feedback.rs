@@ -1,7 +1,8 @@
 //! The codec of what a drive sends: its feedback, and answers about registers.
 
 use super::Register;
-use super::command::Inquiry;
+use crate::motor::Inquiry;
+use crate::units::Angle;
 use crate::wire::mit::{self, Ranges};
 
 /// What a drive reports with each frame.
@@ -40,6 +41,12 @@ pub struct Feedback {
 }
 
 impl Feedback {
+    /// Returns the angle of the output shaft; `None` at an end of the range.
+    #[must_use]
+    pub const fn angle(&self) -> Option<Angle> {
+        if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
+    }
+
     /// Reads a feedback frame; `None` if its status is none that a drive has.
     #[must_use]
     pub const fn decode(data: &[u8; 8], ranges: &Ranges) -> Option<Self> {
@@ -105,31 +112,21 @@ impl Status {
     }
 }
 
-/// The answer of a drive about one of its registers. It has the id of the feedback.
+/// Reads the value in the answer to an inquiry; `None` for any other frame. The answer has the id of the feedback.
+///
+/// A feedback frame may read like one: so only the register that was asked for, of this drive, counts.
 ///
 /// ```text
 /// byte 0 .. 1    2                       3                4 ..  7
 /// id, low first  0x33 read, 0x55 written register number  value, low first
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Answer {
-    pub(super) register: Register,
-    pub(super) value: f32,
-}
-
-impl Answer {
-    /// Reads the answer to an inquiry; `None` for any other frame.
-    ///
-    /// A feedback frame may read like one: so only the register that was asked for, of this drive, counts.
-    pub(super) fn decode(data: &[u8; 8], id: u8, inquiry: Inquiry) -> Option<Self> {
-        let (asked, register) = match inquiry {
-            Inquiry::Read(register) => (0x33, register),
-            Inquiry::Write(register, _) => (0x55, register),
-            Inquiry::Store | Inquiry::Refresh => return None,
-        };
-        let [low, high, verb, number, value @ ..] = *data;
-        let is_answer = low == id && high == 0 && verb == asked;
-        (is_answer && number == register.number())
-            .then(|| Self { register, value: register.value_of(value) })
-    }
+pub(super) fn answer(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Option<f32> {
+    let (asked, register) = match inquiry {
+        Inquiry::Read(register) => (0x33, register),
+        Inquiry::Write(register, _) => (0x55, register),
+        Inquiry::Store => return None,
+    };
+    let [low, high, verb, number, value @ ..] = *data;
+    let is_answer = (low, high, verb, number) == (id, 0, asked, register.number());
+    is_answer.then(|| register.value_of(value))
 }

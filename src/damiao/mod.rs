@@ -17,7 +17,7 @@
 //!
 //! | mode | targets | torque is limited by | rest is |
 //! |---|---|---|---|
-//! | [`Mit`] | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode | no gains, no torque |
+//! | [`ImpedanceControl`](crate::motor::ImpedanceControl): MIT | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode | no gains, no torque |
 //! | [`ForcePosition`] | angle | the torque limit of the mode | disabled |
 //! | [`PositionVelocity`] | angle | the register `OC_Value` | disabled |
 //! | [`Velocity`] | velocity | the register `OC_Value` | disabled |
@@ -30,15 +30,15 @@
 //! configured otherwise, and the drive is enabled only after it has confirmed that.
 //!
 //! ```
-//! use drivetrain::damiao::{Mit, Model, Motor};
-//! use drivetrain::motor::{Devices, Own};
+//! use drivetrain::damiao::{Model, Motor};
+//! use drivetrain::motor::{Devices, ImpedanceControl, Own};
 //! use drivetrain::time::Instant;
 //!
-//! let mode = Mit::new(3.0).with_gains(20.0, 0.6)?; // at most 3 Nm; 20 Nm/rad and 0.6 Nm s/rad
+//! let mode = ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?; // at most 3 Nm; 20 Nm/rad and 0.6 Nm s/rad
 //! let mut joint = Own::new(Motor::new(Model::J4310, 1, mode)?);
 //! let refused = joint.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from DM-J4310 #1".into()));
-//! # Ok::<(), drivetrain::damiao::ConfigError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Sources: the register table and frames as python-damiao-driver (damiao-motor 1.0.6) documents them, which agree with librm and
@@ -58,7 +58,7 @@ mod tests;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{ForcePosition, Mit, Mode, PositionVelocity, Velocity};
+pub use config::{ForcePosition, Mode, PositionVelocity, Velocity};
 pub use error::ConfigError;
 pub use feedback::{Feedback, Status};
 pub use model::Model;

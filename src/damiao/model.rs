@@ -1,6 +1,8 @@
 //! Facts of the models, as a table that a program can extend.
 
 use super::ConfigError;
+use crate::motor::Impedance;
+use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
 
 /// A model of motor: its name and the ranges of its fields, which are registers of the drive.
@@ -103,6 +105,19 @@ impl Model {
     #[must_use]
     pub const fn ranges(&self) -> &Ranges {
         &self.ranges
+    }
+
+    /// Returns the largest value of each MIT field.
+    #[must_use]
+    pub const fn most(&self) -> Impedance {
+        let (stiffness, damping) = self.ranges.gains();
+        Impedance {
+            angle: Angle::from_radians(self.pmax_rad()),
+            velocity: AngularVelocity::from_rad_per_s(self.vmax_rad_per_s()),
+            stiffness,
+            damping,
+            torque_nm: self.tmax_nm(),
+        }
     }
 
     /// Returns the largest position of the fields, in rad.

@@ -61,7 +61,7 @@ pub use link::{Link, Recovery, TimeoutError, Timeouts};
 pub use load::BusLoad;
 pub use measured::Measured;
 pub use name::MotorName;
-pub use own::{Impedance, Order, Own, OwnMotor, Target};
+pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age};
 pub use safety::{Guard, OPENING};
 pub use setting::WrongSetting;

@@ -188,6 +188,12 @@ impl Ranges {
         self.torque.upper
     }
 
+    /// Returns the largest gains, in Nm/rad and Nm s/rad.
+    #[must_use]
+    pub const fn gains(&self) -> (f32, f32) {
+        (self.kp.upper, self.kd.upper)
+    }
+
     /// Returns the range of the velocity, in rad/s.
     #[must_use]
     pub const fn velocity_rad_per_s(&self) -> f32 {

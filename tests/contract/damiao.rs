@@ -2,8 +2,8 @@
 
 use super::*;
 use drivetrain::control::PidConfig;
-use drivetrain::damiao::{ForcePosition, Mit, Mode, Model, Motor, PositionVelocity, Velocity};
-use drivetrain::motor::{AngleDrive, Impedance};
+use drivetrain::damiao::{ForcePosition, Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::sim::DamiaoDrive;
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
@@ -85,7 +85,7 @@ fn kept<M: Mode>(mode: M, number: f32, set: Drive<M>) {
 #[test]
 fn motors_of_damiao_keep_the_contract_in_each_mode_with_each_kind_of_target() {
     let quick = AngularVelocity::from_rad_per_s(10.0);
-    let mit = Mit::new(3.0).with_gains(20.0, 0.6).unwrap();
+    let mit = ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap();
     let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
     let loops = mit.with_loops(position, PidConfig::new(0.5, 2.0, 0.0)).unwrap();
     for mode in [mit, loops] {

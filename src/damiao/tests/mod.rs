@@ -1,7 +1,8 @@
 //! Facts of the models and the codec of registers.
 
-use super::command::Inquiry;
+use super::command::inquiry;
 use super::*;
+use crate::motor::Inquiry;
 use crate::wire::mit::Ranges;
 
 #[test]
@@ -16,13 +17,13 @@ fn the_ranges_of_the_table_are_valid() {
 /// python-damiao-driver: id low, id high, 0x33 read, 0x55 write or 0xAA store, register, value with the low byte first.
 #[test]
 fn a_question_for_a_register_has_the_bytes_of_the_protocol() {
-    for (inquiry, expected) in [
+    for (asked, expected) in [
         (Inquiry::Read(Register::ControlMode), "7FF [8] 03 00 33 0A 00 00 00 00"),
         (Inquiry::Write(Register::Timeout, 2_000.0), "7FF [8] 03 00 55 09 D0 07 00 00"),
         (Inquiry::Write(Register::TorqueRange, 10.0), "7FF [8] 03 00 55 17 00 00 20 41"),
         (Inquiry::Store, "7FF [8] 03 00 AA 01 00 00 00 00"),
     ] {
-        assert_eq!(std::format!("{:?}", inquiry.frame(3)), expected);
+        assert_eq!(std::format!("{:?}", inquiry(3, asked)), expected);
     }
 }
 

@@ -1,12 +1,16 @@
 //! A motor of your own as a device.
 
 mod device;
+mod impedance;
 mod motor;
 mod order;
 mod power;
+mod settings;
 
+pub use impedance::{Impedance, ImpedanceControl};
 pub use motor::OwnMotor;
-pub use order::{Impedance, Order, Target};
+pub use order::{Order, Target};
+pub use settings::{Inquiry, Settings};
 
 use super::{
     AngleDrive, Capabilities, Capability, Claim, Guard, Health, HealthConfig, Link, Severity,

@@ -1,5 +1,6 @@
 //! The input of an own motor for one step.
 
+use super::Impedance;
 use crate::control::TimeStep;
 use crate::units::{Angle, AngularVelocity};
 
@@ -16,58 +17,6 @@ pub enum Target {
     Angle(Angle),
     /// A spring and a damper.
     Impedance(Impedance),
-}
-
-/// A spring and a damper at the output shaft, and a torque beside them: what a joint of an arm or a leg is given.
-///
-/// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
-/// of the motor.
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::Impedance;
-/// use drivetrain::units::Angle;
-///
-/// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
-/// assert!(hold.is_finite() && hold.torque_nm == 0.0);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Impedance {
-    /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
-    pub angle: Angle,
-    /// The velocity at which the damper is at rest.
-    pub velocity: AngularVelocity,
-    /// The stiffness of the spring in Nm/rad, not negative.
-    pub stiffness: f32,
-    /// The damping in Nm s/rad, not negative.
-    pub damping: f32,
-    /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
-    pub torque_nm: f32,
-}
-
-impl Impedance {
-    /// Neither spring nor damper, and no torque.
-    pub const FREE: Self = Self {
-        angle: Angle::ZERO,
-        velocity: AngularVelocity::ZERO,
-        stiffness: 0.0,
-        damping: 0.0,
-        torque_nm: 0.0,
-    };
-
-    /// Tells whether each value is finite, and stiffness and damping are not negative.
-    #[must_use]
-    pub const fn is_finite(&self) -> bool {
-        self.angle.is_finite()
-            && self.velocity.is_finite()
-            && self.stiffness.is_finite()
-            && self.damping.is_finite()
-            && self.torque_nm.is_finite()
-            && self.stiffness >= 0.0
-            && self.damping >= 0.0
-    }
 }
 
 /// A target with its limits, for one step: see [`OwnMotor::control`](super::OwnMotor::control).

@@ -1,0 +1,245 @@
+//! Impedance: a target, and the control of a drive that follows one.
+
+use super::{Order, Target};
+use crate::control::{Cascade, ConfigError, PidConfig, TimeStep};
+use crate::math::wrap_pi;
+use crate::motor::{Capabilities, Capability};
+use crate::units::{Angle, AngularVelocity};
+
+/// A spring and a damper at the output shaft, and a torque beside them: what a joint of an arm or a leg is given.
+///
+/// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
+/// of the motor.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::Impedance;
+/// use drivetrain::units::Angle;
+///
+/// let hold = Impedance { angle: Angle::from_degrees(30.0), stiffness: 20.0, damping: 0.6, ..Impedance::FREE };
+/// assert!(hold.is_finite() && hold.torque_nm == 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Impedance {
+    /// The angle where the spring is at rest, in the range of the motor's own angle: turns count.
+    pub angle: Angle,
+    /// The velocity at which the damper is at rest.
+    pub velocity: AngularVelocity,
+    /// The stiffness of the spring in Nm/rad, not negative.
+    pub stiffness: f32,
+    /// The damping in Nm s/rad, not negative.
+    pub damping: f32,
+    /// The torque beside both, in Nm; positive is counter-clockwise: the weight of an arm, say.
+    pub torque_nm: f32,
+}
+
+impl Impedance {
+    /// Neither spring nor damper, and no torque.
+    pub const FREE: Self = Self {
+        angle: Angle::ZERO,
+        velocity: AngularVelocity::ZERO,
+        stiffness: 0.0,
+        damping: 0.0,
+        torque_nm: 0.0,
+    };
+
+    /// Tells whether each value is finite, and stiffness and damping are not negative.
+    #[must_use]
+    pub const fn is_finite(&self) -> bool {
+        self.angle.is_finite()
+            && self.velocity.is_finite()
+            && self.stiffness.is_finite()
+            && self.damping.is_finite()
+            && self.torque_nm.is_finite()
+            && self.stiffness >= 0.0
+            && self.damping >= 0.0
+    }
+}
+
+/// The control of a drive that follows an [`Impedance`], as those in MIT mode do: any target becomes one, whose torque keeps
+/// within a limit.
+///
+/// The limit holds at the angle and velocity that the drive reported last: the torque beside is limited first, then the spring,
+/// then the damper. Angle and velocity are sent so near that gains times what is left to go do not ask for more, so a drive that
+/// hears no further command goes no further. Stiffness and damping are scaled by the [share](Order::share) of the order.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::TimeStep;
+/// use drivetrain::motor::{Impedance, ImpedanceControl, Order, Target};
+/// use drivetrain::units::{Angle, AngularVelocity};
+///
+/// let mut joint = ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?; // Nm, Nm/rad, Nm s/rad
+/// let most = Impedance { angle: Angle::from_radians(12.5), stiffness: 500.0, damping: 5.0, ..Impedance::FREE };
+/// let order = Order { target: Target::Angle(Angle::from_radians(1.0)), share: 1.0, step: TimeStep::of(0.001) };
+/// let sent = joint.step(order, Some(Angle::ZERO), AngularVelocity::ZERO, &most).ok_or("at rest")?;
+/// assert_eq!((sent.angle.as_radians(), sent.stiffness), (0.15, 20.0)); // 3 Nm, not 20
+/// assert_eq!(joint.effort(), 1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct ImpedanceControl {
+    torque_limit_nm: f32,
+    gains: Option<(f32, f32)>,
+    loops: Option<Cascade>,
+    effort: f32,
+}
+
+impl ImpedanceControl {
+    /// Limits the torque, in Nm. Takes torques and [`Impedance`] as targets.
+    ///
+    /// # Errors
+    /// [`ConfigError::NotPositive`] for a limit that is zero, negative or not finite.
+    pub const fn new(torque_limit_nm: f32) -> Result<Self, ConfigError> {
+        if torque_limit_nm > 0.0 && torque_limit_nm.is_finite() {
+            Ok(Self { torque_limit_nm, gains: None, loops: None, effort: 0.0 })
+        } else {
+            Err(ConfigError::NotPositive("torque_limit"))
+        }
+    }
+
+    /// Has the drive itself follow velocities with a damping in Nm s/rad, and angles with a stiffness in Nm/rad beside it.
+    ///
+    /// # Errors
+    /// [`ConfigError::Negative`] for a value that is negative or not finite.
+    pub const fn with_gains(self, stiffness: f32, damping: f32) -> Result<Self, ConfigError> {
+        if !(stiffness >= 0.0 && stiffness.is_finite()) {
+            return Err(ConfigError::Negative("stiffness"));
+        }
+        if !(damping >= 0.0 && damping.is_finite()) {
+            return Err(ConfigError::Negative("damping"));
+        }
+        Ok(Self { gains: Some((stiffness, damping)), ..self })
+    }
+
+    /// Has our own loops follow velocities and angles by a torque: from rad to rad/s, and from rad/s to Nm. The drive's own gains
+    /// do not apply then.
+    ///
+    /// # Errors
+    /// As [`Cascade::new`].
+    pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
+        let limit = self.torque_limit_nm;
+        Ok(Self { loops: Some(Cascade::new(position, speed.with_output_limit(limit))?), ..self })
+    }
+
+    /// Returns the torque limit in Nm.
+    #[must_use]
+    pub const fn torque_limit_nm(&self) -> f32 {
+        self.torque_limit_nm
+    }
+
+    /// Returns the torque of the last step as a share of the limit, -1 to 1.
+    #[must_use]
+    pub const fn effort(&self) -> f32 {
+        self.effort
+    }
+
+    /// Returns the targets that it takes.
+    #[must_use]
+    pub fn capabilities(&self) -> Capabilities {
+        let always = Capabilities::of(&[Capability::Torque, Capability::Impedance]);
+        if self.gains.is_none() && self.loops.is_none() {
+            return always;
+        }
+        always.with(Capability::Velocity).with(Capability::Angle)
+    }
+
+    /// Returns what the drive is told, at most `most` in each field but the torque; `None` to rest: an angle is needed and not
+    /// known, or the target is none that is [taken](Self::capabilities).
+    pub fn step(
+        &mut self,
+        Order { target, share, step }: Order,
+        angle: Option<Angle>,
+        velocity: AngularVelocity,
+        most: &Impedance,
+    ) -> Option<Impedance> {
+        self.effort = 0.0;
+        let limit = self.torque_limit_nm * share;
+        let wanted = self.wanted(target, angle, velocity, limit, &step)?;
+        let stiffness = share * wanted.stiffness.min(most.stiffness);
+        let damping = share * wanted.damping.min(most.damping);
+        let torque_nm = wanted.torque_nm.min(limit).max(-limit);
+        let at = match angle {
+            Some(angle) => angle.as_radians(),
+            None if stiffness > 0.0 => return None,
+            None => 0.0,
+        };
+        let end = most.angle.as_radians();
+        let way = wanted.angle.as_radians().min(end).max(-end) - at;
+        let way = within(way, torque_nm, stiffness, limit);
+        let spring_nm = torque_nm + stiffness * way;
+        let end = most.velocity.as_rad_per_s();
+        let change = wanted.velocity.as_rad_per_s().min(end).max(-end) - velocity.as_rad_per_s();
+        let change = within(change, spring_nm, damping, limit);
+        self.effort = (spring_nm + damping * change) / self.torque_limit_nm;
+        Some(Impedance {
+            angle: Angle::from_radians(at + way),
+            velocity: velocity + AngularVelocity::from_rad_per_s(change),
+            stiffness,
+            damping,
+            torque_nm,
+        })
+    }
+
+    /// Brings the loops to rest.
+    pub const fn reset(&mut self) {
+        self.effort = 0.0;
+        if let Some(loops) = &mut self.loops {
+            loops.reset();
+        }
+    }
+
+    /// Returns the impedance that a target stands for.
+    fn wanted(
+        &mut self,
+        target: Target,
+        angle: Option<Angle>,
+        velocity: AngularVelocity,
+        limit: f32,
+        step: &TimeStep,
+    ) -> Option<Impedance> {
+        let way_to = |target: Angle| Some(wrap_pi((target - angle?).as_radians()));
+        match target {
+            Target::Torque(torque_nm) => Some(Impedance { torque_nm, ..Impedance::FREE }),
+            Target::Impedance(impedance) => Some(impedance),
+            Target::Velocity(target) => match (&mut self.loops, self.gains) {
+                (Some(loops), _) => {
+                    let (target, velocity) = (target.as_rad_per_s(), velocity.as_rad_per_s());
+                    let torque_nm = loops.speed_mut().step(target, velocity, step);
+                    Some(followed(loops, torque_nm, limit))
+                }
+                (None, Some((_, damping))) => {
+                    Some(Impedance { velocity: target, damping, ..Impedance::FREE })
+                }
+                (None, None) => None,
+            },
+            Target::Angle(target) => match (&mut self.loops, self.gains) {
+                (Some(loops), _) => {
+                    let torque_nm = loops.step(way_to(target)?, velocity.as_rad_per_s(), step);
+                    Some(followed(loops, torque_nm, limit))
+                }
+                (None, Some((stiffness, damping))) => {
+                    let angle = angle? + Angle::from_radians(way_to(target)?);
+                    Some(Impedance { angle, stiffness, damping, ..Impedance::FREE })
+                }
+                (None, None) => None,
+            },
+        }
+    }
+}
+
+/// Returns the torque of the loops, whose integral keeps within what is left of the output range.
+fn followed(loops: &mut Cascade, torque_nm: f32, limit: f32) -> Impedance {
+    loops.speed_mut().keep_integral_between(-limit, limit);
+    Impedance { torque_nm, ..Impedance::FREE }
+}
+
+/// Returns the part of a difference whose torque, beside so much, keeps within the limit.
+fn within(difference: f32, beside_nm: f32, gain: f32, limit: f32) -> f32 {
+    if gain <= 0.0 {
+        return 0.0;
+    }
+    difference.min((limit - beside_nm) / gain).max((-limit - beside_nm) / gain)
+}
