@@ -15,7 +15,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Snake, Subject, Wheel};
+use subjects::{Both, Damiao, Snake, Subject, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -75,6 +75,10 @@ impl<S: Subject<N>, const N: usize> Trial<S, N> {
             Err(ArmError::Stopped) => Some(Refusal::Stopped),
             Err(ArmError::Missing(_)) => Some(Refusal::Missing),
             Err(ArmError::NotReleased) => Some(Refusal::NotReleased),
+            Err(ArmError::Setting(_)) => {
+                assert!(S::RULES.iter().any(|rules| rules.is_prepared));
+                return self.each(Reference::ask);
+            }
             Err(error) => panic!("refused: {error}"),
         };
         if self.motors.iter().any(Reference::is_arming) {
@@ -109,7 +113,7 @@ impl<S: Subject<N>, const N: usize> Trial<S, N> {
             motor.accept(link);
             assert!(may_drive || !drives, "driven at {now} with {dt_s} s: {before:?} to {motor:?}");
             assert!(
-                drives || !may_drive,
+                drives || !may_drive || S::RULES.iter().any(|rules| rules.is_prepared),
                 "at rest at {now} with {dt_s} s: {before:?} to {motor:?}"
             );
             self.seen.driven += u64::from(drives);
@@ -236,6 +240,8 @@ fn every_device(clocks: u64) {
     run("dji that resumes", clocks, Wheel::<true>::new);
     run("dji and own", clocks, Both::new);
     run("snake", clocks, Snake::new);
+    run("damiao, MIT", clocks, Damiao::mit);
+    run("damiao, position", clocks, Damiao::position);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

@@ -41,6 +41,8 @@ pub(super) struct Rules {
     pub(super) arms_later: bool,
     /// A request gives its time to targets, of a motor that is armed already as well.
     pub(super) arms_again: bool,
+    /// Its drive is asked for settings and enabled first: it may rest where the reference drives, and refuse to be armed.
+    pub(super) is_prepared: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,13 +2,15 @@
 
 use super::custom_motor::MyMotor;
 use super::reference::{BadStep, Rules};
+use drivetrain::damiao::{Mode, Model, Motor, PositionVelocity};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, Condition, Devices, HealthConfig, Link, Own, Reaction, Recovery, TargetError,
-    VelocityDrive,
+    AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
+    Reaction, Recovery, TargetError, VelocityDrive,
 };
+use drivetrain::sim::DamiaoDrive;
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
@@ -38,6 +40,7 @@ const BUS: Rules = Rules {
     bad_step: BadStep::Repeats,
     arms_later: false,
     arms_again: true,
+    is_prepared: false,
 };
 const OWN: Rules = Rules { bad_step: BadStep::Ages, arms_again: false, ..BUS };
 
@@ -156,6 +159,88 @@ impl Subject<2> for Both {
             driven[usize::from(frame.header() != 0x200)] |= is_driving(&frame);
         }
         driven
+    }
+}
+
+/// A drive that is asked for its settings, and enabled, before it is driven.
+pub(super) struct Damiao<M: Mode> {
+    motor: Own<Motor<M>>,
+    drive: DamiaoDrive,
+    value: f32,
+    set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+}
+
+impl Damiao<ImpedanceControl> {
+    pub(super) fn mit() -> Self {
+        let mode = ImpedanceControl::new(3.0).unwrap();
+        Self::new(mode, 1.0, |motor, value| motor.set_torque(3.0 * value))
+    }
+}
+
+impl Damiao<PositionVelocity> {
+    pub(super) fn position() -> Self {
+        let mode = PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        Self::new(mode, 2.0, |motor, value| motor.set_angle((), Angle::from_radians(value)))
+    }
+}
+
+impl<M: Mode> Damiao<M> {
+    fn new(
+        mode: M,
+        number: f32,
+        set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+    ) -> Self {
+        let motor = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
+        let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
+        let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
+        Self { motor, drive, value: 0.0, set }
+    }
+
+    /// Gives the drive a frame, and the motor an answer about a register.
+    fn tell(&mut self, frame: &CanFrame) {
+        let answer = self.drive.hear(frame);
+        if let Some(answer) = answer.filter(|_| frame.header() == 0x7FF) {
+            self.motor.motor_mut().decode_answer(&answer);
+        }
+    }
+}
+
+impl<M: Mode> Subject<1> for Damiao<M> {
+    const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
+
+    stops!(self => self.motor);
+
+    fn hear(&mut self, now: Instant) {
+        let refresh = CanFrame::standard(0x7FF, [1, 0, 0xCC, 0, 0, 0, 0, 0]).unwrap();
+        let feedback = self.drive.hear(&refresh).unwrap();
+        _ = Devices::ingest(&mut self.motor, &feedback, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.motor.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.motor.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        self.value = value;
+        [(self.set)(&mut self.motor, value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// The drive takes each frame; it is driven by one that leaves it enabled and with a torque.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.motor, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.motor, 0) {
+            self.tell(&frame);
+            let mut turned = self.drive;
+            turned.step(1e-6);
+            is_driven |= frame.header() != 0x7FF
+                && turned.is_enabled()
+                && turned.torque_nm().abs() > 10.0 / 4095.0;
+        }
+        [is_driven]
     }
 }
 
