@@ -268,6 +268,46 @@ fn the_decisions_are_numbered_in_their_order() {
     assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>());
 }
 
+/// The device families on CAN.
+const FAMILIES: [&str; 3] = ["damiao", "dji", "snake"];
+
+/// The first column of each table row of a text that begins with a path.
+fn paths(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next())
+}
+
+/// All text of a file, or of the files below a folder.
+fn text_of(path: &Path) -> String {
+    if path.is_file() {
+        return fs::read_to_string(path).unwrap();
+    }
+    rust_files(path).iter().map(|file| fs::read_to_string(file).unwrap()).collect()
+}
+
+#[test]
+fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = fs::read_to_string(root.join("docs/adding-a-family.md")).unwrap();
+    let section = |title: &str| {
+        let mut sections = guide.split("\n## ");
+        sections.find(|section| section.starts_with(title)).unwrap().to_owned()
+    };
+    let (inside, around) = (section("The folder"), section("Around the folder"));
+    assert!(paths(&inside).count() == 8 && paths(&around).count() == 9);
+    for family in FAMILIES {
+        for path in paths(&inside).map(|path| path.replace("FAMILY", family)) {
+            assert!(root.join(&path).exists(), "{path} is not there");
+        }
+        for path in paths(&around) {
+            assert!(text_of(&root.join(path)).contains(family), "{path} does not name {family}");
+        }
+    }
+    let floor: Vec<&str> =
+        FLOORS.iter().filter(|(_, floor)| *floor == 30).map(|(name, _)| *name).collect();
+    let on_pins = |name: &&&str| **name != "pwm";
+    assert_eq!(floor.iter().filter(on_pins).copied().collect::<Vec<_>>(), FAMILIES);
+}
+
 /// A family asks the safety core, and has no rule of its own about these.
 const RULES: [&str; 9] = [
     "late_us",
@@ -290,7 +330,7 @@ fn own_rules(text: &str) -> Vec<String> {
 #[test]
 fn no_family_has_a_safety_rule_of_its_own() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    for family in ["dji", "snake", "pwm", "motor/own"] {
+    for family in ["damiao", "dji", "snake", "pwm", "motor/own"] {
         let files = rust_files(&src.join(family));
         for file in
             files.iter().filter(|file| !file.components().any(|part| part.as_os_str() == "tests"))

@@ -13,6 +13,8 @@
 mod arguments;
 #[path = "../../tests/faults/arming.rs"]
 mod arming;
+#[path = "../../tests/damiao/bench.rs"]
+mod bench;
 #[path = "../../tests/faults/case.rs"]
 mod case;
 #[path = "../../tests/faults/catalogue.rs"]
@@ -23,6 +25,8 @@ mod clocks;
 mod commands;
 #[path = "../console/mod.rs"]
 mod console;
+#[path = "../../tests/faults/drives.rs"]
+mod drives;
 #[path = "../../tests/faults/health.rs"]
 mod health;
 #[path = "../../tests/faults/plausibility.rs"]

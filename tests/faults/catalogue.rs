@@ -2,10 +2,10 @@
 
 use crate::case::Case;
 use crate::{
-    arming, clocks, commands, health, plausibility, receive, registration, timing, transmit,
+    arming, clocks, commands, drives, health, plausibility, receive, registration, timing, transmit,
 };
 
-pub(crate) const CATALOGUE: [&[Case]; 9] = [
+pub(crate) const CATALOGUE: [&[Case]; 10] = [
     receive::CASES,
     plausibility::CASES,
     timing::CASES,
@@ -15,4 +15,5 @@ pub(crate) const CATALOGUE: [&[Case]; 9] = [
     registration::CASES,
     transmit::CASES,
     health::CASES,
+    drives::CASES,
 ];

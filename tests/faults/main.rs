@@ -6,10 +6,13 @@
 #![cfg(test)]
 
 mod arming;
+#[path = "../damiao/bench.rs"]
+mod bench;
 mod case;
 mod catalogue;
 mod clocks;
 mod commands;
+mod drives;
 mod health;
 mod plausibility;
 mod receive;

@@ -16,7 +16,7 @@ use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_
 use drivetrain::motor::{
     AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Ingest,
     Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, StopHomingConfig,
-    Timeouts, VelocityDrive, Visitor, Vitals,
+    Timeouts, VelocityDrive, Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, MeasuredLoad,
@@ -40,6 +40,7 @@ pub fn call_all() {
     crate::health::call_all();
     crate::chassis::call_all();
     crate::pwm::call_all();
+    crate::damiao::call_all();
     crate::snake::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();
@@ -302,6 +303,8 @@ fn motor() {
     Own::<AnyMotor>::health.call();
     Own::<AnyMotor>::with_opening.call();
     Own::<AnyMotor>::set_torque.call();
+    Own::<AnyMotor>::set_impedance.call();
+    Own::<AnyMotor>::motor_mut.call();
     (|own: &mut Own<AnyMotor>, target| own.set_velocity((), target)).call();
     (|own: &mut Own<AnyMotor>, target| own.set_angle((), target)).call();
     (|own: &Own<AnyMotor>| (own.velocity(()), own.angle(()))).call();
@@ -341,6 +344,7 @@ pub fn family<D: CanDevice + 'static>() {
     (|device: &D| device.claims().count()).call();
     (|device: &D, now: Instant| device.missing(now).count()).call();
     (|device: &D| (device.faulty().count(), device.second_master())).call();
+    (|device: &D| device.wrong_setting()).call();
     (|device: &mut D| device.next_edge()).call();
     (|device: &mut D| device.ask()).call();
     (|device: &mut D, now: Instant| device.engage(now)).call();
@@ -503,7 +507,20 @@ impl OwnMotor for AnyMotor {
     fn disable(&mut self) -> Option<CanFrame> {
         any()
     }
+    fn poll(&mut self) -> Option<CanFrame> {
+        any()
+    }
     fn is_enabled(&self) -> Option<bool> {
+        any()
+    }
+    fn inquire(&mut self) -> Option<CanFrame> {
+        any()
+    }
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        black_box(frame);
+        any()
+    }
+    fn wrong_setting(&self) -> Option<WrongSetting> {
         any()
     }
     fn capabilities(&self) -> Capabilities {

@@ -8,6 +8,7 @@
 #![no_main]
 
 mod chassis;
+mod damiao;
 mod functions;
 mod geometry;
 mod health;

@@ -1,13 +1,22 @@
 //! The motor as a device of the runner.
 
-use super::{LONGEST_STEP_S, Own, OwnMotor};
+use super::{Impedance, Order, Own, OwnMotor, Target};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
+use crate::math::wrap_pi;
 use crate::motor::{
-    CanDevice, Claim, Devices, Edge, Ingest, MotorName, Role, Visitor, WrongSetting,
+    CanDevice, Claim, Devices, Edge, Ingest, Link, MotorName, Role, Severity, Visitor, Vitals,
+    WrongSetting,
 };
-use crate::time::{Instant, Tick};
+use crate::time::{Duration, Instant, Tick};
+use crate::units::Angle;
 use embedded_can::Frame;
+
+/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
+const LONGEST_STEP_S: f32 = 0.02;
+
+/// The time between two questions for a setting.
+const INQUIRY: Duration = Duration::from_millis(10);
 
 impl<M: OwnMotor> CanDevice for Own<M> {
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -134,6 +143,180 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
     fn is_stopped(&self) -> bool {
         self.guard.is_stopped()
+    }
+}
+
+/// The update, step by step.
+impl<M: OwnMotor> Own<M> {
+    /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
+    fn look(&mut self, now: Instant) -> f32 {
+        let share = self.watch.look(&mut self.guard, &self.motor.vitals(), now);
+        if share <= 0.0 {
+            self.guard.relax();
+        }
+        share
+    }
+
+    /// Takes what the drive reports of its power.
+    fn hear_power(&mut self, now: Instant) {
+        if !self.power.hear(self.motor.is_enabled(), now) {
+            return;
+        }
+        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
+        _ = self.watch.look(&mut self.guard, &vitals, now);
+        self.guard.relax_until_armed();
+        self.motor.forget_settings();
+    }
+
+    /// Asks the drive for its settings as long as it is to be disabled.
+    fn inquire(&mut self, now: Instant) {
+        if self.guard.link() == Link::Offline {
+            self.motor.forget_settings();
+        }
+        let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
+        if self.power.is_on() || !is_due {
+            return;
+        }
+        self.inquired = now;
+        let inquiry = self.motor.inquire();
+        self.asked = inquiry;
+        self.replace(|own| &mut own.inquiry, inquiry);
+    }
+
+    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
+    fn switch(&mut self, may_drive: bool, now: Instant) {
+        if self.power.begin(now) {
+            self.disable();
+            if self.switched.is_some() {
+                return;
+            }
+        }
+        // A late motor whose target was not set anew stays enabled, and nothing enables it meanwhile, no frame that waits either.
+        let stays = self.guard.has_target() && self.power.is_on() && !self.rest_disables;
+        if stays && !may_drive {
+            if self.switching.is_some() {
+                self.power.give_back();
+                self.replace(|own| &mut own.switching, None);
+            }
+            return;
+        }
+        if !self.power.is_on() {
+            self.enabling = 0;
+        }
+        match self.power.step(may_drive, now) {
+            Some(true) => self.enable(),
+            Some(false) => self.disable(),
+            None => {}
+        }
+        if may_drive && !self.power.is_ready() {
+            self.reopen();
+        }
+    }
+
+    fn enable(&mut self) {
+        if self.motor.wrong_setting().is_some() {
+            self.guard.relax_until_armed();
+            return;
+        }
+        let frame = self.motor.enable(self.enabling);
+        self.enabling = self.enabling.saturating_add(1);
+        if frame.is_some() {
+            self.reopen();
+        }
+        self.post(frame);
+    }
+
+    fn disable(&mut self) {
+        let frame = self.motor.disable();
+        self.rest_disables = frame.is_none();
+        self.post(frame);
+    }
+
+    /// Offers a frame for the drive's power, instead of the one before.
+    fn post(&mut self, frame: Option<CanFrame>) {
+        self.switched = frame;
+        self.replace(|own| &mut own.switching, frame);
+    }
+
+    /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
+    fn reopen(&mut self) {
+        self.guard.reopen();
+        self.start = None;
+    }
+
+    /// Returns the command that this step asks for, or rest; what asks for feedback if either would disable a drive that is being
+    /// enabled.
+    fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
+        if !may_drive || !self.power.is_ready() {
+            // A late motor keeps its integral, one without a target starts afresh.
+            if !self.guard.has_target() {
+                self.relax();
+            }
+            self.held = None;
+            let is_enabling = may_drive && self.switched.is_some();
+            if is_enabling && self.rest_disables {
+                return self.motor.poll();
+            }
+            return Some(self.motor.rest());
+        }
+        if step.is_hold() {
+            return self.held.take();
+        }
+        self.is_resting = false;
+        let opened = self.guard.share();
+        let order = Order { target: self.goal(opened), share: left.min(opened), step };
+        self.held = Some(self.motor.control(order));
+        self.held
+    }
+
+    /// Returns the target; an angle on its way from where the shaft was, as far as the output range is open.
+    fn goal(&mut self, opened: f32) -> Target {
+        let measured = self.motor.angle().filter(|angle| angle.is_finite());
+        match (self.target, measured) {
+            (Target::Angle(target), Some(measured)) if opened < 1.0 => {
+                let start = *self.start.get_or_insert(measured);
+                let way = wrap_pi((target - start).as_radians());
+                Target::Angle(start + Angle::from_radians(way * opened))
+            }
+            (Target::Impedance(target), Some(measured)) if opened < 1.0 => {
+                let start = *self.start.get_or_insert(measured);
+                let way = (target.angle - start).as_radians();
+                let angle = start + Angle::from_radians(way * opened);
+                Target::Impedance(Impedance { angle, ..target })
+            }
+            (target, _) => target,
+        }
+    }
+
+    fn relax(&mut self) {
+        self.start = None;
+        if !self.is_resting {
+            self.motor.reset();
+            self.is_resting = true;
+        }
+    }
+
+    /// Rests at once, between two updates.
+    fn stop(&mut self) {
+        self.relax();
+        if self.power.stop() {
+            self.disable();
+        }
+        let rest = self.motor.rest();
+        self.offer(Some(rest));
+    }
+
+    fn offer(&mut self, command: Option<CanFrame>) {
+        self.replace(|own| &mut own.command, command);
+    }
+
+    fn replace(
+        &mut self,
+        place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>,
+        frame: Option<CanFrame>,
+    ) {
+        let before = core::mem::replace(place(self), frame);
+        self.superseded = self.superseded.wrapping_add(u32::from(before.is_some()));
     }
 }
 

@@ -3,79 +3,19 @@
 
 #![cfg(test)]
 
+mod bench;
+
+use bench::{Bench, J4310, mit};
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{
-    ConfigError, ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Status, Velocity,
+    ConfigError, ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Velocity,
 };
-use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    AngleDrive, ArmError, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
+    AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
 use drivetrain::sim::DamiaoDrive;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-
-const J4310: [f32; 3] = [12.5, 30.0, 10.0];
-
-/// A motor and its drive on a bus that loses nothing.
-struct Bench<M: Mode> {
-    own: Own<Motor<M>>,
-    drive: DamiaoDrive,
-    now_us: u64,
-    /// The frames of the last update.
-    frames: Vec<CanFrame>,
-    is_cut: bool,
-}
-
-impl<M: Mode> Bench<M> {
-    fn new(mode: M, number: f32) -> Self {
-        let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
-        let drive = DamiaoDrive::new(1, 0x11, J4310).with_register(10, number);
-        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false }
-    }
-
-    fn now(&self) -> Instant {
-        Instant::from_micros(self.now_us)
-    }
-
-    fn step(&mut self) {
-        self.now_us += 1_000;
-        let now = self.now();
-        self.own.update(Tick::new(now, 0.001));
-        self.frames.clear();
-        while let Some(frame) = self.own.next_frame(0) {
-            self.frames.push(frame);
-            if self.is_cut {
-                continue;
-            }
-            if let Some(answer) = self.drive.hear(&frame) {
-                let outcome = Devices::ingest(&mut self.own, &answer, now);
-                assert_eq!(outcome, drivetrain::motor::Ingest::Taken, "{answer:?}");
-            }
-        }
-        for _ in 0..10 {
-            self.drive.step(1e-4);
-        }
-    }
-
-    fn steps(&mut self, steps: u32, mut each: impl FnMut(&mut Self)) {
-        for _ in 0..steps {
-            self.step();
-            each(self);
-        }
-    }
-
-    fn armed(mode: M, number: f32) -> Self {
-        let mut bench = Self::new(mode, number);
-        bench.steps(100, |_| {});
-        bench.own.arm(bench.now()).unwrap();
-        bench
-    }
-}
-
-fn mit() -> ImpedanceControl {
-    ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap()
-}
 
 #[test]
 fn a_motor_is_armed_when_its_settings_have_been_read() {
@@ -86,43 +26,6 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
     assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
     bench.steps(60, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
-}
-
-#[test]
-fn a_drive_in_another_mode_or_with_other_ranges_is_not_armed_and_the_register_is_named() {
-    for (number, value, text) in [
-        (10, 2.0, "CTRL_MODE 2, the program needs 1"),
-        (21, 12.566, "PMAX 12.566, the program needs 12.5"),
-        (22, 45.0, "VMAX 45, the program needs 30"),
-        (23, 20.0, "TMAX 20, the program needs 10"),
-    ] {
-        let mut bench = Bench::new(mit(), 1.0);
-        bench.drive = bench.drive.with_register(number, value);
-        bench.steps(100, |_| {});
-        let refused = bench.own.arm(bench.now()).unwrap_err();
-        assert!(
-            matches!(refused, ArmError::Setting(_)) && refused.to_string().contains(text),
-            "{refused}"
-        );
-        // The one who arms it all the same is refused too.
-        let now = bench.now();
-        drivetrain::motor::CanDevice::engage(&mut bench.own, now);
-        assert!(!Devices::is_armed(&mut bench.own));
-        // Written, it is armed.
-        let right =
-            [1.0, 12.5, 30.0, 10.0][[10, 21, 22, 23].iter().position(|it| *it == number).unwrap()];
-        let register = [
-            Register::ControlMode,
-            Register::PositionRange,
-            Register::VelocityRange,
-            Register::TorqueRange,
-        ];
-        let register = register.into_iter().find(|it| it.number() == number).unwrap();
-        bench.own.motor_mut().write(register, right).unwrap();
-        bench.steps(150, |_| {});
-        assert_eq!(bench.own.motor().register(), Some((register, right)));
-        assert_eq!(bench.own.arm(bench.now()), Ok(()), "{register:?}");
-    }
 }
 
 #[test]
@@ -240,31 +143,6 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 }
 
 #[test]
-fn the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time() {
-    let mut bench = Bench::armed(mit(), 1.0);
-    let drive = |bench: &mut Bench<_>| {
-        _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
-    };
-    bench.steps(500, drive);
-    assert!(bench.drive.is_enabled());
-    bench.is_cut = true;
-    bench.steps(95, drive);
-    assert!(bench.drive.is_enabled(), "the time-out is 100 ms");
-    bench.steps(10, drive);
-    assert!(!bench.drive.is_enabled() && bench.drive.error() == Status::CommunicationLost as u8);
-    // Its supply fails too, so it forgets the time-out. Back on the bus, arming writes it anew.
-    bench.drive.lose_supply();
-    bench.is_cut = false;
-    bench.steps(300, |_| {});
-    bench.own.arm(bench.now()).unwrap();
-    bench.steps(300, drive);
-    assert!(bench.drive.is_enabled());
-    bench.is_cut = true;
-    bench.steps(110, drive);
-    assert!(!bench.drive.is_enabled());
-}
-
-#[test]
 fn a_drive_that_does_not_confirm_its_time_out_is_never_enabled() {
     let mut bench = Bench::armed(mit(), 1.0);
     for _ in 0..300 {
@@ -281,23 +159,6 @@ fn a_drive_that_does_not_confirm_its_time_out_is_never_enabled() {
         }
         assert!(!bench.drive.is_enabled());
     }
-}
-
-#[test]
-fn an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itself() {
-    let mut bench = Bench::armed(mit(), 1.0);
-    let drive = |bench: &mut Bench<_>| {
-        _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
-    };
-    bench.steps(300, drive);
-    bench.drive.fail(Status::Overload as u8);
-    bench.steps(300, drive);
-    assert!(!bench.drive.is_enabled() && bench.drive.error() == 0, "cleared, and still disabled");
-    assert!(!Devices::is_armed(&mut bench.own));
-    bench.steps(150, |_| {});
-    assert_eq!(bench.own.arm(bench.now()), Ok(()));
-    bench.steps(300, drive);
-    assert!(bench.drive.is_enabled());
 }
 
 #[test]
