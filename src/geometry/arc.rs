@@ -1,37 +1,22 @@
-use super::vector::linear;
 use super::{Body, Rotation2, Twist, Vec2};
 use crate::math::sin_cos;
 
 /// A stretch of motion at constant twist, in the frame of the body where the stretch begins.
 ///
 /// This is the logarithm of a planar transform: `x_m` and `y_m` are the way along the body's own axes, which turn by
-/// `theta_rad` on the way. [`Transform2::exp`](super::Transform2::exp) gives the pose at the end.
-///
-/// # Examples
-/// ```
-/// use drivetrain::geometry::{Body, Twist};
-///
-/// let arc = Twist::<Body>::new(2.0, 0.0, 1.0).over(0.5);
-/// assert_eq!((arc.x_m, arc.y_m, arc.theta_rad), (1.0, 0.0, 0.5));
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Arc {
+/// `theta_rad` on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Arc {
     /// The way along the body's x axis in m: forward is positive.
-    pub x_m: f32,
+    pub(crate) x_m: f32,
     /// The way along the body's y axis in m: left is positive.
-    pub y_m: f32,
+    pub(crate) y_m: f32,
     /// The turn in rad: counter-clockwise is positive.
-    pub theta_rad: f32,
+    pub(crate) theta_rad: f32,
 }
 
-linear!(Arc, x_m, y_m, theta_rad);
-
 impl Arc {
-    /// Takes the way along the body's x and y axes in m and the turn in rad.
-    #[must_use]
-    pub const fn new(x_m: f32, y_m: f32, theta_rad: f32) -> Self {
+    pub(crate) const fn new(x_m: f32, y_m: f32, theta_rad: f32) -> Self {
         Self { x_m, y_m, theta_rad }
     }
 
@@ -39,8 +24,7 @@ impl Arc {
     ///
     /// Exact for any turn: the line is the way times `sin(h)/h`, turned by `h`, with `h` half the turn. Nothing
     /// cancels near zero.
-    #[must_use]
-    pub const fn chord(self) -> (Vec2, Rotation2) {
+    pub(crate) const fn chord(self) -> (Vec2, Rotation2) {
         let half = 0.5 * self.theta_rad;
         let (sin, cos) = sin_cos(half);
         // Below, 1 - h^2/6 is as exact as f32, and 0/0 is out of the way.
@@ -53,8 +37,7 @@ impl Arc {
     /// Returns the arc over the straight line `chord_m` with the turn `theta_rad`: undoes [`chord`](Self::chord).
     ///
     /// A turn of a whole number of revolutions has no chord to speak of; the result is then very long or not finite.
-    #[must_use]
-    pub const fn over_chord(chord_m: Vec2, theta_rad: f32) -> Self {
+    pub(crate) const fn over_chord(chord_m: Vec2, theta_rad: f32) -> Self {
         let half = 0.5 * theta_rad;
         let (sin, cos) = sin_cos(half);
         let stretch = if half.abs() < 1e-2 { 1.0 + half * half * (1.0 / 6.0) } else { half / sin };
@@ -65,8 +48,7 @@ impl Arc {
 
 impl Twist<Body> {
     /// Returns the stretch that this twist makes in `dt_s` seconds.
-    #[must_use]
-    pub const fn over(self, dt_s: f32) -> Arc {
+    pub(crate) const fn over(self, dt_s: f32) -> Arc {
         Arc::new(self.vx_m_s * dt_s, self.vy_m_s * dt_s, self.wz_rad_s * dt_s)
     }
 
@@ -78,12 +60,13 @@ impl Twist<Body> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::geometry::{Body, Twist};
+    /// use drivetrain::geometry::{Body, Transform2, Twist};
     ///
     /// let command = Twist::<Body>::new(2.0, 0.0, 5.0);
-    /// let (line_m, _) = command.discretized(0.02).over(0.02).chord();
-    /// assert!((line_m.x - 0.04).abs() < 1e-6 && line_m.y.abs() < 1e-6); // straight ahead
-    /// assert!(command.over(0.02).chord().0.y > 0.001); // without: off to the left
+    /// let line_m = |twist| Transform2::<Body, Body>::exp(twist, 0.02).translation_m();
+    /// let straight = line_m(command.discretized(0.02));
+    /// assert!((straight.x - 0.04).abs() < 1e-6 && straight.y.abs() < 1e-6); // straight ahead
+    /// assert!(line_m(command).y > 0.001); // without: off to the left
     /// ```
     #[must_use]
     pub const fn discretized(self, dt_s: f32) -> Self {

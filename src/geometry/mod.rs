@@ -21,8 +21,8 @@
 //! | [`Rotation2`], [`Heading`] | a turn in the plane; a heading keeps the angle too |
 //! | [`Rotation3`], [`RollPitchYaw`] | a turn in space: unit quaternion; three angles |
 //! | [`Transform2`], [`Transform3`] | where one frame stands in another |
-//! | [`Pose2`], [`Pose3`] | position and direction in a frame |
-//! | [`Twist`], [`Arc`] | a velocity in the plane; the stretch it makes in a time |
+//! | [`Pose2`] | position and direction in a frame of the plane; in space, a [`Transform3`] |
+//! | [`Twist`] | a velocity in the plane; [`Transform2::exp`] is the way it makes in a time |
 //! | [`Body`], [`World`], [`Gimbal`] | names of frames |
 //!
 //! A frame of your own is any type: `#[derive(Debug, PartialEq)] enum Camera {}`. The names cost nothing at run time.
@@ -50,11 +50,10 @@ mod transform3;
 mod twist;
 mod vector;
 
-pub use arc::Arc;
 pub use error::MatrixError;
 pub use frame::{Body, Gimbal, World};
 pub use point::{Point2, Point3};
-pub use pose::{Pose2, Pose3};
+pub use pose::Pose2;
 pub use rotation2::{Heading, Rotation2};
 pub use rotation3::{RollPitchYaw, Rotation3};
 pub use transform2::Transform2;

@@ -1,5 +1,5 @@
 use super::vector::copy;
-use super::{Heading, Point2, Point3, Rotation2, Rotation3, Transform2, Transform3, Vec2};
+use super::{Heading, Point2, Rotation2, Transform2, Vec2};
 use crate::math::wrap_pi;
 use crate::units::Angle;
 use core::marker::PhantomData;
@@ -99,51 +99,5 @@ impl<F> Pose2<F> {
 impl<F> Default for Pose2<F> {
     fn default() -> Self {
         Self::ORIGIN
-    }
-}
-
-/// A position and an orientation in space, in the frame `F`.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{geometry::{Body, Point3, Pose3, Rotation3, RollPitchYaw, World}, units::Angle};
-///
-/// // The first seed's camera: at (1, 2, 0.5), turned 90 degrees to the left.
-/// let yaw = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
-/// let camera = Pose3::<World>::new(Point3::new(1.0, 2.0, 0.5), yaw);
-/// let seen = camera.to_transform::<Body>().apply(Point3::new(0.0, 1.0, 0.0));
-/// assert!(seen.x_m.abs() < 1e-6 && (seen.y_m - 2.0).abs() < 1e-6 && (seen.z_m - 0.5).abs() < 1e-6);
-/// ```
-#[derive(Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = ""))]
-pub struct Pose3<F> {
-    /// Where the origin stands.
-    pub position: Point3<F>,
-    /// How the axes are turned against those of `F`.
-    pub rotation: Rotation3,
-}
-
-copy!(Pose3<F>);
-
-impl<F> Pose3<F> {
-    /// Takes position and orientation.
-    #[must_use]
-    pub const fn new(position: Point3<F>, rotation: Rotation3) -> Self {
-        Self { position, rotation }
-    }
-
-    /// Returns the transform from the frame that stands at this pose.
-    #[must_use]
-    pub const fn to_transform<Own>(self) -> Transform3<Own, F> {
-        Transform3::new(self.rotation, self.position.to_vec())
-    }
-
-    /// Returns this pose as seen from another of the same frame.
-    #[must_use]
-    pub fn relative_to<Own>(self, base: Self) -> Pose3<Own> {
-        let back = base.rotation.inverse();
-        let way = back.apply((self.position - base.position).to_vec());
-        Pose3::new(Point3::from_vec(way), back.compose(self.rotation))
     }
 }

@@ -1,6 +1,7 @@
+use super::arc::Arc;
 use super::error::TOLERANCE;
 use super::vector::copy;
-use super::{Arc, MatrixError, Point2, Pose2, Rotation2, Vec2};
+use super::{Body, MatrixError, Point2, Pose2, Rotation2, Twist, Vec2};
 use core::marker::PhantomData;
 
 /// Where the frame `From` stands in the frame `To`; applied to a point in `From` it gives the point in `To`.
@@ -115,34 +116,48 @@ impl<From, To> Transform2<From, To> {
     }
 
     /// Returns the transform at the fraction `t` of the way to `other`: the origin on the straight line, the turn evenly
-    /// by the shorter way. For the way along a constant twist, scale the [`log`](Self::log) of the relative transform.
+    /// by the shorter way. For the way along a constant twist, take [`exp`](Self::exp) of the [`log`](Self::log) of the relative transform.
     #[must_use]
     pub fn interpolate(self, other: Self, t: f32) -> Self {
         let way = other.translation_m - self.translation_m;
         Self::new(self.rotation.interpolate(other.rotation, t), self.translation_m + way * t)
     }
 
-    /// Returns where a body stands after the stretch, seen from where it started: the exponential.
-    #[must_use]
-    pub const fn exp(arc: Arc) -> Self {
-        let (line, turn) = arc.chord();
-        Self::new(turn, line)
-    }
-
-    /// Returns the stretch at constant twist that leads here, turning by at most half a revolution: the logarithm.
+    /// Returns where a body stands after `dt_s` seconds at the constant `twist`, seen from where it started: the exponential.
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::geometry::{Arc, Body, Transform2, World};
+    /// use drivetrain::geometry::{Body, Transform2, Twist, World};
+    /// use core::f32::consts::FRAC_PI_2;
     ///
-    /// let arc = Arc::new(1.0, -0.2, 0.7);
-    /// let back = Transform2::<Body, World>::exp(arc).log();
-    /// assert!((back.x_m - 1.0).abs() < 1e-6 && (back.y_m + 0.2).abs() < 1e-6);
-    /// assert!((back.theta_rad - 0.7).abs() < 1e-6);
+    /// // 1 m/s on a circle of 1 m, for a quarter of it.
+    /// let end = Transform2::<Body, World>::exp(Twist::new(1.0, 0.0, 1.0), FRAC_PI_2);
+    /// assert!((end.translation_m().x - 1.0).abs() < 1e-6 && (end.translation_m().y - 1.0).abs() < 1e-6);
+    /// assert!((end.rotation().angle().as_degrees() - 90.0).abs() < 1e-4);
     /// ```
     #[must_use]
-    pub fn log(self) -> Arc {
-        Arc::over_chord(self.translation_m, self.rotation.angle().as_radians())
+    pub const fn exp(twist: Twist<Body>, dt_s: f32) -> Self {
+        let (line, turn) = twist.over(dt_s).chord();
+        Self::new(turn, line)
+    }
+
+    /// Returns the constant twist that leads here in `dt_s` seconds, turning by at most half a revolution: the logarithm.
+    ///
+    /// With a `dt_s` of zero the twist is not finite.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::geometry::{Body, Transform2, Twist, World};
+    ///
+    /// let twist = Twist::new(1.0, -0.2, 0.7);
+    /// let back = Transform2::<Body, World>::exp(twist, 0.5).log(0.5);
+    /// assert!((back.vx_m_s - 1.0).abs() < 1e-6 && (back.vy_m_s + 0.2).abs() < 1e-6);
+    /// assert!((back.wz_rad_s - 0.7).abs() < 1e-6);
+    /// ```
+    #[must_use]
+    pub fn log(self, dt_s: f32) -> Twist<Body> {
+        let arc = Arc::over_chord(self.translation_m, self.rotation.angle().as_radians());
+        Twist::new(arc.x_m / dt_s, arc.y_m / dt_s, arc.theta_rad / dt_s)
     }
 
     /// Returns the same place as position and angle in `To`.
@@ -222,9 +237,9 @@ mod tests {
     #[test]
     fn a_quarter_of_a_circle_ends_beside_its_centre() {
         let quarter = core::f32::consts::FRAC_PI_2;
-        let end = BodyToWorld::exp(Arc::new(quarter, 0.0, quarter)); // radius 1, to the left
+        let end = BodyToWorld::exp(Twist::new(quarter, 0.0, quarter), 1.0); // radius 1, to the left
         assert!(difference(end, at(1.0, 1.0, quarter)) < 1e-6, "{end:?}");
-        let end = BodyToWorld::exp(Arc::new(quarter, 0.0, -quarter));
+        let end = BodyToWorld::exp(Twist::new(quarter, 0.0, -quarter), 1.0);
         assert!(difference(end, at(1.0, -1.0, -quarter)) < 1e-6, "{end:?}");
     }
 
@@ -237,7 +252,7 @@ mod tests {
     #[test]
     fn a_circle_of_a_million_composed_steps_ends_where_it_began() {
         // 1 m radius; of each step what f32 makes of it, a million times: the last place of the turn counts.
-        let step = Transform2::<Body, Body>::exp(Arc::new(TAU * 1e-6, 0.0, TAU * 1e-6));
+        let step = Transform2::<Body, Body>::exp(Twist::new(TAU * 1e-6, 0.0, TAU * 1e-6), 1.0);
         let mut end = BodyToWorld::IDENTITY;
         for count in 1..=1_000_000 {
             end = end.compose(step);
@@ -309,9 +324,9 @@ mod tests {
 
         #[test]
         fn exp_of_log_leads_back_also_near_half_a_turn(t in transforms(), near in -1e-3_f32..1e-3) {
-            prop_assert!(difference(BodyToWorld::exp(t.log()), t) < 2e-5);
+            prop_assert!(difference(BodyToWorld::exp(t.log(1.0), 1.0), t) < 2e-5);
             let half = at(t.translation_m().x, t.translation_m().y, core::f32::consts::PI + near);
-            prop_assert!(difference(BodyToWorld::exp(half.log()), half) < 2e-5);
+            prop_assert!(difference(BodyToWorld::exp(half.log(1.0), 1.0), half) < 2e-5);
         }
 
         #[test]
@@ -319,16 +334,16 @@ mod tests {
             x in -5.0_f32..5.0, y in -5.0_f32..5.0, power in 0.0_f32..12.0, left in any::<bool>()
         ) {
             let theta = if left { 1.0 } else { -1.0 } * 10.0_f32.powf(-power);
-            let error = BodyToWorld::exp(Arc::new(x, y, theta)).log() - Arc::new(x, y, theta);
-            prop_assert!(error.x_m.abs() < 3e-6 && error.y_m.abs() < 3e-6, "{error:?}");
-            prop_assert!(error.theta_rad.abs() < 1e-6 * theta.abs(), "{theta}: {error:?}");
+            let error = BodyToWorld::exp(Twist::new(x, y, theta), 1.0).log(1.0) - Twist::new(x, y, theta);
+            prop_assert!(error.vx_m_s.abs() < 3e-6 && error.vy_m_s.abs() < 3e-6, "{error:?}");
+            prop_assert!(error.wz_rad_s.abs() < 1e-6 * theta.abs(), "{theta}: {error:?}");
         }
 
         #[test]
         fn log_of_exp_leads_back(x in -5.0_f32..5.0, y in -5.0_f32..5.0, theta in -3.0_f32..3.0) {
-            let error = BodyToWorld::exp(Arc::new(x, y, theta)).log() - Arc::new(x, y, theta);
-            prop_assert!(error.x_m.abs() < 1e-5 && error.y_m.abs() < 1e-5, "{error:?}");
-            prop_assert!(error.theta_rad.abs() < 1e-6, "{error:?}");
+            let error = BodyToWorld::exp(Twist::new(x, y, theta), 1.0).log(1.0) - Twist::new(x, y, theta);
+            prop_assert!(error.vx_m_s.abs() < 1e-5 && error.vy_m_s.abs() < 1e-5, "{error:?}");
+            prop_assert!(error.wz_rad_s.abs() < 1e-6, "{error:?}");
         }
 
         #[test]

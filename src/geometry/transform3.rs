@@ -1,9 +1,12 @@
 use super::error::TOLERANCE;
 use super::vector::copy;
-use super::{MatrixError, Point3, Pose3, Rotation3, Vec3};
+use super::{MatrixError, Point3, Rotation3, Vec3};
 use core::marker::PhantomData;
 
 /// Where the frame `From` stands in the frame `To`, in space; applied to a point in `From` it gives the point in `To`.
+///
+/// It is also the pose of a thing in space: [`rotation`](Self::rotation) is its orientation, [`translation_m`](Self::translation_m)
+/// its position, [`relative_to`](Self::relative_to) the same as seen from another pose.
 ///
 /// The turn is kept as a matrix, which is cheaper to apply than a quaternion. After 10^6 compositions its rows are some per
 /// cent off. With [`normalized`](Self::normalized) once in a thousand they stay right, and 10^6 composed steps add up to
@@ -20,6 +23,16 @@ use core::marker::PhantomData;
 /// assert!(target.x_m.abs() < 1e-6 && (target.z_m - 2.4).abs() < 1e-6);
 /// let back: Point3<Gimbal> = gimbal.inverse().apply(target);
 /// assert!((back.x_m - 2.0).abs() < 1e-6);
+/// ```
+///
+/// The first seed's camera, at (1, 2, 0.5), turned 90 degrees to the left:
+/// ```
+/// use drivetrain::{geometry::{Body, Point3, Rotation3, RollPitchYaw, Transform3, Vec3, World}, units::Angle};
+///
+/// let yaw = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
+/// let camera = Transform3::<Body, World>::new(yaw, Vec3::new(1.0, 2.0, 0.5));
+/// let seen = camera.apply(Point3::new(0.0, 1.0, 0.0));
+/// assert!(seen.x_m.abs() < 1e-6 && (seen.y_m - 2.0).abs() < 1e-6 && (seen.z_m - 0.5).abs() < 1e-6);
 /// ```
 ///
 /// A point of another frame is refused:
@@ -123,12 +136,6 @@ impl<From, To> Transform3<From, To> {
         let way = other.translation_m - self.translation_m;
         let turn = self.rotation().interpolate(other.rotation(), t);
         Self::new(turn, self.translation_m + way * t)
-    }
-
-    /// Returns the same place as position and orientation in `To`.
-    #[must_use]
-    pub fn to_pose(self) -> Pose3<To> {
-        Pose3::new(Point3::from_vec(self.translation_m), self.rotation())
     }
 
     /// Returns the homogeneous matrix, rows first.

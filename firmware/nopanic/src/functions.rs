@@ -148,7 +148,6 @@ fn control() {
     TimeStep::is_hold.call();
     TimeStep::is_frozen.call();
     ConfigError::parameter.call();
-    ConfigError::fault.call();
     PidConfig::new.call();
     PidConfig::with_output_limit.call();
     PidConfig::with_output_range.call();

@@ -4,14 +4,10 @@ use crate::opaque::Function;
 use drivetrain::geometry::*;
 
 pub fn call_all() {
-    Arc::new.call();
-    Arc::chord.call();
-    Arc::over_chord.call();
     Twist::<Body>::new.call();
     Twist::<Body>::linear.call();
     Twist::<Body>::is_finite.call();
     Twist::<Body>::with_wz.call();
-    Twist::<Body>::over.call();
     Twist::<Body>::discretized.call();
     Twist::<Body>::at.call();
     Twist::<Body>::about.call();
@@ -30,9 +26,6 @@ pub fn call_all() {
     Pose2::<World>::heading.call();
     Pose2::<World>::to_transform::<Body>.call();
     Pose2::<World>::relative_to::<Body>.call();
-    Pose3::<World>::new.call();
-    Pose3::<World>::to_transform::<Body>.call();
-    Pose3::<World>::relative_to::<Body>.call();
     Rotation2::new.call();
     Rotation2::cos.call();
     Rotation2::sin.call();
@@ -79,7 +72,6 @@ pub fn call_all() {
     Transform3::<Body, World>::relative_to::<Gimbal>.call();
     Transform3::<Body, World>::normalized.call();
     Transform3::<Body, World>::interpolate.call();
-    Transform3::<Body, World>::to_pose.call();
     Transform3::<Body, World>::to_matrix.call();
     Transform3::<Body, World>::from_matrix.call();
     Vec2::new.call();

@@ -77,7 +77,7 @@ pub fn call_all() {
     SlewLimiter::reset_to.call();
     SlewLimiter::value.call();
     SlewLimiter::rejected.call();
-    Oscillation::gains.call();
+    Oscillation::pid.call();
     RelayTunerConfig::new.call();
     RelayTunerConfig::with_bias.call();
     RelayTunerConfig::with_cycles.call();
