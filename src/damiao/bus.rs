@@ -13,11 +13,11 @@ use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit;
 
-/// The time-out of the drive unless configured otherwise.
-const TIMEOUT: Duration = Duration::from_millis(100);
+/// A unit of the register TIMEOUT.
+const TIMEOUT_UNIT_US: u32 = 50;
 
-/// Units of the register TIMEOUT in a millisecond.
-const TIMEOUT_UNITS_PER_MS: u32 = 20;
+/// The time-out of the drive unless configured otherwise: 100 ms.
+const TIMEOUT_UNITS: u32 = 100_000 / TIMEOUT_UNIT_US;
 
 /// The largest share by which a range may differ from that of the model: rounding of the drive's display.
 const RANGE_TOLERANCE: f32 = 1e-4;
@@ -53,7 +53,7 @@ pub struct Motor<M> {
     model: Model,
     id: u8,
     master_id: u16,
-    timeout_ms: u32,
+    timeout_units: u32,
     mode: M,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
@@ -76,13 +76,12 @@ impl<M: Mode> Motor<M> {
             model,
             id,
             master_id: u16::from(id) + 0x10,
-            timeout_ms: 0,
+            timeout_units: TIMEOUT_UNITS,
             mode,
             drive: None,
             settings: Settings::new(CHECKED),
             is_timeout_set: false,
-        }
-        .with_timeout_ms(TIMEOUT))
+        })
     }
 
     /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which may be that of other drives too.
@@ -101,17 +100,12 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// [`ConfigError::Timeout`] for another time.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        let ms = timeout.as_micros() / 1_000;
-        if matches!(ms, 1..=60_000) {
-            Ok(self.with_timeout_ms(timeout))
-        } else {
-            Err(ConfigError::Timeout(ms))
+        match u32::try_from(timeout.as_micros()) {
+            Ok(micros @ 1_000..=60_000_000) => {
+                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
+            }
+            _ => Err(ConfigError::Timeout(timeout)),
         }
-    }
-
-    fn with_timeout_ms(self, timeout: Duration) -> Self {
-        let timeout_ms = u32::try_from(timeout.as_micros() / 1_000).unwrap_or(60_000);
-        Self { timeout_ms, ..self }
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -173,7 +167,7 @@ impl<M: Mode> Motor<M> {
             Register::PositionRange => self.model.pmax_rad(),
             Register::VelocityRange => self.model.vmax_rad_per_s(),
             Register::TorqueRange => self.model.tmax_nm(),
-            Register::Timeout => (self.timeout_ms * TIMEOUT_UNITS_PER_MS) as f32,
+            Register::Timeout => self.timeout_units as f32,
             _ => <M as sealed::Mode>::NUMBER.into(),
         }
     }

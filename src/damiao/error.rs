@@ -1,6 +1,7 @@
 //! Errors of the configuration.
 
 use super::Register;
+use crate::time::Duration;
 use crate::wire::mit::RangeError;
 
 /// A configuration that no drive has.
@@ -18,8 +19,8 @@ pub enum ConfigError {
     TorqueLimit(f32, f32),
     /// A velocity limit that is not above zero and at most VMAX: the limit, and VMAX, in rad/s.
     VelocityLimit(f32, f32),
-    /// A time-out of the drive that is not between 1 ms and 60 s, in ms.
-    Timeout(u64),
+    /// A time-out of the drive that is not between 1 ms and 60 s.
+    Timeout(Duration),
     /// A register that is read only, or cannot hold the value.
     Register(Register, f32),
 }
@@ -44,7 +45,9 @@ impl core::fmt::Display for ConfigError {
             Self::Register(register, value) => {
                 write!(f, "register {} ({register:?}) cannot hold {value}", register.number())
             }
-            Self::Timeout(ms) => write!(f, "time-out of {ms} ms: 1 ms to 60 s are allowed"),
+            Self::Timeout(time) => {
+                write!(f, "time-out of {} us: 1 ms to 60 s are allowed", time.as_micros())
+            }
         }
     }
 }

@@ -206,7 +206,8 @@ fn bad_configurations_are_refused_with_the_limit() {
         "id 16: 1 to 15 are allowed"
     );
     let motor = |limit| {
-        let mode = ImpedanceControl::new(limit).map_err(|_| ConfigError::Timeout(0))?;
+        let mode =
+            ImpedanceControl::new(limit).map_err(|_| ConfigError::Timeout(Duration::ZERO))?;
         Motor::new(Model::J4310, 1, mode)
     };
     assert!(text(motor(10.001)).ends_with("above 0 and at most TMAX, 10 Nm"));

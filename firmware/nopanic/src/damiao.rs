@@ -4,7 +4,7 @@ use crate::functions::{device, family};
 use crate::opaque::{Function, any};
 use drivetrain::damiao::*;
 use drivetrain::motor::{
-    AngleDrive, Impedance, ImpedanceControl, Inquiry, Own, OwnMotor, Settings, VelocityDrive,
+    AngleDrive, Impedance, ImpedanceControl, Own, OwnMotor, Settings, VelocityDrive,
 };
 
 pub fn call_all() {
@@ -43,20 +43,15 @@ pub fn call_all() {
 }
 
 fn settings() {
-    type Asked = Settings<Register, 4>;
-    Asked::new.call();
-    Asked::forget.call();
-    Asked::request.call();
-    Asked::answer.call();
-    Asked::inquire.call();
-    Asked::ask.call();
-    Asked::asked.call();
-    Asked::take.call();
-    (|asked: &Asked, inquiry: Inquiry<Register>| {
-        _ = inquiry;
-        asked.wrong(|_, _| any())
-    })
-    .call();
+    Settings::<Register, 4>::new.call();
+    Settings::<Register, 4>::forget.call();
+    Settings::<Register, 4>::request.call();
+    Settings::<Register, 4>::answer.call();
+    Settings::<Register, 4>::inquire.call();
+    Settings::<Register, 4>::ask.call();
+    Settings::<Register, 4>::asked.call();
+    Settings::<Register, 4>::take.call();
+    (|asked: &Settings<Register, 4>| Settings::wrong(asked, |_: Register, _| any())).call();
 }
 
 fn motor<M: Mode + 'static>() {

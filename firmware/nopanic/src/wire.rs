@@ -85,6 +85,8 @@ pub fn call_all() {
     justfloat.call();
     mit::Ranges::new.call();
     mit::Ranges::with_gains.call();
+    mit::Ranges::gains.call();
+    mit::Ranges::position_rad.call();
     mit::Ranges::torque_nm.call();
     mit::Ranges::velocity_rad_per_s.call();
     (|ranges: &mit::Ranges, command: &mit::Command| mit::Ranges::encode(ranges, command)).call();
