@@ -83,16 +83,19 @@ impl<const N: usize> Window<N> {
     /// Returns the median of the samples; zero before the first one.
     #[must_use]
     pub fn median(&self) -> f32 {
+        let samples = self.samples.get(..self.filled).unwrap_or_default();
         let middle = self.filled.saturating_sub(1) / 2;
-        let samples = self.held();
-        samples
-            .clone()
-            .find(|&candidate| {
-                let below = samples.clone().filter(|&other| other < candidate).count();
-                let up_to = samples.clone().filter(|&other| other <= candidate).count();
-                below <= middle && middle < up_to
-            })
-            .unwrap_or(0.0)
+        for &candidate in samples {
+            let (mut below, mut up_to) = (0, 0);
+            for &other in samples {
+                below += usize::from(other < candidate);
+                up_to += usize::from(other <= candidate);
+            }
+            if below <= middle && middle < up_to {
+                return candidate;
+            }
+        }
+        0.0
     }
 
     /// Forgets the samples.
