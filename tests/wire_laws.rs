@@ -7,8 +7,8 @@ use std::fmt::Debug;
 use drivetrain::wire::feetech::{self, Sts};
 use drivetrain::wire::hipnuc::HipNuc;
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry,
-    TelemetryFormat, TelemetryHeader,
+    COMMAND_LENGTH, CommandFormat, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry,
+    TelemetryFormat,
 };
 use drivetrain::wire::vofa::{JustFloat, justfloat};
 use drivetrain::wire::{Counts, Deframer, Protocol};
@@ -39,7 +39,7 @@ impl Subject for CommandFormat {
     fn frame(&self, seed: u64) -> Vec<u8> {
         let mut bytes = scramble(seed);
         let mut byte = || bytes.next().unwrap();
-        let mut command = Command::default();
+        let mut command = HostCommand::default();
         for joint in &mut command.joints {
             // Now and then a whole header, or half of one, inside of the payload.
             let position = match byte() % 4 {
@@ -303,7 +303,7 @@ macro_rules! laws {
 laws! {
     host_link_command: CommandFormat;
     host_link_telemetry: TelemetryFormat::new();
-    host_link_telemetry_of_the_document: TelemetryFormat::new().with_header(TelemetryHeader::Document);
+    host_link_telemetry_of_the_document: TelemetryFormat::new().with_document_header();
     imu: HipNuc;
     servo: Sts;
     plot: JustFloat::<3>;

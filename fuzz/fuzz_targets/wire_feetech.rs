@@ -24,8 +24,8 @@ fn status(input: &mut Input) -> Vec<u8> {
         let status = status.expect("a whole frame");
         let sent = &frame[5..5 + usize::from(parameters)];
         assert_eq!((status.id(), status.parameters()), (id, sent));
-        assert_eq!(status.errors().is_empty(), frame[4] == 0);
-        assert_eq!(status.errors().overload(), frame[4] & 0x20 != 0);
+        assert_eq!(status.errors(), frame[4]);
+        assert_eq!(status.is_overloaded(), frame[4] & 0x20 != 0);
     } else {
         assert!(status.is_err(), "{status:?}");
     }

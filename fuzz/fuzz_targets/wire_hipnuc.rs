@@ -62,7 +62,7 @@ fn sensible(input: &mut Input) -> Vec<u8> {
     assert!(near(rates, &values[3..6], 1.0), "{imu:?}");
     assert!(near(imu.magnetic_field_ut, &values[6..9], 1.0), "{imu:?}");
     assert!(near(angles, &values[9..], 1.0), "{imu:?}");
-    let attitude = imu.attitude.as_array().into_iter().zip(quaternion);
+    let attitude = imu.attitude.to_quaternion().into_iter().zip(quaternion);
     assert!(attitude.into_iter().all(|(is, sent): (f32, f32)| (is - sent).abs() < 1e-6), "{imu:?}");
     refuses_a_flipped_bit(HipNuc, &frame);
     frame

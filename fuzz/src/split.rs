@@ -4,7 +4,7 @@ use crate::Input;
 use std::fmt::Debug;
 
 use drivetrain::time::{Duration, Instant};
-use drivetrain::wire::{Counts, Deframer, Link, Protocol, Reject};
+use drivetrain::wire::{Counts, Deframer, Protocol, Receiver, Reject};
 use std::cell::Cell;
 
 /// Long enough for every frame of every protocol.
@@ -131,7 +131,7 @@ fn search<P: Protocol>(protocol: P, bytes: &[u8]) -> Vec<P::Frame> {
 /// Reads through a link, each piece up to 255 ms after the one before: what it shows came in time (I4).
 fn watch<P: Protocol<Frame: Copy>>(protocol: P, bytes: &[u8], piece: usize) -> Counts {
     const DEADLINE: Duration = Duration::from_millis(100);
-    let mut link = Link::<P, BUFFER>::new(protocol, DEADLINE);
+    let mut link = Receiver::<P, BUFFER>::new(protocol, DEADLINE);
     let (mut now, mut heard, mut repeated) = (Instant::START, None, 0);
     for mut piece in bytes.chunks(piece) {
         now = now + Duration::from_millis(piece.first().copied().unwrap_or_default().into());

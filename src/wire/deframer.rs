@@ -45,7 +45,7 @@ pub trait Protocol {
 
     /// Returns whether `frame` says something new; `false` when its source is frozen and repeats `previous`.
     ///
-    /// [`Link`](super::Link) takes only new frames for a sign of life.
+    /// [`Receiver`](super::Receiver) takes only new frames for a sign of life.
     fn is_new(&self, _previous: &Self::Frame, _frame: &Self::Frame) -> bool {
         true
     }
@@ -82,13 +82,13 @@ pub enum Reject {
 pub struct Counts {
     /// Good frames.
     pub frames: u32,
-    /// Headers followed by a length of zero, or by one too large for the protocol or the buffer.
+    /// Headers followed by a length of zero, or by one too large for the protocol or the buffer; frames that ended early.
     pub length_errors: u32,
     /// Whole frames whose checksum did not fit.
     pub checksum_errors: u32,
     /// Good frames of a kind that is not read.
     pub foreign_frames: u32,
-    /// Frames with a fitting checksum and an impossible value.
+    /// Frames with a fitting checksum, or none, and an impossible value.
     pub content_errors: u32,
     /// Bytes that belonged to no good frame: noise, and what is left of damaged frames.
     pub skipped_bytes: u32,
@@ -268,7 +268,7 @@ impl<P: fmt::Debug, const N: usize> fmt::Debug for Deframer<P, N> {
 }
 
 impl Counts {
-    const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             frames: 0,
             length_errors: 0,
@@ -280,7 +280,7 @@ impl Counts {
     }
 }
 
-fn count(counter: &mut u32, more: u32) {
+pub(super) fn count(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
 

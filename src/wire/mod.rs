@@ -29,7 +29,7 @@
 //!     assert_eq!(status.id(), 1);
 //! }
 //! assert_eq!((replies.counts().frames, replies.counts().skipped_bytes), (1, 1));
-//! # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+//! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
 //! With `embedded-io` the two arrows are `port.write_all(ping)?` and `let n = port.read(&mut bytes)?;
@@ -49,10 +49,11 @@ pub mod vofa;
 
 mod deadline;
 mod deframer;
+mod error;
 mod field;
-mod link;
+mod receiver;
 
-pub use deadline::{Deadline, Edge};
+pub use deadline::{Deadline, SignalEdge};
 pub use deframer::{Counts, Deframer, Protocol, Reject};
-pub use field::BufferTooSmall;
-pub use link::Link;
+pub use error::EncodeError;
+pub use receiver::Receiver;

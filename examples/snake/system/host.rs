@@ -4,7 +4,7 @@ use super::{JOINTS, at, degrees, gait, pulses, seconds};
 use drivetrain::math::sin_cos;
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, Command, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::{Counts, Deframer};
 use std::f32::consts::TAU;
@@ -99,7 +99,7 @@ pub(crate) struct Host {
     pub(crate) latest: Option<Telemetry>,
     received_s: f32,
     /// All that was sent.
-    pub(crate) sent: Vec<Command>,
+    pub(crate) sent: Vec<HostCommand>,
     pub(crate) sent_bytes: u32,
     /// The largest angle of a joint that came back during the gait, in degrees.
     pub(crate) furthest_deg: f32,
@@ -136,7 +136,7 @@ impl Host {
         command.encode(buffer).ok()
     }
 
-    fn plan(&self, time_s: f32) -> Command {
+    fn plan(&self, time_s: f32) -> HostCommand {
         let from_s = time_s + LATENCY_S;
         let until_s = from_s + PERIOD.as_secs_f32();
         // What the operator will do is not known yet.
@@ -146,7 +146,7 @@ impl Host {
             since_s.map_or(0.0, |since_s| gait::angle_deg(joint, at_s - since_s))
         };
         let swing = GRIPPER_DEG * sin_cos(TAU * GRIPPER_HZ * moving_s).0;
-        Command {
+        HostCommand {
             joints: std::array::from_fn(|joint| {
                 let target = wanted(joint, until_s);
                 let way = target - wanted(joint, from_s) + self.lag_deg(joint, time_s);

@@ -8,7 +8,7 @@ use drivetrain::motor::BusLoad;
 use drivetrain::sim::{Fault, Line, Noise, Record, SerialCounts, SerialLine, Traffic, World};
 use drivetrain::snake::{Counters, State};
 use drivetrain::wire::Counts;
-use drivetrain::wire::host_link::{COMMAND_LENGTH, Command, Reset, Telemetry};
+use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset, Telemetry};
 use std::error::Error;
 
 pub(crate) const BAUD: u32 = 115_200;
@@ -114,8 +114,8 @@ pub(crate) struct Run {
     pub(crate) budget: BusLoad,
     pub(crate) down: (SerialCounts, Counts),
     pub(crate) up: (SerialCounts, Counts),
-    pub(crate) sent: Vec<Command>,
-    pub(crate) accepted: Vec<Command>,
+    pub(crate) sent: Vec<HostCommand>,
+    pub(crate) accepted: Vec<HostCommand>,
     pub(crate) last_telemetry: Option<Telemetry>,
     pub(crate) host_losses: u32,
     pub(crate) imus: [(u32, Counts); 4],

@@ -7,7 +7,7 @@ use drivetrain::time::Instant;
 use drivetrain::wire::dbus::Dbus;
 use drivetrain::wire::feetech::{self, Goal, ServoId, Sts};
 use drivetrain::wire::hipnuc::HipNuc;
-use drivetrain::wire::host_link::{Command, CommandFormat, Telemetry, TelemetryFormat};
+use drivetrain::wire::host_link::{CommandFormat, HostCommand, Telemetry, TelemetryFormat};
 use drivetrain::wire::{Deframer, vofa};
 
 type Hosts = Deframer<CommandFormat, 79>;
@@ -32,7 +32,7 @@ functions! {
     bytes_hipnuc(reader: &mut Imus, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes)).is_some(), bytes);
     bytes_sts_status(reader: &mut Servos, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes)).is_some(), bytes);
     bytes_dbus(reader: &mut Dbus, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes, Instant::START)).is_some(), bytes);
-    bytes_command(command: &Command, out: &mut [u8; 128]) = command.encode(out).map_or(0, <[u8]>::len);
+    bytes_command(command: &HostCommand, out: &mut [u8; 128]) = command.encode(out).map_or(0, <[u8]>::len);
     bytes_telemetry(telemetry: &Telemetry, out: &mut [u8; 128]) = TelemetryFormat::new().encode(telemetry, out).map_or(0, <[u8]>::len);
     bytes_goal(goal: &Goal, out: &mut [u8; 128]) = feetech::write(ServoId::ONE, 41, &goal.to_bytes(), out).map_or(0, <[u8]>::len);
     bytes_justfloat(values: &[f32; 4], out: &mut [u8; 128]) = vofa::justfloat(values, out).map_or(0, <[u8]>::len);
@@ -58,7 +58,7 @@ const NOISE: [u8; 100] = [0x11; 100];
 /// Frames in and out.
 pub fn rows() {
     let mut out = [0; 128];
-    let command = black_box(Command::default());
+    let command = black_box(HostCommand::default());
     let mut bytes = [0; 79];
     _ = command.encode(&mut bytes);
     let bytes = black_box(bytes);
@@ -81,7 +81,7 @@ pub fn rows() {
         "wire_sts_status" bytes_sts_status(&mut servos, black_box(&STATUS)): fn(&mut Servos, &[u8]) -> usize;
         "wire_dbus" bytes_dbus(&mut remotes, black_box(&REMOTE)): fn(&mut Dbus, &[u8]) -> usize;
         "wire_noise" bytes_hipnuc(&mut noisy, black_box(&NOISE)): fn(&mut Imus, &[u8]) -> usize;
-        "wire_command" bytes_command(&command, &mut out): fn(&Command, &mut [u8; 128]) -> usize;
+        "wire_command" bytes_command(&command, &mut out): fn(&HostCommand, &mut [u8; 128]) -> usize;
         "wire_telemetry" bytes_telemetry(&black_box(Telemetry::default()), &mut out): fn(&Telemetry, &mut [u8; 128]) -> usize;
         "wire_goal" bytes_goal(&black_box(Goal { speed: 2250, ..Goal::default() }), &mut out): fn(&Goal, &mut [u8; 128]) -> usize;
         "wire_justfloat" bytes_justfloat(black_box(&[1.0, 2.0, 3.0, 4.0]), &mut out): fn(&[f32; 4], &mut [u8; 128]) -> usize;

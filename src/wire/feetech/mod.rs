@@ -36,11 +36,9 @@ mod values;
 
 pub mod register;
 
-pub use instruction::{
-    InstructionError, action, ping, read, reg_write, reset, sync_read, sync_write, write,
-};
+pub use instruction::{action, ping, read, reg_write, reset, sync_read, sync_write, write};
 
-pub use status::{MAX_FRAME, MAX_PARAMETERS, ServoErrors, Status, Sts};
+pub use status::{MAX_FRAME, MAX_PARAMETERS, Status, Sts};
 pub use values::{COUNTS_PER_TURN, Goal, Present, from_sign_magnitude, to_sign_magnitude};
 
 /// The number of a servo on its line: 0 to 253, or all of them.

@@ -11,12 +11,23 @@ pub const MAX_FRAME: usize = MAX_PARAMETERS + OVERHEAD;
 const OVERHEAD: usize = 6;
 
 /// The answer of a servo.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::{Deframer, feetech::Sts};
+///
+/// let mut replies = Deframer::<Sts, 64>::new(Sts);
+/// let mut received = &[0xFF, 0xFF, 0x01, 0x02, 0b0010_0100, 0xD8][..];
+/// let status = replies.read(&mut received).ok_or("no status")?;
+/// assert!(status.is_overheated() && status.is_overloaded() && !status.has_voltage_error());
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(align(4))] // moved in words instead of bytes: a third less work a frame
 pub struct Status {
     id: u8,
-    errors: ServoErrors,
+    errors: u8,
     parameters: [u8; MAX_PARAMETERS],
     length: u8,
 }
@@ -28,10 +39,40 @@ impl Status {
         self.id
     }
 
-    /// Returns what the servo complains about.
+    /// Returns the error bits as they came; 0 without an error.
     #[must_use]
-    pub const fn errors(&self) -> ServoErrors {
+    pub const fn errors(&self) -> u8 {
         self.errors
+    }
+
+    /// Returns whether the supply voltage is out of its limits: bit 0.
+    #[must_use]
+    pub const fn has_voltage_error(&self) -> bool {
+        self.errors & 1 != 0
+    }
+
+    /// Returns whether the position sensor failed: bit 1.
+    #[must_use]
+    pub const fn has_sensor_error(&self) -> bool {
+        self.errors & 1 << 1 != 0
+    }
+
+    /// Returns whether the servo is too hot: bit 2.
+    #[must_use]
+    pub const fn is_overheated(&self) -> bool {
+        self.errors & 1 << 2 != 0
+    }
+
+    /// Returns whether the current is too high: bit 3.
+    #[must_use]
+    pub const fn has_overcurrent(&self) -> bool {
+        self.errors & 1 << 3 != 0
+    }
+
+    /// Returns whether the load is too high: bit 5.
+    #[must_use]
+    pub const fn is_overloaded(&self) -> bool {
+        self.errors & 1 << 5 != 0
     }
 
     /// Returns the bytes that were asked for; none after a ping or a write.
@@ -41,62 +82,7 @@ impl Status {
     }
 }
 
-/// The error bits of a status.
-///
-/// # Examples
-/// ```
-/// use drivetrain::wire::feetech::ServoErrors;
-///
-/// let errors = ServoErrors(0b0010_0100);
-/// assert!(errors.overheat() && errors.overload() && !errors.voltage());
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ServoErrors(
-    /// The bits as they came.
-    pub u8,
-);
-
-impl ServoErrors {
-    /// Returns whether there is no complaint.
-    #[must_use]
-    pub const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// Returns whether the supply voltage is out of its limits: bit 0.
-    #[must_use]
-    pub const fn voltage(self) -> bool {
-        self.0 & 1 != 0
-    }
-
-    /// Returns whether the position sensor failed: bit 1.
-    #[must_use]
-    pub const fn sensor(self) -> bool {
-        self.0 & 1 << 1 != 0
-    }
-
-    /// Returns whether the servo is too hot: bit 2.
-    #[must_use]
-    pub const fn overheat(self) -> bool {
-        self.0 & 1 << 2 != 0
-    }
-
-    /// Returns whether the current is too high: bit 3.
-    #[must_use]
-    pub const fn overcurrent(self) -> bool {
-        self.0 & 1 << 3 != 0
-    }
-
-    /// Returns whether the load is too high: bit 5.
-    #[must_use]
-    pub const fn overload(self) -> bool {
-        self.0 & 1 << 5 != 0
-    }
-}
-
-/// The format of [`Status`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Link`](crate::wire::Link).
+/// The format of [`Status`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Receiver`](crate::wire::Receiver).
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub struct Sts;
 
@@ -122,12 +108,8 @@ impl Protocol for Sts {
             return Err(Reject::Checksum);
         }
         let length = u8::try_from(parameters.len()).map_err(|_| Reject::Length)?;
-        let mut status = Status {
-            id: *id,
-            errors: ServoErrors(*errors),
-            parameters: [0; MAX_PARAMETERS],
-            length,
-        };
+        let mut status =
+            Status { id: *id, errors: *errors, parameters: [0; MAX_PARAMETERS], length };
         let place = status.parameters.get_mut(..parameters.len()).ok_or(Reject::Length)?;
         place.copy_from_slice(parameters);
         Ok(status)
@@ -140,19 +122,23 @@ mod tests {
 
     #[test]
     fn each_complaint_is_one_bit() {
-        let complaints = |errors: ServoErrors| {
-            let (voltage, sensor, overheat) =
-                (errors.voltage(), errors.sensor(), errors.overheat());
-            [voltage, sensor, overheat, errors.overcurrent(), errors.overload()]
+        let complaints = |errors: u8| {
+            let status = Status { id: 1, errors, parameters: [0; MAX_PARAMETERS], length: 0 };
+            assert_eq!(status.errors(), errors);
+            [
+                status.has_voltage_error(),
+                status.has_sensor_error(),
+                status.is_overheated(),
+                status.has_overcurrent(),
+                status.is_overloaded(),
+            ]
         };
         for (place, bit) in [0, 1, 2, 3, 5].into_iter().enumerate() {
             let mut only = [false; 5];
             only[place] = true;
-            assert_eq!(complaints(ServoErrors(1 << bit)), only);
-            assert_eq!(complaints(ServoErrors(!(1 << bit))), only.map(|set| !set));
-            assert!(!ServoErrors(1 << bit).is_empty());
+            assert_eq!(complaints(1 << bit), only);
+            assert_eq!(complaints(!(1 << bit)), only.map(|set| !set));
         }
-        assert!(ServoErrors(0).is_empty());
     }
 
     #[test]

@@ -15,21 +15,21 @@
 //!
 //! **Use the quaternion.** It is normalised here (a live sensor was seen to send 0.99904), and a frame without a usable
 //! one is refused. The three Euler angles on the wire mean different rotations in different firmware, and no field says
-//! which, see [`EulerOrder`]; [`Attitude::euler`] computes them from the quaternion in the order you name.
+//! which; [`Imu::euler_roll_x`] and [`Imu::euler_pitch_x`] compute them from the quaternion, each in its order.
 //!
 //! A heading that stands still may be a robot at rest or a dead sensor. Put the decoder into a
-//! [`Link`](super::Link): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
+//! [`Receiver`](super::Receiver): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
 //! latched when no new one came in time.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
-//! use drivetrain::wire::{Link, hipnuc::{EulerOrder, HipNuc, MAX_FRAME}};
+//! use drivetrain::wire::{Receiver, hipnuc::{HipNuc, MAX_FRAME}};
 //!
-//! let mut imu = Link::<HipNuc, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+//! let mut imu = Receiver::<HipNuc, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
 //! let now = Instant::START;
 //! let mut received: &[u8] = &[0x5A, 0xA5]; // from the serial port
 //! while let Some(frame) = imu.read(&mut received, now) {
-//!     let (roll, pitch, yaw) = frame.attitude.euler(EulerOrder::PitchX);
+//!     let (roll, pitch, yaw) = frame.euler_pitch_x();
 //! }
 //! assert!(imu.latest(now).is_none()); // no heading to trust yet
 //! ```
@@ -39,10 +39,9 @@
 mod attitude;
 mod payload;
 
-pub use attitude::{Attitude, EulerOrder};
-
 use super::field::Reader;
 use super::{Protocol, Reject};
+use crate::geometry::Rotation3;
 use crate::units::{Angle, AngularVelocity};
 
 /// A buffer for every frame that the sensors send by themselves (the longest, `81`, has 110 bytes).
@@ -77,17 +76,17 @@ pub struct Imu {
     pub angular_velocity: [AngularVelocity; 3],
     /// Magnetic field along x, y, z in microtesla, as it came.
     pub magnetic_field_ut: [f32; 3],
-    /// Roll as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    /// Roll as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub roll: Angle,
-    /// Pitch as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    /// Pitch as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub pitch: Angle,
     /// Yaw as the sensor computed it.
     pub yaw: Angle,
-    /// The orientation, from the quaternion of the frame, normalised.
-    pub attitude: Attitude,
+    /// The orientation, from the quaternion of the frame, normalised: turns the sensor's axes into the world's (z up).
+    pub attitude: Rotation3,
 }
 
-/// The format of HiPNUC frames, for a [`Deframer`](super::Deframer) or a [`Link`](super::Link).
+/// The format of HiPNUC frames, for a [`Deframer`](super::Deframer) or a [`Receiver`](super::Receiver).
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub struct HipNuc;
 

@@ -1,4 +1,4 @@
-use super::{Counts, Deadline, Deframer, Edge, Protocol};
+use super::{Counts, Deadline, Deframer, Protocol, SignalEdge};
 use crate::time::{Duration, Instant};
 
 /// A [`Deframer`] that keeps its latest frame, and takes it away when no new one came in time.
@@ -6,30 +6,30 @@ use crate::time::{Duration, Instant};
 /// # Examples
 /// ```
 /// use drivetrain::time::{Duration, Instant};
-/// use drivetrain::wire::host_link::{Command, CommandFormat, COMMAND_LENGTH};
-/// use drivetrain::wire::{Edge, Link};
+/// use drivetrain::wire::host_link::{HostCommand, CommandFormat, COMMAND_LENGTH};
+/// use drivetrain::wire::{SignalEdge, Receiver};
 ///
 /// let ms = |ms| Instant::START + Duration::from_millis(ms);
-/// let mut host = Link::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+/// let mut host = Receiver::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
 /// let mut buffer = [0; COMMAND_LENGTH];
-/// let mut received = Command::default().encode(&mut buffer)?;
-/// assert_eq!(host.read(&mut received, ms(1)), Some(Command::default()));
+/// let mut received = HostCommand::default().encode(&mut buffer)?;
+/// assert_eq!(host.read(&mut received, ms(1)), Some(HostCommand::default()));
 ///
 /// assert!(host.latest(ms(101)).is_some());
 /// assert!(host.latest(ms(102)).is_none()); // relax the robot
-/// assert_eq!(host.edge(ms(102)), Some(Edge::Heard { at: ms(1) }));
-/// assert_eq!(host.edge(ms(102)), Some(Edge::Lost { at: ms(101) }));
-/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Heard { at: ms(1) }));
+/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Lost { at: ms(101) }));
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Link<P: Protocol, const N: usize> {
+pub struct Receiver<P: Protocol, const N: usize> {
     decoder: Deframer<P, N>,
     deadline: Deadline,
     latest: Option<P::Frame>,
     frozen_frames: u32,
 }
 
-impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
+impl<P: Protocol<Frame: Copy>, const N: usize> Receiver<P, N> {
     /// Takes the protocol, and the age at which its last frame no longer counts.
     #[must_use]
     pub const fn new(protocol: P, deadline: Duration) -> Self {
@@ -71,7 +71,7 @@ impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
 
     /// Returns the oldest change between heard and lost that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
         self.deadline.edge(now)
     }
 
