@@ -7,7 +7,7 @@ use drivetrain::dji::{self, Bus, Gm6020Voltage, Handle, M2006};
 use drivetrain::encoder::Position;
 use drivetrain::motor::{BusLoad, Devices};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{SimClock, World};
+use drivetrain::sim::Simulation;
 use drivetrain::snake::{Config, Joint, Joints};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -56,7 +56,7 @@ pub(crate) struct Output {
     pub(crate) servo: Vec<u8>,
 }
 
-type Shell<'w> = Runner<Nb<Queued<'w>>, SimClock<'w>, (Joints, Bus)>;
+type Shell<'w> = Runner<Nb<Queued<'w>>, &'w Simulation, (Joints, Bus)>;
 
 pub(crate) struct Robot<'w> {
     pub(crate) runner: Shell<'w>,
@@ -79,7 +79,7 @@ pub(crate) struct Robot<'w> {
 }
 
 impl<'w> Robot<'w> {
-    pub(crate) fn new(world: &'w World) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn new(world: &'w Simulation) -> Result<Self, Box<dyn Error>> {
         let mut joints = Joints::new();
         let mut handles = Vec::new();
         for id in 1..=12 {

@@ -1,10 +1,11 @@
 use super::super::mailbox::Mailboxes;
+use super::super::motor::MotorState;
 use super::super::random::Random;
-use super::{JointConfig, JointState};
+use super::JointConfig;
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use crate::snake::{IDS, PULSES_PER_TURN, Register};
-use crate::units::AngularVelocity;
+use crate::units::{AngularVelocity, Current};
 use embedded_can::{Frame, StandardId};
 
 /// The longest time that a reply is later than the least. An estimate.
@@ -195,14 +196,20 @@ impl Drive {
     }
 
     /// Returns the true state.
-    pub(crate) fn state(&self) -> JointState {
+    pub(crate) fn state(&self) -> MotorState {
         let turns_per_s = self.velocity / PULSES_PER_TURN as f32;
-        JointState {
-            pulses: nearest(self.shaft),
-            counter: nearest(self.shaft - self.zero),
+        let turn = f64::from(PULSES_PER_TURN);
+        MotorState {
+            angle_rad: self.shaft / turn * core::f64::consts::TAU,
             velocity: AngularVelocity::from_rpm(turns_per_s * 60.0),
+            current: Current::from_amperes(f32::NAN),
+            torque_nm: f32::NAN,
+            power_w: f32::NAN,
+            temperature_c: f32::NAN,
+            encoder_counts: i64::from(nearest(self.shaft)),
+            drive_counts: nearest(self.shaft - self.zero),
+            command: self.registers.position,
             is_enabled: self.powered && self.registers.moves(),
-            target: self.registers.position,
             replies: self.replies,
             collisions: self.collisions,
         }
@@ -269,13 +276,13 @@ mod tests {
             fastest = fastest.max(before);
         }
         assert!((fastest - 65_536.0).abs() < 1.0);
-        assert!(drive.state().pulses == 65_536 && drive.velocity.abs() < 1.0);
+        assert!(drive.state().encoder_counts == 65_536 && drive.velocity.abs() < 1.0);
         // 0.1 s up and 0.2 s down at 1 turn/s: a turn takes 1.15 s.
         let mut again = self::drive();
         steps(&mut again, 11_000);
-        assert!(again.state().pulses < 65_500);
+        assert!(again.state().encoder_counts < 65_500);
         steps(&mut again, 800);
-        assert!(again.state().pulses >= 65_530);
+        assert!(again.state().encoder_counts >= 65_530);
     }
 
     #[test]
@@ -283,10 +290,10 @@ mod tests {
         let mut drive = drive();
         steps(&mut drive, 3_000);
         write(&mut drive, 0x0A, -65_536);
-        let mut before = drive.state().pulses;
+        let mut before = drive.state().encoder_counts;
         for _ in 0..40_000 {
             drive.step(STEP);
-            let now = drive.state().pulses;
+            let now = drive.state().encoder_counts;
             assert!((now - before).abs() <= 8);
             before = now;
         }
@@ -300,9 +307,9 @@ mod tests {
             steps(&mut drive, 3_000);
             write(&mut drive, register, 0);
             steps(&mut drive, 1_000);
-            let rest = drive.state().pulses;
+            let rest = drive.state().encoder_counts;
             steps(&mut drive, 1_000);
-            assert_eq!((drive.state().pulses, drive.state().is_enabled), (rest, false));
+            assert_eq!((drive.state().encoder_counts, drive.state().is_enabled), (rest, false));
         }
     }
 
@@ -327,11 +334,11 @@ mod tests {
         drive.receive(&frame(&[3, 7]), 0);
         assert_eq!((drive.due(), drive.state().is_enabled), (None, false));
         steps(&mut drive, 2_000);
-        let rest = drive.state().pulses;
+        let rest = drive.state().encoder_counts;
         drive.set_powered(true);
         drive.receive(&frame(&[3, 7]), 0);
         drive.reply(false);
         assert_eq!(drive.mailboxes.candidate().unwrap().data(), [4, 7, 0, 0, 0, 0]);
-        assert_eq!((drive.state().pulses, drive.state().is_enabled), (rest, false));
+        assert_eq!((drive.state().encoder_counts, drive.state().is_enabled), (rest, false));
     }
 }
