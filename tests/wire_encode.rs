@@ -2,18 +2,17 @@
 
 #![cfg(test)]
 
-use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Sts};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, CommandFormat, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry,
-    TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
-use drivetrain::wire::{Deframer, EncodeError, Protocol};
+use drivetrain::wire::{Decode, Deframer, EncodeError};
 use proptest::prelude::*;
 
-fn read<P: Protocol>(protocol: P, mut bytes: &[u8]) -> Option<P::Frame> {
-    let mut decoder = Deframer::<P, 160>::new(protocol);
+fn read<F: Decode>(options: F::Options, mut bytes: &[u8]) -> Option<F> {
+    let mut decoder = Deframer::<F, 160>::with_options(options);
     let frame = decoder.read(&mut bytes);
     assert_eq!((decoder.counts().skipped_bytes, bytes.len()), (0, 0));
     frame
@@ -37,7 +36,7 @@ proptest! {
     #[test]
     fn commands_come_back_as_they_were(command in any_command()) {
         let mut buffer = [0; COMMAND_LENGTH];
-        prop_assert_eq!(read(CommandFormat, command.encode(&mut buffer).unwrap()), Some(command));
+        prop_assert_eq!(read((), command.encode(&mut buffer).unwrap()), Some(command));
     }
 
     #[test]
@@ -68,7 +67,7 @@ proptest! {
     #[test]
     fn plotted_values_come_back_but_for_the_last_bit(values: [f32; 4]) {
         let mut buffer = [0; 20];
-        let seen = read(JustFloat::<4>, justfloat(&values, &mut buffer).unwrap()).unwrap();
+        let seen = read::<JustFloat<4>>((), justfloat(&values, &mut buffer).unwrap()).unwrap().0;
         for (seen, value) in seen.iter().zip(values) {
             prop_assert!(seen.to_bits() ^ value.to_bits() <= 1);
         }
@@ -83,7 +82,7 @@ proptest! {
         let mut frame = vec![0xFF, 0xFF, 3, 10, 0, p0, p1, s0, s1, l0, l1, 121, 30];
         let sum = frame[2..].iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
         frame.push(!sum);
-        let present = Present::from_status(&read(Sts, &frame).unwrap());
+        let present = Present::from_status(&read::<Status>((), &frame).unwrap());
         let expected = Present { position, speed, load, voltage_dv: 121, temperature_c: 30 };
         prop_assert_eq!(present, Some(expected));
     }

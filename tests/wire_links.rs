@@ -4,8 +4,8 @@
 
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
-use drivetrain::wire::hipnuc::{HipNuc, MAX_FRAME};
-use drivetrain::wire::host_link::{COMMAND_LENGTH, CommandFormat, HostCommand, Reset};
+use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
+use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset};
 use drivetrain::wire::{Receiver, SignalEdge};
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ fn ms(ms: u64) -> Instant {
 
 #[test]
 fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
-    let mut host = Receiver::<_, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+    let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
     let command = HostCommand { reset: Reset::Enable, ..HostCommand::default() };
     let mut buffer = [0; COMMAND_LENGTH];
     let bytes = command.encode(&mut buffer).unwrap();
@@ -42,7 +42,7 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
 
 #[test]
 fn f61_half_a_command_given_up_does_not_swallow_the_next() {
-    let mut host = Receiver::<_, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+    let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
     let command = HostCommand { reset: Reset::Enable, ..HostCommand::default() };
     let mut buffer = [0; COMMAND_LENGTH];
     let bytes = command.encode(&mut buffer).unwrap();
@@ -198,7 +198,7 @@ fn imu_frame(time_ms: u32, w: f32, gyro: f32) -> Vec<u8> {
 
 #[test]
 fn f63_an_imu_with_a_frozen_clock_goes_stale_with_an_edge() {
-    let mut imu = Receiver::<_, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+    let mut imu = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
     for step in 0..5 {
         let frame = imu_frame(10 * step, 1.0, 0.0);
         assert!(imu.read(&mut &frame[..], ms(10 * u64::from(step))).is_some());
@@ -218,7 +218,7 @@ fn f63_an_imu_with_a_frozen_clock_goes_stale_with_an_edge() {
 
 #[test]
 fn f63_an_imu_that_sends_nonsense_is_refused_and_goes_stale() {
-    let mut imu = Receiver::<_, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+    let mut imu = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
     assert!(imu.read(&mut &imu_frame(0, 0.95, 0.0)[..], ms(0)).is_some(), "normalised");
     let nonsense = [
         (f32::NAN, 0.0),

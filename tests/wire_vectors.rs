@@ -5,14 +5,13 @@
 use drivetrain::time::Instant;
 use drivetrain::units::Angle;
 use drivetrain::wire::dbus::{Dbus, Keys, Switch};
-use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Sts, register};
-use drivetrain::wire::hipnuc::{self, HipNuc, Imu};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
+use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, CommandFormat, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry,
-    TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
-use drivetrain::wire::{Counts, Deframer, Protocol};
+use drivetrain::wire::{Counts, Decode, Deframer};
 use serde_json::Value;
 
 fn vector(id: &str) -> Value {
@@ -44,8 +43,8 @@ fn close(actual: &[f32], expected: &Value, tolerance: f64) {
 }
 
 /// Reads all frames of `bytes`.
-fn frames<P: Protocol, const N: usize>(protocol: P, bytes: &[u8]) -> (Vec<P::Frame>, Counts) {
-    let mut decoder = Deframer::<P, N>::new(protocol);
+fn frames<F: Decode, const N: usize>(options: F::Options, bytes: &[u8]) -> (Vec<F>, Counts) {
+    let mut decoder = Deframer::<F, N>::with_options(options);
     let mut input = bytes;
     let mut frames = Vec::new();
     while let Some(frame) = decoder.read(&mut input) {
@@ -55,7 +54,7 @@ fn frames<P: Protocol, const N: usize>(protocol: P, bytes: &[u8]) -> (Vec<P::Fra
 }
 
 fn imu(id: &str) -> Imu {
-    let (frames, counts) = frames::<_, 128>(HipNuc, &hex(&vector(id)["input"]["frame"]));
+    let (frames, counts) = frames::<Imu, 128>((), &hex(&vector(id)["input"]["frame"]));
     assert_eq!((frames.len(), counts.skipped_bytes), (1, 0), "{id}");
     frames[0]
 }
@@ -96,7 +95,7 @@ fn hipnuc_92_frame() {
 #[test]
 fn hipnuc_other_tags_are_skipped_and_counted() {
     let frame = hex(&vector("hipnuc.hi81.crc")["input"]["frame"]);
-    let (frames, counts) = frames::<_, 128>(HipNuc, &frame);
+    let (frames, counts) = frames::<Imu, 128>((), &frame);
     assert!(frames.is_empty());
     assert_eq!(counts, Counts { foreign_frames: 1, ..Counts::default() });
 }
@@ -109,14 +108,14 @@ fn hipnuc_live_frame_passes_and_its_flipped_twin_does_not() {
     let norm: f32 = live.attitude.to_quaternion().iter().map(|part| part * part).sum();
     assert!((norm - 1.0).abs() < 1e-6, "sent as 0.99904");
     let flipped = hex(&vector("hipnuc.neg.flip")["input"]["frame"]);
-    let (frames, counts) = frames::<_, 128>(HipNuc, &flipped);
+    let (frames, counts) = frames::<Imu, 128>((), &flipped);
     assert_eq!((frames.len(), counts.checksum_errors), (0, 1));
 }
 
 #[test]
 fn hipnuc_finds_the_good_frame_in_the_public_resync_stream() {
     let vector = vector("hipnuc.resync");
-    let (frames, counts) = frames::<_, 518>(HipNuc, &hex(&vector["input"]["stream"]));
+    let (frames, counts) = frames::<Imu, 518>((), &hex(&vector["input"]["stream"]));
     let expect = &vector["expect"];
     assert_eq!(frames.len() as u64, expect["valid_frames"].as_u64().unwrap());
     assert_eq!(i64::from(counts.length_errors), expect["length_errors"]);
@@ -172,7 +171,7 @@ fn host_link_commands_in_both_directions() {
         let vector = vector(id);
         let (command, frame) = (command(&vector["input"]), hex(&vector["expect"]["frame"]));
         assert_eq!(command.encode(&mut [0; COMMAND_LENGTH]).unwrap(), frame);
-        let (frames, counts) = frames::<_, COMMAND_LENGTH>(CommandFormat, &frame);
+        let (frames, counts) = frames::<HostCommand, COMMAND_LENGTH>((), &frame);
         assert_eq!((frames, counts.skipped_bytes), (vec![command], 0));
     }
     let first = command(&vector("snake.cmd.ramp")["input"]).joints[0];
@@ -183,7 +182,7 @@ fn host_link_commands_in_both_directions() {
 #[test]
 fn host_link_refuses_the_byte_order_of_modbus_in_the_crc() {
     let frame = hex(&vector("snake.cmd.neg.crc_swapped")["input"]["frame"]);
-    let (frames, counts) = frames::<_, COMMAND_LENGTH>(CommandFormat, &frame);
+    let (frames, counts) = frames::<HostCommand, COMMAND_LENGTH>((), &frame);
     assert_eq!((frames.len(), counts.checksum_errors), (0, 1));
 }
 
@@ -195,7 +194,7 @@ fn host_link_telemetry_with_both_headers_in_both_directions() {
     ] {
         let vector = vector(id);
         let (frame, expect) = (hex(&vector["input"]["frame"]), &vector["expect"]);
-        let (frames, counts) = frames::<_, TELEMETRY_LENGTH>(format, &frame);
+        let (frames, counts) = frames::<Telemetry, TELEMETRY_LENGTH>(format, &frame);
         assert_eq!((frames.len(), counts.skipped_bytes), (1, 0), "{id}");
         let telemetry: Telemetry = frames[0];
         assert_eq!(telemetry.positions_pulses[..], integers::<i32>(&expect["positions"]));
@@ -215,7 +214,7 @@ fn host_link_telemetry_with_both_headers_in_both_directions() {
         let mut buffer = [0; TELEMETRY_LENGTH];
         let swapped = big.encode(&telemetry, &mut buffer).unwrap();
         assert_ne!(swapped, frame);
-        assert_eq!(self::frames::<_, TELEMETRY_LENGTH>(big, swapped).0, [telemetry]);
+        assert_eq!(self::frames::<Telemetry, TELEMETRY_LENGTH>(big, swapped).0, [telemetry]);
     }
     assert_eq!(TelemetryFormat::default(), TelemetryFormat::new());
 }
@@ -249,7 +248,7 @@ fn feetech_instructions_of_the_manual() {
 fn feetech_status_frames_of_the_manual() {
     for (id, position) in [("feetech.status.block1", 2048), ("feetech.status.block2", 2047)] {
         let vector = vector(id);
-        let (frames, _) = frames::<_, 64>(Sts, &hex(&vector["input"]["frame"]));
+        let (frames, _) = frames::<Status, 64>((), &hex(&vector["input"]["frame"]));
         let (status, expect) = (&frames[0], &vector["expect"]);
         assert_eq!(i64::from(status.id()), expect["id"]);
         assert!(status.errors() == 0);
@@ -262,11 +261,11 @@ fn feetech_status_frames_of_the_manual() {
         assert_eq!(i64::from(present.temperature_c), expect["temperature_c"]);
     }
     let (acknowledged, _) =
-        frames::<_, 64>(Sts, &hex(&vector("feetech.status.ok")["input"]["frame"]));
+        frames::<Status, 64>((), &hex(&vector("feetech.status.ok")["input"]["frame"]));
     assert_eq!((acknowledged[0].id(), acknowledged[0].parameters()), (1, &[][..]));
     assert_eq!(Present::from_status(&acknowledged[0]), None);
     let bad = hex(&vector("feetech.neg.checksum")["input"]["frame"]);
-    let (none, counts) = frames::<_, 64>(Sts, &bad);
+    let (none, counts) = frames::<Status, 64>((), &bad);
     assert_eq!((none.len(), counts.checksum_errors), (0, 1));
 }
 

@@ -17,8 +17,8 @@
 //! let mut buffer = [0; 32];
 //! let mut bytes = justfloat(&[1.0, -2.5], &mut buffer)?;
 //! assert_eq!(bytes, [0, 0, 0x80, 0x3F, 0, 0, 0x20, 0xC0, 0, 0, 0x80, 0x7F]);
-//! let mut reader = Deframer::<JustFloat<2>, 12>::new(JustFloat);
-//! assert_eq!(reader.read(&mut bytes), Some([1.0, -2.5]));
+//! let mut reader = Deframer::<JustFloat<2>, 12>::new();
+//! assert_eq!(reader.read(&mut bytes), Some(JustFloat([1.0, -2.5])));
 //!
 //! assert_eq!(text_line("rpm", &[482.0, -0.25], &mut buffer)?, b"rpm:482.000,-0.250\n");
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
@@ -33,7 +33,7 @@
 use core::fmt::Write;
 
 use super::field::{Reader, Writer};
-use super::{EncodeError, Protocol, Reject};
+use super::{Decode, EncodeError, Reject};
 
 /// The end of a frame: +infinity.
 const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];
@@ -103,25 +103,29 @@ impl Write for Line<'_> {
     }
 }
 
-/// The format of `JustFloat` frames of `C` channels, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct JustFloat<const C: usize>;
+/// A `JustFloat` frame of `C` channels, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct JustFloat<const C: usize>(
+    /// The channels.
+    pub [f32; C],
+);
 
-impl<const C: usize> Protocol for JustFloat<C> {
-    type Frame = [f32; C];
+impl<const C: usize> Decode for JustFloat<C> {
+    type Options = ();
     const PREFIX: usize = TAIL.len();
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &[]
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), _prefix: &[u8]) -> Option<usize> {
         Some(4 * C + TAIL.len())
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<[f32; C], Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         let values = frame.strip_suffix(&TAIL).ok_or(Reject::Unframed)?;
-        Reader(values).array(Reader::f32_le).ok_or(Reject::Length)
+        Reader(values).array(Reader::f32_le).map(Self).ok_or(Reject::Length)
     }
 }
 
@@ -141,8 +145,8 @@ mod tests {
         let mut buffer = [0; 16];
         let mut bytes = justfloat(&[f32::INFINITY, f32::NEG_INFINITY, 1.0], &mut buffer).unwrap();
         assert_eq!(tails(bytes), 1);
-        let mut reader = Deframer::<JustFloat<3>, 16>::new(JustFloat);
-        assert_eq!(reader.read(&mut bytes), Some([f32::MAX, f32::NEG_INFINITY, 1.0]));
+        let mut reader = Deframer::<JustFloat<3>, 16>::new();
+        assert_eq!(reader.read(&mut bytes), Some(JustFloat([f32::MAX, f32::NEG_INFINITY, 1.0])));
     }
 
     #[test]

@@ -95,7 +95,7 @@ impl Operator {
 pub(crate) struct Host {
     pub(crate) operator: Operator,
     due: Instant,
-    telemetry: Deframer<TelemetryFormat, TELEMETRY_LENGTH>,
+    telemetry: Deframer<Telemetry, TELEMETRY_LENGTH>,
     pub(crate) latest: Option<Telemetry>,
     received_s: f32,
     /// All that was sent.
@@ -110,7 +110,7 @@ impl Host {
         Self {
             operator,
             due: Instant::START,
-            telemetry: Deframer::new(TelemetryFormat::new()),
+            telemetry: Deframer::with_options(TelemetryFormat::new()),
             latest: None,
             received_s: 0.0,
             sent: Vec::new(),

@@ -11,10 +11,10 @@ use drivetrain::sim::Simulation;
 use drivetrain::snake::{Config, Joint, Joints};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Sts, register};
-use drivetrain::wire::hipnuc::{self, HipNuc};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
+use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, CommandFormat, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::{Counts, Deframer, Receiver, SignalEdge};
 use std::error::Error;
@@ -63,9 +63,9 @@ pub(crate) struct Robot<'w> {
     pub(crate) joints: [Joint; JOINTS],
     pub(crate) yaw: Handle<Gm6020Voltage>,
     pub(crate) finger: Handle<M2006>,
-    host: Receiver<CommandFormat, COMMAND_LENGTH>,
-    imus: [Receiver<HipNuc, { hipnuc::MAX_FRAME }>; 4],
-    servo: Deframer<Sts, { feetech::MAX_FRAME }>,
+    host: Receiver<HostCommand, COMMAND_LENGTH>,
+    imus: [Receiver<Imu, { hipnuc::MAX_FRAME }>; 4],
+    servo: Deframer<Status, { feetech::MAX_FRAME }>,
     pub(crate) servo_position: Option<Present>,
     /// When the last command came, and how fast its targets moved, in pulses a second.
     heard: Instant,
@@ -96,9 +96,9 @@ impl<'w> Robot<'w> {
             joints: handles.try_into().map_err(|_| "12 joints")?,
             yaw,
             finger,
-            host: Receiver::new(CommandFormat, HOST_DEADLINE),
-            imus: std::array::from_fn(|_| Receiver::new(HipNuc, IMU_DEADLINE)),
-            servo: Deframer::new(Sts),
+            host: Receiver::new(HOST_DEADLINE),
+            imus: std::array::from_fn(|_| Receiver::new(IMU_DEADLINE)),
+            servo: Deframer::new(),
             servo_position: None,
             heard: Instant::START,
             rates: [0.0; JOINTS],

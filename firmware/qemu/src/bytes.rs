@@ -5,14 +5,14 @@ use crate::row;
 use core::hint::black_box;
 use drivetrain::time::Instant;
 use drivetrain::wire::dbus::Dbus;
-use drivetrain::wire::feetech::{self, Goal, ServoId, Sts};
-use drivetrain::wire::hipnuc::HipNuc;
-use drivetrain::wire::host_link::{CommandFormat, HostCommand, Telemetry, TelemetryFormat};
+use drivetrain::wire::feetech::{self, Goal, ServoId, Status};
+use drivetrain::wire::hipnuc::Imu;
+use drivetrain::wire::host_link::{HostCommand, Telemetry, TelemetryFormat};
 use drivetrain::wire::{Deframer, vofa};
 
-type Hosts = Deframer<CommandFormat, 79>;
-type Imus = Deframer<HipNuc, 128>;
-type Servos = Deframer<Sts, 64>;
+type Hosts = Deframer<HostCommand, 79>;
+type Imus = Deframer<Imu, 128>;
+type Servos = Deframer<Status, 64>;
 
 /// Functions out of line that say how much came out.
 macro_rules! functions {
@@ -73,8 +73,8 @@ pub fn rows() {
         };
     }
     let (mut hosts, mut imus, mut servos) =
-        (Hosts::new(CommandFormat), Imus::new(HipNuc), Servos::new(Sts));
-    let (mut noisy, mut remotes) = (Imus::new(HipNuc), Dbus::new());
+        (Hosts::new(), Imus::new(), Servos::new());
+    let (mut noisy, mut remotes) = (Imus::new(), Dbus::new());
     row! {
         "wire_host_command" bytes_host_command(&mut hosts, &bytes): fn(&mut Hosts, &[u8]) -> usize;
         "wire_hipnuc" bytes_hipnuc(&mut imus, black_box(&IMU)): fn(&mut Imus, &[u8]) -> usize;
@@ -98,9 +98,9 @@ pub fn rows() {
         };
     }
     byte! {
-        "wire_host_byte" bytes_host_command(Hosts::new(CommandFormat), bytes): fn(&mut Hosts, &[u8]) -> usize;
-        "wire_hipnuc_byte" bytes_hipnuc(Imus::new(HipNuc), IMU): fn(&mut Imus, &[u8]) -> usize;
-        "wire_sts_byte" bytes_sts_status(Servos::new(Sts), STATUS): fn(&mut Servos, &[u8]) -> usize;
+        "wire_host_byte" bytes_host_command(Hosts::new(), bytes): fn(&mut Hosts, &[u8]) -> usize;
+        "wire_hipnuc_byte" bytes_hipnuc(Imus::new(), IMU): fn(&mut Imus, &[u8]) -> usize;
+        "wire_sts_byte" bytes_sts_status(Servos::new(), STATUS): fn(&mut Servos, &[u8]) -> usize;
         "wire_dbus_byte" bytes_dbus(Dbus::new(), REMOTE): fn(&mut Dbus, &[u8]) -> usize;
     }
     // A reader that found nothing would be cheap.

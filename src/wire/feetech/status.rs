@@ -1,5 +1,5 @@
 use super::checksum;
-use crate::wire::{Protocol, Reject};
+use crate::wire::{Decode, Reject};
 
 /// The most parameters that a [`Status`] holds: a longer reply is refused by its length.
 pub const MAX_PARAMETERS: usize = 32;
@@ -10,13 +10,13 @@ pub const MAX_FRAME: usize = MAX_PARAMETERS + OVERHEAD;
 /// Header, id, length, error and checksum in bytes.
 const OVERHEAD: usize = 6;
 
-/// The answer of a servo.
+/// The answer of a servo, of the series STS and SMS.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::wire::{Deframer, feetech::Sts};
+/// use drivetrain::wire::{Deframer, feetech::Status};
 ///
-/// let mut replies = Deframer::<Sts, 64>::new(Sts);
+/// let mut replies = Deframer::<Status, 64>::new();
 /// let mut received = &[0xFF, 0xFF, 0x01, 0x02, 0b0010_0100, 0xD8][..];
 /// let status = replies.read(&mut received).ok_or("no status")?;
 /// assert!(status.is_overheated() && status.is_overloaded() && !status.has_voltage_error());
@@ -82,34 +82,29 @@ impl Status {
     }
 }
 
-/// The format of [`Status`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Receiver`](crate::wire::Receiver).
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct Sts;
-
-impl Protocol for Sts {
-    type Frame = Status;
+impl Decode for Status {
+    type Options = ();
     const PREFIX: usize = 4;
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &[0xFF, 0xFF]
     }
 
     /// A status comes from one servo, so an id above 253 is noise: most often a third `FF` before a frame.
-    fn length(&self, prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), prefix: &[u8]) -> Option<usize> {
         let [.., id, length] = prefix else { return None };
         let parameters = usize::from(*length).checked_sub(2)?;
         (*id < 254 && parameters <= MAX_PARAMETERS).then_some(parameters + OVERHEAD)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<Status, Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         let [_, _, summed @ .., sum] = frame else { return Err(Reject::Length) };
         let [id, _, errors, parameters @ ..] = summed else { return Err(Reject::Length) };
         if checksum(summed) != *sum {
             return Err(Reject::Checksum);
         }
         let length = u8::try_from(parameters.len()).map_err(|_| Reject::Length)?;
-        let mut status =
-            Status { id: *id, errors: *errors, parameters: [0; MAX_PARAMETERS], length };
+        let mut status = Self { id: *id, errors: *errors, parameters: [0; MAX_PARAMETERS], length };
         let place = status.parameters.get_mut(..parameters.len()).ok_or(Reject::Length)?;
         place.copy_from_slice(parameters);
         Ok(status)
@@ -144,9 +139,9 @@ mod tests {
     #[test]
     fn a_status_comes_from_one_servo_and_fits_the_longest_frame() {
         assert_eq!(MAX_FRAME, 38);
-        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 34]), Some(MAX_FRAME));
-        assert_eq!(Sts.length(&[0xFF, 0xFF, 254, 34]), None);
-        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 35]), None);
-        assert_eq!(Sts.length(&[0xFF, 0xFF, 253, 1]), None);
+        assert_eq!(Status::length(&(), &[0xFF, 0xFF, 253, 34]), Some(MAX_FRAME));
+        assert_eq!(Status::length(&(), &[0xFF, 0xFF, 254, 34]), None);
+        assert_eq!(Status::length(&(), &[0xFF, 0xFF, 253, 35]), None);
+        assert_eq!(Status::length(&(), &[0xFF, 0xFF, 253, 1]), None);
     }
 }

@@ -1,6 +1,6 @@
 use super::{JOINTS, PULSES_PER_TURN, check, seal};
 use crate::wire::field::{Reader, Writer};
-use crate::wire::{EncodeError, Protocol, Reject};
+use crate::wire::{Decode, EncodeError, Reject};
 
 /// The length of a command frame in bytes.
 pub const COMMAND_LENGTH: usize = 79;
@@ -134,23 +134,19 @@ impl HostCommand {
     }
 }
 
-/// The format of [`HostCommand`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Receiver`](crate::wire::Receiver).
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct CommandFormat;
-
-impl Protocol for CommandFormat {
-    type Frame = HostCommand;
+impl Decode for HostCommand {
+    type Options = ();
     const PREFIX: usize = HEADER.len();
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &HEADER
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), _prefix: &[u8]) -> Option<usize> {
         Some(COMMAND_LENGTH)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<HostCommand, Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         read(check(frame)?).ok_or(Reject::Length)
     }
 }

@@ -22,7 +22,7 @@
 //! | the four tags | left out | skipped unread | written as 13 to 16, skipped when read |
 //! | IMUs | USART 2, 7, 8, 6; pitch, roll, yaw | USART 6, 2, 7, 8 | in the order of the wire, without names |
 //!
-//! A host that is silent must not keep a robot going: put a decoder of commands into a [`Receiver`](super::Receiver), and relax
+//! A host that is silent must not keep a robot going: read its commands with a [`Receiver`](super::Receiver), and relax
 //! the motors while its `latest` is `None`.
 //!
 //! ```
@@ -35,7 +35,7 @@
 //!
 //! let mut buffer = [0; COMMAND_LENGTH];
 //! let mut bytes = command.encode(&mut buffer)?;
-//! let mut decoder = Deframer::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat);
+//! let mut decoder = Deframer::<HostCommand, COMMAND_LENGTH>::new();
 //! assert_eq!(decoder.read(&mut bytes), Some(command));
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
@@ -46,7 +46,7 @@
 mod command;
 mod telemetry;
 
-pub use command::{COMMAND_LENGTH, CommandFormat, HostCommand, JointTarget, Reset};
+pub use command::{COMMAND_LENGTH, HostCommand, JointTarget, Reset};
 pub use telemetry::{TELEMETRY_LENGTH, Telemetry, TelemetryFormat};
 
 use super::Reject;

@@ -1,6 +1,6 @@
 use super::{JOINTS, check, seal};
 use crate::wire::field::{Reader, Writer};
-use crate::wire::{EncodeError, Protocol, Reject};
+use crate::wire::{Decode, EncodeError, Reject};
 
 /// The length of a telemetry frame in bytes: 10.5 ms at 115200 baud, of the 50 ms between two frames.
 pub const TELEMETRY_LENGTH: usize = 121;
@@ -39,7 +39,7 @@ pub struct Telemetry {
 /// let mut bytes = format.encode(&telemetry, &mut buffer)?;
 /// assert_eq!(bytes[..3], [0xAA, 0x55, 116]);
 ///
-/// let mut decoder = Deframer::<_, TELEMETRY_LENGTH>::new(format);
+/// let mut decoder = Deframer::<Telemetry, TELEMETRY_LENGTH>::with_options(format);
 /// assert_eq!(decoder.read(&mut bytes), Some(telemetry));
 /// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
@@ -80,7 +80,7 @@ impl TelemetryFormat {
         out: &'a mut [u8],
     ) -> Result<&'a [u8], EncodeError> {
         let mut writer = Writer::new(out, TELEMETRY_LENGTH)?;
-        writer.put(self.header());
+        writer.put(Telemetry::header(self));
         for position in telemetry.positions_pulses {
             writer.put(&position.to_be_bytes());
         }
@@ -119,19 +119,19 @@ impl TelemetryFormat {
     }
 }
 
-impl Protocol for TelemetryFormat {
-    type Frame = Telemetry;
+impl Decode for Telemetry {
+    type Options = TelemetryFormat;
     const PREFIX: usize = 3;
 
-    fn header(&self) -> &[u8] {
-        if self.document_header { &[0xAA, 0x55, PAYLOAD] } else { &[0xBB, 0x66, PAYLOAD] }
+    fn header(format: &TelemetryFormat) -> &[u8] {
+        if format.document_header { &[0xAA, 0x55, PAYLOAD] } else { &[0xBB, 0x66, PAYLOAD] }
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &TelemetryFormat, _prefix: &[u8]) -> Option<usize> {
         Some(TELEMETRY_LENGTH)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<Telemetry, Reject> {
-        self.read(check(frame)?).ok_or(Reject::Length)
+    fn decode(format: &TelemetryFormat, frame: &[u8]) -> Result<Self, Reject> {
+        format.read(check(frame)?).ok_or(Reject::Length)
     }
 }

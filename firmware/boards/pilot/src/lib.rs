@@ -13,7 +13,7 @@ use drivetrain::geometry::{Heading, Twist};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
-use drivetrain::wire::hipnuc::{HipNuc, MAX_FRAME};
+use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::{Receiver, SignalEdge};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
@@ -63,7 +63,7 @@ pub struct Pilot {
     wheels: MecanumWheels<Handle<M3508>>,
     chassis: Chassis<Mecanum>,
     dbus: Dbus,
-    imu: Receiver<HipNuc, MAX_FRAME>,
+    imu: Receiver<Imu, MAX_FRAME>,
     switch: Switch,
     forward: Forward,
 }
@@ -89,7 +89,7 @@ impl Pilot {
         let limits =
             ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
-        let imu = Receiver::new(HipNuc, IMU_DEADLINE);
+        let imu = Receiver::new(IMU_DEADLINE);
         let (switch, forward) = (Switch::Absent, Forward::Chassis);
         Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch, forward })
     }
