@@ -72,8 +72,7 @@ pub fn rows() {
             )*
         };
     }
-    let (mut hosts, mut imus, mut servos) =
-        (Hosts::new(), Imus::new(), Servos::new());
+    let (mut hosts, mut imus, mut servos) = (Hosts::new(), Imus::new(), Servos::new());
     let (mut noisy, mut remotes) = (Imus::new(), Dbus::new());
     row! {
         "wire_host_command" bytes_host_command(&mut hosts, &bytes): fn(&mut Hosts, &[u8]) -> usize;
