@@ -100,8 +100,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Tells whether no motor has this fault: one of an ESC, for a joint.
-    const fn misses_its_motor(&self) -> bool {
+    /// Tells whether its motor cannot have it: a joint has no fault of an ESC.
+    const fn is_impossible(&self) -> bool {
         match self {
             Self::Silent(_) | Self::PowerLoss { .. } => false,
             _ => match self.motor() {
@@ -163,7 +163,7 @@ impl Faults {
         seed: u64,
         now_ns: u64,
     ) -> Result<(), SimError> {
-        if fault.misses_its_motor() {
+        if fault.is_impossible() {
             return Err(SimError::NoFaultOfJoint);
         }
         let ns = |instant: &Instant| instant.as_micros().saturating_mul(1_000);

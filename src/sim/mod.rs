@@ -84,8 +84,8 @@ mod random;
 mod ring;
 mod rotor;
 mod serial;
+mod simulation;
 mod wheel;
-mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState};
@@ -96,5 +96,5 @@ pub use joint::JointConfig;
 pub use line::{Line, Sender, Traffic, Transmission};
 pub use motor::{MotorConfig, MotorKey, MotorState};
 pub use serial::SerialLine;
+pub use simulation::Simulation;
 pub use wheel::Wheel;
-pub use world::Simulation;

@@ -3,28 +3,6 @@ use crate::dji::{self, Facts};
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity, Current};
 
-/// A motor of the driver's family [`dji`] with its ESC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) enum Model {
-    M2006,
-    M3508,
-    Gm6020Voltage,
-    Gm6020Current,
-}
-
-impl Model {
-    /// Returns what the wire and the data sheets say about it.
-    pub(crate) const fn facts(self) -> &'static Facts {
-        match self {
-            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
-            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
-            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
-            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
-        }
-    }
-}
-
 /// A motor with its ESC to attach to a [`Simulation`](super::Simulation).
 ///
 /// All values at the output shaft, at 24 V. Torque constant, gear and no-load speed are those of the driver's table
@@ -269,6 +247,28 @@ pub struct MotorState {
     /// How often a frame of the controller with its id began in the same bit as its reply: on a real bus both would have
     /// been destroyed. Here the controller goes first. Only a joint has one id for both.
     pub collisions: u32,
+}
+
+/// A motor of the driver's family [`dji`] with its ESC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) enum Model {
+    M2006,
+    M3508,
+    Gm6020Voltage,
+    Gm6020Current,
+}
+
+impl Model {
+    /// Returns what the wire and the data sheets say about it.
+    pub(crate) const fn facts(self) -> &'static Facts {
+        match self {
+            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
+            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
+            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
+            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
+        }
+    }
 }
 
 /// The physical constants of a model, at the output shaft. Units are SI.

@@ -40,7 +40,9 @@ use crate::time::Duration;
 /// let state = world.motor(neck).ok_or("not attached")?;
 /// assert!((state.velocity.as_rpm() - 60.0).abs() < 0.1 && state.is_enabled);
 /// world.advance(Duration::from_millis(400));
-/// assert_eq!(world.motor(neck).map(|joint| joint.encoder_counts), Some(32_768));
+/// let state = world.motor(neck).ok_or("not attached")?;
+/// assert_eq!((state.encoder_counts, state.command), (32_768, 32_768));
+/// assert!((state.angle_rad - std::f64::consts::PI).abs() < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,8 +7,8 @@ use crate::units::Angle;
 
 /// Takes w, x, y, z; `None` when they are further than 10 % from length 1, or not finite.
 pub(super) fn normalised(quaternion: [f32; 4]) -> Option<Rotation3> {
-    let norm = sqrt(quaternion.iter().map(|part| part * part).sum());
-    if !(0.9..=1.1).contains(&norm) {
+    let square: f32 = quaternion.iter().map(|part| part * part).sum();
+    if !(0.9 * 0.9..=1.1 * 1.1).contains(&square) {
         return None; // NaN and infinity included
     }
     let [w, x, y, z] = quaternion;

@@ -13,7 +13,8 @@ use core::ops::RangeBounds;
 /// Three CAN buses with motors on them, and the time.
 ///
 /// It is shared by reference, so that the code under test can own the driver's end of a bus while the test goes
-/// on to move time; a reference to it is also a [`Clock`] that shows its time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block.
+/// on to move time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block. A
+/// reference to it is a [`Clock`] that shows its time.
 ///
 /// # Examples
 /// ```
@@ -253,8 +254,9 @@ impl Clock for &Simulation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::Sender;
     use crate::sim::motor::Model;
+    use crate::sim::{JointConfig, Sender};
+    use core::f64::consts::PI;
     use embedded_can::{Frame, nb::Can};
     use std::string::{String, ToString};
     use std::vec::Vec;
@@ -364,6 +366,53 @@ mod tests {
         let wrong = SimError::Id { model: "M3508", id: 9 };
         assert_eq!(Simulation::new(1).attach(m3508(9)), Err(wrong));
         assert_eq!(wrong.to_string(), "M3508 has no id 9");
+    }
+
+    #[test]
+    fn the_angle_of_the_shaft_is_what_its_encoder_counts() {
+        let world = Simulation::new(1);
+        let wheel = world.attach(m3508(1).with_rotor_angle(4_096)).unwrap();
+        let joint = world.attach_joint(JointConfig::new(1).with_position(-16_384)).unwrap();
+        let state = |key| world.motor(key).unwrap();
+        let gear = f64::from(m3508(1).facts().gear.as_f32());
+        assert!((state(wheel).angle_rad * gear - PI).abs() < 1e-6);
+        assert!((state(joint).angle_rad + PI / 2.0).abs() < 1e-12);
+        world.set_load_nm(wheel, 1.0);
+        world.advance(Duration::from_secs(1));
+        let MotorState { angle_rad, encoder_counts, drive_counts, .. } = state(wheel);
+        let counted_rad = encoder_counts as f64 / 8_192.0 * 2.0 * PI / gear;
+        assert!(angle_rad > 1.0 && (0.0..1e-4).contains(&(angle_rad - counted_rad)));
+        assert_eq!(i64::from(drive_counts), encoder_counts);
+        assert!(state(joint).torque_nm.is_nan() && state(joint).current.as_amperes().is_nan());
+    }
+
+    #[test]
+    fn a_drive_that_forgot_its_angle_counts_from_there() {
+        let world = Simulation::new(1);
+        let wheel = world.attach(m3508(1).with_rotor_angle(1_000)).unwrap();
+        let loss = Fault::PowerLoss { motor: wheel, forgets_angle: true };
+        world.fault(loss, at(10)..at(20)).unwrap();
+        world.advance(Duration::from_millis(15));
+        assert!(!world.motor(wheel).unwrap().is_enabled);
+        world.advance(Duration::from_millis(15));
+        let state = world.motor(wheel).unwrap();
+        assert_eq!((state.encoder_counts, state.drive_counts, state.is_enabled), (1_000, 0, true));
+        assert_eq!(state.replies, world.traffic(Line::Can1).frames);
+    }
+
+    #[test]
+    fn a_joint_has_no_fault_of_an_esc() {
+        let world = Simulation::new(1);
+        let joint = world.attach_joint(JointConfig::new(1)).unwrap();
+        for fault in [
+            Fault::StuckEncoder(joint),
+            Fault::FrozenFeedback(joint),
+            Fault::BlockedShaft(joint),
+            Fault::ErrorCode { motor: joint, code: 1 },
+        ] {
+            assert_eq!(world.fault(fault, ..), Err(SimError::NoFaultOfJoint));
+        }
+        assert_eq!(world.fault(Fault::Silent(joint), ..), Ok(()));
     }
 
     #[test]
