@@ -99,7 +99,7 @@ impl Gimbal<'_> {
     fn truth(&self) -> Option<(f32, f32)> {
         let motor = self.world.motor(self.key)?;
         let (angle, rate, _) = chassis(self.time_s());
-        let relative = motor.angle_rad as f32;
+        let relative = motor.position.as_angle().as_radians();
         Some((relative + angle, motor.velocity.as_rad_per_s() + rate))
     }
 

@@ -1,5 +1,5 @@
 use super::mailbox::Mailboxes;
-use super::motor::{MotorConfig, MotorState};
+use super::motor::{MotorConfig, MotorState, position};
 use super::random::Random;
 use super::rotor::{Drive, Rotor};
 use crate::dji::{Facts, Unit};
@@ -200,7 +200,7 @@ impl Esc {
     pub(crate) fn state(&self, since_step_s: f32) -> MotorState {
         let encoder_counts = self.rotor.counts(since_step_s);
         MotorState {
-            angle_rad: self.rotor.angle_rad(since_step_s),
+            position: position(self.rotor.shaft_turns(since_step_s)),
             velocity: AngularVelocity::from_rad_per_s(self.rotor.velocity()),
             current: Current::from_amperes(self.rotor.current()),
             torque_nm: self.rotor.torque_nm(),

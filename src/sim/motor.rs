@@ -1,5 +1,6 @@
 use super::Line;
 use crate::dji::{self, Facts};
+use crate::encoder::Position;
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity, Current};
 
@@ -219,8 +220,8 @@ impl MotorKey {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MotorState {
-    /// The angle of the output shaft in rad, not reduced to one turn, from where [`encoder_counts`](Self::encoder_counts) is 0.
-    pub angle_rad: f64,
+    /// Turns and angle of the output shaft, from where [`encoder_counts`](Self::encoder_counts) is 0.
+    pub position: Position,
     /// The velocity of the output shaft.
     pub velocity: AngularVelocity,
     /// The torque current.
@@ -269,6 +270,13 @@ impl Model {
             Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
         }
     }
+}
+
+/// Returns the position that is so many turns.
+#[expect(clippy::cast_possible_truncation, reason = "an angle within a turn")]
+pub(crate) fn position(turns: f64) -> Position {
+    let whole = turns as i64;
+    Position::new(whole, Angle::from_turns((turns - whole as f64) as f32))
 }
 
 /// The physical constants of a model, at the output shaft. Units are SI.

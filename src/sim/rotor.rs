@@ -156,10 +156,10 @@ impl Rotor {
         self.angle.wrapping_add(self.travel(dt_s)) >> 19
     }
 
-    /// Returns the angle of the output shaft `dt_s` after the last step, in rad.
-    pub(crate) fn angle_rad(&self, dt_s: f32) -> f64 {
+    /// Returns the turns of the output shaft `dt_s` after the last step.
+    pub(crate) fn shaft_turns(&self, dt_s: f32) -> f64 {
         let turns = self.angle.wrapping_add(self.travel(dt_s)) as f64 / f64::from(TURN);
-        turns / f64::from(self.gear) * core::f64::consts::TAU
+        turns / f64::from(self.gear)
     }
 
     /// Returns the angle of the output shaft within a turn in rad, from that of the rotor's zero at the start.

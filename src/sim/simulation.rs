@@ -256,7 +256,6 @@ mod tests {
     use super::*;
     use crate::sim::motor::Model;
     use crate::sim::{JointConfig, Sender};
-    use core::f64::consts::PI;
     use embedded_can::{Frame, nb::Can};
     use std::string::{String, ToString};
     use std::vec::Vec;
@@ -374,14 +373,14 @@ mod tests {
         let wheel = world.attach(m3508(1).with_rotor_angle(4_096)).unwrap();
         let joint = world.attach_joint(JointConfig::new(1).with_position(-16_384)).unwrap();
         let state = |key| world.motor(key).unwrap();
-        let gear = f64::from(m3508(1).facts().gear.as_f32());
-        assert!((state(wheel).angle_rad * gear - PI).abs() < 1e-6);
-        assert!((state(joint).angle_rad + PI / 2.0).abs() < 1e-12);
+        let gear = m3508(1).facts().gear.as_f32();
+        assert!((state(wheel).position.as_turns() * gear - 0.5).abs() < 1e-6);
+        assert!((state(joint).position.as_angle().as_degrees() + 90.0).abs() < 1e-4);
         world.set_load_nm(wheel, 1.0);
         world.advance(Duration::from_secs(1));
-        let MotorState { angle_rad, encoder_counts, drive_counts, .. } = state(wheel);
-        let counted_rad = encoder_counts as f64 / 8_192.0 * 2.0 * PI / gear;
-        assert!(angle_rad > 1.0 && (0.0..1e-4).contains(&(angle_rad - counted_rad)));
+        let MotorState { position, encoder_counts, drive_counts, .. } = state(wheel);
+        let counted = encoder_counts as f32 / 8_192.0 / gear;
+        assert!(position.turns() > 0 && (position.as_turns() - counted).abs() < 1e-4);
         assert_eq!(i64::from(drive_counts), encoder_counts);
         assert!(state(joint).torque_nm.is_nan() && state(joint).current.as_amperes().is_nan());
     }

@@ -30,7 +30,7 @@ struct Bus {
 /// Half a second later the motors turn.
 fn driven() -> (Bus, Example) {
     let world = Simulation::new(4);
-    let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::m3508(id)).collect();
+    let mut configs: Vec<_> = (1..=4).map(MotorConfig::m3508).collect();
     configs.push(MotorConfig::gm6020_voltage(5));
     let motors = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut bus = Bus {

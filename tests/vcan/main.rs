@@ -269,7 +269,7 @@ impl Robot {
 fn every_frame_on_a_real_can_stack_is_accounted_for() {
     let witness = Witness::new();
     let world = Simulation::new(1);
-    let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::m3508(id)).collect();
+    let mut configs: Vec<_> = (1..=4).map(MotorConfig::m3508).collect();
     configs.push(MotorConfig::gm6020_voltage(5));
     let keys: Vec<_> = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut robot = Robot::new(world);

@@ -3,6 +3,7 @@
 use super::JOINTS;
 use super::imu::Imu;
 use super::servo::Servo;
+use drivetrain::encoder::Position;
 use drivetrain::sim::{JointConfig, MotorConfig, MotorKey, MotorState, SimError, Simulation};
 use drivetrain::time::Duration;
 
@@ -18,7 +19,7 @@ pub(crate) struct Plant<'w> {
     pub(crate) servo: Servo,
     pub(crate) imus: [Imu; 4],
     /// Where the body was straight.
-    straight_rad: [f64; JOINTS],
+    straight: [Position; JOINTS],
 }
 
 impl<'w> Plant<'w> {
@@ -37,7 +38,7 @@ impl<'w> Plant<'w> {
             servo: Servo::new(seed + 100),
             imus: [0_u64, 1, 2, 3]
                 .map(|index| Imu::new(seed + 200 + index, Duration::from_millis(2 * index))),
-            straight_rad: joints.map(|joint| angle_rad(world.motor(joint))),
+            straight: joints.map(|joint| position(world.motor(joint))),
         })
     }
 
@@ -47,9 +48,9 @@ impl<'w> Plant<'w> {
         let now = self.world.now();
         self.servo.step(now, STEP.as_secs_f32());
         let mut yaw_deg = 0.0;
-        let angles = self.states().map(angle_rad).into_iter().zip(self.straight_rad);
-        for (index, (angle_rad, straight_rad)) in angles.enumerate() {
-            yaw_deg += (angle_rad - straight_rad).to_degrees() as f32;
+        let positions = self.states().map(position).into_iter().zip(self.straight);
+        for (index, (position, straight)) in positions.enumerate() {
+            yaw_deg += (position - straight).as_degrees();
             for (imu, _) in self.imus.iter_mut().zip(IMU_AFTER).filter(|(_, after)| *after == index)
             {
                 imu.step(now, yaw_deg);
@@ -62,6 +63,6 @@ impl<'w> Plant<'w> {
     }
 }
 
-fn angle_rad(joint: Option<MotorState>) -> f64 {
-    joint.map_or(0.0, |joint| joint.angle_rad)
+fn position(joint: Option<MotorState>) -> Position {
+    joint.map_or(Position::ZERO, |joint| joint.position)
 }

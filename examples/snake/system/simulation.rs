@@ -258,7 +258,7 @@ fn observe(time_s: f32, host: &Host, robot: &mut Robot<'_>, plant: &Plant<'_>) -
         wanted_deg: std::array::from_fn(|joint| host.operator.wanted_deg(joint, time_s)),
         true_deg,
         absolute_deg: states
-            .map(|state| state.map_or(0.0, |state| state.angle_rad.to_degrees() as f32)),
+            .map(|state| state.map_or(0.0, |state| state.position.as_angle().as_degrees())),
         rate_deg_s: states.map(|state| state.map_or(0.0, |s| s.velocity.as_degrees_per_s())),
         gripper_deg: [
             (asked.gm6020_position.into(), yaw),

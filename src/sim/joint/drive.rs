@@ -1,5 +1,5 @@
 use super::super::mailbox::Mailboxes;
-use super::super::motor::MotorState;
+use super::super::motor::{MotorState, position};
 use super::super::random::Random;
 use super::JointConfig;
 use crate::frame::CanFrame;
@@ -198,9 +198,8 @@ impl Drive {
     /// Returns the true state.
     pub(crate) fn state(&self) -> MotorState {
         let turns_per_s = self.velocity / PULSES_PER_TURN as f32;
-        let turn = f64::from(PULSES_PER_TURN);
         MotorState {
-            angle_rad: self.shaft / turn * core::f64::consts::TAU,
+            position: position(self.shaft / f64::from(PULSES_PER_TURN)),
             velocity: AngularVelocity::from_rpm(turns_per_s * 60.0),
             current: Current::from_amperes(f32::NAN),
             torque_nm: f32::NAN,

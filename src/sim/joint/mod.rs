@@ -42,7 +42,7 @@ use crate::time::Duration;
 /// world.advance(Duration::from_millis(400));
 /// let state = world.motor(neck).ok_or("not attached")?;
 /// assert_eq!((state.encoder_counts, state.command), (32_768, 32_768));
-/// assert!((state.angle_rad - std::f64::consts::PI).abs() < 1e-4);
+/// assert!((state.position.as_turns() - 0.5).abs() < 1e-5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
