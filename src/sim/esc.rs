@@ -1,5 +1,5 @@
 use super::mailbox::Mailboxes;
-use super::motor::{MotorConfig, MotorState, position};
+use super::motor::{MotorConfig, MotorState, position, wrapped};
 use super::random::Random;
 use super::rotor::{Drive, Rotor};
 use crate::dji::{Facts, Unit};
@@ -214,12 +214,6 @@ impl Esc {
             collisions: 0,
         }
     }
-}
-
-/// A counter of 32 bits wraps.
-#[expect(clippy::cast_possible_truncation, reason = "wraps")]
-const fn wrapped(counts: i64) -> i32 {
-    counts as i32
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounds half away from zero, and saturates")]

@@ -243,7 +243,7 @@ pub struct MotorState {
     pub command: i32,
     /// Whether the drive moves the shaft, or holds it: an ESC does while it has its supply, a joint while it is enabled.
     pub is_enabled: bool,
-    /// Feedback frames and replies that it had to send.
+    /// Answers to requests of a joint, feedback frames of an ESC; those too that found no room in its mailboxes.
     pub replies: u32,
     /// How often a frame of the controller with its id began in the same bit as its reply: on a real bus both would have
     /// been destroyed. Here the controller goes first. Only a joint has one id for both.
@@ -270,6 +270,12 @@ impl Model {
             Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
         }
     }
+}
+
+/// A counter of 32 bits wraps.
+#[expect(clippy::cast_possible_truncation, reason = "wraps")]
+pub(crate) const fn wrapped(counts: i64) -> i32 {
+    counts as i32
 }
 
 /// Returns the position that is so many turns.

@@ -1,5 +1,5 @@
 use super::super::mailbox::Mailboxes;
-use super::super::motor::{MotorState, position};
+use super::super::motor::{MotorState, position, wrapped};
 use super::super::random::Random;
 use super::JointConfig;
 use crate::frame::CanFrame;
@@ -125,8 +125,8 @@ impl Drive {
     pub(crate) fn reply(&mut self, silent: bool) {
         let Some((_, register)) = self.due.take() else { return };
         let value = match register {
-            Register::ActualPosition => nearest(self.shaft - self.zero),
-            Register::ActualSpeed => nearest(self.velocity.into()),
+            Register::ActualPosition => wrapped(nearest(self.shaft - self.zero)),
+            Register::ActualSpeed => wrapped(nearest(self.velocity.into())),
             other => self.registers.place(other).copied().unwrap_or(0),
         };
         let [a, b, c, d] = value.to_be_bytes();
@@ -205,8 +205,8 @@ impl Drive {
             torque_nm: f32::NAN,
             power_w: f32::NAN,
             temperature_c: f32::NAN,
-            encoder_counts: i64::from(nearest(self.shaft)),
-            drive_counts: nearest(self.shaft - self.zero),
+            encoder_counts: nearest(self.shaft),
+            drive_counts: wrapped(nearest(self.shaft - self.zero)),
             command: self.registers.position,
             is_enabled: self.powered && self.registers.moves(),
             replies: self.replies,
@@ -220,10 +220,9 @@ const fn narrow(pulses: f64) -> f32 {
     pulses as f32
 }
 
-/// The counter of the drive has 32 bits, and wraps.
-#[expect(clippy::cast_possible_truncation, reason = "wraps")]
-fn nearest(pulses: f64) -> i32 {
-    (pulses + 0.5_f64.copysign(pulses)) as i64 as i32
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+fn nearest(pulses: f64) -> i64 {
+    (pulses + 0.5_f64.copysign(pulses)) as i64
 }
 
 #[cfg(test)]
