@@ -9,7 +9,7 @@ mod console;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use std::cell::RefCell;
@@ -19,7 +19,7 @@ use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
 /// An async driver over the simulated controller: both halves wait without blocking.
-struct AsyncCan<'w>(&'w World);
+struct AsyncCan<'w>(&'w Simulation);
 
 impl AsyncCan<'_> {
     async fn receive(&self) -> CanFrame {
@@ -80,8 +80,8 @@ async fn control(can: &AsyncCan<'_>, bus: &RefCell<Bus>, motor: Handle<M2006>) {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let world = World::new(5);
-    world.attach(MotorConfig::new(Model::M2006, 3))?;
+    let world = Simulation::new(5);
+    world.attach(MotorConfig::m2006(3))?;
     let can = AsyncCan(&world);
     let mut bus = Bus::new();
     let motor = bus.attach(Config::<M2006>::new(3).speed_loop(PidConfig::new(0.2, 2.0, 0.0)))?;

@@ -104,7 +104,7 @@ mod simulation {
     use super::*;
     use drivetrain::motor::{ArmError, Condition, Devices, VelocityDrive};
     use drivetrain::runner::{Nb, Runner};
-    use drivetrain::sim::{Line, Model, MotorConfig, World};
+    use drivetrain::sim::{Line, MotorConfig, Simulation};
     use drivetrain::time::{Duration, Instant};
     use drivetrain::wire::mit;
     use std::error::Error;
@@ -138,8 +138,8 @@ mod simulation {
     }
 
     pub(crate) fn drive() -> Result<(), Box<dyn Error>> {
-        let world = World::new(1);
-        world.attach(MotorConfig::new(Model::M3508, 1))?;
+        let world = Simulation::new(1);
+        world.attach(MotorConfig::m3508(1))?;
         let mut esc = Esc { id: 3, amperes: 0.0, rad_per_s: 0.0 };
 
         let mut bus = Bus::new();

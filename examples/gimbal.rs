@@ -17,7 +17,7 @@ use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Measured, TargetError};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Line, Model, MotorConfig, MotorKey, World};
+use drivetrain::sim::{Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 use plotters::prelude::*;
@@ -73,12 +73,12 @@ struct Sample {
     chassis_deg: f32,
     yaw_deg: f32,
     error_deg: f32,
-    raw: i16,
+    raw: i32,
 }
 
 /// The gimbal in the world: the chassis under it turns as it likes, and its acceleration is felt at the shaft.
 struct Gimbal<'w> {
-    world: &'w World,
+    world: &'w Simulation,
     key: MotorKey,
     noise: u32,
 }
@@ -99,7 +99,7 @@ impl Gimbal<'_> {
     fn truth(&self) -> Option<(f32, f32)> {
         let motor = self.world.motor(self.key)?;
         let (angle, rate, _) = chassis(self.time_s());
-        let relative = motor.rotor_counts as f32 / 8_192.0 * TAU;
+        let relative = motor.position.as_angle().as_radians();
         Some((relative + angle, motor.velocity.as_rad_per_s() + rate))
     }
 
@@ -139,8 +139,8 @@ fn decode(frame: &CanFrame, at: Instant) -> Option<Measured<Angle>> {
 }
 
 fn drive(imu_dies: bool) -> Result<(Vec<Sample>, u32), Box<dyn Error>> {
-    let world = World::new(5);
-    let motor = MotorConfig::new(Model::Gm6020Voltage, 1).with_load_inertia_kg_m2(LOAD);
+    let world = Simulation::new(5);
+    let motor = MotorConfig::gm6020_voltage(1).with_load_inertia_kg_m2(LOAD);
     let key = world.attach(motor)?;
     let mut gimbal = Gimbal { world: &world, key, noise: 0x5EED };
     let mut bus = Bus::new();
@@ -266,7 +266,7 @@ fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
             2.0,
             &[(&BLUE, |sample| sample.error_deg.clamp(-2.0, 2.0))],
         ),
-        (below, "command, raw", -25_000.0, 25_000.0, &[(&BLUE, |sample| sample.raw.into())]),
+        (below, "command, raw", -25_000.0, 25_000.0, &[(&BLUE, |sample| sample.raw as f32)]),
     ];
     for (area, caption, lowest, highest, lines) in charts {
         let mut chart = ChartBuilder::on(&area)

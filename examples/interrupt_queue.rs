@@ -10,7 +10,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{BlockingTx, EmergencyStop, FrameQueue, Runner};
-use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
 use std::error::Error;
@@ -24,8 +24,8 @@ static STOP: EmergencyStop = EmergencyStop::new();
 fn main() -> Result<(), Box<dyn Error>> {
     const SPEED: PidConfig = PidConfig::new(0.5, 3.0, 0.0);
 
-    let world = World::new(3);
-    world.attach(MotorConfig::new(Model::M3508, 1))?;
+    let world = Simulation::new(3);
+    world.attach(MotorConfig::m3508(1))?;
 
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED))?;

@@ -187,7 +187,7 @@ mod simulation {
     use super::*;
     use drivetrain::motor::{AngleDrive, Condition, Devices, VelocityDrive};
     use drivetrain::runner::{Nb, Runner};
-    use drivetrain::sim::{Line, World};
+    use drivetrain::sim::{Line, Simulation};
     use drivetrain::time::Duration;
     use std::error::Error;
 
@@ -246,7 +246,7 @@ mod simulation {
     }
 
     pub(crate) fn drive() -> Result<(), Box<dyn Error>> {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut drives = [Drive::new(1), Drive::new(2)];
         let motor = |id| J4310::new(id, MASTER_ID).map(Own::new).ok_or("ids are 1 to 15");
         let robot = [motor(1)?, motor(2)?];

@@ -14,7 +14,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::Vec2;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{ChassisConfig, Line, Model, MotorConfig, Wheel, World};
+use drivetrain::sim::{ChassisConfig, Line, MotorConfig, Simulation, Wheel};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
@@ -27,7 +27,7 @@ const SPEED: PidConfig = PidConfig::new(4.0, 10.0, 0.0).with_output_limit(8.0);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = course::output("omni");
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear"], &samples)?;
     course::console::line(format_args!(
@@ -41,11 +41,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 type Wheels = [Handle<M3508>; 3];
 
 /// The robot, and the floor under it: each wheel rolls counter-clockwise round the centre.
-fn robot(world: &World) -> Result<(Bus, Wheels), Box<dyn Error>> {
+fn robot(world: &Simulation) -> Result<(Bus, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new().with_load_ceiling(0.9);
     let mut floor = Vec::new();
     let mut wheel = |id, degrees: f32| -> Result<_, Box<dyn Error>> {
-        let motor = world.attach(MotorConfig::new(Model::M3508, id))?;
+        let motor = world.attach(MotorConfig::m3508(id))?;
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let place = Vec2::new(cosine, sine) * DISTANCE_M;
         floor.push(Wheel::omni(motor, WHEEL_RADIUS_M, place, Angle::from_degrees(degrees + 90.0)));
@@ -56,7 +56,7 @@ fn robot(world: &World) -> Result<(Bus, Wheels), Box<dyn Error>> {
     Ok((bus, wheels))
 }
 
-fn drive(world: &World) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
+fn drive(world: &Simulation) -> Result<Vec<Sample<3>>, Box<dyn Error>> {
     let (bus, wheels) = robot(world)?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
     let mut chassis = Chassis::new(Omni::three(WHEEL_RADIUS_M, DISTANCE_M)?);

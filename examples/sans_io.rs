@@ -7,7 +7,7 @@ mod console;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{Controller, Model, MotorConfig, World};
+use drivetrain::sim::{Controller, MotorConfig, Simulation};
 use drivetrain::time::{Duration, Tick, Ticker};
 use drivetrain::units::Angle;
 use std::error::Error;
@@ -34,8 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     const ANGLE: PidConfig = PidConfig::new(15.0, 0.0, 0.0);
     const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0);
 
-    let world = World::new(1);
-    world.attach(MotorConfig::new(Model::Gm6020Voltage, 1))?;
+    let world = Simulation::new(1);
+    world.attach(MotorConfig::gm6020_voltage(1))?;
     let mut driver = Driver(world.controller());
 
     let mut bus = Bus::new();

@@ -19,9 +19,7 @@ use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::Vec2;
 use drivetrain::motor::{OneOf, VelocityDrive};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{
-    ChassisConfig, Controller, Line, Model, MotorConfig, SimClock, Wheel, World,
-};
+use drivetrain::sim::{ChassisConfig, Controller, Line, MotorConfig, Simulation, Wheel};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
@@ -47,11 +45,11 @@ const MODULES: [(Vec2, Angle); 4] = [
 /// A motor on the first bus or on the second.
 type Motor = OneOf<Handle<M3508>, Handle<Gm6020Voltage>>;
 type Modules = [ModuleMotors<Motor>; 4];
-type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+type Robot<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus>;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = course::output("swerve");
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear left", "rear right"], &samples)?;
     for (line, kind) in [(Line::Can1, "drive"), (Line::Can2, "steering")] {
@@ -64,13 +62,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The motors that roll, those that steer, and the floor under them.
-fn robot(world: &World) -> Result<(Robot<'_>, Robot<'_>, Modules), Box<dyn Error>> {
+fn robot(world: &Simulation) -> Result<(Robot<'_>, Robot<'_>, Modules), Box<dyn Error>> {
     let (mut can1, mut can2) =
         (Bus::new().with_load_ceiling(0.9), Bus::new().with_load_ceiling(0.9));
     let (mut floor, mut motors) = (Vec::new(), Vec::new());
     for (id, (place, zero)) in (1..).zip(MODULES) {
-        let drive = world.attach(MotorConfig::new(Model::M3508, id))?;
-        let steering = MotorConfig::new(Model::Gm6020Voltage, id)
+        let drive = world.attach(MotorConfig::m3508(id))?;
+        let steering = MotorConfig::gm6020_voltage(id)
             .with_line(Line::Can2)
             .with_load_inertia_kg_m2(MODULE_INERTIA_KG_M2);
         let steering = world.attach(steering)?;
@@ -90,7 +88,7 @@ fn is_ready(robot: &mut Robot<'_>, tick: Tick) -> bool {
     robot.is_armed() || robot.arm(tick).is_ok()
 }
 
-fn drive(world: &World) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
+fn drive(world: &Simulation) -> Result<Vec<Sample<4>>, Box<dyn Error>> {
     let (mut drives, mut steerings, modules) = robot(world)?;
     let mut chassis = Chassis::new(Swerve::new(WHEEL_RADIUS_M, MODULES.map(|(place, _)| place))?);
     let limits = ChassisLimits::new()

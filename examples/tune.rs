@@ -15,7 +15,7 @@ use drivetrain::control::{
 };
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Model as SimModel, MotorConfig, World};
+use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{AngularVelocity, Current, Voltage};
 use plotters::prelude::*;
@@ -27,7 +27,7 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 struct Plan<M: Model> {
     name: &'static str,
     unit: &'static str,
-    simulated: SimModel,
+    simulated: MotorConfig,
     /// A speed about which the motor swings: away from zero, where dry friction would hold it.
     swing_about: f32,
     relay: RelayTunerConfig,
@@ -40,7 +40,7 @@ struct Plan<M: Model> {
 const WHEEL: Plan<M3508> = Plan {
     name: "M3508",
     unit: "A",
-    simulated: SimModel::M3508,
+    simulated: MotorConfig::m3508(1),
     swing_about: 15.0,
     // The hysteresis slows the swing down to 8 samples of the loop in half a period, and more.
     relay: RelayTunerConfig::new(3.0, 0.5),
@@ -53,7 +53,7 @@ const WHEEL: Plan<M3508> = Plan {
 const YAW: Plan<Gm6020Voltage> = Plan {
     name: "GM6020",
     unit: "V",
-    simulated: SimModel::Gm6020Voltage,
+    simulated: MotorConfig::gm6020_voltage(1),
     swing_about: 8.0,
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
     relay: RelayTunerConfig::new(4.0, 3.0).with_bias(6.0),
@@ -80,8 +80,8 @@ fn run<M: Model>(
     seconds: u32,
     mut work: impl FnMut(&mut Bus, Handle<M>, f32, f32),
 ) -> Outcome<()> {
-    let world = World::new(1);
-    world.attach(MotorConfig::new(plan.simulated, 1))?;
+    let world = Simulation::new(1);
+    world.attach(plan.simulated)?;
     let mut bus = Bus::new();
     let motor = bus.attach(Config::<M>::new(1).speed_loop(speed))?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);

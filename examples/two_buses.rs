@@ -13,9 +13,7 @@ use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::motor::OneOf;
 use drivetrain::runner::{BusCondition, Nb, Runner};
-use drivetrain::sim::{
-    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, SimClock, Wheel, World,
-};
+use drivetrain::sim::{ChassisConfig, Controller, Fault, Line, MotorConfig, Simulation, Wheel};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
 use std::error::Error;
@@ -39,12 +37,12 @@ struct Front;
 struct Rear;
 struct Top;
 
-type Axle<'w, B> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus<B>>;
+type Axle<'w, B> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus<B>>;
 
 /// The wheels of one axle: the left one, then the right one.
 type Wheels<B> = (Handle<M3508, B>, Handle<M3508, B>);
 
-fn axle<B>(world: &World, line: Line) -> Result<(Axle<'_, B>, Wheels<B>), AttachError> {
+fn axle<B>(world: &Simulation, line: Line) -> Result<(Axle<'_, B>, Wheels<B>), AttachError> {
     let mut bus = Bus::<B>::branded();
     let left = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED))?;
     let right = bus.attach(Config::<M3508>::new(2).speed_loop(SPEED).reversed())?;
@@ -61,7 +59,7 @@ struct Robot<'w> {
 }
 
 impl<'w> Robot<'w> {
-    fn new(world: &'w World) -> Result<Self, Box<dyn Error>> {
+    fn new(world: &'w Simulation) -> Result<Self, Box<dyn Error>> {
         let (front, (front_left, front_right)) = axle(world, Line::Can1)?;
         let (rear, (rear_left, rear_right)) = axle(world, Line::Can2)?;
         let wheels = MecanumWheels {
@@ -113,12 +111,12 @@ fn arm(front: &mut Axle<'_, Front>, rear: &mut Axle<'_, Rear>, tick: Tick) -> bo
 
 /// The bus of the gimbal.
 struct Gimbal<'w> {
-    runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus<Top>>,
+    runner: Runner<Nb<Controller<'w>>, &'w Simulation, Bus<Top>>,
     yaw: Handle<Gm6020Voltage, Top>,
 }
 
 impl<'w> Gimbal<'w> {
-    fn new(world: &'w World, line: Line) -> Result<Self, AttachError> {
+    fn new(world: &'w Simulation, line: Line) -> Result<Self, AttachError> {
         let mut bus = Bus::branded();
         let yaw = bus.attach(Config::<Gm6020Voltage>::new(1).position_loop(ANGLE, RATE))?;
         let runner = Runner::new(Nb(world.controller_on(line)), world.clock(), bus);
@@ -143,8 +141,8 @@ impl<'w> Gimbal<'w> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let world = World::new(1);
-    let wheel = |id, line| world.attach(MotorConfig::new(Model::M3508, id).with_line(line));
+    let world = Simulation::new(1);
+    let wheel = |id, line| world.attach(MotorConfig::m3508(id).with_line(line));
     let wheels = MecanumWheels {
         front_left: wheel(1, Line::Can1)?,
         front_right: wheel(2, Line::Can1)?,
@@ -159,7 +157,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         mounted(wheels.rear_left, -x, y),
         mounted(wheels.rear_right, -x, -y).reversed(),
     ]))?;
-    world.attach(MotorConfig::new(Model::Gm6020Voltage, 1).with_line(Line::Can3))?;
+    world.attach(MotorConfig::gm6020_voltage(1).with_line(Line::Can3))?;
     let fault = Instant::from_micros(1_500_000)..Instant::from_micros(1_900_000);
     world.fault(Fault::Unplugged(Line::Can2), fault)?;
 

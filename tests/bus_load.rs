@@ -7,7 +7,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{BusLoad, Devices};
 use drivetrain::runner::{MeasuredLoad, Nb, Runner};
 use drivetrain::sim::{
-    Line, Model, MotorConfig, Sender, World, frame_bits, nominal_bits, worst_case_bits,
+    Line, MotorConfig, Sender, Simulation, frame_bits, nominal_bits, worst_case_bits,
 };
 use drivetrain::time::Duration;
 use proptest::prelude::*;
@@ -34,11 +34,11 @@ fn the_bounds_are_those_of_the_simulator() {
 
 /// Runs motors with raw commands for a second; returns the reckoned and the measured load.
 fn measured(ids: impl Iterator<Item = u8>, raw: i16) -> (BusLoad, f32) {
-    let world = World::new(5);
+    let world = Simulation::new(5);
     let mut bus = Bus::new();
     let wheels: Vec<_> = ids
         .map(|id| {
-            world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+            world.attach(MotorConfig::m3508(id)).unwrap();
             bus.attach(Config::<M3508>::new(id)).unwrap()
         })
         .collect();
@@ -91,11 +91,11 @@ fn frames_of_every_kind_are_counted_by_their_length() {
 }
 
 /// The runner's load beside what the simulated bus carried, from 2 s to 5 s; and the frames a second.
-fn runner_and_truth(world: &World, motors: u8) -> (MeasuredLoad, f32, f32) {
+fn runner_and_truth(world: &Simulation, motors: u8) -> (MeasuredLoad, f32, f32) {
     use embedded_can::{ExtendedId, Frame};
     let mut bus = Bus::new();
     for id in 1..=motors {
-        world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        world.attach(MotorConfig::m3508(id)).unwrap();
         bus.attach(Config::<M3508>::new(id)).unwrap();
     }
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
@@ -122,16 +122,16 @@ fn runner_and_truth(world: &World, motors: u8) -> (MeasuredLoad, f32, f32) {
 #[test]
 fn the_load_that_the_runner_counts_is_that_of_the_bus() {
     for motors in [1, 3, 5] {
-        let (load, truth, frames) = runner_and_truth(&World::new(9), motors);
+        let (load, truth, frames) = runner_and_truth(&Simulation::new(9), motors);
         let (low, high) = (load.nominal() * 0.995, load.worst_case() * 1.005);
         assert!((low..=high).contains(&truth), "{motors} motors: {truth} not in {load}");
         assert!((load.frames_per_s() as f32 / frames - 1.0).abs() < 0.005, "{load:?}, {frames}");
         assert!(load.worst_case() - load.nominal() < 0.16, "the bounds say something");
     }
     // What the filter drops is not seen: the foreign frames, 200 a second of 91 bits.
-    let (all, ..) = runner_and_truth(&World::new(9), 2);
+    let (all, ..) = runner_and_truth(&Simulation::new(9), 2);
     let (seen, truth, _) =
-        runner_and_truth(&World::new(9).with_filter(Line::Can1, 0x200, 0x7F0), 2);
+        runner_and_truth(&Simulation::new(9).with_filter(Line::Can1, 0x200, 0x7F0), 2);
     assert!((all.nominal() - seen.nominal() - 200.0 * 91e-6).abs() < 1e-3, "{all:?} {seen:?}");
     assert!(truth > seen.nominal());
 }
@@ -144,14 +144,14 @@ fn more_than_the_bus_carries_fills_it() {
 
 #[test]
 fn commands_0x2ff_and_0x2fe_starve_on_a_full_bus_and_0x200_does_not() {
-    let world = World::new(5);
+    let world = Simulation::new(5);
     let mut bus = Bus::new();
     for id in 1..=8 {
-        world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        world.attach(MotorConfig::m3508(id)).unwrap();
         bus.attach(Config::<M3508>::new(id)).unwrap();
     }
-    world.attach(MotorConfig::new(Model::Gm6020Voltage, 5)).unwrap();
-    world.attach(MotorConfig::new(Model::Gm6020Current, 6)).unwrap();
+    world.attach(MotorConfig::gm6020_voltage(5)).unwrap();
+    world.attach(MotorConfig::gm6020_current(6)).unwrap();
     bus.attach(Config::<Gm6020Voltage>::new(5)).unwrap();
     bus.attach(Config::<Gm6020Current>::new(6)).unwrap();
     let bus = bus.with_keep_alive(Duration::from_millis(1)); // as if all moved

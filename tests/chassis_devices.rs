@@ -15,7 +15,7 @@ use drivetrain::motor::{
     MotorName, OneOf, Order, Own, OwnMotor, Reaction, Role, Target, TargetError, VelocityDrive,
 };
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, Fault, Line, Model, MotorConfig, SimClock, World};
+use drivetrain::sim::{Controller, Fault, Line, MotorConfig, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id, StandardId};
@@ -474,12 +474,12 @@ fn an_index_beyond_the_array_names_no_motor() {
     assert_eq!(two.set_angle((usize::MAX, ()), Angle::ZERO), Err(TargetError::Detached));
 }
 
-type Axle<'w, B> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus<B>>;
+type Axle<'w, B> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus<B>>;
 
-fn axle<B>(world: &World, line: Line) -> (Axle<'_, B>, [Handle<M3508, B>; 2]) {
+fn axle<B>(world: &Simulation, line: Line) -> (Axle<'_, B>, [Handle<M3508, B>; 2]) {
     let mut bus = Bus::branded();
     let motors = [1, 2].map(|id| {
-        world.attach(MotorConfig::new(Model::M3508, id).with_line(line)).unwrap();
+        world.attach(MotorConfig::m3508(id).with_line(line)).unwrap();
         bus.attach(config(id)).unwrap()
     });
     (Runner::new(Nb(world.controller_on(line)), world.clock(), bus), motors)
@@ -488,7 +488,7 @@ fn axle<B>(world: &World, line: Line) -> (Axle<'_, B>, [Handle<M3508, B>; 2]) {
 /// Two CAN ports and two runners, each with a grid of its own: the steps of the rear come 0.3 ms after those in front.
 #[test]
 fn one_call_drives_the_devices_of_two_runners_and_goes_on_when_one_is_lost() {
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let (mut front, [front_left, front_right]) = axle::<Front>(&world, Line::Can1);
     let (mut rear, [rear_left, rear_right]) = axle::<Rear>(&world, Line::Can2);
     let wheels = MecanumWheels {

@@ -11,7 +11,7 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Fault, Model, MotorConfig, SimClock, Wheel, World,
+    ChassisConfig, ChassisState, Controller, Fault, MotorConfig, Simulation, Wheel,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
@@ -21,17 +21,17 @@ const GEOMETRY: MecanumGeometry =
 const SPEED: PidConfig = PidConfig::new(4.0, 20.0, 0.0).with_output_limit(5.0);
 
 struct Robot<'w> {
-    world: &'w World,
-    runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>,
+    world: &'w Simulation,
+    runner: Runner<Nb<Controller<'w>>, &'w Simulation, Bus>,
     wheels: MecanumWheels<Handle<M3508>>,
     chassis: Chassis<Mecanum>,
 }
 
 impl<'w> Robot<'w> {
     /// With the fault, if any: the front left motor falls silent after two seconds.
-    fn new(world: &'w World, silent: bool) -> Self {
+    fn new(world: &'w Simulation, silent: bool) -> Self {
         let ids = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
-        let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
+        let motor = |id| world.attach(MotorConfig::m3508(id));
         let motors = ids.try_map(motor).unwrap();
         let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
         let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
@@ -94,7 +94,7 @@ impl<'w> Robot<'w> {
 
 #[test]
 fn spinning_while_driving_along_world_x_goes_straight_and_the_odometry_knows() {
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut robot = Robot::new(&world, false);
     robot.run(4.0, |robot, _| {
         let heading = Heading::new(robot.heading());
@@ -107,7 +107,7 @@ fn spinning_while_driving_along_world_x_goes_straight_and_the_odometry_knows() {
 
 #[test]
 fn the_chassis_follows_its_gimbal() {
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut robot = Robot::new(&world, false);
     let config = ModeConfig::new(PidConfig::new(4.0, 0.0, 0.0).with_output_limit(4.0));
     let mut modes = Modes::new(config).unwrap();
@@ -126,7 +126,7 @@ fn the_chassis_follows_its_gimbal() {
 
 #[test]
 fn a_silent_wheel_is_flagged_and_refuses_and_the_position_is_followed_by_the_others() {
-    let world = World::new(3);
+    let world = Simulation::new(3);
     let mut robot = Robot::new(&world, true);
     robot.run(3.0, |robot, _| robot.chassis.set_body(Twist::new(0.5, 0.0, 0.0)));
     let status = *robot.chassis.status();

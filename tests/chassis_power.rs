@@ -9,7 +9,7 @@ use drivetrain::dji::{self, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Ingest;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Line, Model, MotorConfig, World};
+use drivetrain::sim::{Line, MotorConfig, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use proptest::prelude::*;
@@ -151,10 +151,9 @@ fn a_speed_loop_that_is_cut_does_not_wind_up() {
 
 #[test]
 fn the_runner_shows_what_the_loops_ask_for_before_it_sends() {
-    let world = World::new(1);
-    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
-    let steering =
-        world.attach(MotorConfig::new(Model::Gm6020Voltage, 1).with_line(Line::Can2)).unwrap();
+    let world = Simulation::new(1);
+    world.attach(MotorConfig::m3508(1)).unwrap();
+    let steering = world.attach(MotorConfig::gm6020_voltage(1).with_line(Line::Can2)).unwrap();
     let (mut one, mut other) = (Bus::new(), Bus::new());
     let wheel = one.attach(at_once::<M3508>(1)).unwrap();
     let module = other.attach(at_once::<Gm6020Voltage>(1)).unwrap();

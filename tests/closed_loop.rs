@@ -8,13 +8,12 @@ use drivetrain::encoder::{Homing, Position};
 use drivetrain::motor::{Devices, Link, Recovery, TargetError};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    Controller, Fault, Line, Model as SimModel, MotorConfig, MotorKey, Record, Sender, SimClock,
-    World,
+    Controller, Fault, Line, MotorConfig, MotorKey, Sender, Simulation, Transmission,
 };
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 
-type SimRunner<'w, D = Bus> = Runner<Nb<Controller<'w>>, SimClock<'w>, D>;
+type SimRunner<'w, D = Bus> = Runner<Nb<Controller<'w>>, &'w Simulation, D>;
 
 const WHEEL_SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0);
 
@@ -22,17 +21,17 @@ fn at_ms(ms: u64) -> Instant {
     Instant::from_micros(ms * 1_000)
 }
 
-fn runner(world: &World, bus: Bus) -> SimRunner<'_> {
+fn runner(world: &Simulation, bus: Bus) -> SimRunner<'_> {
     Runner::new(Nb(world.controller()), world.clock(), bus)
 }
 
 /// Runs `ms` milliseconds in steps of 100 µs; arms once all are heard and calls `work` before each tick.
 fn run<'w>(
-    world: &'w World,
+    world: &'w Simulation,
     runner: &mut SimRunner<'w>,
     ms: u64,
     mut work: impl FnMut(&mut Bus, u64),
-    mut show: impl FnMut(&Record),
+    mut show: impl FnMut(&Transmission),
 ) {
     let end = world.now() + Duration::from_millis(ms);
     let mut was_armed = runner.is_armed();
@@ -49,15 +48,15 @@ fn run<'w>(
     }
 }
 
-fn word(record: &Record, id: u32, slot: usize) -> Option<i16> {
+fn word(record: &Transmission, id: u32, slot: usize) -> Option<i16> {
     let bytes = record.frame.bytes();
     let ours = record.frame.header() == id && record.sender == Sender::Controller;
     ours.then(|| i16::from_be_bytes([bytes[2 * slot], bytes[2 * slot + 1]]))
 }
 
-fn speed_of<M: Model>(model: SimModel, id: u8, gains: PidConfig, rpm: f32) -> (f32, f32) {
-    let world = World::new(11);
-    let key = world.attach(MotorConfig::new(model, id)).unwrap();
+fn speed_of<M: Model>(simulated: MotorConfig, id: u8, gains: PidConfig, rpm: f32) -> (f32, f32) {
+    let world = Simulation::new(11);
+    let key = world.attach(simulated).unwrap();
     let mut bus = Bus::new();
     let motor: Handle<M> = bus.attach(Config::new(id).speed_loop(gains)).unwrap();
     let mut runner = runner(&world, bus);
@@ -71,17 +70,26 @@ fn speed_of<M: Model>(model: SimModel, id: u8, gains: PidConfig, rpm: f32) -> (f
 fn every_model_follows_a_velocity_in_both_directions() {
     for sign in [1.0, -1.0] {
         for (name, rpm, (true_rpm, reported)) in [
-            ("M3508", 300.0, speed_of::<M3508>(SimModel::M3508, 1, WHEEL_SPEED, 300.0 * sign)),
+            (
+                "M3508",
+                300.0,
+                speed_of::<M3508>(MotorConfig::m3508(1), 1, WHEEL_SPEED, 300.0 * sign),
+            ),
             (
                 "M2006",
                 300.0,
-                speed_of::<M2006>(SimModel::M2006, 5, PidConfig::new(0.2, 2.0, 0.0), 300.0 * sign),
+                speed_of::<M2006>(
+                    MotorConfig::m2006(5),
+                    5,
+                    PidConfig::new(0.2, 2.0, 0.0),
+                    300.0 * sign,
+                ),
             ),
             (
                 "GM6020 V",
                 100.0,
                 speed_of::<Gm6020Voltage>(
-                    SimModel::Gm6020Voltage,
+                    MotorConfig::gm6020_voltage(7),
                     7,
                     PidConfig::new(1.0, 8.0, 0.0),
                     100.0 * sign,
@@ -91,7 +99,7 @@ fn every_model_follows_a_velocity_in_both_directions() {
                 "GM6020 A",
                 100.0,
                 speed_of::<Gm6020Current>(
-                    SimModel::Gm6020Current,
+                    MotorConfig::gm6020_current(2),
                     2,
                     PidConfig::new(0.2, 2.0, 0.0),
                     100.0 * sign,
@@ -110,8 +118,8 @@ fn every_model_follows_a_velocity_in_both_directions() {
 
 #[test]
 fn a_yaw_motor_goes_the_shortest_way_across_zero() {
-    let world = World::new(2);
-    world.attach(MotorConfig::new(SimModel::Gm6020Voltage, 3).with_rotor_angle(7_964)).unwrap(); // 350 degrees
+    let world = Simulation::new(2);
+    world.attach(MotorConfig::gm6020_voltage(3).with_rotor_angle(7_964)).unwrap(); // 350 degrees
     let mut bus = Bus::new();
     let loops = (PidConfig::new(15.0, 0.0, 0.0), PidConfig::new(1.0, 5.0, 0.0));
     let yaw = bus.attach(Config::<Gm6020Voltage>::new(3).position_loop(loops.0, loops.1)).unwrap();
@@ -137,8 +145,8 @@ fn a_yaw_motor_goes_the_shortest_way_across_zero() {
 
 #[test]
 fn a_geared_joint_holds_a_multi_turn_position() {
-    let world = World::new(3);
-    let key = world.attach(MotorConfig::new(SimModel::M2006, 1)).unwrap();
+    let world = Simulation::new(3);
+    let key = world.attach(MotorConfig::m2006(1)).unwrap();
     let mut bus = Bus::new();
     let joint = Config::<M2006>::new(1)
         .position_loop(PidConfig::new(12.0, 0.0, 0.0), PidConfig::new(0.3, 3.0, 0.0));
@@ -157,15 +165,15 @@ fn a_geared_joint_holds_a_multi_turn_position() {
     let state = runner.device().state(joint).unwrap();
     assert_eq!(state.homing, Homing::Homed);
     assert!((state.position - goal).as_degrees().abs() < 1.0, "{:?}", state.position);
-    let turns = world.motor(key).unwrap().rotor_counts as f64 / 8192.0 / 36.0;
+    let turns = world.motor(key).unwrap().encoder_counts as f64 / 8192.0 / 36.0;
     assert!((turns - 3.25).abs() < 0.05, "the simulated shaft turned {turns}");
 }
 
 #[test]
 fn lost_frames_at_speed_lose_no_turn() {
     for (seed, loss) in [(1, 0.05), (2, 0.2), (3, 0.5)] {
-        let world = World::new(seed);
-        let key = world.attach(MotorConfig::new(SimModel::M3508, 1)).unwrap();
+        let world = Simulation::new(seed);
+        let key = world.attach(MotorConfig::m3508(1)).unwrap();
         let all = Fault::LostFrames { line: Line::Can1, id: None, probability: loss };
         world.fault(all, at_ms(50)..).unwrap();
         let mut bus = Bus::new();
@@ -177,7 +185,7 @@ fn lost_frames_at_speed_lose_no_turn() {
         };
         run(&world, &mut runner, 4_000, work, |_| {});
         let state = runner.device().state(wheel).unwrap();
-        let error = state.rotor_counts - world.motor(key).unwrap().rotor_counts;
+        let error = state.rotor_counts - world.motor(key).unwrap().encoder_counts;
         // Up to 11 lost frames in a row lie between the true state and the last one that arrived: 1.7 turns.
         assert!(
             error.abs() < 2 * 8192,
@@ -192,9 +200,9 @@ type Silence = (Vec<(u64, [i16; 4])>, Vec<(u64, Link)>, bool);
 
 /// Four wheels at speed; the first one falls silent for `silent` ms at 500 ms.
 fn silence(silent: u64, config: impl Fn(u8) -> Config<M3508>) -> Silence {
-    let world = World::new(4);
+    let world = Simulation::new(4);
     let keys: Vec<MotorKey> =
-        (1..=4).map(|id| world.attach(MotorConfig::new(SimModel::M3508, id)).unwrap()).collect();
+        (1..=4).map(|id| world.attach(MotorConfig::m3508(id)).unwrap()).collect();
     world.fault(Fault::Silent(keys[0]), at_ms(500)..at_ms(500 + silent)).unwrap();
     let mut bus = Bus::new();
     let wheels = bus.attach_all([1, 2, 3, 4].map(config)).unwrap();
@@ -206,7 +214,7 @@ fn silence(silent: u64, config: impl Fn(u8) -> Config<M3508>) -> Silence {
         }
         links.push((ms, bus.link(wheels[0]).unwrap()));
     };
-    let show = |record: &Record| {
+    let show = |record: &Transmission| {
         if let Some(first) = word(record, 0x200, 0) {
             let rest = [1, 2, 3].map(|slot| word(record, 0x200, slot).unwrap());
             sent.push((record.at.as_micros(), [first, rest[0], rest[1], rest[2]]));
@@ -263,14 +271,14 @@ fn a_motor_with_a_ramp_is_driven_again_after_150_ms_of_silence() {
 
 #[test]
 fn after_bus_off_the_first_new_frames_are_zeros_and_it_has_to_be_armed() {
-    let world = World::new(6);
-    world.attach(MotorConfig::new(SimModel::M3508, 1)).unwrap();
+    let world = Simulation::new(6);
+    world.attach(MotorConfig::m3508(1)).unwrap();
     world.fault(Fault::BusOff(Line::Can1), at_ms(300)..at_ms(600)).unwrap();
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(WHEEL_SPEED)).unwrap();
     let mut runner = runner(&world, bus);
     let mut sent = Vec::new();
-    let show = |record: &Record| {
+    let show = |record: &Transmission| {
         sent.extend(word(record, 0x200, 0).map(|word| (record.at.as_micros(), word)))
     };
     let mut refused = None;
@@ -293,8 +301,8 @@ fn after_bus_off_the_first_new_frames_are_zeros_and_it_has_to_be_armed() {
 
 #[test]
 fn foreign_frames_are_handed_back_while_the_loop_runs() {
-    let world = World::new(7);
-    world.attach(MotorConfig::new(SimModel::M3508, 1)).unwrap();
+    let world = Simulation::new(7);
+    world.attach(MotorConfig::m3508(1)).unwrap();
     let foreign = drivetrain::frame::CanFrame::standard(0x321, [7; 8]).unwrap();
     let flood =
         Fault::Flood { line: Line::Can1, frame: foreign, period: Duration::from_micros(500) };
@@ -324,8 +332,8 @@ fn foreign_frames_are_handed_back_while_the_loop_runs() {
 #[test]
 fn the_same_seed_gives_the_same_frames() {
     let log = |seed| {
-        let world = World::new(seed);
-        world.attach(MotorConfig::new(SimModel::M3508, 1)).unwrap();
+        let world = Simulation::new(seed);
+        world.attach(MotorConfig::m3508(1)).unwrap();
         world
             .fault(Fault::LostFrames { line: Line::Can1, id: None, probability: 0.1 }, ..)
             .unwrap();

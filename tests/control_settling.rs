@@ -6,7 +6,7 @@
 use drivetrain::control::{Pid, PidConfig, StepResponse, TimeStep};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{AngularVelocity, Current};
 
@@ -15,8 +15,8 @@ const LIMIT: f32 = 6.0; // A
 
 /// Steps the speed of a motor from rest; `control` gets setpoint, speed and time step, and gives amperes.
 fn step_response(mut control: impl FnMut(f32, f32, f32) -> f32) -> StepResponse {
-    let world = World::new(1);
-    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let world = Simulation::new(1);
+    world.attach(MotorConfig::m3508(1)).unwrap();
     let mut bus = Bus::new();
     let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
@@ -66,8 +66,8 @@ fn after_a_step_that_saturates_the_incremental_form_settles_as_fast_as_the_posit
 
 /// The loop of a motor, as the bus runs it: speed and amperes of each tick after a step of the target.
 fn driven(speed_loop: PidConfig) -> Vec<(f32, f32)> {
-    let world = World::new(1);
-    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let world = Simulation::new(1);
+    world.attach(MotorConfig::m3508(1)).unwrap();
     let mut bus = Bus::new();
     let config = Config::<M3508>::new(1).with_opening(Duration::ZERO).speed_loop(speed_loop);
     let motor = bus.attach(config).unwrap();

@@ -11,7 +11,7 @@ use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model as _};
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{ChassisConfig, Model, MotorConfig, Wheel, World};
+use drivetrain::sim::{ChassisConfig, MotorConfig, Simulation, Wheel};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
 use std::fs;
@@ -67,7 +67,7 @@ impl Layout {
 
     /// Drives a robot with these gains; without a mass its wheels are lifted, and the speed is theirs.
     fn step(self, mass_kg: Option<f32>, speed: PidConfig, m_s: f32) -> Settling {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut robot = Robot { world: &world, bus: Bus::new(), floor: Vec::new(), speed };
         match self {
             Self::Mecanum => {
@@ -105,7 +105,7 @@ fn mecanum() -> Mecanum {
 }
 
 struct Robot<'w> {
-    world: &'w World,
+    world: &'w Simulation,
     bus: Bus,
     floor: Vec<Wheel>,
     speed: PidConfig,
@@ -113,7 +113,7 @@ struct Robot<'w> {
 
 impl Robot<'_> {
     fn mecanum(&mut self, id: u8, place: Vec2) -> Handle<M3508> {
-        let motor = self.world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        let motor = self.world.attach(MotorConfig::m3508(id)).unwrap();
         let (wheel, config) = (Wheel::mecanum(motor, RADIUS_M, place), self.config(id));
         let right = place.y < 0.0;
         self.floor.push(if right { wheel.reversed() } else { wheel });
@@ -121,7 +121,7 @@ impl Robot<'_> {
     }
 
     fn omni(&mut self, id: u8, degrees: f32) -> Handle<M3508> {
-        let motor = self.world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        let motor = self.world.attach(MotorConfig::m3508(id)).unwrap();
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let (place, along) = (Vec2::new(cosine, sine) * 0.22, Angle::from_degrees(degrees + 90.0));
         self.floor.push(Wheel::omni(motor, RADIUS_M, place, along));

@@ -7,7 +7,7 @@ use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage, M200
 use drivetrain::encoder::Position;
 use drivetrain::motor::Condition;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Fault, Line, Model, MotorConfig, MotorKey, World};
+use drivetrain::sim::{Fault, Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::thread;
@@ -31,7 +31,7 @@ impl Chance {
 }
 
 struct Story<'w> {
-    world: &'w World,
+    world: &'w Simulation,
     keys: Vec<MotorKey>,
     motors: Vec<AnyHandle>,
     chance: Chance,
@@ -79,7 +79,7 @@ struct Outcome {
 
 /// Drives four motors of a seed for this long.
 fn drive(seed: u64, seconds: u64) -> Outcome {
-    let world = World::new(seed);
+    let world = Simulation::new(seed);
     let mut bus = Bus::new();
     let mut story = Story {
         world: &world,
@@ -89,8 +89,8 @@ fn drive(seed: u64, seconds: u64) -> Outcome {
         goals: vec![Goal::Nothing; 4],
     };
     for id in 1..=4 {
-        let model = if id == 4 { Model::M2006 } else { Model::M3508 };
-        story.keys.push(world.attach(MotorConfig::new(model, id)).unwrap());
+        let simulated = if id == 4 { MotorConfig::m2006(id) } else { MotorConfig::m3508(id) };
+        story.keys.push(world.attach(simulated).unwrap());
         story.motors.push(if id == 4 {
             bus.attach(Config::<M2006>::new(id).speed_loop(SPEED)).unwrap().erase()
         } else {
@@ -166,10 +166,11 @@ fn gimbals_and_cascades_at_5_percent_loss_have_no_edge() {
     const VOLTS: PidConfig = PidConfig::new(1.0, 5.0, 0.0);
     const AMPERES: PidConfig = PidConfig::new(0.3, 1.0, 0.0);
     for seed in [1, 2] {
-        let world = World::new(seed);
-        for (model, id) in [(Model::Gm6020Voltage, 1), (Model::Gm6020Current, 2), (Model::M2006, 1)]
+        let world = Simulation::new(seed);
+        for simulated in
+            [MotorConfig::gm6020_voltage(1), MotorConfig::gm6020_current(2), MotorConfig::m2006(1)]
         {
-            world.attach(MotorConfig::new(model, id)).unwrap();
+            world.attach(simulated).unwrap();
         }
         let mut bus = Bus::new();
         let yaw = Config::<Gm6020Voltage>::new(1).position_loop(TO_ANGLE, VOLTS);

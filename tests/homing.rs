@@ -9,7 +9,7 @@ use drivetrain::motor::{
     Devices, HomingError, HomingStep, Link, ShaftState, StopHoming, StopHomingConfig,
 };
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Fault, Model, MotorConfig, MotorKey, World};
+use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity, Current};
 
@@ -48,8 +48,8 @@ struct Outcome {
 }
 
 /// Homes a motor in a world, from rest; relaxed after a failure.
-fn home(world: &World, key: MotorKey, reversed: bool, config: StopHomingConfig) -> Outcome {
-    let start = world.motor(key).unwrap().rotor_counts;
+fn home(world: &Simulation, key: MotorKey, reversed: bool, config: StopHomingConfig) -> Outcome {
+    let start = world.motor(key).unwrap().encoder_counts;
     let mut bus = Bus::new();
     let limit = Current::from_amperes(LIMIT_A);
     let arm = Config::<M2006>::new(1).speed_loop(SPEED).with_current_limit(limit);
@@ -91,14 +91,14 @@ fn home(world: &World, key: MotorKey, reversed: bool, config: StopHomingConfig) 
         result: result.unwrap(),
         took_ms,
         position: runner.device().state(arm).unwrap().position,
-        turned: Angle::from_turns((truth.rotor_counts - start) as f32 / (8_192.0 * 36.0)),
+        turned: Angle::from_turns((truth.encoder_counts - start) as f32 / (8_192.0 * 36.0)),
         strongest_a,
         relaxed: world.motor(key).unwrap().command == 0,
     }
 }
 
 fn motor(lower: f32, upper: f32) -> MotorConfig {
-    MotorConfig::new(Model::M2006, 1).with_stops(degrees(lower), degrees(upper))
+    MotorConfig::m2006(1).with_stops(degrees(lower), degrees(upper))
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn the_stop_is_found_from_both_sides_and_whichever_way_the_motor_is_mounted() {
     for (rpm, reversed, stop) in
         [(-30.0, false, -120.0), (30.0, false, 60.0), (-30.0, true, 60.0), (30.0, true, -120.0)]
     {
-        let world = World::new(3);
+        let world = Simulation::new(3);
         let key = world.attach(motor(-120.0, 60.0)).unwrap();
         let stop_at = Position::new(2, degrees(40.0));
         let outcome = home(&world, key, reversed, config(rpm).with_stop_at(stop_at));
@@ -120,7 +120,7 @@ fn the_stop_is_found_from_both_sides_and_whichever_way_the_motor_is_mounted() {
 #[test]
 fn a_stop_that_is_touched_already_is_home() {
     for (rpm, lower, upper) in [(-30.0, 0.0, 90.0), (30.0, -90.0, 0.0)] {
-        let world = World::new(4);
+        let world = Simulation::new(4);
         let key = world.attach(motor(lower, upper)).unwrap();
         let outcome = home(&world, key, false, config(rpm));
         assert_eq!(outcome.result, Ok(()));
@@ -132,7 +132,7 @@ fn a_stop_that_is_touched_already_is_home() {
 #[test]
 fn it_backs_off_by_as_much_as_is_asked_for_and_keeps_the_stop_where_it_is() {
     for (rpm, rest) in [(-30.0, 12.0), (30.0, -12.0)] {
-        let world = World::new(5);
+        let world = Simulation::new(5);
         let key = world.attach(motor(-70.0, 70.0)).unwrap();
         let outcome = home(&world, key, false, config(rpm).with_back_off(degrees(12.0)));
         assert_eq!(outcome.result, Ok(()));
@@ -148,7 +148,7 @@ fn it_backs_off_by_as_much_as_is_asked_for_and_keeps_the_stop_where_it_is() {
 fn friction_is_not_taken_for_the_stop() {
     // It needs 2 A to move, and at the start the loop winds up until it does.
     for friction_nm in [0.1, 0.2, 0.3] {
-        let world = World::new(6);
+        let world = Simulation::new(6);
         let key = world.attach(motor(-100.0, 100.0).with_load_friction_nm(friction_nm)).unwrap();
         let outcome = home(&world, key, false, config(-30.0));
         assert_eq!(outcome.result, Ok(()), "{outcome:?}");
@@ -156,7 +156,7 @@ fn friction_is_not_taken_for_the_stop() {
     }
     // To break loose takes 2.7 A, more than at the stop; but not for the whole window.
     for (window_ms, turned) in [(100, -100.0), (10, 0.0)] {
-        let world = World::new(6);
+        let world = Simulation::new(6);
         let key = world.attach(motor(-100.0, 100.0).with_load_friction_nm(0.44)).unwrap();
         let window = Duration::from_millis(window_ms);
         let outcome = home(&world, key, false, config(-30.0).with_window(window));
@@ -167,7 +167,7 @@ fn friction_is_not_taken_for_the_stop() {
 
 #[test]
 fn each_failure_is_told_and_the_motor_relaxed() {
-    let free = MotorConfig::new(Model::M2006, 1);
+    let free = MotorConfig::m2006(1);
     let stuck = free.with_load_friction_nm(0.6); // 3.6 A: more than it may
     let weak = StopHomingConfig::new(AngularVelocity::from_rpm(-30.0), 3.5);
     let weak = weak.with_timeout(Duration::from_secs(2));
@@ -176,14 +176,14 @@ fn each_failure_is_told_and_the_motor_relaxed() {
         (free, config(30.0), HomingError::NoStop, 200.0),
         (stuck, weak, HomingError::TimedOut, 0.0),
     ] {
-        let world = World::new(7);
+        let world = Simulation::new(7);
         let key = world.attach(motor).unwrap();
         let outcome = home(&world, key, false, config);
         assert_eq!(outcome.result, Err(error));
         assert!((outcome.turned.as_degrees() - turned).abs() < 2.0, "{outcome:?}");
         assert!(outcome.strongest_a < 1.01 * LIMIT_A && outcome.relaxed, "{outcome:?}");
     }
-    let world = World::new(7);
+    let world = Simulation::new(7);
     let key = world.attach(free).unwrap();
     world.fault(Fault::Silent(key), Instant::from_micros(500_000)..).unwrap();
     let outcome = home(&world, key, false, config(-30.0));

@@ -2,7 +2,7 @@
 
 #![cfg(test)]
 
-use drivetrain::sim::{self, Model, MotorConfig};
+use drivetrain::sim::{self, MotorConfig};
 use drivetrain::time::{Duration, Instant};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -17,7 +17,7 @@ fn the_program_of_this_test_is_that_of_the_readme() {
 
 /// Follows a plan of the times, in ms, in which the switch is on, and stops and clears at these.
 struct Plan<'a> {
-    world: &'a sim::World,
+    world: &'a sim::Simulation,
     on: &'a [Range<u64>],
     stop: u64,
     clear: u64,
@@ -55,9 +55,9 @@ impl Pilot for Plan<'_> {
 
 /// Runs the robot; returns the milliseconds in which a wheel was commanded, as spans, and the refusals.
 fn run(on: &[Range<u64>], stop: u64, clear: u64, end: u64) -> (Vec<Range<u64>>, Vec<String>) {
-    let world = sim::World::new(1);
-    let wheels = [1, 2, 3, 4].map(|id| world.attach(MotorConfig::new(Model::M3508, id)).unwrap());
-    world.attach(MotorConfig::new(Model::Gm6020Voltage, 5)).unwrap();
+    let world = sim::Simulation::new(1);
+    let wheels = [1, 2, 3, 4].map(|id| world.attach(MotorConfig::m3508(id)).unwrap());
+    world.attach(MotorConfig::gm6020_voltage(5)).unwrap();
     let refused = RefCell::new(Vec::new());
     let mut driven = Vec::<Range<u64>>::new();
     let clock = || {

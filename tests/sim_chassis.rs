@@ -9,7 +9,7 @@ use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, SimClock, Wheel, World,
+    ChassisConfig, ChassisState, Controller, Line, MotorConfig, Simulation, Wheel,
 };
 use drivetrain::time::Duration;
 use drivetrain::units::AngularVelocity;
@@ -23,18 +23,18 @@ const IDS: MecanumWheels<u8> =
 const ON_THE_RIGHT: MecanumWheels<bool> =
     MecanumWheels { front_left: false, front_right: true, rear_left: false, rear_right: true };
 
-type Robot<'a> = Runner<Nb<Controller<'a>>, SimClock<'a>, Bus>;
+type Robot<'a> = Runner<Nb<Controller<'a>>, &'a Simulation, Bus>;
 
 /// The front wheels on the first bus, the rear wheels on the line that is given.
 struct Car<'a> {
-    world: &'a World,
+    world: &'a Simulation,
     robots: [Robot<'a>; 2],
     wheels: MecanumWheels<(Line, Handle<M3508>)>,
     mecanum: Mecanum,
 }
 
 impl<'a> Car<'a> {
-    fn new(world: &'a World, rear: Line) -> Self {
+    fn new(world: &'a Simulation, rear: Line) -> Self {
         let front = Line::Can1;
         let lines = MecanumWheels {
             front_left: front,
@@ -42,9 +42,9 @@ impl<'a> Car<'a> {
             rear_left: rear,
             rear_right: rear,
         };
-        let motors = IDS.zip(lines).map(|(id, line)| {
-            world.attach(MotorConfig::new(Model::M3508, id).with_line(line)).unwrap()
-        });
+        let motors = IDS
+            .zip(lines)
+            .map(|(id, line)| world.attach(MotorConfig::m3508(id).with_line(line)).unwrap());
         let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
         let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
         world
@@ -110,7 +110,7 @@ fn the_body_goes_where_the_wheels_are_told_in_every_direction() {
         Twist::new(0.6, -0.4, 1.0),
     ];
     for wanted in directions {
-        let world = World::new(3);
+        let world = Simulation::new(3);
         let mut car = Car::new(&world, Line::Can1);
         let state = car.drive(wanted, 1_000);
         let twist = state.twist;
@@ -129,7 +129,7 @@ fn the_body_goes_where_the_wheels_are_told_in_every_direction() {
 
 #[test]
 fn wheels_on_two_buses_carry_one_chassis() {
-    let world = World::new(4);
+    let world = Simulation::new(4);
     let mut car = Car::new(&world, Line::Can2);
     let state = car.drive(Twist::new(0.5, 0.5, 0.0), 1_000);
     assert!(
@@ -143,7 +143,7 @@ fn wheels_on_two_buses_carry_one_chassis() {
 
 #[test]
 fn after_a_second_forward_the_body_is_where_its_speed_says() {
-    let world = World::new(5);
+    let world = Simulation::new(5);
     let mut car = Car::new(&world, Line::Can1);
     let start = car.drive(Twist::new(1.0, 0.0, 0.0), 500);
     let end = car.drive(Twist::new(1.0, 0.0, 0.0), 1_000);

@@ -13,8 +13,7 @@ use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::motor::OneOf;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
-    ChassisConfig, ChassisState, Controller, Line, Model, MotorConfig, MotorKey, SimClock, Wheel,
-    World,
+    ChassisConfig, ChassisState, Controller, Line, MotorConfig, MotorKey, Simulation, Wheel,
 };
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -24,20 +23,20 @@ const SPEED: PidConfig = PidConfig::new(4.0, 20.0, 0.0).with_output_limit(6.0);
 const MOTIONS: [(f32, f32, f32); 5] =
     [(0.8, 0.0, 0.0), (0.0, 0.8, 0.0), (0.0, 0.0, -2.0), (-0.5, 0.4, 1.0), (-0.8, 0.0, 0.0)];
 
-type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+type Robot<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus>;
 
-fn m3508(world: &World, id: u8) -> MotorKey {
-    world.attach(MotorConfig::new(Model::M3508, id)).unwrap()
+fn m3508(world: &Simulation, id: u8) -> MotorKey {
+    world.attach(MotorConfig::m3508(id)).unwrap()
 }
 
-fn robot<const N: usize>(world: &World, ids: [u8; N]) -> (Robot<'_>, [Handle<M3508>; N]) {
+fn robot<const N: usize>(world: &Simulation, ids: [u8; N]) -> (Robot<'_>, [Handle<M3508>; N]) {
     let mut bus = Bus::new();
     let handles = bus.attach_all(ids.map(|id| Config::new(id).speed_loop(SPEED))).unwrap();
     (Runner::new(Nb(world.controller()), world.clock(), bus), handles)
 }
 
 fn each_tick<'w>(
-    world: &'w World,
+    world: &'w Simulation,
     robot: &mut Robot<'w>,
     mut work: impl FnMut(&mut Robot<'w>, Tick),
 ) {
@@ -53,7 +52,7 @@ fn each_tick<'w>(
 
 /// Drives a motion for a second.
 fn drive<K, const N: usize>(
-    world: &World,
+    world: &Simulation,
     layout: K,
     wheels: impl Fn([Handle<M3508>; N]) -> K::Wheels<Handle<M3508>>,
     ids: [u8; N],
@@ -80,7 +79,7 @@ fn assert_moves(state: ChassisState, wanted: Twist<Body>) {
 #[test]
 fn four_omni_wheels_on_the_corners_go_where_they_are_told() {
     for (vx, vy, wz) in MOTIONS {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let degrees = [45.0_f32, -45.0, 135.0, -135.0];
         let floor = [0, 1, 2, 3].map(|index: u8| {
             let (sine, cosine) = degrees[usize::from(index)].to_radians().sin_cos();
@@ -99,7 +98,7 @@ fn four_omni_wheels_on_the_corners_go_where_they_are_told() {
 #[test]
 fn a_differential_drive_goes_where_it_is_told_but_not_sideways() {
     for (vx, vy, wz) in MOTIONS {
-        let world = World::new(2);
+        let world = Simulation::new(2);
         let side = |id, y| Wheel::plain(m3508(&world, id), RADIUS_M, Vec2::new(0.0, y));
         let floor = [side(1, 0.18), side(2, -0.18)];
         world.attach_chassis(ChassisConfig::new(&floor)).unwrap();
@@ -120,7 +119,7 @@ type Motors = ModuleMotors<OneOf<Handle<M3508>, Handle<Gm6020Voltage>>>;
 
 /// Four modules, drive on the first bus and steering on the second.
 struct Modules<'w> {
-    world: &'w World,
+    world: &'w Simulation,
     drives: (Robot<'w>, [Handle<M3508>; 4]),
     steerings: (Robot<'w>, [Handle<Gm6020Voltage>; 4]),
     chassis: Chassis<Swerve<4>>,
@@ -128,11 +127,11 @@ struct Modules<'w> {
 }
 
 impl<'w> Modules<'w> {
-    fn new(world: &'w World) -> Self {
+    fn new(world: &'w Simulation) -> Self {
         let mut ids = 1..;
         let floor = CORNERS.map(|place| {
             let id = ids.next().unwrap();
-            let motor = MotorConfig::new(Model::Gm6020Voltage, id).with_line(Line::Can2);
+            let motor = MotorConfig::gm6020_voltage(id).with_line(Line::Can2);
             let motor = world.attach(motor.with_load_inertia_kg_m2(0.004)).unwrap();
             Wheel::steered(m3508(world, id), RADIUS_M, place, motor, ZERO)
         });
@@ -183,7 +182,7 @@ impl<'w> Modules<'w> {
 #[test]
 fn swerve_modules_go_where_they_are_told() {
     for (vx, vy, wz) in MOTIONS {
-        let world = World::new(3);
+        let world = Simulation::new(3);
         let wanted = Twist::new(vx, vy, wz);
         assert_moves(Modules::new(&world).run(Some(wanted)), wanted);
     }
@@ -192,7 +191,7 @@ fn swerve_modules_go_where_they_are_told() {
 #[test]
 fn without_current_locked_modules_hold_against_a_push_and_modules_in_line_roll_away() {
     let pushed = |motion: Option<Twist<Body>>| {
-        let world = World::new(4);
+        let world = Simulation::new(4);
         let mut modules = Modules::new(&world);
         let _aligned = modules.run(motion);
         modules.relaxed = true;

@@ -5,7 +5,7 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::sim::{
-    Controller, Fault, Line, Model, MotorConfig, Record, Sender, World, frame_bits,
+    Controller, Fault, Line, MotorConfig, Sender, Simulation, Transmission, frame_bits,
 };
 use drivetrain::time::{Duration, Instant};
 use embedded_can::nb::Can;
@@ -60,12 +60,12 @@ proptest! {
         actions in proptest::collection::vec(action(), 1..120),
     ) {
         let line = Line::Can1;
-        let world = World::new(seed).with_receive_depth(line, 8);
-        let motor = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
-        world.attach(MotorConfig::new(Model::Gm6020Voltage, 1)).unwrap();
+        let world = Simulation::new(seed).with_receive_depth(line, 8);
+        let motor = world.attach(MotorConfig::m3508(1)).unwrap();
+        world.attach(MotorConfig::gm6020_voltage(1)).unwrap();
         let mut can = world.controller();
         let mut ledger = Ledger::default();
-        let mut records: Vec<Record> = Vec::new();
+        let mut records: Vec<Transmission> = Vec::new();
         for action in actions {
             match action {
                 Action::Advance(micros) => {
@@ -122,7 +122,7 @@ proptest! {
         for frame in &evicted {
             prop_assert!(remove(&mut accepted, frame), "{frame:?} came back out of nothing");
         }
-        for Record { frame, delivered, sender, .. } in &records {
+        for Transmission { frame, delivered, sender, .. } in &records {
             if *sender == Sender::Controller && *delivered {
                 prop_assert!(remove(&mut accepted, frame), "{frame:?} went out of nothing");
             }

@@ -7,14 +7,14 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::motor::Link;
 use drivetrain::runner::{BlockingTx, Nb, Runner};
-use drivetrain::sim::{Controller, Fault, Line, Model, MotorConfig, MotorKey, SimClock, World};
+use drivetrain::sim::{Controller, Fault, Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::nb::Can;
 
 const SPEED: PidConfig = PidConfig::new(0.6, 6.0, 0.0).with_output_limit(20.0);
 
-type Robot<'a> = Runner<Nb<Controller<'a>>, SimClock<'a>, Bus>;
+type Robot<'a> = Runner<Nb<Controller<'a>>, &'a Simulation, Bus>;
 
 fn at(millis: u64) -> Instant {
     Instant::START + Duration::from_millis(millis)
@@ -25,15 +25,20 @@ fn rpm(value: f32) -> AngularVelocity {
 }
 
 /// A world with two M3508, and a robot on it that has them in speed loops.
-fn two_wheels(world: &World) -> ([MotorKey; 2], [Handle<M3508>; 2], Robot<'_>) {
-    let keys = [1, 2].map(|id| world.attach(MotorConfig::new(Model::M3508, id)).unwrap());
+fn two_wheels(world: &Simulation) -> ([MotorKey; 2], [Handle<M3508>; 2], Robot<'_>) {
+    let keys = [1, 2].map(|id| world.attach(MotorConfig::m3508(id)).unwrap());
     let mut bus = Bus::new();
     let handles = [1, 2].map(|id| bus.attach(Config::<M3508>::new(id).speed_loop(SPEED)).unwrap());
     (keys, handles, Runner::new(Nb(world.controller()), world.clock(), bus))
 }
 
 /// Runs the loop of a robot for a time, with `work` before each tick.
-fn run(world: &World, robot: &mut Robot<'_>, millis: u64, mut work: impl FnMut(&mut Bus, Tick)) {
+fn run(
+    world: &Simulation,
+    robot: &mut Robot<'_>,
+    millis: u64,
+    mut work: impl FnMut(&mut Bus, Tick),
+) {
     for _ in 0..10 * millis {
         world.advance(Duration::from_micros(100));
         robot.poll(16);
@@ -47,7 +52,7 @@ fn run(world: &World, robot: &mut Robot<'_>, millis: u64, mut work: impl FnMut(&
 
 #[test]
 fn a_speed_loop_reaches_its_target_and_the_library_sees_what_is_true() {
-    let world = World::new(7);
+    let world = Simulation::new(7);
     let (keys, handles, mut robot) = two_wheels(&world);
     let targets = [rpm(100.0), rpm(-300.0)];
     run(&world, &mut robot, 500, |bus, _| {
@@ -63,7 +68,7 @@ fn a_speed_loop_reaches_its_target_and_the_library_sees_what_is_true() {
         assert!((state.velocity - truth.velocity).abs() < rpm(1.0));
         assert!((state.current - truth.current).abs().as_amperes() < 0.05);
         // The last frame is a millisecond old at most: 8192 counts at 19.2 * 300 rpm are 787 a millisecond.
-        assert!(state.rotor_counts.abs_diff(truth.rotor_counts) < 1_000, "{state:?} {truth:?}");
+        assert!(state.rotor_counts.abs_diff(truth.encoder_counts) < 1_000, "{state:?} {truth:?}");
     }
     let (statistics, traffic) = (robot.statistics(), world.traffic(Line::Can1));
     assert_eq!((statistics.sent, statistics.refused), (traffic.sent, 0));
@@ -72,7 +77,7 @@ fn a_speed_loop_reaches_its_target_and_the_library_sees_what_is_true() {
 
 #[test]
 fn a_silent_motor_gets_zero_and_the_other_goes_on() {
-    let world = World::new(8);
+    let world = Simulation::new(8);
     let (keys, handles, mut robot) = two_wheels(&world);
     world.fault(Fault::Silent(keys[0]), at(300)..at(450)).unwrap();
     let target = |bus: &mut Bus, _: Tick| {
@@ -92,7 +97,7 @@ fn a_silent_motor_gets_zero_and_the_other_goes_on() {
 
 #[test]
 fn what_waits_in_the_mailboxes_at_bus_off_still_goes_out_afterwards() {
-    let world = World::new(9);
+    let world = Simulation::new(9);
     let (keys, handles, mut robot) = two_wheels(&world);
     world.fault(Fault::Unplugged(Line::Can1), at(300)..at(900)).unwrap();
     run(&world, &mut robot, 850, |bus, _| {
@@ -125,8 +130,8 @@ fn what_waits_in_the_mailboxes_at_bus_off_still_goes_out_afterwards() {
 
 #[test]
 fn over_a_blocking_driver_frames_come_in_by_another_door_and_sending_takes_time() {
-    let world = World::new(10);
-    let key = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let world = Simulation::new(10);
+    let key = world.attach(MotorConfig::m3508(1)).unwrap();
     let mut bus = Bus::new();
     let handle = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)).unwrap();
     let mut robot = Runner::new(BlockingTx(world.controller()), world.clock(), bus);
@@ -149,7 +154,7 @@ fn over_a_blocking_driver_frames_come_in_by_another_door_and_sending_takes_time(
 #[test]
 fn two_runs_of_one_seed_are_the_same_to_the_last_bit() {
     let story = || {
-        let world = World::new(11);
+        let world = Simulation::new(11);
         let (keys, handles, mut robot) = two_wheels(&world);
         let line = Line::Can1;
         world.fault(Fault::LostFrames { line, id: None, probability: 0.2 }, ..).unwrap();
@@ -161,7 +166,7 @@ fn two_runs_of_one_seed_are_the_same_to_the_last_bit() {
         });
         let truth = keys.map(|key| world.motor(key).unwrap());
         (
-            truth.map(|motor| (motor.rotor_counts, motor.velocity.as_rad_per_s().to_bits())),
+            truth.map(|motor| (motor.encoder_counts, motor.velocity.as_rad_per_s().to_bits())),
             robot.statistics(),
         )
     };

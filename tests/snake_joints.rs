@@ -6,19 +6,19 @@ use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Controller, Fault, JointConfig, JointKey, Line, Sender, SimClock, World};
+use drivetrain::sim::{Controller, Fault, JointConfig, Line, MotorKey, Sender, Simulation};
 use drivetrain::snake::{Command, Config, Joint, Joints, Register};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 
-type Shell<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Joints>;
+type Shell<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Joints>;
 
 struct Robot<'w> {
-    world: &'w World,
+    world: &'w Simulation,
     runner: Shell<'w>,
     joints: Vec<Joint>,
-    keys: Vec<JointKey>,
+    keys: Vec<MotorKey>,
     /// Where they are told to be, in degrees.
     wanted: Option<f32>,
     /// The application arms as soon as it sees itself disarmed and, where it is told to release its request, 100 ms later.
@@ -31,12 +31,12 @@ struct Robot<'w> {
 }
 
 impl<'w> Robot<'w> {
-    fn new(world: &'w World, count: u8, joints: Joints) -> Self {
+    fn new(world: &'w Simulation, count: u8, joints: Joints) -> Self {
         Self::of(world, (1..=count).map(JointConfig::new), joints)
     }
 
     fn of(
-        world: &'w World,
+        world: &'w Simulation,
         configs: impl Iterator<Item = JointConfig>,
         mut joints: Joints,
     ) -> Self {
@@ -87,21 +87,22 @@ impl<'w> Robot<'w> {
     }
 
     fn is_enabled(&self, joint: usize) -> bool {
-        self.world.joint(self.keys[joint]).unwrap().is_enabled
+        self.world.motor(self.keys[joint]).unwrap().is_enabled
     }
 }
 
 #[test]
 fn joints_go_where_they_are_told_from_wherever_they_were_zeroed() {
-    let world = World::new(3);
+    let world = Simulation::new(3);
     let mut robot = Robot::new(&world, 12, Joints::new());
     robot.run(50);
-    let start: Vec<_> = robot.keys.iter().map(|key| world.joint(*key).unwrap().pulses).collect();
+    let start: Vec<_> =
+        robot.keys.iter().map(|key| world.motor(*key).unwrap().encoder_counts).collect();
     robot.arm();
     robot.wanted = Some(45.0);
     robot.run(600);
     for (index, start) in start.iter().enumerate() {
-        let way = world.joint(robot.keys[index]).unwrap().pulses - start;
+        let way = world.motor(robot.keys[index]).unwrap().encoder_counts - start;
         assert_eq!(way, 8_192, "an eighth of a turn, whatever the counter was");
         assert!((robot.degrees(index) - 45.0).abs() < 0.01);
     }
@@ -112,7 +113,7 @@ fn joints_go_where_they_are_told_from_wherever_they_were_zeroed() {
 
 #[test]
 fn an_application_that_stops_setting_targets_has_its_joints_disabled() {
-    let world = World::new(3);
+    let world = Simulation::new(3);
     let mut robot = Robot::new(&world, 12, Joints::new());
     robot.run(50);
     robot.arm();
@@ -127,7 +128,7 @@ fn an_application_that_stops_setting_targets_has_its_joints_disabled() {
 
 #[test]
 fn an_emergency_stop_disables_twelve_joints_within_five_milliseconds_over_three_mailboxes() {
-    let world = World::new(3);
+    let world = Simulation::new(3);
     let mut robot = Robot::new(&world, 12, Joints::new());
     robot.run(50);
     robot.arm();
@@ -144,7 +145,7 @@ fn an_emergency_stop_disables_twelve_joints_within_five_milliseconds_over_three_
 fn the_load_of_every_budget_is_measured_between_its_bounds() {
     // Four frames a tick would need a queue before the three mailboxes.
     for (reads, writes) in [(1, 1), (2, 1), (1, 2)] {
-        let world = World::new(9);
+        let world = Simulation::new(9);
         let joints = Joints::new().with_frames_per_update(reads, writes);
         let mut robot = Robot::new(&world, 12, joints);
         robot.run(50);
@@ -158,17 +159,17 @@ fn the_load_of_every_budget_is_measured_between_its_bounds() {
         // What the runner has sent, and what is answered, shift by a frame at the ends.
         let (low, high) = (load.nominal() * 0.998, load.worst_case() * 1.002);
         assert!((low..=high).contains(&measured), "{reads} {writes}: {measured} not in {load}");
-        let collisions = robot.keys.iter().map(|key| world.joint(*key).unwrap().collisions);
+        let collisions = robot.keys.iter().map(|key| world.motor(*key).unwrap().collisions);
         assert_eq!(collisions.sum::<u32>(), 0);
     }
 }
 
 #[test]
 fn a_joint_that_is_unplugged_is_named_and_comes_back() {
-    let world = World::new(4);
+    let world = Simulation::new(4);
     let mut robot = Robot::new(&world, 4, Joints::new());
     let at = |ms| Instant::START + Duration::from_millis(ms);
-    world.fault(Fault::SilentJoint(robot.keys[2]), at(300)..at(700)).unwrap();
+    world.fault(Fault::Silent(robot.keys[2]), at(300)..at(700)).unwrap();
     robot.run(50);
     robot.arm();
     robot.wanted = Some(30.0);
@@ -190,10 +191,12 @@ fn a_joint_that_is_unplugged_is_named_and_comes_back() {
 
 #[test]
 fn a_brown_out_shorter_than_any_time_limit_does_not_set_a_joint_going_again() {
-    let world = World::new(4);
+    let world = Simulation::new(4);
     let mut robot = Robot::new(&world, 12, Joints::new());
     let at = |ms| Instant::START + Duration::from_millis(ms);
-    world.fault(Fault::JointPowerLoss(robot.keys[6]), at(400)..at(405)).unwrap();
+    world
+        .fault(Fault::PowerLoss { motor: robot.keys[6], forgets_angle: true }, at(400)..at(405))
+        .unwrap();
     robot.run(50);
     robot.arm();
     robot.wanted = Some(5.0);
@@ -211,7 +214,10 @@ type Event = (&'static str, fn(&mut Robot), (u16, u16), u32);
 fn brown_out(robot: &mut Robot) {
     let now = robot.world.now();
     let window = now..now + Duration::from_millis(5);
-    robot.world.fault(Fault::JointPowerLoss(robot.keys[0]), window).unwrap();
+    robot
+        .world
+        .fault(Fault::PowerLoss { motor: robot.keys[0], forgets_angle: true }, window)
+        .unwrap();
 }
 
 fn register(command: &Command) -> u8 {
@@ -234,7 +240,7 @@ fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_
         (0, ("stopped and cleared", stop_and_clear, (0, 0), 1)),
     ];
     for (position, (what, event, counts, releases)) in events {
-        let world = World::new(4);
+        let world = Simulation::new(4);
         let config = JointConfig::new(1).with_position(position);
         let mut robot = Robot::of(&world, [config].into_iter(), Joints::new());
         robot.run(50);
@@ -262,7 +268,7 @@ fn a_joint_that_is_armed_again_at_once_is_disabled_and_brought_up_anew_whatever_
 
 #[test]
 fn a_second_controller_shows_in_the_counters() {
-    let world = World::new(4);
+    let world = Simulation::new(4);
     let mut robot = Robot::new(&world, 2, Joints::new());
     robot.run(20);
     let foreign: CanFrame = Command::Write(Register::Enable, 1).frame(1).unwrap();
@@ -275,7 +281,7 @@ fn a_second_controller_shows_in_the_counters() {
 #[test]
 fn a_controller_that_does_not_wait_for_the_answer_collides_with_it() {
     use embedded_can::nb::Can;
-    let world = World::new(6);
+    let world = Simulation::new(6);
     let key = world.attach_joint(JointConfig::new(3)).unwrap();
     let mut can = world.controller();
     let read = Command::Read(Register::ActualPosition).frame(3).unwrap();
@@ -292,7 +298,7 @@ fn a_controller_that_does_not_wait_for_the_answer_collides_with_it() {
         can.transmit(&write).unwrap();
         world.advance(Duration::from_millis(2));
     }
-    let state = world.joint(key).unwrap();
+    let state = world.motor(key).unwrap();
     assert!(state.replies == 50 && state.collisions > 25, "{state:?}");
 }
 

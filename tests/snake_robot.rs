@@ -7,7 +7,7 @@
 mod system;
 
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{Record, Sender};
+use drivetrain::sim::{Sender, Transmission};
 use drivetrain::snake::{Command, Register, Reply};
 use embedded_can::Frame;
 use std::net::TcpListener;
@@ -130,7 +130,7 @@ fn the_load_is_that_of_the_bits_and_between_nominal_and_worst_case() {
 fn nothing_is_sent_to_a_joint_that_owes_an_answer() {
     let mut owes = [None::<Register>; 13];
     let (mut asked, mut answered) = (0, 0);
-    let mut watch = |record: &Record| {
+    let mut watch = |record: &Transmission| {
         let Some(owed) = owes.get_mut(usize::try_from(record.frame.header()).unwrap()) else {
             return;
         };

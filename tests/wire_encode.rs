@@ -2,27 +2,26 @@
 
 #![cfg(test)]
 
-use drivetrain::wire::feetech::{self, Goal, InstructionError, Present, ServoId, Sts};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status};
 use drivetrain::wire::host_link::{
-    ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
-    Telemetry, TelemetryFormat, TelemetryHeader,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::mit;
 use drivetrain::wire::vofa::{JustFloat, justfloat, text_line};
-use drivetrain::wire::{BufferTooSmall, Deframer, Protocol};
+use drivetrain::wire::{Decode, Deframer, EncodeError};
 use proptest::prelude::*;
 
-fn read<P: Protocol>(protocol: P, mut bytes: &[u8]) -> Option<P::Frame> {
-    let mut decoder = Deframer::<P, 160>::new(protocol);
+fn read<F: Decode>(options: F::Options, mut bytes: &[u8]) -> Option<F> {
+    let mut decoder = Deframer::<F, 160>::with_options(options);
     let frame = decoder.read(&mut bytes);
     assert_eq!((decoder.counts().skipped_bytes, bytes.len()), (0, 0));
     frame
 }
 
-fn any_command() -> impl Strategy<Value = Command> {
+fn any_command() -> impl Strategy<Value = HostCommand> {
     let joints = any::<[(u8, i32); 12]>();
     (joints, any::<[i16; 3]>(), any::<u8>()).prop_map(|(joints, [gm6020, c610, sts3032], reset)| {
-        Command {
+        HostCommand {
             joints: joints
                 .map(|(speed_rpm, position_pulses)| JointTarget { speed_rpm, position_pulses }),
             gm6020_position: gm6020,
@@ -37,7 +36,7 @@ proptest! {
     #[test]
     fn commands_come_back_as_they_were(command in any_command()) {
         let mut buffer = [0; COMMAND_LENGTH];
-        prop_assert_eq!(read(CommandFormat, command.encode(&mut buffer).unwrap()), Some(command));
+        prop_assert_eq!(read((), command.encode(&mut buffer).unwrap()), Some(command));
     }
 
     #[test]
@@ -58,9 +57,9 @@ proptest! {
         let imu_angles_deg = angles;
         let telemetry =
             Telemetry { positions_pulses, speeds_rpm, gm6020_position, c610_position, imu_angles_deg };
-        let header = if document { TelemetryHeader::Document } else { TelemetryHeader::Firmware };
-        let floats = if big { ByteOrder::Big } else { ByteOrder::Little };
-        let format = TelemetryFormat::new().with_header(header).with_floats(floats);
+        let format = TelemetryFormat::new();
+        let format = if document { format.with_document_header() } else { format };
+        let format = if big { format.with_big_endian_floats() } else { format };
         let mut buffer = [0; TELEMETRY_LENGTH];
         prop_assert_eq!(read(format, format.encode(&telemetry, &mut buffer).unwrap()), Some(telemetry));
     }
@@ -68,7 +67,7 @@ proptest! {
     #[test]
     fn plotted_values_come_back_but_for_the_last_bit(values: [f32; 4]) {
         let mut buffer = [0; 20];
-        let seen = read(JustFloat::<4>, justfloat(&values, &mut buffer).unwrap()).unwrap();
+        let seen = read::<JustFloat<4>>((), justfloat(&values, &mut buffer).unwrap()).unwrap().0;
         for (seen, value) in seen.iter().zip(values) {
             prop_assert!(seen.to_bits() ^ value.to_bits() <= 1);
         }
@@ -83,27 +82,23 @@ proptest! {
         let mut frame = vec![0xFF, 0xFF, 3, 10, 0, p0, p1, s0, s1, l0, l1, 121, 30];
         let sum = frame[2..].iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
         frame.push(!sum);
-        let present = Present::from_status(&read(Sts, &frame).unwrap());
+        let present = Present::from_status(&read::<Status>((), &frame).unwrap());
         let expected = Present { position, speed, load, voltage_dv: 121, temperature_c: 30 };
         prop_assert_eq!(present, Some(expected));
     }
 }
 
 /// Tries every buffer from none to one byte more than needed.
-fn refuses_less_than<E: std::fmt::Debug>(
-    needed: usize,
-    encode: impl Fn(&mut [u8]) -> Result<usize, E>,
-    error: impl Fn(&E) -> Option<BufferTooSmall>,
-) {
+fn refuses_less_than(needed: usize, encode: impl Fn(&mut [u8]) -> Result<usize, EncodeError>) {
     for given in 0..=needed + 1 {
         let mut buffer = vec![0; given];
         match encode(&mut buffer) {
             Ok(written) => assert_eq!((written, given >= needed), (needed, true)),
             Err(refused) => {
                 assert!(given < needed);
-                assert_eq!(error(&refused), Some(BufferTooSmall { needed, given }));
+                assert_eq!(refused, EncodeError::BufferTooSmall { needed, given });
                 let text = format!("the frame needs {needed} bytes, the buffer has {given}");
-                assert_eq!(error(&refused).unwrap().to_string(), text);
+                assert_eq!(refused.to_string(), text);
             }
         }
     }
@@ -111,41 +106,24 @@ fn refuses_less_than<E: std::fmt::Debug>(
 
 #[test]
 fn too_small_a_buffer_is_refused_by_every_encoder() {
-    let plain = |error: &BufferTooSmall| Some(*error);
-    let command = Command::default();
-    refuses_less_than(79, |out| command.encode(out).map(<[u8]>::len), plain);
+    let command = HostCommand::default();
+    refuses_less_than(79, |out| command.encode(out).map(<[u8]>::len));
     let telemetry = Telemetry::default();
     let format = TelemetryFormat::new();
-    refuses_less_than(121, |out| format.encode(&telemetry, out).map(<[u8]>::len), plain);
-    refuses_less_than(20, |out| justfloat(&[0.0; 4], out).map(<[u8]>::len), plain);
-    refuses_less_than(8, |out| text_line("x", &[1.0], out).map(<[u8]>::len), plain);
+    refuses_less_than(121, |out| format.encode(&telemetry, out).map(<[u8]>::len));
+    refuses_less_than(20, |out| justfloat(&[0.0; 4], out).map(<[u8]>::len));
+    refuses_less_than(8, |out| text_line("x", &[1.0], out).map(<[u8]>::len));
 
     let one = ServoId::ONE;
-    refuses_less_than(6, |out| feetech::ping(one, out).map(<[u8]>::len), plain);
-    refuses_less_than(6, |out| feetech::action(one, out).map(<[u8]>::len), plain);
-    refuses_less_than(6, |out| feetech::reset(one, out).map(<[u8]>::len), plain);
-    refuses_less_than(8, |out| feetech::read(one, 56, 8, out).map(<[u8]>::len), plain);
-    let instruction = |error: &InstructionError| match error {
-        InstructionError::Buffer(error) => Some(*error),
-        _ => None,
-    };
-    refuses_less_than(9, |out| feetech::write(one, 42, &[1, 2], out).map(<[u8]>::len), instruction);
-    refuses_less_than(
-        9,
-        |out| feetech::reg_write(one, 42, &[1, 2], out).map(<[u8]>::len),
-        instruction,
-    );
-    refuses_less_than(
-        10,
-        |out| feetech::sync_read(&[one; 2], 56, 8, out).map(<[u8]>::len),
-        instruction,
-    );
+    refuses_less_than(6, |out| feetech::ping(one, out).map(<[u8]>::len));
+    refuses_less_than(6, |out| feetech::action(one, out).map(<[u8]>::len));
+    refuses_less_than(6, |out| feetech::reset(one, out).map(<[u8]>::len));
+    refuses_less_than(8, |out| feetech::read(one, 56, 8, out).map(<[u8]>::len));
+    refuses_less_than(9, |out| feetech::write(one, 42, &[1, 2], out).map(<[u8]>::len));
+    refuses_less_than(9, |out| feetech::reg_write(one, 42, &[1, 2], out).map(<[u8]>::len));
+    refuses_less_than(10, |out| feetech::sync_read(&[one; 2], 56, 8, out).map(<[u8]>::len));
     let servos = [(one, [1, 2]); 3];
-    refuses_less_than(
-        17,
-        |out| feetech::sync_write(42, &servos, out).map(<[u8]>::len),
-        instruction,
-    );
+    refuses_less_than(17, |out| feetech::sync_write(42, &servos, out).map(<[u8]>::len));
 }
 
 #[test]
@@ -154,11 +132,11 @@ fn an_instruction_longer_than_its_length_byte_is_refused() {
     let one = ServoId::ONE;
     assert_eq!(feetech::write(one, 0, &[7; 252], &mut buffer).map(<[u8]>::len), Ok(259));
     let error = feetech::write(one, 0, &[7; 253], &mut buffer).unwrap_err();
-    assert_eq!(error, InstructionError::TooLong { parameters: 254 });
+    assert_eq!(error, EncodeError::TooManyParameters { parameters: 254 });
     assert!(error.to_string().contains("254 parameter bytes"));
     let servos = [(one, [0; 7]); 32];
     let error = feetech::sync_write(41, &servos, &mut buffer).unwrap_err();
-    assert_eq!(error, InstructionError::TooLong { parameters: 258 });
+    assert_eq!(error, EncodeError::TooManyParameters { parameters: 258 });
     assert!(feetech::sync_write(41, &servos[..31], &mut buffer).is_ok());
 }
 

@@ -4,21 +4,20 @@
 
 use std::fmt::Debug;
 
-use drivetrain::wire::feetech::{self, Sts};
-use drivetrain::wire::hipnuc::HipNuc;
+use drivetrain::wire::feetech::{self, Status};
+use drivetrain::wire::hipnuc::Imu;
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry,
-    TelemetryFormat, TelemetryHeader,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::vofa::{JustFloat, justfloat};
-use drivetrain::wire::{Counts, Deframer, Protocol};
+use drivetrain::wire::{Counts, Decode, Deframer};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
 
-/// A protocol under test, with a way to write its frames.
-trait Subject: Protocol<Frame: PartialEq + Debug> + Copy + Debug {
+/// A frame under test, with a way to write one.
+trait Subject: Decode<Options: Copy> + PartialEq + Debug {
     /// The bytes of a frame that `seed` makes up.
-    fn frame(&self, seed: u64) -> Vec<u8>;
+    fn frame(options: Self::Options, seed: u64) -> Vec<u8>;
 
     /// Whether a flipped bit is always found.
     const CHECKED: bool = true;
@@ -35,11 +34,11 @@ fn scramble(seed: u64) -> impl Iterator<Item = u8> {
     })
 }
 
-impl Subject for CommandFormat {
-    fn frame(&self, seed: u64) -> Vec<u8> {
+impl Subject for HostCommand {
+    fn frame(_: (), seed: u64) -> Vec<u8> {
         let mut bytes = scramble(seed);
         let mut byte = || bytes.next().unwrap();
-        let mut command = Command::default();
+        let mut command = Self::default();
         for joint in &mut command.joints {
             // Now and then a whole header, or half of one, inside of the payload.
             let position = match byte() % 4 {
@@ -59,11 +58,11 @@ impl Subject for CommandFormat {
     }
 }
 
-impl Subject for TelemetryFormat {
-    fn frame(&self, seed: u64) -> Vec<u8> {
+impl Subject for Telemetry {
+    fn frame(format: TelemetryFormat, seed: u64) -> Vec<u8> {
         let mut bytes = scramble(seed);
         let mut byte = || bytes.next().unwrap();
-        let mut telemetry = Telemetry::default();
+        let mut telemetry = Self::default();
         for position in &mut telemetry.positions_pulses {
             *position = match byte() % 4 {
                 0 => i32::from_be_bytes([byte(), 0xAA, 0x55, 0x74]),
@@ -72,13 +71,13 @@ impl Subject for TelemetryFormat {
             };
         }
         telemetry.imu_angles_deg = [[f32::from(byte()), -1.5, f32::from(byte())]; 4];
-        self.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).unwrap().to_vec()
+        format.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).unwrap().to_vec()
     }
 }
 
-impl Subject for HipNuc {
+impl Subject for Imu {
     /// The frame of the manual with another time: the only encoder of this protocol.
-    fn frame(&self, seed: u64) -> Vec<u8> {
+    fn frame(_: (), seed: u64) -> Vec<u8> {
         const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_XMODEM);
         let golden = "5A A5 4C 00 14 BB 91 08 15 23 09 A2 C4 47 08 15 1C 00 CC E8 61 BE 9A 35 56 3E 65 EA 72 \
             3F 31 D0 7C BD 75 DD C5 BB 6B D7 24 BC 89 88 FC 40 01 00 6A 41 AB 2A 70 C2 96 D4 50 41 ED 03 43 \
@@ -96,8 +95,8 @@ impl Subject for HipNuc {
     }
 }
 
-impl Subject for Sts {
-    fn frame(&self, seed: u64) -> Vec<u8> {
+impl Subject for Status {
+    fn frame(_: (), seed: u64) -> Vec<u8> {
         let mut bytes = scramble(seed);
         let count = usize::from(bytes.next().unwrap()) % (feetech::MAX_PARAMETERS + 1);
         let mut frame =
@@ -110,7 +109,7 @@ impl Subject for Sts {
 }
 
 impl Subject for JustFloat<3> {
-    fn frame(&self, seed: u64) -> Vec<u8> {
+    fn frame(_: (), seed: u64) -> Vec<u8> {
         let values: Vec<f32> = scramble(seed).take(3).map(|byte| f32::from(byte) - 100.5).collect();
         justfloat(&values, &mut [0; 16]).unwrap().to_vec()
     }
@@ -121,8 +120,8 @@ impl Subject for JustFloat<3> {
 const BUFFER: usize = 160;
 
 /// Reads `bytes` in pieces of the given lengths (one piece when there are none), and what is left in one.
-fn read<P: Subject>(protocol: P, bytes: &[u8], pieces: &[usize]) -> (Vec<P::Frame>, Counts) {
-    let mut decoder = Deframer::<P, BUFFER>::new(protocol);
+fn read<F: Subject>(options: F::Options, bytes: &[u8], pieces: &[usize]) -> (Vec<F>, Counts) {
+    let mut decoder = Deframer::<F, BUFFER>::with_options(options);
     let mut frames = Vec::new();
     let (mut rest, mut pieces) = (bytes, pieces.iter());
     while !rest.is_empty() {
@@ -137,38 +136,39 @@ fn read<P: Subject>(protocol: P, bytes: &[u8], pieces: &[usize]) -> (Vec<P::Fram
     (frames, decoder.counts())
 }
 
-fn good<P: Subject>(protocol: P, seed: u64) -> P::Frame {
-    protocol.parse(&protocol.frame(seed)).ok().unwrap()
+fn good<F: Subject>(options: F::Options, seed: u64) -> F {
+    F::decode(&options, &F::frame(options, seed)).ok().unwrap()
 }
 
-fn any_split_gives_the_same_frames<P: Subject>(
-    protocol: P,
+fn any_split_gives_the_same_frames<F: Subject>(
+    options: F::Options,
     seeds: &[u64],
     noise: &[u8],
     pieces: &[usize],
 ) -> TestCaseResult {
     let mut stream = noise.to_vec();
     for seed in seeds {
-        stream.extend(protocol.frame(*seed));
+        stream.extend(F::frame(options, *seed));
         stream.extend(noise.iter().take((*seed % 5) as usize));
     }
-    let whole = read(protocol, &stream, &[]);
-    prop_assert_eq!(&read(protocol, &stream, pieces), &whole);
-    prop_assert_eq!(&read(protocol, &stream, &vec![1; stream.len()]), &whole);
+    let whole = read::<F>(options, &stream, &[]);
+    prop_assert_eq!(&read::<F>(options, &stream, pieces), &whole);
+    prop_assert_eq!(&read::<F>(options, &stream, &vec![1; stream.len()]), &whole);
     Ok(())
 }
 
 /// What a patient reader finds who has all bytes before him and tries every place: where each frame begins and ends.
-fn oracle<P: Subject>(protocol: P, bytes: &[u8]) -> Vec<(std::ops::Range<usize>, P::Frame)> {
+fn oracle<F: Subject>(options: F::Options, bytes: &[u8]) -> Vec<(std::ops::Range<usize>, F)> {
     let (mut at, mut found) = (0, Vec::new());
     while at < bytes.len() {
         let rest = &bytes[at..];
-        let length = rest.get(..P::PREFIX).filter(|prefix| prefix.starts_with(protocol.header()));
-        let length =
-            length.and_then(|prefix| protocol.length(prefix)).filter(|length| *length <= BUFFER);
+        let length = rest.get(..F::PREFIX).filter(|prefix| prefix.starts_with(F::header(&options)));
+        let length = length
+            .and_then(|prefix| F::length(&options, prefix))
+            .filter(|length| *length <= BUFFER);
         let frame = length
             .and_then(|length| rest.get(..length))
-            .map(|frame| (frame.len(), protocol.parse(frame)));
+            .map(|frame| (frame.len(), F::decode(&options, frame)));
         if let Some((length, Ok(frame))) = frame {
             found.push((at..at + length, frame));
             at += length;
@@ -181,7 +181,10 @@ fn oracle<P: Subject>(protocol: P, bytes: &[u8]) -> Vec<(std::ops::Range<usize>,
 
 /// The decoder finds what the oracle finds, and with it every frame that was sent whole. Only chance can hide one:
 /// when bytes before it and some of its own make up a frame with a checksum that fits.
-fn whole_frames_are_found<P: Subject>(protocol: P, parts: &[(&[u8], bool)]) -> TestCaseResult {
+fn whole_frames_are_found<F: Subject>(
+    options: F::Options,
+    parts: &[(&[u8], bool)],
+) -> TestCaseResult {
     let mut stream = Vec::new();
     let mut sent = Vec::new();
     for (bytes, is_whole) in parts {
@@ -191,51 +194,55 @@ fn whole_frames_are_found<P: Subject>(protocol: P, parts: &[(&[u8], bool)]) -> T
         stream.extend(*bytes);
     }
     stream.extend([0x11; BUFFER]); // what noise that looks like a header waits for
-    let found = oracle(protocol, &stream);
+    let found = oracle::<F>(options, &stream);
     for sent in sent {
         let chance =
             |place: &std::ops::Range<usize>| place.start < sent.start && place.end > sent.start;
         let is_found = found.iter().any(|(place, _)| *place == sent || chance(place));
         prop_assert!(is_found, "{:?}", sent);
     }
-    let (frames, counts) = read(protocol, &stream, &[]);
+    let (frames, counts) = read::<F>(options, &stream, &[]);
     prop_assert_eq!(counts.frames as usize, frames.len());
-    let found: Vec<P::Frame> = found.into_iter().map(|(_, frame)| frame).collect();
+    let found: Vec<F> = found.into_iter().map(|(_, frame)| frame).collect();
     prop_assert_eq!(format!("{frames:?}"), format!("{found:?}")); // as text: a flipped bit may make NaN
     Ok(())
 }
 
-fn noise_loses_no_frame<P: Subject>(protocol: P, seeds: &[u64], noise: &[u8]) -> TestCaseResult {
-    let frames: Vec<Vec<u8>> = seeds.iter().map(|seed| protocol.frame(*seed)).collect();
+fn noise_loses_no_frame<F: Subject>(
+    options: F::Options,
+    seeds: &[u64],
+    noise: &[u8],
+) -> TestCaseResult {
+    let frames: Vec<Vec<u8>> = seeds.iter().map(|seed| F::frame(options, *seed)).collect();
     let parts: Vec<_> = frames.iter().flat_map(|frame| [(noise, false), (frame, true)]).collect();
-    whole_frames_are_found(protocol, &parts)
+    whole_frames_are_found::<F>(options, &parts)
 }
 
 /// The damaged frame is refused, and the one behind it is delivered.
-fn damage_loses_only_the_damaged<P: Subject>(
-    protocol: P,
+fn damage_loses_only_the_damaged<F: Subject>(
+    options: F::Options,
     seed: u64,
     cut: usize,
     bit: usize,
 ) -> TestCaseResult {
-    let (frame, next) = (protocol.frame(seed), protocol.frame(seed ^ 1));
-    whole_frames_are_found(protocol, &[(&frame[..cut % frame.len()], false), (&next, true)])?;
+    let (frame, next) = (F::frame(options, seed), F::frame(options, seed ^ 1));
+    whole_frames_are_found::<F>(options, &[(&frame[..cut % frame.len()], false), (&next, true)])?;
 
     let mut flipped = frame.clone();
     let bit = bit % (8 * frame.len());
     flipped[bit / 8] ^= 1 << (bit % 8);
-    whole_frames_are_found(protocol, &[(&flipped, false), (&next, true)])?;
-    if P::CHECKED {
-        let (frames, counts) = read(protocol, &flipped, &[]);
-        prop_assert!(!frames.contains(&good(protocol, seed)), "bit {bit} flipped");
-        prop_assert!(bit < 8 * P::PREFIX || counts.checksum_errors > 0, "bit {bit} flipped");
+    whole_frames_are_found::<F>(options, &[(&flipped, false), (&next, true)])?;
+    if F::CHECKED {
+        let (frames, counts) = read::<F>(options, &flipped, &[]);
+        prop_assert!(!frames.contains(&good::<F>(options, seed)), "bit {bit} flipped");
+        prop_assert!(bit < 8 * F::PREFIX || counts.checksum_errors > 0, "bit {bit} flipped");
     }
     Ok(())
 }
 
 /// Any bytes: nothing panics, and every byte is accounted for.
-fn any_bytes_are_accounted_for<P: Subject>(protocol: P, bytes: &[u8]) -> TestCaseResult {
-    let mut decoder = Deframer::<P, BUFFER>::new(protocol);
+fn any_bytes_are_accounted_for<F: Subject>(options: F::Options, bytes: &[u8]) -> TestCaseResult {
+    let mut decoder = Deframer::<F, BUFFER>::with_options(options);
     let mut input = bytes;
     let mut found = 0;
     while decoder.read(&mut input).is_some() {
@@ -252,7 +259,7 @@ fn any_bytes_are_accounted_for<P: Subject>(protocol: P, bytes: &[u8]) -> TestCas
 }
 
 macro_rules! laws {
-    ($($name:ident: $protocol:expr;)*) => {$(
+    ($($name:ident: $frame:ty, $options:expr;)*) => {$(
         mod $name {
             use super::*;
 
@@ -263,7 +270,7 @@ macro_rules! laws {
                     noise in prop::collection::vec(any::<u8>(), 0..20),
                     pieces in prop::collection::vec(1_usize..100, 0..20),
                 ) {
-                    any_split_gives_the_same_frames($protocol, &seeds, &noise, &pieces)?;
+                    any_split_gives_the_same_frames::<$frame>($options, &seeds, &noise, &pieces)?;
                 }
 
                 #[test]
@@ -271,7 +278,7 @@ macro_rules! laws {
                     seeds in prop::collection::vec(any::<u64>(), 1..5),
                     noise in prop::collection::vec(any::<u8>(), 0..200),
                 ) {
-                    noise_loses_no_frame($protocol, &seeds, &noise)?;
+                    noise_loses_no_frame::<$frame>($options, &seeds, &noise)?;
                 }
 
                 #[test]
@@ -279,21 +286,21 @@ macro_rules! laws {
                     seeds in prop::collection::vec(any::<u64>(), 1..5),
                     cut in 0_usize..200,
                 ) {
-                    let mut noise = $protocol.frame(seeds[0] ^ 2);
+                    let mut noise = <$frame>::frame($options, seeds[0] ^ 2);
                     noise.truncate(cut.min(noise.len() - 1));
-                    noise_loses_no_frame($protocol, &seeds, &noise)?;
+                    noise_loses_no_frame::<$frame>($options, &seeds, &noise)?;
                 }
 
                 #[test]
                 fn f59_one_flipped_bit_loses_only_its_frame(
                     seed in any::<u64>(), cut in any::<usize>(), bit in any::<usize>(),
                 ) {
-                    damage_loses_only_the_damaged($protocol, seed, cut, bit)?;
+                    damage_loses_only_the_damaged::<$frame>($options, seed, cut, bit)?;
                 }
 
                 #[test]
                 fn any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
-                    any_bytes_are_accounted_for($protocol, &bytes)?;
+                    any_bytes_are_accounted_for::<$frame>($options, &bytes)?;
                 }
             }
         }
@@ -301,12 +308,12 @@ macro_rules! laws {
 }
 
 laws! {
-    host_link_command: CommandFormat;
-    host_link_telemetry: TelemetryFormat::new();
-    host_link_telemetry_of_the_document: TelemetryFormat::new().with_header(TelemetryHeader::Document);
-    imu: HipNuc;
-    servo: Sts;
-    plot: JustFloat::<3>;
+    host_link_command: HostCommand, ();
+    host_link_telemetry: Telemetry, TelemetryFormat::new();
+    host_link_telemetry_of_the_document: Telemetry, TelemetryFormat::new().with_document_header();
+    imu: Imu, ();
+    servo: Status, ();
+    plot: JustFloat<3>, ();
 }
 
 #[test]
@@ -314,14 +321,14 @@ fn f60_a_length_of_zero_or_too_large_is_refused_at_once() {
     for length in [0_u16, 513, 0xFFFF, 155] {
         // 155: one byte more than the buffer takes
         let [low, high] = length.to_le_bytes();
-        let mut decoder = Deframer::<HipNuc, BUFFER>::new(HipNuc);
+        let mut decoder = Deframer::<Imu, BUFFER>::new();
         assert_eq!(decoder.read(&mut &[0x5A, 0xA5, low, high][..]), None);
         assert_eq!(decoder.counts().length_errors, 1, "{length}");
-        assert!(decoder.read(&mut &HipNuc.frame(1)[..]).is_some(), "{length}");
+        assert!(decoder.read(&mut &Imu::frame((), 1)[..]).is_some(), "{length}");
     }
     for length in [0, 1, 35, 0xFF] {
         // 35: one parameter more than a status takes
-        let mut decoder = Deframer::<Sts, BUFFER>::new(Sts);
+        let mut decoder = Deframer::<Status, BUFFER>::new();
         assert_eq!(decoder.read(&mut &[0xFF, 0xFF, 1, length][..]), None);
         assert!(decoder.counts().length_errors >= 1, "{length}");
         assert!(decoder.read(&mut &[0xFF, 0xFF, 1, 2, 0, 0xFC][..]).is_some(), "{length}");
@@ -330,24 +337,24 @@ fn f60_a_length_of_zero_or_too_large_is_refused_at_once() {
 
 #[test]
 fn f58_a_third_ff_before_a_servo_frame_is_noise() {
-    let (frames, counts) = read(Sts, &[0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 0, 0xFC], &[]);
+    let (frames, counts) = read::<Status>((), &[0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 0, 0xFC], &[]);
     assert_eq!((frames.len(), counts.skipped_bytes), (1, 2));
 }
 
 #[test]
 fn f58_a_whole_frame_inside_a_damaged_one_is_found() {
-    let inner = Sts.frame(7);
+    let inner = Status::frame((), 7);
     let mut outer = vec![0xFF, 0xFF, 1, u8::try_from(inner.len()).unwrap() + 3, 0];
     outer.extend(&inner);
     outer.extend([0, 0x55]); // not the sum
-    let (frames, counts) = read(Sts, &outer, &[]);
-    assert_eq!(frames, [good(Sts, 7)]);
+    let (frames, counts) = read::<Status>((), &outer, &[]);
+    assert_eq!(frames, [good((), 7)]);
     assert_eq!(counts.checksum_errors, 1);
 }
 
 #[test]
 fn a_pause_frees_what_a_damaged_length_holds_back() {
-    let mut decoder = Deframer::<Sts, BUFFER>::new(Sts);
+    let mut decoder = Deframer::<Status, BUFFER>::new();
     let held_back = [&[0xFF, 0xFF, 1, 30][..], &[0xFF, 0xFF, 1, 2, 0, 0xFC]].concat();
     assert_eq!(decoder.read(&mut &held_back[..]), None);
     decoder.abandon();
@@ -358,8 +365,8 @@ fn a_pause_frees_what_a_damaged_length_holds_back() {
 fn f58_a_checksum_that_fits_by_chance_hides_no_frame() {
     // The first 69 bytes of one frame with the first 13 of the next have a CRC that fits, and no quaternion.
     let seed = 17_266_557_442_579_749_602;
-    let truncated = &HipNuc.frame(seed ^ 2)[..69];
+    let truncated = &Imu::frame((), seed ^ 2)[..69];
     let (frames, counts) =
-        read(HipNuc, &[truncated, &HipNuc.frame(seed), &[0x11; 82]].concat(), &[]);
+        read::<Imu>((), &[truncated, &Imu::frame((), seed), &[0x11; 82]].concat(), &[]);
     assert_eq!((frames.len(), counts.content_errors), (1, 1));
 }

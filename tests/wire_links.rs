@@ -4,9 +4,9 @@
 
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
-use drivetrain::wire::hipnuc::{HipNuc, MAX_FRAME};
-use drivetrain::wire::host_link::{COMMAND_LENGTH, Command, CommandFormat, Reset};
-use drivetrain::wire::{Edge, Link};
+use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
+use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset};
+use drivetrain::wire::{Receiver, SignalEdge};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Instant {
@@ -15,8 +15,8 @@ fn ms(ms: u64) -> Instant {
 
 #[test]
 fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
-    let mut host = Link::<_, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
-    let command = Command { reset: Reset::Enable, ..Command::default() };
+    let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
+    let command = HostCommand { reset: Reset::Enable, ..HostCommand::default() };
     let mut buffer = [0; COMMAND_LENGTH];
     let bytes = command.encode(&mut buffer).unwrap();
     assert_eq!(host.latest(ms(0)), None, "nothing moves before the first command");
@@ -24,7 +24,7 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     for at in [10, 60, 110] {
         assert_eq!(host.read(&mut &bytes[..], ms(at)), Some(command));
     }
-    assert_eq!(host.edge(ms(110)), Some(Edge::Heard { at: ms(10) }));
+    assert_eq!(host.edge(ms(110)), Some(SignalEdge::Heard { at: ms(10) }));
     assert_eq!(host.latest(ms(210)), Some(command));
     assert_eq!(host.latest(ms(211)), None);
 
@@ -32,18 +32,18 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     damaged[40] ^= 0x10;
     assert_eq!(host.read(&mut &damaged[..], ms(215)), None);
     assert_eq!(host.latest(ms(215)), None, "a damaged command is no sign of life");
-    assert_eq!(host.edge(ms(215)), Some(Edge::Lost { at: ms(210) }));
+    assert_eq!(host.edge(ms(215)), Some(SignalEdge::Lost { at: ms(210) }));
     assert_eq!(host.edge(ms(215)), None, "told once");
 
     assert_eq!(host.read(&mut &bytes[..], ms(500)), Some(command));
-    assert_eq!(host.edge(ms(500)), Some(Edge::Heard { at: ms(500) }));
+    assert_eq!(host.edge(ms(500)), Some(SignalEdge::Heard { at: ms(500) }));
     assert_eq!(host.losses(), 1);
 }
 
 #[test]
 fn f61_half_a_command_given_up_does_not_swallow_the_next() {
-    let mut host = Link::<_, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
-    let command = Command { reset: Reset::Enable, ..Command::default() };
+    let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
+    let command = HostCommand { reset: Reset::Enable, ..HostCommand::default() };
     let mut buffer = [0; COMMAND_LENGTH];
     let bytes = command.encode(&mut buffer).unwrap();
     let (half, _) = bytes.split_at(40);
@@ -66,10 +66,10 @@ fn f62_loss_of_the_remote_is_neutral_with_an_edge() {
     assert_eq!(dbus.remote(ms(100)).right_switch, Switch::Up);
     assert_eq!(dbus.remote(ms(101)), Remote::default());
     assert_eq!(dbus.remote(ms(101)).right_switch, Switch::Absent);
-    assert_eq!(dbus.edge(ms(101)), Some(Edge::Heard { at: ms(0) }));
-    assert_eq!(dbus.edge(ms(101)), Some(Edge::Lost { at: ms(100) }));
+    assert_eq!(dbus.edge(ms(101)), Some(SignalEdge::Heard { at: ms(0) }));
+    assert_eq!(dbus.edge(ms(101)), Some(SignalEdge::Lost { at: ms(100) }));
     assert!(dbus.read(&mut &SHOWN[..], ms(200)).is_some());
-    assert_eq!(dbus.edge(ms(200)), Some(Edge::Heard { at: ms(200) }));
+    assert_eq!(dbus.edge(ms(200)), Some(SignalEdge::Heard { at: ms(200) }));
 }
 
 #[test]
@@ -82,9 +82,9 @@ fn f62_an_implausible_frame_is_neutral_at_once() {
         assert!(dbus.edge(ms(0)).is_some());
         assert_eq!(dbus.read(&mut &bad[..], ms(14)), None, "byte {byte}");
         assert_eq!(dbus.remote(ms(14)), Remote::default());
-        assert_eq!(dbus.edge(ms(14)), Some(Edge::Lost { at: ms(14) }));
+        assert_eq!(dbus.edge(ms(14)), Some(SignalEdge::Lost { at: ms(14) }));
         assert!(dbus.read(&mut &SHOWN[..], ms(28)).is_some());
-        assert!((dbus.remote(ms(28)).right.x - 1.0).abs() < 1e-6);
+        assert!((dbus.remote(ms(28)).right_x - 1.0).abs() < 1e-6);
     }
 }
 
@@ -93,7 +93,7 @@ fn f58_a_remote_frame_cut_short_or_late_is_not_joined_with_the_next() {
     let mut dbus = Dbus::new();
     assert_eq!(dbus.read(&mut &SHOWN[..7], ms(0)), None);
     assert!(dbus.read(&mut &SHOWN[..], ms(14)).is_some());
-    assert_eq!((dbus.counts().truncated, dbus.counts().skipped_bytes), (1, 7));
+    assert_eq!((dbus.counts().length_errors, dbus.counts().skipped_bytes), (1, 7));
     // The rest of a frame after an idle interrupt, which says better than the time where a frame begins.
     assert_eq!(dbus.read(&mut &SHOWN[..7], ms(28)), None);
     dbus.note_pause();
@@ -107,7 +107,7 @@ fn f58_after_an_implausible_remote_frame_nothing_counts_before_a_pause() {
     shifted.extend(SHOWN);
     shifted.extend(SHOWN);
     assert_eq!(dbus.read(&mut &shifted[..], ms(0)), None);
-    assert_eq!((dbus.counts().implausible, dbus.counts().skipped_bytes), (1, 20));
+    assert_eq!((dbus.counts().content_errors, dbus.counts().skipped_bytes), (1, 20));
     assert!(dbus.read(&mut &SHOWN[..], ms(14)).is_some());
 }
 
@@ -119,7 +119,7 @@ fn the_dead_band_ends_at_zero_and_at_one() {
         frame[0] = low;
         frame[1] = frame[1] & 0xF8 | high;
         let mut dbus = Dbus::new().with_dead_band(dead_band);
-        dbus.read(&mut &frame[..], ms(0)).unwrap().right.x
+        dbus.read(&mut &frame[..], ms(0)).unwrap().right_x
     };
     for (raw, dead_band, expected) in [
         (1024, 0, 0.0),
@@ -170,7 +170,7 @@ proptest! {
         for (at, bytes) in [(0, &noise[..]), (14, &frame[..]), (28, &SHOWN[..])] {
             let mut input = bytes;
             while let Some(remote) = dbus.read(&mut input, ms(at)) {
-                let values = [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
+                let values = [remote.right_x, remote.right_y, remote.left_x, remote.left_y, remote.dial];
                 prop_assert!(values.iter().all(|value| value.abs() <= 1.0));
                 prop_assert_ne!(remote.left_switch, Switch::Absent);
             }
@@ -198,27 +198,27 @@ fn imu_frame(time_ms: u32, w: f32, gyro: f32) -> Vec<u8> {
 
 #[test]
 fn f63_an_imu_with_a_frozen_clock_goes_stale_with_an_edge() {
-    let mut imu = Link::<_, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+    let mut imu = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
     for step in 0..5 {
         let frame = imu_frame(10 * step, 1.0, 0.0);
         assert!(imu.read(&mut &frame[..], ms(10 * u64::from(step))).is_some());
     }
-    assert_eq!(imu.edge(ms(40)), Some(Edge::Heard { at: ms(0) }));
+    assert_eq!(imu.edge(ms(40)), Some(SignalEdge::Heard { at: ms(0) }));
     let frozen = imu_frame(40, 1.0, 0.0);
     for step in 5..20 {
         assert!(imu.read(&mut &frozen[..], ms(10 * step)).is_some());
         assert_eq!(imu.latest(ms(10 * step)).is_some(), step <= 9, "{step}");
     }
     assert_eq!(imu.frozen_frames(), 15);
-    assert_eq!(imu.edge(ms(190)), Some(Edge::Lost { at: ms(90) }));
+    assert_eq!(imu.edge(ms(190)), Some(SignalEdge::Lost { at: ms(90) }));
     assert_eq!(imu.edge(ms(190)), None);
     assert!(imu.read(&mut &imu_frame(200, 1.0, 0.0)[..], ms(200)).is_some());
-    assert_eq!(imu.edge(ms(200)), Some(Edge::Heard { at: ms(200) }));
+    assert_eq!(imu.edge(ms(200)), Some(SignalEdge::Heard { at: ms(200) }));
 }
 
 #[test]
 fn f63_an_imu_that_sends_nonsense_is_refused_and_goes_stale() {
-    let mut imu = Link::<_, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+    let mut imu = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
     assert!(imu.read(&mut &imu_frame(0, 0.95, 0.0)[..], ms(0)).is_some(), "normalised");
     let nonsense = [
         (f32::NAN, 0.0),

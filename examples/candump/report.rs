@@ -4,7 +4,7 @@ use std::io::{self, BufRead, Read, Write};
 
 use drivetrain::dji::State;
 use drivetrain::time::Instant;
-use drivetrain::wire::candump::{Expected, Record};
+use drivetrain::wire::candump::{ParseError, Record};
 
 use super::options::Options;
 use super::replay::{Account, Replay};
@@ -53,7 +53,7 @@ pub(crate) fn run(
                 Some((now, state)) if options.csv => row_of_frame(output, now, &state)?,
                 _ => {}
             },
-            Err(error) if error.expected == Expected::Line => {}
+            Err(ParseError::Blank(_)) => {}
             Err(error) => {
                 bad += 1;
                 writeln!(complaints, "line {number}: {error}; skipped")?;

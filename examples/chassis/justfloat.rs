@@ -1,13 +1,13 @@
 //! The wheels as a stream for a plotting tool on a serial port.
 
 use super::scenario::Sample;
-use drivetrain::wire::BufferTooSmall;
+use drivetrain::wire::EncodeError;
 use drivetrain::wire::vofa::justfloat;
 
 /// Four targets, then four speeds, in rpm: front left, front right, rear left, rear right.
 pub(crate) const CHANNELS: usize = 8;
 
-pub(crate) fn stream(samples: &[Sample]) -> Result<Vec<u8>, BufferTooSmall> {
+pub(crate) fn stream(samples: &[Sample]) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     let mut frame = [0; 4 * CHANNELS + 4];
     for sample in samples {

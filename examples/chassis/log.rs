@@ -1,6 +1,6 @@
 //! The frames on the bus, as candump would have written them.
 
-use drivetrain::sim::Record;
+use drivetrain::sim::Transmission;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::Path;
@@ -17,7 +17,7 @@ impl Log {
         Ok(Self { file, outcome: Ok(()) })
     }
 
-    pub(crate) fn write(&mut self, record: &Record) {
+    pub(crate) fn write(&mut self, record: &Transmission) {
         if let (Some(file), Ok(())) = (&mut self.file, &self.outcome) {
             self.outcome = writeln!(file, "{record}");
         }

@@ -8,7 +8,7 @@ use drivetrain::chassis::{
 use drivetrain::control::PidConfig;
 use drivetrain::dji::Bus;
 use drivetrain::geometry::Twist;
-use drivetrain::sim::{MotorKey, Record, World};
+use drivetrain::sim::{MotorKey, Simulation, Transmission};
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
@@ -58,9 +58,9 @@ impl Drive {
     pub(crate) fn run(
         &self,
         mut progress: impl FnMut(f32),
-        mut record: impl FnMut(&Record),
+        mut record: impl FnMut(&Transmission),
     ) -> Result<Outcome, Box<dyn Error>> {
-        let world = World::new(self.seed);
+        let world = Simulation::new(self.seed);
         let motors = attach_motors(&world)?;
         let (mut robot, wheels) = robot(&world)?;
         let mut chassis = Chassis::new(Mecanum::new(GEOMETRY)?);
@@ -173,7 +173,7 @@ fn start() -> Result<PowerModel, Box<dyn Error>> {
 }
 
 /// What the referee measures: the electric power of the four motors.
-fn power_w(world: &World, motors: MecanumWheels<MotorKey>) -> f32 {
+fn power_w(world: &Simulation, motors: MecanumWheels<MotorKey>) -> f32 {
     motors.into_iter().filter_map(|motor| world.motor(motor)).map(|state| state.power_w).sum()
 }
 

@@ -8,8 +8,8 @@ use drivetrain::geometry::{Heading, Twist, Vec2, World as WorldFrame};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner, Statistics};
 use drivetrain::sim::{
-    ChassisConfig, Controller, Fault, Line, Model, MotorConfig, MotorKey, Record, SimClock,
-    Traffic, Wheel, World,
+    ChassisConfig, Controller, Fault, Line, MotorConfig, MotorKey, Simulation, Traffic,
+    Transmission, Wheel,
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -30,7 +30,7 @@ const RAMP_S: f32 = 0.3;
 /// After this time of constant velocity the wheels have to be where they belong.
 const SETTLING_S: f32 = 0.3;
 
-pub(crate) type Robot<'w> = Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>;
+pub(crate) type Robot<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus>;
 pub(crate) type Wheels = MecanumWheels<Handle<M3508>>;
 
 /// What can be made to go wrong.
@@ -54,7 +54,7 @@ impl Trouble {
 
     fn schedule(
         self,
-        world: &World,
+        world: &Simulation,
         wheel: MotorKey,
         seconds: f32,
     ) -> Result<(Instant, Instant), Box<dyn Error>> {
@@ -110,9 +110,9 @@ impl Scenario {
     pub(crate) fn run(
         &self,
         mut progress: impl FnMut(f32),
-        mut record: impl FnMut(&Record),
+        mut record: impl FnMut(&Transmission),
     ) -> Result<Run, Box<dyn Error>> {
-        let world = World::new(self.seed);
+        let world = Simulation::new(self.seed);
         let motors = attach_motors(&world)?;
         let trouble = match self.fault {
             Some(fault) => {
@@ -170,8 +170,8 @@ impl Scenario {
 }
 
 /// Four M3508 under a chassis of 20 kg.
-pub(crate) fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
-    let motor = |id| world.attach(MotorConfig::new(Model::M3508, id));
+pub(crate) fn attach_motors(world: &Simulation) -> Result<MecanumWheels<MotorKey>, Box<dyn Error>> {
+    let motor = |id| world.attach(MotorConfig::m3508(id));
     let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
         .try_map(motor)?;
     let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
@@ -186,7 +186,7 @@ pub(crate) fn attach_motors(world: &World) -> Result<MecanumWheels<MotorKey>, Bo
 }
 
 /// The code that would run on the microcontroller.
-pub(crate) fn robot(world: &World) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
+pub(crate) fn robot(world: &Simulation) -> Result<(Robot<'_>, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
     let wheel = |id| Config::<M3508>::new(id).speed_loop(SPEED);
     let wheels = MecanumWheels {
@@ -216,7 +216,7 @@ fn drive(
 }
 
 fn observe(
-    world: &World,
+    world: &Simulation,
     robot: &mut Robot<'_>,
     (motors, wheels): (MecanumWheels<MotorKey>, Wheels),
     targets: MecanumWheels<AngularVelocity>,
@@ -242,7 +242,7 @@ fn observe(
 }
 
 /// Stands for the IMU.
-fn heading(world: &World) -> Heading {
+fn heading(world: &Simulation) -> Heading {
     Heading::new(Angle::from_radians(
         world.chassis().map_or(0.0, |state| narrow(state.heading_rad)),
     ))

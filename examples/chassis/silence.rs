@@ -2,7 +2,7 @@
 
 use super::scenario::{Sample, at, seconds_of};
 use drivetrain::chassis::MecanumWheels;
-use drivetrain::sim::{Record, Sender};
+use drivetrain::sim::{Sender, Transmission};
 use drivetrain::time::{Duration, Instant};
 
 /// Without a command for longer than this, the ESCs missed one: the controller sends one each millisecond.
@@ -22,7 +22,7 @@ impl CommandWatch {
     }
 
     /// Takes a frame on the wire; the controller sends nothing but commands.
-    pub(crate) fn see(&mut self, record: &Record) {
+    pub(crate) fn see(&mut self, record: &Transmission) {
         if record.sender == Sender::Controller && record.delivered {
             self.command(record.at);
         }

@@ -92,7 +92,7 @@ pub(crate) fn place(pose: Pose2<World>) -> Vec2 {
 
 /// Where the robot truly is, and which way it faces; stands for the IMU.
 #[expect(clippy::cast_possible_truncation, reason = "some radians and metres")]
-pub(crate) fn truth(world: &sim::World) -> Result<(Vec2, Heading), Box<dyn Error>> {
+pub(crate) fn truth(world: &sim::Simulation) -> Result<(Vec2, Heading), Box<dyn Error>> {
     let state = world.chassis().ok_or("no chassis")?;
     let heading = Heading::new(Angle::from_radians(state.heading_rad as f32));
     Ok((Vec2::new(state.x_m as f32, state.y_m as f32), heading))

@@ -5,7 +5,7 @@ use super::system::checks::{Check, RMS_LIMIT_DEG};
 use super::system::robot::Event;
 use super::system::simulation::Run;
 use super::system::tcp::Report;
-use drivetrain::sim::SerialCounts;
+use drivetrain::sim::SerialLine;
 use drivetrain::wire::Counts;
 use std::fmt::Write as _;
 
@@ -41,9 +41,9 @@ pub(crate) fn table(run: &Run, checks: &[Check]) -> String {
         counters.unanswered,
         counters.bad_length + counters.bad_field + counters.foreign_commands
     );
-    _ = writeln!(text, "down    {}", line(run.sent.len(), run.down));
-    let up_frames = run.up.0.sent / 121;
-    _ = writeln!(text, "up      {}", line(usize::try_from(up_frames).unwrap_or(0), run.up));
+    _ = writeln!(text, "down    {}", line(run.sent.len(), &run.down));
+    let up_frames = run.up.0.sent() / 121;
+    _ = writeln!(text, "up      {}", line(usize::try_from(up_frames).unwrap_or(0), &run.up));
     let imus = run.imus.map(|(sent, counts)| format!("{}/{sent}", counts.frames)).join(" ");
     _ = writeln!(text, "IMUs    frames read of those sent: {imus}");
     let yaws = run
@@ -66,15 +66,15 @@ pub(crate) fn table(run: &Run, checks: &[Check]) -> String {
     text
 }
 
-fn line(frames: usize, (bytes, counts): (SerialCounts, Counts)) -> String {
+fn line(frames: usize, (bytes, counts): &(SerialLine, Counts)) -> String {
     format!(
         "{frames} frames sent, {} good, {} with a wrong sum; {} bytes sent, {} damaged, {} lost, {} stray; {} skipped to resynchronise",
         counts.frames,
         counts.checksum_errors,
-        bytes.sent,
-        bytes.flipped,
-        bytes.lost,
-        bytes.inserted,
+        bytes.sent(),
+        bytes.flipped(),
+        bytes.lost(),
+        bytes.inserted(),
         counts.skipped_bytes
     )
 }

@@ -11,6 +11,6 @@ fuzz_target!(|line: &[u8]| {
                 assert_eq!(Record::parse(text.as_bytes()), Ok(record));
             }
         }
-        Err(error) => assert!((1..=line.len() + 1).contains(&error.column)),
+        Err(error) => assert!((1..=line.len() + 1).contains(&error.column())),
     }
 });

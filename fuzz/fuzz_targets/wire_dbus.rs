@@ -27,7 +27,7 @@ fuzz_target!(|data: &[u8]| {
         while let Some(remote) = dbus.read(&mut bytes, now) {
             heard = Some(now);
             let values =
-                [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
+                [remote.right_x, remote.right_y, remote.left_x, remote.left_y, remote.dial];
             assert!(values.iter().all(|value| value.abs() <= 1.0), "I2: {remote:?}");
             assert!(remote.left_switch != Switch::Absent && remote.right_switch != Switch::Absent);
         }
@@ -40,7 +40,7 @@ fuzz_target!(|data: &[u8]| {
         assert_eq!(dbus.edge(now), split.edge(now), "I10");
         // I6: every byte was in a frame, was skipped, or waits for the end of its frame.
         let counts = dbus.counts();
-        let in_frames = FRAME_LENGTH * (counts.frames + counts.implausible) as usize;
+        let in_frames = FRAME_LENGTH * (counts.frames + counts.content_errors) as usize;
         let waiting = bytes_came.checked_sub(in_frames + counts.skipped_bytes as usize);
         assert!(waiting.is_some_and(|waiting| waiting < FRAME_LENGTH), "I6: {counts:?}");
     }
@@ -72,7 +72,7 @@ fn good_frames_are_taken(dbus: &mut Dbus, mut now: Instant, mut input: Input) {
             let counts = f32::from(channel) - 1024.0;
             (counts.abs() - DEAD_BAND).max(0.0).copysign(counts) / (660.0 - DEAD_BAND)
         });
-        let values = [remote.right.x, remote.right.y, remote.left.x, remote.left.y, remote.dial];
+        let values = [remote.right_x, remote.right_y, remote.left_x, remote.left_y, remote.dial];
         let near = values.iter().zip(shares).all(|(value, share)| (value - share).abs() < 1e-6);
         assert!(near && dbus.is_live(now), "{frame:02X?}: {remote:?}, not {shares:?}");
     }

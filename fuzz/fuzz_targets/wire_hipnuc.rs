@@ -3,12 +3,12 @@
 
 use core::array::from_fn;
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::Protocol;
-use drivetrain::wire::hipnuc::HipNuc;
+use drivetrain::wire::Decode;
+use drivetrain::wire::hipnuc::Imu;
 use drivetrain_fuzz::{Input, any_split_gives_the_same, refuses_a_flipped_bit};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| any_split_gives_the_same(HipNuc, data, imu));
+fuzz_target!(|data: &[u8]| any_split_gives_the_same::<Imu>((), data, imu));
 
 /// Header, length, checksum, and a payload of a kind that is known or not, with any content or such as a sensor sends.
 fn imu(input: &mut Input) -> Vec<u8> {
@@ -21,7 +21,7 @@ fn imu(input: &mut Input) -> Vec<u8> {
     let mut payload = vec![tag];
     payload.extend((1..length).map(|_| input.byte()));
     let frame = framed(&payload);
-    if let Ok(imu) = HipNuc.parse(&frame) {
+    if let Ok(imu) = Imu::decode(&(), &frame) {
         // What motion is computed from; pressure and magnetic field may be anything.
         let rates = imu.angular_velocity.map(AngularVelocity::as_rad_per_s);
         let angles = [imu.roll, imu.pitch, imu.yaw].map(Angle::as_radians);
@@ -50,7 +50,7 @@ fn sensible(input: &mut Input) -> Vec<u8> {
     let floats = values.iter().chain(&quaternion);
     payload.extend(floats.flat_map(|value| value.to_le_bytes()));
     let frame = framed(&payload);
-    let imu = HipNuc.parse(&frame).expect("a whole frame");
+    let imu = Imu::decode(&(), &frame).expect("a whole frame");
     assert_eq!((imu.status, imu.time_ms), (status, Some(time_ms)));
     assert_eq!((imu.temperature_c, imu.pressure_pa), (temperature_c.cast_signed(), 101_325.0));
     let near = |is: [f32; 3], sent: &[f32], unit: f32| {
@@ -62,9 +62,9 @@ fn sensible(input: &mut Input) -> Vec<u8> {
     assert!(near(rates, &values[3..6], 1.0), "{imu:?}");
     assert!(near(imu.magnetic_field_ut, &values[6..9], 1.0), "{imu:?}");
     assert!(near(angles, &values[9..], 1.0), "{imu:?}");
-    let attitude = imu.attitude.as_array().into_iter().zip(quaternion);
+    let attitude = imu.attitude.to_quaternion().into_iter().zip(quaternion);
     assert!(attitude.into_iter().all(|(is, sent): (f32, f32)| (is - sent).abs() < 1e-6), "{imu:?}");
-    refuses_a_flipped_bit(HipNuc, &frame);
+    refuses_a_flipped_bit::<Imu>(&(), &frame);
     frame
 }
 

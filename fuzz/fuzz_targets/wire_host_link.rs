@@ -2,19 +2,18 @@
 #![no_main]
 
 use core::array::from_fn;
-use drivetrain::wire::Protocol;
+use drivetrain::wire::Decode;
 use drivetrain::wire::host_link::{
-    ByteOrder, COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset, TELEMETRY_LENGTH,
-    Telemetry, TelemetryFormat, TelemetryHeader,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain_fuzz::{Input, any_split_gives_the_same, refuses_a_flipped_bit};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    any_split_gives_the_same(CommandFormat, data, command);
-    let document = TelemetryFormat::new().with_header(TelemetryHeader::Document);
-    for format in [document, TelemetryFormat::new().with_floats(ByteOrder::Big)] {
-        any_split_gives_the_same(format, data, |input| telemetry(format, input));
+    any_split_gives_the_same::<HostCommand>((), data, command);
+    let document = TelemetryFormat::new().with_document_header();
+    for format in [document, TelemetryFormat::new().with_big_endian_floats()] {
+        any_split_gives_the_same::<Telemetry>(format, data, |input| telemetry(format, input));
     }
 });
 
@@ -26,10 +25,10 @@ fn command(input: &mut Input) -> Vec<u8> {
     let [gm6020_position, c610_position, sts3032_degrees] =
         from_fn(|_| i16::from_le_bytes(input.bytes()));
     let reset = Reset::from_raw(input.byte());
-    let command = Command { joints, gm6020_position, c610_position, sts3032_degrees, reset };
+    let command = HostCommand { joints, gm6020_position, c610_position, sts3032_degrees, reset };
     let frame = command.encode(&mut [0; COMMAND_LENGTH]).expect("room").to_vec();
-    assert_eq!(CommandFormat.parse(&frame), Ok(command));
-    refuses_a_flipped_bit(CommandFormat, &frame);
+    assert_eq!(HostCommand::decode(&(), &frame), Ok(command));
+    refuses_a_flipped_bit::<HostCommand>(&(), &frame);
     frame
 }
 
@@ -43,9 +42,9 @@ fn telemetry(format: TelemetryFormat, input: &mut Input) -> Vec<u8> {
     };
     let frame = format.encode(&telemetry, &mut [0; TELEMETRY_LENGTH]).expect("room").to_vec();
     // The format refuses no angle, infinite or NaN. As text and as bytes, because NaN is not equal to itself.
-    let read = format.parse(&frame).expect("a whole frame");
+    let read = Telemetry::decode(&format, &frame).expect("a whole frame");
     assert_eq!(format!("{read:?}"), format!("{telemetry:?}"));
     assert_eq!(format.encode(&read, &mut [0; TELEMETRY_LENGTH]), Ok(&frame[..]));
-    refuses_a_flipped_bit(format, &frame);
+    refuses_a_flipped_bit::<Telemetry>(&format, &frame);
     frame
 }

@@ -4,46 +4,45 @@ use crate::Input;
 use std::fmt::Debug;
 
 use drivetrain::time::{Duration, Instant};
-use drivetrain::wire::{Counts, Deframer, Link, Protocol, Reject};
+use drivetrain::wire::{Counts, Decode, Deframer, Receiver, Reject};
 use std::cell::Cell;
+use std::rc::Rc;
 
 /// Long enough for every frame of every protocol.
 const BUFFER: usize = 160;
 
-/// A protocol that notes how many bytes were frames.
-struct Counted<'a, P> {
-    protocol: P,
-    bytes: &'a Cell<usize>,
-}
+/// A frame that notes how many bytes were frames.
+struct Counted<F>(F);
 
-impl<P: Protocol> Protocol for Counted<'_, P> {
-    type Frame = P::Frame;
-    const PREFIX: usize = P::PREFIX;
+impl<F: Decode> Decode for Counted<F> {
+    type Options = (F::Options, Rc<Cell<usize>>);
+    const PREFIX: usize = F::PREFIX;
 
-    fn header(&self) -> &[u8] {
-        self.protocol.header()
+    fn header((options, _): &Self::Options) -> &[u8] {
+        F::header(options)
     }
 
-    fn length(&self, prefix: &[u8]) -> Option<usize> {
-        self.protocol.length(prefix)
+    fn length((options, _): &Self::Options, prefix: &[u8]) -> Option<usize> {
+        F::length(options, prefix)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<P::Frame, Reject> {
-        let outcome = self.protocol.parse(frame);
+    fn decode((options, bytes): &Self::Options, frame: &[u8]) -> Result<Self, Reject> {
+        let outcome = F::decode(options, frame);
         if matches!(outcome, Ok(_) | Err(Reject::Foreign)) {
-            self.bytes.set(self.bytes.get() + frame.len());
+            bytes.set(bytes.get() + frame.len());
         }
-        outcome
+        outcome.map(Self)
     }
 }
 
 /// Reads `bytes` in pieces of `piece` bytes and checks what holds for any bytes.
-fn read<P: Protocol>(protocol: P, bytes: &[u8], piece: usize) -> (Vec<P::Frame>, Counts) {
-    let in_frames = Cell::new(0);
-    let mut decoder = Deframer::<_, BUFFER>::new(Counted { protocol, bytes: &in_frames });
+fn read<F: Decode>(options: F::Options, bytes: &[u8], piece: usize) -> (Vec<F>, Counts) {
+    let in_frames = Rc::new(Cell::new(0));
+    let options = (options, Rc::clone(&in_frames));
+    let mut decoder = Deframer::<Counted<F>, BUFFER>::with_options(options);
     let mut frames = Vec::new();
     for mut piece in bytes.chunks(piece) {
-        while let Some(frame) = decoder.read(&mut piece) {
+        while let Some(Counted(frame)) = decoder.read(&mut piece) {
             frames.push(frame);
         }
         assert!(piece.is_empty());
@@ -80,40 +79,40 @@ fn stream(mut input: Input, frame: impl Fn(&mut Input) -> Vec<u8>) -> Vec<u8> {
 
 /// One bit that was turned over on the way, wherever it is behind the header and the length, makes a frame none. Which bit is chosen
 /// by what the frame holds.
-pub fn refuses_a_flipped_bit<P: Protocol<Frame: Debug>>(protocol: P, frame: &[u8]) {
+pub fn refuses_a_flipped_bit<F: Decode + Debug>(options: &F::Options, frame: &[u8]) {
     let seed = frame.iter().fold(0_usize, |sum, byte| sum * 31 % 65_521 + usize::from(*byte));
     let mut damaged = frame.to_vec();
-    damaged[P::PREFIX + seed / 8 % (frame.len() - P::PREFIX)] ^= 1 << (seed % 8);
-    let outcome = protocol.parse(&damaged);
+    damaged[F::PREFIX + seed / 8 % (frame.len() - F::PREFIX)] ^= 1 << (seed % 8);
+    let outcome = F::decode(options, &damaged);
     assert!(matches!(outcome, Err(Reject::Checksum)), "{damaged:02X?}: {outcome:?}");
 }
 
 /// The first byte says how the others are split: the frames found and the counts must not depend on it. `frame` writes what the
 /// protocol takes.
-pub fn any_split_gives_the_same<P: Protocol<Frame: Copy + Debug> + Copy>(
-    protocol: P,
+pub fn any_split_gives_the_same<F: Decode<Options: Copy> + Copy + Debug>(
+    options: F::Options,
     data: &[u8],
     frame: impl Fn(&mut Input) -> Vec<u8>,
 ) {
     let Some((piece, data)) = data.split_first() else { return };
     let bytes = &stream(Input(data), frame);
-    let (whole, whole_counts) = read(protocol, bytes, usize::MAX);
-    assert_eq!(format!("{whole:?}"), format!("{:?}", search(protocol, bytes)), "I6");
-    let (split, split_counts) = read(protocol, bytes, usize::from(*piece % 64) + 1);
+    let (whole, whole_counts) = read::<F>(options, bytes, usize::MAX);
+    assert_eq!(format!("{whole:?}"), format!("{:?}", search::<F>(&options, bytes)), "I6");
+    let (split, split_counts) = read::<F>(options, bytes, usize::from(*piece % 64) + 1);
     assert_eq!(whole_counts, split_counts);
     // Compared as text: a frame may hold NaN.
     assert_eq!(format!("{whole:?}"), format!("{split:?}"));
-    assert_eq!(watch(protocol, bytes, usize::from(*piece % 64) + 1), whole_counts);
+    assert_eq!(watch::<F>(options, bytes, usize::from(*piece % 64) + 1), whole_counts);
 }
 
 /// The frames as one finds them who has all bytes before them: a frame that is none costs one byte, not its length.
-fn search<P: Protocol>(protocol: P, bytes: &[u8]) -> Vec<P::Frame> {
+fn search<F: Decode>(options: &F::Options, bytes: &[u8]) -> Vec<F> {
     let (mut frames, mut rest) = (Vec::new(), bytes);
-    while let Some(prefix) = rest.get(..P::PREFIX) {
-        let total = protocol.length(prefix).filter(|total| (P::PREFIX..=BUFFER).contains(total));
-        let used = match total.filter(|_| rest.starts_with(protocol.header())) {
+    while let Some(prefix) = rest.get(..F::PREFIX) {
+        let total = F::length(options, prefix).filter(|total| (F::PREFIX..=BUFFER).contains(total));
+        let used = match total.filter(|_| rest.starts_with(F::header(options))) {
             None => 1,
-            Some(total) => match rest.get(..total).map(|frame| protocol.parse(frame)) {
+            Some(total) => match rest.get(..total).map(|frame| F::decode(options, frame)) {
                 None => break,
                 Some(Ok(frame)) => {
                     frames.push(frame);
@@ -129,9 +128,9 @@ fn search<P: Protocol>(protocol: P, bytes: &[u8]) -> Vec<P::Frame> {
 }
 
 /// Reads through a link, each piece up to 255 ms after the one before: what it shows came in time (I4).
-fn watch<P: Protocol<Frame: Copy>>(protocol: P, bytes: &[u8], piece: usize) -> Counts {
+fn watch<F: Decode + Copy>(options: F::Options, bytes: &[u8], piece: usize) -> Counts {
     const DEADLINE: Duration = Duration::from_millis(100);
-    let mut link = Link::<P, BUFFER>::new(protocol, DEADLINE);
+    let mut link = Receiver::<F, BUFFER>::with_options(options, DEADLINE);
     let (mut now, mut heard, mut repeated) = (Instant::START, None, 0);
     for mut piece in bytes.chunks(piece) {
         now = now + Duration::from_millis(piece.first().copied().unwrap_or_default().into());

@@ -199,13 +199,13 @@ impl core::error::Error for HomingError {}
 /// use drivetrain::encoder::Position;
 /// use drivetrain::motor::{HomingStep, Link, ShaftState, StopHoming, StopHomingConfig};
 /// use drivetrain::runner::{Nb, Runner};
-/// use drivetrain::sim::{Model, MotorConfig, World};
+/// use drivetrain::sim::{MotorConfig, Simulation};
 /// use drivetrain::time::Duration;
 /// use drivetrain::units::{Angle, AngularVelocity, Current};
 ///
-/// let world = World::new(1);
+/// let world = Simulation::new(1);
 /// let stops = (Angle::from_degrees(-90.0), Angle::from_degrees(90.0)); // from where it starts
-/// world.attach(MotorConfig::new(Model::M2006, 1).with_stops(stops.0, stops.1))?;
+/// world.attach(MotorConfig::m2006(1).with_stops(stops.0, stops.1))?;
 /// let mut bus = Bus::new();
 /// let limit = Current::from_amperes(3.0);
 /// let speed = PidConfig::new(0.2, 3.0, 0.0); // A per rad/s, A per rad

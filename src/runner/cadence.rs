@@ -25,8 +25,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// use drivetrain::dji::Bus;
     /// use drivetrain::runner::{Nb, Runner};
     /// use drivetrain::time::{Duration, Instant, ManualClock};
-    /// # use drivetrain::sim::World;
-    /// # let world = World::new(1);
+    /// # use drivetrain::sim::Simulation;
+    /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
     /// let clock = ManualClock::new(Instant::START);

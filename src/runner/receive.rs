@@ -67,8 +67,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// use drivetrain::frame::CanFrame;
     /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
     /// use drivetrain::time::{Instant, ManualClock};
-    /// # use drivetrain::sim::World;
-    /// # let world = World::new(1);
+    /// # use drivetrain::sim::Simulation;
+    /// # let world = Simulation::new(1);
     /// # let can = world.controller();
     ///
     /// let clock = ManualClock::new(Instant::from_micros(9));

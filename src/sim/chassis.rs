@@ -1,9 +1,10 @@
 use super::body::{Body, Contact, Rolling, Velocity};
 use super::esc::Esc;
+use super::motor::MOTORS;
 use super::{MotorKey, Wheel};
 use crate::geometry::{self, Twist};
 
-/// A chassis to attach to a [`World`](super::World): a rigid body on wheels of any layout, all of which can slip.
+/// A chassis to attach to a [`Simulation`](super::Simulation): a rigid body on wheels of any layout, all of which can slip.
 ///
 /// The weight rests on all wheels alike. The floor holds each [`Wheel`] as its kind says, with a force of at most
 /// friction times load, in all directions together; below that the slip is some millimetres a second. Castors are no
@@ -13,13 +14,13 @@ use crate::geometry::{self, Twist};
 /// ```
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::geometry::Vec2;
-/// use drivetrain::sim::{AttachError, ChassisConfig, Model, MotorConfig, Wheel, World};
+/// use drivetrain::sim::{SimError, ChassisConfig, MotorConfig, Wheel, Simulation};
 /// use drivetrain::time::Duration;
 /// use embedded_can::nb::Can;
 ///
-/// let world = World::new(1);
-/// let wheel = |id, x, y| -> Result<Wheel, AttachError> {
-///     Ok(Wheel::mecanum(world.attach(MotorConfig::new(Model::M3508, id))?, 0.076, Vec2::new(x, y)))
+/// let world = Simulation::new(1);
+/// let wheel = |id, x, y| -> Result<Wheel, SimError> {
+///     Ok(Wheel::mecanum(world.attach(MotorConfig::m3508(id))?, 0.076, Vec2::new(x, y)))
 /// };
 /// // The motors sit inside with their shafts outward: those on the right turn clockwise to drive forward.
 /// let wheels = [
@@ -85,7 +86,7 @@ impl ChassisConfig {
     ///
     /// # Errors
     /// The name of the first that makes no sense: no wheel or more than eight, a length, mass, inertia or friction that
-    /// is not above zero and at most 1000, a direction that is not finite, a roller that lies nearly across its wheel.
+    /// is not above zero and at most 1000, a direction that is not finite, a joint as the motor of a wheel, a roller that lies nearly across its wheel.
     pub fn validate(&self) -> Result<(), &'static str> {
         if self.too_many || self.wheels().next().is_none() {
             return Err("number of wheels");
@@ -162,8 +163,8 @@ impl Chassis {
 
     /// Moves the chassis on its motors by one step, and returns the torque of the ground on each motor. A wheel
     /// without one stands still.
-    pub(crate) fn step(&mut self, escs: &Escs, dt_s: f32) -> [f32; MotorKey::CAPACITY] {
-        let esc = |motor: MotorKey| escs.get(usize::from(motor.0))?.as_ref();
+    pub(crate) fn step(&mut self, escs: &Escs, dt_s: f32) -> [f32; MOTORS] {
+        let esc = |motor: MotorKey| escs.get(motor.index())?.as_ref();
         let mut rolling = [NONE; ChassisConfig::MAX_WHEELS];
         let mut count = 0;
         for (place, mounted) in rolling.iter_mut().zip(self.wheels.iter_mut().flatten()) {
@@ -180,9 +181,9 @@ impl Chassis {
         }
         let rolling = rolling.get_mut(..count).unwrap_or_default();
         self.body.step(rolling, dt_s);
-        let mut ground_nm = [0.0; MotorKey::CAPACITY];
+        let mut ground_nm = [0.0; MOTORS];
         for (rolling, mounted) in rolling.iter().zip(self.wheels.iter().flatten()) {
-            if let Some(sum) = ground_nm.get_mut(usize::from(mounted.wheel.motor().0)) {
+            if let Some(sum) = ground_nm.get_mut(mounted.wheel.motor().index()) {
                 *sum += mounted.wheel.sign() * rolling.torque;
             }
         }
@@ -197,7 +198,7 @@ impl Chassis {
 }
 
 /// The motors of a world.
-pub(crate) type Escs = [Option<Esc>; MotorKey::CAPACITY];
+pub(crate) type Escs = [Option<Esc>; MOTORS];
 
 const NONE: Rolling = Rolling {
     contact: Contact {
@@ -216,7 +217,8 @@ mod tests {
     use super::*;
     use crate::frame::CanFrame;
     use crate::geometry::Vec2;
-    use crate::sim::{AttachError, Model, MotorConfig, World};
+    use crate::sim::motor::Model;
+    use crate::sim::{MotorConfig, SimError, Simulation};
     use crate::time::Duration;
     use crate::units::Angle;
     use embedded_can::nb::Can;
@@ -233,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_parameter_that_makes_no_sense_is_named() {
-        let motor = MotorKey(0);
+        let motor = MotorKey::new(0).unwrap();
         let config = ChassisConfig::new(&four(motor));
         assert_eq!(config.validate(), Ok(()));
         let one = |wheel| ChassisConfig::new(&[wheel]);
@@ -248,22 +250,23 @@ mod tests {
             (one(Wheel::steered(motor, 0.1, Vec2::ZERO, motor, nan)), "direction"),
             (one(corner(motor).with_roller_axis(Angle::from_degrees(90.0))), "roller_axis"),
             (one(corner(motor).with_roller_axis(nan)), "roller_axis"),
+            (one(corner(MotorKey::of_joint(0).unwrap())), "motor"),
             (config.with_mass_kg(-1.0), "mass_kg"),
             (config.with_yaw_inertia_kg_m2(f32::NAN), "yaw_inertia_kg_m2"),
             (config.with_friction(f32::INFINITY), "friction"),
         ];
         for (config, name) in table {
             assert_eq!(config.validate(), Err(name));
-            let error = World::new(1).attach_chassis(config);
-            assert_eq!(error, Err(AttachError::Chassis(name)));
-            assert!(AttachError::Chassis(name).to_string().starts_with(name));
+            let error = Simulation::new(1).attach_chassis(config);
+            assert_eq!(error, Err(SimError::Chassis(name)));
+            assert!(SimError::Chassis(name).to_string().starts_with(name));
         }
     }
 
     #[test]
     fn a_chassis_on_motors_of_another_world_stands_and_can_be_pushed() {
-        let world = World::new(1);
-        world.attach_chassis(ChassisConfig::new(&four(MotorKey(15)))).unwrap();
+        let world = Simulation::new(1);
+        world.attach_chassis(ChassisConfig::new(&four(MotorKey::new(15).unwrap()))).unwrap();
         world.push_chassis(0.0, 1_000.0, f32::NAN);
         world.advance(Duration::from_millis(100));
         let state = world.chassis().unwrap();
@@ -271,7 +274,7 @@ mod tests {
         assert!(state.twist.wz_rad_s.abs() < 1e-3);
     }
 
-    fn amperes(world: &World, per_slot: [i16; 4]) {
+    fn amperes(world: &Simulation, per_slot: [i16; 4]) {
         let words = per_slot.map(|amperes| (amperes * 819).to_be_bytes());
         let data = words.as_flattened().try_into().unwrap();
         let frame = CanFrame::standard(0x200, data).unwrap();
@@ -281,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_motor_that_drives_two_wheels_of_its_side_drives_both() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let left = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
         let right = world.attach(MotorConfig::new(Model::M3508, 2)).unwrap();
         let wheel = |motor, x, y| Wheel::plain(motor, 0.076, Vec2::new(x, y));
@@ -303,7 +306,7 @@ mod tests {
 
     #[test]
     fn a_module_drives_where_its_steering_motor_points_from_its_zero() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let wheel = |id: u8, x, y| {
             let drive = world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
             // 90 degrees on the encoder of a module whose zero is at 45.

@@ -1,7 +1,6 @@
 use super::mailbox::Offer;
-use super::{Fault, Line, World};
+use super::{Fault, Line, SimError, Simulation};
 use crate::frame::CanFrame;
-use embedded_can::ErrorKind;
 
 /// How long a blocking call waits, in simulated time, before it gives up.
 const PATIENCE_NS: u64 = 1_000_000_000;
@@ -23,10 +22,10 @@ const NAP_NS: u64 = 100_000;
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::World;
+/// use drivetrain::sim::Simulation;
 /// use embedded_can::nb::Can;
 ///
-/// let world = World::new(1);
+/// let world = Simulation::new(1);
 /// let mut can = world.controller();
 /// for id in [0x300, 0x100, 0x200] {
 ///     let frame = CanFrame::standard(id, [0; 8]).ok_or("id")?;
@@ -41,50 +40,12 @@ const NAP_NS: u64 = 100_000;
 /// ```
 #[derive(Debug)]
 pub struct Controller<'a> {
-    world: &'a World,
+    world: &'a Simulation,
     line: Line,
 }
 
-/// Why a call to a [`Controller`] failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum ControllerError {
-    /// The controller is bus-off.
-    BusOff,
-    /// Frames were missed because the receive queue was full. Reported once; those before them are still there.
-    Overrun,
-    /// [`Fault::DriverErrors`] wants it so.
-    Scripted,
-    /// A blocking call waited for a second.
-    TimedOut,
-}
-
-impl core::fmt::Display for ControllerError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::BusOff => "the controller is bus-off",
-            Self::Overrun => "frames were missed: the receive queue was full",
-            Self::Scripted => "a scripted error of the driver",
-            Self::TimedOut => "waited for a simulated second",
-        })
-    }
-}
-
-impl core::error::Error for ControllerError {}
-
-impl embedded_can::Error for ControllerError {
-    fn kind(&self) -> ErrorKind {
-        match self {
-            Self::Overrun => ErrorKind::Overrun,
-            Self::Scripted => ErrorKind::Acknowledge,
-            Self::BusOff | Self::TimedOut => ErrorKind::Other,
-        }
-    }
-}
-
 impl<'a> Controller<'a> {
-    pub(super) const fn new(world: &'a World, line: Line) -> Self {
+    pub(super) const fn new(world: &'a Simulation, line: Line) -> Self {
         Self { world, line }
     }
 
@@ -96,13 +57,13 @@ impl<'a> Controller<'a> {
     }
 
     /// Fails where any call of the driver fails.
-    fn check(&self) -> Result<(), ControllerError> {
+    fn check(&self) -> Result<(), SimError> {
         self.world.with(|engine| {
             let now_ns = engine.now_ns;
             let error = if engine.faults.is_active(Fault::BusOff(self.line), now_ns) {
-                ControllerError::BusOff
+                SimError::BusOff
             } else if engine.faults.driver_error(self.line, now_ns) {
-                ControllerError::Scripted
+                SimError::Scripted
             } else {
                 return Ok(());
             };
@@ -131,10 +92,10 @@ impl<'a> Controller<'a> {
         })
     }
 
-    fn take(&self) -> nb::Result<CanFrame, ControllerError> {
+    fn take(&self) -> nb::Result<CanFrame, SimError> {
         let missed = self.world.with(|engine| engine.wire_mut(self.line).take_overrun());
         if missed {
-            return Err(nb::Error::Other(ControllerError::Overrun));
+            return Err(nb::Error::Other(SimError::Overrun));
         }
         let heard = self.world.with(|engine| engine.wire_mut(self.line).take_heard());
         heard.ok_or(nb::Error::WouldBlock)
@@ -143,8 +104,8 @@ impl<'a> Controller<'a> {
     /// Moves time until `attempt` gives something.
     fn wait<T>(
         &self,
-        mut attempt: impl FnMut() -> Option<Result<T, ControllerError>>,
-    ) -> Result<T, ControllerError> {
+        mut attempt: impl FnMut() -> Option<Result<T, SimError>>,
+    ) -> Result<T, SimError> {
         let deadline_ns = self.world.with(|engine| engine.now_ns.saturating_add(PATIENCE_NS));
         loop {
             if let Some(result) = attempt() {
@@ -158,7 +119,7 @@ impl<'a> Controller<'a> {
                 engine.now_ns < deadline_ns
             });
             if !waiting {
-                return Err(ControllerError::TimedOut);
+                return Err(SimError::TimedOut);
             }
         }
     }
@@ -166,9 +127,9 @@ impl<'a> Controller<'a> {
 
 impl embedded_can::nb::Can for Controller<'_> {
     type Frame = CanFrame;
-    type Error = ControllerError;
+    type Error = SimError;
 
-    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ControllerError> {
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, SimError> {
         self.check()?;
         match self.offer(frame) {
             Offer::Taken => Ok(None),
@@ -177,7 +138,7 @@ impl embedded_can::nb::Can for Controller<'_> {
         }
     }
 
-    fn receive(&mut self) -> nb::Result<CanFrame, ControllerError> {
+    fn receive(&mut self) -> nb::Result<CanFrame, SimError> {
         self.check()?;
         self.take()
     }
@@ -185,9 +146,9 @@ impl embedded_can::nb::Can for Controller<'_> {
 
 impl embedded_can::blocking::Can for Controller<'_> {
     type Frame = CanFrame;
-    type Error = ControllerError;
+    type Error = SimError;
 
-    fn transmit(&mut self, frame: &CanFrame) -> Result<(), ControllerError> {
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), SimError> {
         self.wait(|| {
             if let Err(error) = self.check() {
                 return Some(Err(error));
@@ -202,7 +163,7 @@ impl embedded_can::blocking::Can for Controller<'_> {
         })
     }
 
-    fn receive(&mut self) -> Result<CanFrame, ControllerError> {
+    fn receive(&mut self) -> Result<CanFrame, SimError> {
         self.wait(|| match self.check().map_err(nb::Error::Other).and_then(|()| self.take()) {
             Ok(frame) => Some(Ok(frame)),
             Err(nb::Error::Other(error)) => Some(Err(error)),
@@ -214,7 +175,7 @@ impl embedded_can::blocking::Can for Controller<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Record, Sender};
+    use crate::sim::{Sender, Transmission};
     use crate::time::{Duration, Instant};
     use embedded_can::{Frame as _, nb::Can as _};
     use std::vec::Vec;
@@ -223,19 +184,19 @@ mod tests {
         CanFrame::standard(id, [tag; 8]).unwrap()
     }
 
-    fn run(world: &World, micros: u64) -> Vec<Record> {
+    fn run(world: &Simulation, micros: u64) -> Vec<Transmission> {
         let mut records = Vec::new();
         world.advance_with(Duration::from_micros(micros), |record| records.push(*record));
         records
     }
 
-    fn frames(records: &[Record]) -> Vec<CanFrame> {
+    fn frames(records: &[Transmission]) -> Vec<CanFrame> {
         records.iter().map(|record| record.frame).collect()
     }
 
     #[test]
     fn frames_of_one_instant_leave_in_the_order_of_their_ids() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         for id in [0x300, 0x100, 0x200] {
             assert_eq!(can.transmit(&frame(id, 0)), Ok(None));
@@ -251,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_frame_on_the_wire_is_not_interrupted_by_a_more_urgent_one() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         assert_eq!(can.transmit(&frame(0x300, 0)), Ok(None));
         run(&world, 50);
@@ -262,7 +223,7 @@ mod tests {
     #[test]
     fn frames_follow_each_other_after_exactly_their_bits_and_the_pause() {
         for (bits_per_s, bit_us) in [(1_000_000, 1), (500_000, 2), (250_000, 4)] {
-            let world = World::new(1).with_bit_rate(Line::Can1, bits_per_s);
+            let world = Simulation::new(1).with_bit_rate(Line::Can1, bits_per_s);
             let mut can = world.controller();
             for tag in 1..=3 {
                 assert_eq!(can.transmit(&frame(0x200, tag)), Ok(None));
@@ -282,7 +243,7 @@ mod tests {
 
     #[test]
     fn an_evicted_frame_comes_back_and_never_leaves() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         for id in [0x201, 0x202, 0x203] {
             assert_eq!(can.transmit(&frame(id, 0)), Ok(None));
@@ -299,7 +260,7 @@ mod tests {
 
     #[test]
     fn the_controller_does_not_hear_itself_and_the_buses_do_not_hear_each_other() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let (mut can1, mut can2) = (world.controller(), world.controller_on(Line::Can2));
         assert_eq!(can1.transmit(&frame(0x100, 0)), Ok(None));
         world.inject(Line::Can2, frame(0x101, 0)).unwrap();
@@ -310,13 +271,13 @@ mod tests {
 
     #[test]
     fn a_full_receive_queue_keeps_the_old_counts_the_new_and_says_so_once() {
-        let world = World::new(1).with_receive_depth(Line::Can1, 3);
+        let world = Simulation::new(1).with_receive_depth(Line::Can1, 3);
         let mut can = world.controller();
         for tag in 0..5 {
             world.inject(Line::Can1, frame(0x400, tag)).unwrap();
         }
         run(&world, 1_000);
-        assert_eq!(can.receive(), Err(nb::Error::Other(ControllerError::Overrun)));
+        assert_eq!(can.receive(), Err(nb::Error::Other(SimError::Overrun)));
         for tag in 0..3 {
             assert_eq!(can.receive(), Ok(frame(0x400, tag)));
         }
@@ -327,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_filter_keeps_out_other_ids_and_other_kinds_of_frame() {
-        let world = World::new(1).with_filter(Line::Can1, 0x200, 0x7F8);
+        let world = Simulation::new(1).with_filter(Line::Can1, 0x200, 0x7F8);
         let extended = embedded_can::ExtendedId::new(0x201).unwrap();
         let remote = CanFrame::new_remote(frame(0x201, 0).id(), 8).unwrap();
         for frame in
@@ -344,7 +305,7 @@ mod tests {
     #[test]
     fn blocking_calls_move_time_until_they_are_done() {
         use embedded_can::blocking::Can;
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         for tag in 0..4 {
             assert_eq!(Can::transmit(&mut can, &frame(0x200, tag)), Ok(()));
@@ -355,13 +316,13 @@ mod tests {
         world.inject(Line::Can1, frame(0x300, 9)).unwrap();
         assert_eq!(Can::receive(&mut can), Ok(frame(0x300, 9)));
         let before = world.now();
-        assert_eq!(Can::receive(&mut can), Err(ControllerError::TimedOut));
+        assert_eq!(Can::receive(&mut can), Err(SimError::TimedOut));
         assert_eq!(world.now().since(before), Duration::from_secs(1));
     }
 
     #[test]
     fn bus_off_is_an_error_and_afterwards_the_mailboxes_send_what_they_hold() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         let window = Instant::from_micros(1_000)..Instant::from_micros(5_000);
         world.fault(Fault::BusOff(Line::Can1), window).unwrap();
@@ -370,7 +331,7 @@ mod tests {
         let cut_off = run(&world, 2_050);
         assert_eq!(frames(&cut_off), [frame(0x200, 1)]);
         assert!(!cut_off[0].delivered && world.traffic(Line::Can1).sent == 0);
-        let off = Err(nb::Error::Other(ControllerError::BusOff));
+        let off = Err(nb::Error::Other(SimError::BusOff));
         assert_eq!(can.transmit(&frame(0x200, 2)), off.map(Some));
         world.inject(Line::Can1, frame(0x400, 0)).unwrap();
         assert_eq!(frames(&run(&world, 1_900)), [frame(0x400, 0)]); // which it does not hear
@@ -383,7 +344,7 @@ mod tests {
 
     #[test]
     fn without_a_cable_the_mailboxes_fill_and_can_be_emptied_by_hand() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         world.fault(Fault::Unplugged(Line::Can1), ..Instant::from_micros(5_000)).unwrap();
         for tag in 0..3 {
@@ -398,7 +359,7 @@ mod tests {
 
     #[test]
     fn a_scripted_driver_blocks_or_fails_in_its_window_only() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut can = world.controller();
         let (first, second) = (Instant::from_micros(100), Instant::from_micros(200));
         let errors = Fault::DriverErrors { line: Line::Can1, probability: 1.0 };
@@ -406,7 +367,7 @@ mod tests {
         world.fault(errors, first..second).unwrap();
         assert_eq!(can.transmit(&frame(0x200, 0)), Err(nb::Error::WouldBlock));
         run(&world, 100);
-        let scripted = nb::Error::Other(ControllerError::Scripted);
+        let scripted = nb::Error::Other(SimError::Scripted);
         assert_eq!(can.transmit(&frame(0x200, 0)), Err(scripted));
         assert_eq!(can.receive(), Err(scripted));
         run(&world, 100);

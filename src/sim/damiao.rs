@@ -27,7 +27,7 @@ const TMAX: usize = 6;
 
 /// A drive of Damiao and the shaft that it turns, for tests: it takes frames, answers them, and moves.
 ///
-/// It stands beside the [`World`](super::World): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
+/// It stands beside the [`Simulation`](super::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
 /// Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is
 /// discarded without an answer. The shaft is an inertia with viscous friction.
 ///

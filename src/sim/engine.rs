@@ -2,11 +2,11 @@ use super::chassis::{Chassis, Escs};
 use super::esc::Esc;
 use super::fault::Faults;
 use super::joint::Drive;
-use super::line::{Line, Record, Sender, Wire};
-use super::mailbox::Offer;
-use super::motor::{MotorConfig, MotorState};
+use super::line::{Line, Sender, Transmission, Wire};
+use super::mailbox::{Mailboxes, Offer};
+use super::motor::{JOINTS, MOTORS, MotorConfig, MotorState};
 use super::ring::Ring;
-use super::{AttachError, Fault, JointConfig, JointKey, JointState, MotorKey};
+use super::{Fault, JointConfig, MotorKey, SimError};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
 
@@ -36,11 +36,11 @@ pub(crate) struct Engine {
     steps: u64,
     wires: [Wire; 3],
     escs: Escs,
-    joints: [Option<Drive>; JointKey::CAPACITY],
+    joints: [Option<Drive>; JOINTS],
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
     /// Frames that passed while a blocking call waited.
-    pub(crate) unseen: Ring<Record, 64>,
+    pub(crate) unseen: Ring<Transmission, 64>,
 }
 
 impl Engine {
@@ -51,8 +51,8 @@ impl Engine {
             stepped_ns: 0,
             steps: 0,
             wires: [Wire::new(Line::Can1), Wire::new(Line::Can2), Wire::new(Line::Can3)],
-            escs: [None; MotorKey::CAPACITY],
-            joints: [None; JointKey::CAPACITY],
+            escs: [None; MOTORS],
+            joints: [None; JOINTS],
             chassis: None,
             faults: Faults::new(),
             unseen: Ring::new(),
@@ -77,42 +77,44 @@ impl Engine {
         }
     }
 
-    pub(crate) fn attach(&mut self, config: MotorConfig) -> Result<MotorKey, AttachError> {
-        let free = self.escs.iter().position(Option::is_none).ok_or(AttachError::Full)?;
-        let key = MotorKey::new(free).ok_or(AttachError::Full)?;
-        let esc = Esc::new(config, self.seed, u64::from(key.0), self.now_ns);
-        let esc = esc.ok_or(AttachError::Id { model: config.model, id: config.id })?;
+    pub(crate) fn attach(&mut self, config: MotorConfig) -> Result<MotorKey, SimError> {
+        let free = self.escs.iter().position(Option::is_none).ok_or(SimError::Full)?;
+        let key = MotorKey::new(free).ok_or(SimError::Full)?;
+        let esc = Esc::new(config, self.seed, free as u64, self.now_ns);
+        let esc = esc.ok_or(SimError::Id { model: config.facts().name, id: config.id })?;
         if let Some(slot) = self.escs.get_mut(free) {
             *slot = Some(esc);
         }
         Ok(key)
     }
 
-    pub(crate) fn attach_joint(&mut self, config: JointConfig) -> Result<JointKey, AttachError> {
-        let refused = AttachError::Joint { id: config.id };
+    pub(crate) fn attach_joint(&mut self, config: JointConfig) -> Result<MotorKey, SimError> {
+        let refused = SimError::Joint { id: config.id };
         let free = self.joints.iter().position(Option::is_none).ok_or(refused)?;
-        let key = JointKey::new(free).ok_or(refused)?;
-        let drive = Drive::new(config, self.seed, u64::from(key.0)).ok_or(refused)?;
+        let key = MotorKey::of_joint(free).ok_or(refused)?;
+        let drive = Drive::new(config, self.seed, free as u64).ok_or(refused)?;
         if let Some(slot) = self.joints.get_mut(free) {
             *slot = Some(drive);
         }
         Ok(key)
     }
 
-    pub(crate) fn joint(&self, key: JointKey) -> Option<JointState> {
-        Some(self.joints.get(usize::from(key.0))?.as_ref()?.state())
-    }
-
-    fn joint_mut(&mut self, key: JointKey) -> Option<&mut Drive> {
-        self.joints.get_mut(usize::from(key.0))?.as_mut()
-    }
-
     pub(crate) fn esc_mut(&mut self, key: MotorKey) -> Option<&mut Esc> {
-        self.escs.get_mut(usize::from(key.0))?.as_mut()
+        self.escs.get_mut(key.index())?.as_mut()
+    }
+
+    fn mailboxes_mut(&mut self, key: MotorKey) -> Option<&mut Mailboxes> {
+        match key.joint_index() {
+            Some(joint) => Some(&mut self.joints.get_mut(joint)?.as_mut()?.mailboxes),
+            None => Some(&mut self.esc_mut(key)?.mailboxes),
+        }
     }
 
     pub(crate) fn motor(&self, key: MotorKey) -> Option<MotorState> {
-        let esc = self.escs.get(usize::from(key.0))?.as_ref()?;
+        if let Some(joint) = key.joint_index() {
+            return Some(self.joints.get(joint)?.as_ref()?.state());
+        }
+        let esc = self.escs.get(key.index())?.as_ref()?;
         Some(esc.state(self.since_step_s()))
     }
 
@@ -122,7 +124,7 @@ impl Engine {
     }
 
     /// Lets happen what happens until `limit_ns`, up to and including the next frame.
-    pub(crate) fn run_until(&mut self, limit_ns: u64) -> Option<Record> {
+    pub(crate) fn run_until(&mut self, limit_ns: u64) -> Option<Transmission> {
         loop {
             let (at_ns, event) = self.next_event();
             if at_ns > limit_ns {
@@ -139,7 +141,7 @@ impl Engine {
                 Event::Step => self.step(),
                 Event::Feedback(index) => self.send_feedback(index),
                 Event::Reply(index) => {
-                    let key = JointKey::new(index).map(Fault::SilentJoint);
+                    let key = MotorKey::of_joint(index).map(Fault::Silent);
                     let silent = key.is_some_and(|fault| self.faults.is_active(fault, self.now_ns));
                     if let Some(Some(joint)) = self.joints.get_mut(index) {
                         joint.reply(silent);
@@ -202,8 +204,8 @@ impl Engine {
             esc.step_current(self.now_ns, STEP_S);
         }
         for (index, slot) in self.joints.iter_mut().enumerate() {
-            let (Some(joint), Some(key)) = (slot, JointKey::new(index)) else { continue };
-            joint.set_powered(!self.faults.is_active(Fault::JointPowerLoss(key), self.now_ns));
+            let (Some(joint), Some(key)) = (slot, MotorKey::of_joint(index)) else { continue };
+            joint.set_powered(self.faults.power_loss(key, self.now_ns).is_none());
             joint.step(STEP_S);
         }
         let ground = self.chassis.as_mut().map(|chassis| chassis.step(&self.escs, STEP_S));
@@ -244,7 +246,7 @@ impl Engine {
         });
         let joints = self.joints.iter().enumerate().filter_map(|(index, joint)| {
             let joint = joint.as_ref().filter(|joint| joint.config.line == line)?;
-            Some((joint.mailboxes.candidate()?, Sender::Joint(JointKey::new(index)?)))
+            Some((joint.mailboxes.candidate()?, Sender::Motor(MotorKey::of_joint(index)?)))
         });
         let rank = |(frame, _): &(CanFrame, Sender)| (frame.id(), frame.is_remote_frame());
         controller.into_iter().chain(foreign).chain(motors).chain(joints).min_by_key(rank)
@@ -265,13 +267,8 @@ impl Engine {
             }
             Sender::Foreign => {}
             Sender::Motor(key) => {
-                if let Some(esc) = self.esc_mut(key) {
-                    esc.mailboxes.begin();
-                }
-            }
-            Sender::Joint(key) => {
-                if let Some(joint) = self.joint_mut(key) {
-                    joint.mailboxes.begin();
+                if let Some(mailboxes) = self.mailboxes_mut(key) {
+                    mailboxes.begin();
                 }
             }
         }
@@ -279,7 +276,7 @@ impl Engine {
     }
 
     /// Takes a frame off the wire and gives it to all the others.
-    fn end_frame(&mut self, line: Line) -> Option<Record> {
+    fn end_frame(&mut self, line: Line) -> Option<Transmission> {
         let now_ns = self.now_ns;
         let flight = self.wire(line).flight()?;
         let (frame, sender) = (flight.frame, flight.sender);
@@ -300,13 +297,8 @@ impl Engine {
                 let _sent = self.wire_mut(line).foreign.pop();
             }
             Sender::Motor(key) => {
-                if let Some(esc) = self.esc_mut(key) {
-                    esc.mailboxes.finish();
-                }
-            }
-            Sender::Joint(key) => {
-                if let Some(joint) = self.joint_mut(key) {
-                    joint.mailboxes.finish();
+                if let Some(mailboxes) = self.mailboxes_mut(key) {
+                    mailboxes.finish();
                 }
             }
         }
@@ -319,7 +311,9 @@ impl Engine {
                 esc.receive(&frame, now_ns);
             }
             for joint in self.joints.iter_mut().flatten() {
-                if joint.config.line == line && !matches!(sender, Sender::Joint(_)) {
+                if joint.config.line == line
+                    && !matches!(sender, Sender::Motor(key) if key.is_joint())
+                {
                     joint.receive(&frame, now_ns);
                 }
             }

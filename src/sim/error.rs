@@ -1,16 +1,17 @@
-use super::{Model, MotorKey};
+use super::motor::MOTORS;
+use embedded_can::ErrorKind;
 
-/// Why something cannot join a [`World`](super::World).
+/// Why a [`Simulation`](super::Simulation) refuses something, or a call of its driver failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum AttachError {
-    /// The world is full.
+pub enum SimError {
+    /// There are 16 motors already.
     Full,
     /// The ESC has no such id.
     Id {
-        /// The model.
-        model: Model,
+        /// The name of the model.
+        model: &'static str,
         /// The id that was asked for.
         id: u8,
     },
@@ -21,17 +22,49 @@ pub enum AttachError {
     },
     /// A parameter of the chassis, by its name, makes no sense; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
     Chassis(&'static str),
+    /// There are 16 faults already that are not over yet.
+    TooManyFaults,
+    /// The fault is one of an ESC, and the motor is a joint: a joint can be silent or without supply.
+    NoFaultOfJoint,
+    /// The controller is bus-off.
+    BusOff,
+    /// Frames were missed because the receive queue was full. Reported once; those before them are still there.
+    Overrun,
+    /// [`Fault::DriverErrors`](super::Fault::DriverErrors) wants the call of the driver to fail.
+    Scripted,
+    /// A blocking call waited for a second.
+    TimedOut,
 }
 
-impl core::fmt::Display for AttachError {
+impl core::fmt::Display for SimError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Full => write!(f, "a world holds {} motors", MotorKey::CAPACITY),
-            Self::Id { model, id } => write!(f, "{model:?} has no id {id}"),
+            Self::Full => write!(f, "a world holds {MOTORS} motors"),
+            Self::Id { model, id } => write!(f, "{model} has no id {id}"),
             Self::Joint { id } => write!(f, "no joint has the id {id}, or there are 12 already"),
             Self::Chassis(name) => write!(f, "{name} of the chassis makes no sense"),
+            Self::TooManyFaults => {
+                f.write_str("a world keeps 16 faults at a time: schedule more when some are over")
+            }
+            Self::NoFaultOfJoint => {
+                f.write_str("a joint can be silent or without supply, and has no other fault")
+            }
+            Self::BusOff => f.write_str("the controller is bus-off"),
+            Self::Overrun => f.write_str("frames were missed: the receive queue was full"),
+            Self::Scripted => f.write_str("a scripted error of the driver"),
+            Self::TimedOut => f.write_str("waited for a simulated second"),
         }
     }
 }
 
-impl core::error::Error for AttachError {}
+impl core::error::Error for SimError {}
+
+impl embedded_can::Error for SimError {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Overrun => ErrorKind::Overrun,
+            Self::Scripted => ErrorKind::Acknowledge,
+            _ => ErrorKind::Other,
+        }
+    }
+}

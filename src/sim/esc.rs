@@ -1,5 +1,5 @@
 use super::mailbox::Mailboxes;
-use super::motor::{LostCommand, MotorConfig, MotorState};
+use super::motor::{MotorConfig, MotorState, position, wrapped};
 use super::random::Random;
 use super::rotor::{Drive, Rotor};
 use crate::dji::{Facts, Unit};
@@ -46,6 +46,8 @@ pub(crate) struct Esc {
     zero: i64,
     /// The feedback as last sent.
     sent: [u8; 8],
+    /// Feedback frames.
+    replies: u32,
 }
 
 impl Esc {
@@ -78,6 +80,7 @@ impl Esc {
             commanded_ns: now_ns,
             zero: 0,
             sent: [0; 8],
+            replies: 0,
         };
         esc.due_ns = esc.grid_ns + u64::from(esc.random.below(JITTER_NS));
         Some(esc)
@@ -119,7 +122,7 @@ impl Esc {
 
     /// Moves the winding's current by one step.
     pub(crate) fn step_current(&mut self, now_ns: u64, dt_s: f32) {
-        if let LostCommand::ZeroAfter(limit) = self.config.lost_command {
+        if let Some(limit) = self.config.command_timeout {
             let silence_us = now_ns.saturating_sub(self.commanded_ns) / 1_000;
             if silence_us > limit.as_micros() {
                 self.command = 0;
@@ -176,6 +179,7 @@ impl Esc {
         if let (Some(angle), [high, low, ..]) = (tampering.angle, &mut data) {
             [*high, *low] = angle.to_be_bytes();
         }
+        self.replies = self.replies.saturating_add(1);
         let id = self.facts.feedback_base + u16::from(self.config.id);
         let frame = CanFrame::standard(id, data)?;
         match tampering.length {
@@ -194,14 +198,20 @@ impl Esc {
 
     /// Returns the true state, `since_step_s` after the last step of the motor.
     pub(crate) fn state(&self, since_step_s: f32) -> MotorState {
+        let encoder_counts = self.rotor.counts(since_step_s);
         MotorState {
-            rotor_counts: self.rotor.counts(since_step_s),
+            position: position(self.rotor.shaft_turns(since_step_s)),
             velocity: AngularVelocity::from_rad_per_s(self.rotor.velocity()),
             current: Current::from_amperes(self.rotor.current()),
             torque_nm: self.rotor.torque_nm(),
             power_w: self.rotor.power_w(),
             temperature_c: self.rotor.temperature(),
-            command: self.command,
+            encoder_counts,
+            drive_counts: wrapped(encoder_counts.wrapping_sub(self.zero)),
+            command: self.command.into(),
+            is_enabled: self.loss.is_none(),
+            replies: self.replies,
+            collisions: 0,
         }
     }
 }
@@ -222,7 +232,7 @@ fn nearest_u8(value: f32) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Model;
+    use super::super::motor::Model;
     use super::*;
     use crate::time::Duration;
     use embedded_can::Frame;
@@ -343,9 +353,9 @@ mod tests {
 
     #[test]
     fn without_commands_the_last_one_holds_unless_told_otherwise() {
-        let lost = LostCommand::ZeroAfter(Duration::from_millis(20));
+        let timeout = Duration::from_millis(20);
         let config = MotorConfig::new(Model::M3508, 1);
-        for (config, later) in [(config, 1000), (config.with_lost_command(lost), 0)] {
+        for (config, later) in [(config, 1000), (config.with_command_timeout(timeout), 0)] {
             let mut esc = Esc::new(config, 1, 0, 0).unwrap();
             esc.receive(&command(0x200, 0, 1000), 0);
             esc.step_current(20_000_000, STEP);

@@ -1,19 +1,19 @@
 use super::esc::Tampering;
 use super::random::Random;
 use super::rotor::Mechanics;
-use super::{JointKey, Line, MotorKey};
+use super::{Line, MotorKey, SimError};
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use core::ops::{Bound, RangeBounds};
 use embedded_can::{Frame, Id};
 
-/// Something that goes wrong in a [`World`](super::World) for a while.
+/// Something that goes wrong in a [`Simulation`](super::Simulation) for a while.
 ///
-/// What needs no fault: a second master ([`World::inject`](super::World::inject) of a command frame), two motors with
+/// What needs no fault: a second master ([`Simulation::inject`](super::Simulation::inject) of a command frame), two motors with
 /// one id (attach both), a burst after a stall (advance without receiving), an overrun (the same, with
-/// [`World::with_receive_depth`](super::World::with_receive_depth)), heat
-/// ([`World::set_temperature_c`](super::World::set_temperature_c)), a push from outside
-/// ([`World::set_load_nm`](super::World::set_load_nm)), a full bus (eight motors).
+/// [`Simulation::with_receive_depth`](super::Simulation::with_receive_depth)), heat
+/// ([`Simulation::set_temperature_c`](super::Simulation::set_temperature_c)), a push from outside
+/// ([`Simulation::set_load_nm`](super::Simulation::set_load_nm)), a full bus (eight motors).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
@@ -58,19 +58,16 @@ pub enum Fault {
         /// Time between two of them; at least 1 µs. The bus limits the rate that comes out.
         period: Duration,
     },
-    /// The ESC sends no feedback, and goes on otherwise.
+    /// The ESC sends no feedback, or the joint answers nothing, and goes on otherwise.
     Silent(MotorKey),
-    /// The ESC has no supply: no feedback, no current, nothing heard. Afterwards it starts afresh.
+    /// There is no supply: no feedback, no current, nothing heard. Afterwards the motor starts afresh, a joint disabled.
     PowerLoss {
         /// The motor.
         motor: MotorKey,
-        /// Whether the angle at which it starts again is its new zero.
+        /// Whether the angle at which it starts again is its new zero. The zero of a joint always is: it counts from where
+        /// it is.
         forgets_angle: bool,
     },
-    /// The joint answers nothing, and goes on otherwise.
-    SilentJoint(JointKey),
-    /// The joint has no supply. Afterwards it starts afresh, disabled, and counts from where it is.
-    JointPowerLoss(JointKey),
     /// Angle and speed in the feedback stay what they were.
     StuckEncoder(MotorKey),
     /// The ESC sends the same feedback again and again, and goes on otherwise.
@@ -103,6 +100,17 @@ pub enum Fault {
 }
 
 impl Fault {
+    /// Tells whether its motor cannot have it: a joint has no fault of an ESC.
+    const fn is_impossible(&self) -> bool {
+        match self {
+            Self::Silent(_) | Self::PowerLoss { .. } => false,
+            _ => match self.motor() {
+                Some(motor) => motor.is_joint(),
+                None => false,
+            },
+        }
+    }
+
     /// Returns the motor that the fault belongs to.
     const fn motor(&self) -> Option<MotorKey> {
         match self {
@@ -119,19 +127,6 @@ impl Fault {
         }
     }
 }
-
-/// More faults than a [`World`](super::World) keeps at a time: 16, those that are over not counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FaultsFull;
-
-impl core::fmt::Display for FaultsFull {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("a world keeps 16 faults at a time: schedule more when some are over")
-    }
-}
-
-impl core::error::Error for FaultsFull {}
 
 #[derive(Debug, Clone, Copy)]
 struct Scheduled {
@@ -167,7 +162,10 @@ impl Faults {
         window: impl RangeBounds<Instant>,
         seed: u64,
         now_ns: u64,
-    ) -> Result<(), FaultsFull> {
+    ) -> Result<(), SimError> {
+        if fault.is_impossible() {
+            return Err(SimError::NoFaultOfJoint);
+        }
         let ns = |instant: &Instant| instant.as_micros().saturating_mul(1_000);
         let from_ns = match window.start_bound() {
             Bound::Included(from) | Bound::Excluded(from) => ns(from),
@@ -179,7 +177,7 @@ impl Faults {
             Bound::Unbounded => u64::MAX,
         };
         let over = |slot: &&mut Option<Scheduled>| slot.is_none_or(|slot| slot.until_ns <= now_ns);
-        let slot = self.scheduled.iter_mut().find(over).ok_or(FaultsFull)?;
+        let slot = self.scheduled.iter_mut().find(over).ok_or(SimError::TooManyFaults)?;
         self.total += 1;
         let random = Random::new(seed, 2 * self.total);
         *slot = Some(Scheduled { fault, from_ns, until_ns, random, due_ns: from_ns.max(now_ns) });
@@ -339,7 +337,7 @@ mod tests {
             faults.schedule(Fault::BusOff(Line::Can1), ..AT(5), 1, 0).unwrap();
         }
         let another = Fault::WouldBlock(Line::Can1);
-        assert_eq!(faults.schedule(another, .., 1, 4_000), Err(FaultsFull));
+        assert_eq!(faults.schedule(another, .., 1, 4_000), Err(SimError::TooManyFaults));
         assert_eq!(faults.schedule(another, .., 1, 5_000), Ok(()));
     }
 

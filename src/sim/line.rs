@@ -5,7 +5,7 @@ use crate::frame::CanFrame;
 use crate::time::Instant;
 use embedded_can::{Frame, Id};
 
-/// One of the three buses of a [`World`](super::World).
+/// One of the three buses of a [`Simulation`](super::Simulation).
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Line {
@@ -24,11 +24,9 @@ pub enum Line {
 pub enum Sender {
     /// The controller under test.
     Controller,
-    /// A simulated motor.
+    /// A simulated motor or joint.
     Motor(super::MotorKey),
-    /// A simulated joint.
-    Joint(super::JointKey),
-    /// Anybody else: [`World::inject`](super::World::inject) or a flood.
+    /// Anybody else: [`Simulation::inject`](super::Simulation::inject) or a flood.
     Foreign,
 }
 
@@ -39,10 +37,10 @@ pub enum Sender {
 /// # Examples
 /// ```
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::sim::{Line, World};
+/// use drivetrain::sim::{Line, Simulation};
 /// use drivetrain::time::Duration;
 ///
-/// let world = World::new(1);
+/// let world = Simulation::new(1);
 /// let frame = CanFrame::standard(0x201, [0x0E, 0x16, 0, 0, 0xFF, 0xFD, 0x21, 0]).ok_or("id")?;
 /// world.inject(Line::Can1, frame).map_err(|_| "full")?;
 /// let mut log = String::new();
@@ -52,7 +50,7 @@ pub enum Sender {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Record {
+pub struct Transmission {
     /// When its last bit was over, in whole microseconds.
     pub at: Instant,
     /// The bus.
@@ -67,7 +65,7 @@ pub struct Record {
     pub delivered: bool,
 }
 
-impl core::fmt::Display for Record {
+impl core::fmt::Display for Transmission {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let micros = self.at.as_micros();
         let line = match self.line {
@@ -91,18 +89,18 @@ impl core::fmt::Display for Record {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{Line, Model, MotorConfig, World};
+/// use drivetrain::sim::{Line, MotorConfig, Simulation};
 /// use drivetrain::time::Duration;
 ///
-/// let world = World::new(1);
+/// let world = Simulation::new(1);
 /// for id in 1..=4 {
-///     world.attach(MotorConfig::new(Model::M3508, id))?;
+///     world.attach(MotorConfig::m3508(id))?;
 /// }
 /// world.advance(Duration::from_secs(1));
 /// let traffic = world.traffic(Line::Can1);
 /// assert!((3_998..=4_001).contains(&traffic.frames)); // four ESCs, 1 kHz each by their own clocks
 /// assert!(traffic.load() > 0.44 && traffic.load() < 0.54); // 111 to 135 bits a frame
-/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// # Ok::<(), drivetrain::sim::SimError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -264,7 +262,7 @@ impl Wire {
     }
 
     /// Takes the frame in transmission off the wire, and counts it.
-    pub(crate) fn finish(&mut self, now_ns: u64, delivered: bool) -> Option<Record> {
+    pub(crate) fn finish(&mut self, now_ns: u64, delivered: bool) -> Option<Transmission> {
         let Flight { frame, sender, bits, .. } = self.flight.take()?;
         self.traffic.busy_bits += u64::from(bits);
         self.traffic.frames = self.traffic.frames.saturating_add(1);
@@ -272,7 +270,7 @@ impl Wire {
             self.traffic.lost = self.traffic.lost.saturating_add(1);
         }
         let at = Instant::from_micros(now_ns / 1_000);
-        Some(Record { at, line: self.line, frame, sender, bits, delivered })
+        Some(Transmission { at, line: self.line, frame, sender, bits, delivered })
     }
 
     pub(crate) const fn flight(&self) -> Option<Flight> {

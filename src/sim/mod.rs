@@ -1,42 +1,42 @@
-//! A world to test robots in: CAN buses, motors with their ESCs, and what goes wrong with them.
+//! A simulated world to test robots in: CAN buses, motors with their ESCs, and what goes wrong with them.
 //!
-//! [`World`] stands for everything beyond the CAN driver. The code under test gets the driver's end of a bus,
+//! [`Simulation`] stands for everything beyond the CAN driver. The code under test gets the driver's end of a bus,
 //! [`Controller`], which implements both [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], and a
-//! [`SimClock`]; the test moves time, and looks at what is true rather than at what was reported.
+//! clock, `&Simulation`; the test moves time, and looks at what is true rather than at what was reported.
 //!
 //! ```text
-//!  code under test                        World
+//!  code under test                        Simulation
 //!  ┌──────────────┐   ┌──────────────────────────────────────────────────┐
 //!  │ driver calls ├───┤ Controller: 3 mailboxes, receive queue           │
 //!  │              │   │      ║                                           │
 //!  │              │   │ ═════╩══ bus ══╦══════════╦══════════╦═══════════│ arbitration, bit-exact times
 //!  │              │   │          ESC + motor  ESC + motor  foreign nodes │
-//!  │ clock        ├───┤ SimClock       ╚═ own clock, own phase           │
+//!  │ clock        ├───┤ &Simulation    ╚═ own clock, own phase           │
 //!  └──────────────┘   └──────────────────────────────────────────────────┘
 //! ```
 //!
 //! | item | what it is |
 //! |---|---|
-//! | [`World`] | the three buses, up to 16 motors, and the time |
-//! | [`MotorConfig`], [`Model`], [`LostCommand`] | a motor to attach |
-//! | [`MotorKey`], [`MotorState`] | an attached motor, and its true state |
+//! | [`Simulation`] | the three buses, up to 16 motors and 12 joints, and the time |
+//! | [`MotorConfig`], [`JointConfig`] | a motor to attach, or a joint of a snake robot with its drive |
+//! | [`MotorKey`], [`MotorState`] | an attached motor or joint, and its true state |
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
-//! | [`JointConfig`], [`JointKey`], [`JointState`] | a joint of a snake robot, with its drive |
-//! | [`SerialLine`], [`Noise`] | a serial line that takes its time, and damages bytes |
-//! | [`Controller`], [`ControllerError`] | the driver's end of a bus |
+//! | [`SerialLine`] | a serial line that takes its time, and damages bytes |
+//! | [`Controller`] | the driver's end of a bus |
 //! | [`Fault`] | what goes wrong, and when |
-//! | [`Record`], [`Traffic`] | every frame with its time, as a line of candump; bus load and counters |
-//! | [`check_contract`], [`Subject`], [`Rule`] | whether a device, yours too, keeps what it promises |
+//! | [`SimError`] | why something is refused, or a call of the driver failed |
+//! | [`Transmission`], [`Sender`], [`Traffic`] | every frame on a [`Line`] with its time, as a line of candump; bus load and counters |
+//! | [`contract`] | whether a device, yours too, keeps what it promises |
 //! | [`frame_bits`], [`nominal_bits`], [`worst_case_bits`] | how long a frame is on the wire |
 //!
 //! ```
 //! use drivetrain::frame::CanFrame;
-//! use drivetrain::sim::{Model, MotorConfig, World};
+//! use drivetrain::sim::{MotorConfig, Simulation};
 //! use drivetrain::time::Duration;
 //! use embedded_can::nb::Can;
 //!
-//! let world = World::new(7);
-//! let wheel = world.attach(MotorConfig::new(Model::M3508, 1))?;
+//! let world = Simulation::new(7);
+//! let wheel = world.attach(MotorConfig::m3508(1))?;
 //! let mut can = world.controller();
 //! let two_amperes = CanFrame::standard(0x200, [0x06, 0x66, 0, 0, 0, 0, 0, 0]).ok_or("id")?;
 //! can.transmit(&two_amperes).map_err(|_| "refused")?;
@@ -54,7 +54,7 @@
 //! Exact: frame lengths with stuff bits and checksum, arbitration, mailbox rules, slots, scales, rounding, and
 //! that the same seed and the same calls give the same states, bit for bit, on every target. Documented:
 //! torque constants, gears and no-load speeds. **Estimates**: inertia, friction, winding, heat, jitter of the
-//! ESC, and what it does when commands stop ([`LostCommand`]).
+//! ESC, and what it does when commands stop ([`MotorConfig::with_command_timeout`]).
 //!
 //! A wheel on the ground holds as its friction allows (estimate 0.8, so about 2 Nm a wheel under 20 kg): more
 //! torque than that makes it spin, as on a real floor.
@@ -65,12 +65,12 @@
 //!
 //! # A node of your own
 //! Anything that talks on a bus can be played by the test: look at each frame in
-//! [`World::advance_with`] and answer with [`World::inject`].
+//! [`Simulation::advance_with`] and answer with [`Simulation::inject`].
 
 mod bits;
 mod body;
 mod chassis;
-mod contract;
+pub mod contract;
 mod controller;
 mod damiao;
 mod engine;
@@ -85,19 +85,18 @@ mod random;
 mod ring;
 mod rotor;
 mod serial;
+mod simulation;
 mod wheel;
-mod world;
 
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState};
-pub use contract::{Rule, Subject, Violation, check_contract};
-pub use controller::{Controller, ControllerError};
+pub use controller::Controller;
 pub use damiao::DamiaoDrive;
-pub use error::AttachError;
-pub use fault::{Fault, FaultsFull};
-pub use joint::{JointConfig, JointKey, JointState};
-pub use line::{Line, Record, Sender, Traffic};
-pub use motor::{LostCommand, Model, MotorConfig, MotorKey, MotorState};
-pub use serial::{Noise, SerialCounts, SerialLine};
+pub use error::SimError;
+pub use fault::Fault;
+pub use joint::JointConfig;
+pub use line::{Line, Sender, Traffic, Transmission};
+pub use motor::{MotorConfig, MotorKey, MotorState};
+pub use serial::SerialLine;
+pub use simulation::Simulation;
 pub use wheel::Wheel;
-pub use world::{SimClock, World};

@@ -1,9 +1,10 @@
 use super::Line;
 use crate::dji::{self, Facts};
+use crate::encoder::Position;
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity, Current};
 
-/// A motor model with its ESC, as it can be simulated.
+/// A motor with its ESC to attach to a [`Simulation`](super::Simulation).
 ///
 /// All values at the output shaft, at 24 V. Torque constant, gear and no-load speed are those of the driver's table
 /// ([`facts`](Self::facts)); the M3508's resistance is what its rated point asks for, 469 rpm at 10 A and 3 Nm.
@@ -22,58 +23,20 @@ use crate::units::{Angle, AngularVelocity, Current};
 /// | time constant of the current, ms (estimate) | 0.5 | 0.5 | 0.5, in voltage mode 3.2 |
 /// | final heat, K/A² (estimate) | 4 | 0.6 | 15 |
 /// | time constant of heat, s (estimate) | 200 | 300 | 400 |
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Model {
-    /// The M2006 on its C610: ids 1 to 8.
-    M2006,
-    /// The M3508 on its C620: ids 1 to 8.
-    M3508,
-    /// The GM6020 as it is delivered, commanded in volts: ids 1 to 7.
-    Gm6020Voltage,
-    /// The GM6020 with current control switched on: ids 1 to 7.
-    Gm6020Current,
-}
-
-impl Model {
-    /// Returns what the wire and the data sheets say about it.
-    #[must_use]
-    pub const fn facts(self) -> &'static Facts {
-        match self {
-            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
-            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
-            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
-            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
-        }
-    }
-}
-
-/// What the simulated ESC does when no command arrives any more.
 ///
-/// What a real one does is not documented, so the default is the worst case.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum LostCommand {
-    /// It goes on with the last command for ever.
-    #[default]
-    HoldLast,
-    /// It goes to zero this long after the last command.
-    ZeroAfter(Duration),
-}
-
-/// A motor to attach to a [`World`](super::World).
+/// What a real ESC does when commands stop is not documented, so the default is the worst case: it goes on with the last one
+/// for ever ([`with_command_timeout`](Self::with_command_timeout)).
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{Model, MotorConfig, World};
+/// use drivetrain::sim::{MotorConfig, Simulation};
 /// use drivetrain::time::Duration;
 ///
-/// let world = World::new(1);
-/// let wheel = world.attach(MotorConfig::new(Model::M3508, 2).with_rotor_angle(8000))?;
+/// let world = Simulation::new(1);
+/// let wheel = world.attach(MotorConfig::m3508(2).with_rotor_angle(8000))?;
 /// world.advance(Duration::from_millis(3)); // nothing commands it, so it stands
-/// assert_eq!(world.motor(wheel).map(|motor| motor.rotor_counts), Some(8000));
-/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// assert_eq!(world.motor(wheel).map(|motor| motor.encoder_counts), Some(8000));
+/// # Ok::<(), drivetrain::sim::SimError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -81,7 +44,7 @@ pub struct MotorConfig {
     pub(crate) model: Model,
     pub(crate) id: u8,
     pub(crate) line: Line,
-    pub(crate) lost_command: LostCommand,
+    pub(crate) command_timeout: Option<Duration>,
     pub(crate) supply_v: f32,
     pub(crate) load_inertia_kg_m2: f32,
     pub(crate) load_friction_nm: f32,
@@ -94,14 +57,36 @@ pub struct MotorConfig {
 }
 
 impl MotorConfig {
-    /// Takes the model and the id that is set on its ESC.
+    /// Takes the id of an M2006 on its C610: 1 to 8.
     #[must_use]
-    pub const fn new(model: Model, id: u8) -> Self {
+    pub const fn m2006(id: u8) -> Self {
+        Self::new(Model::M2006, id)
+    }
+
+    /// Takes the id of an M3508 on its C620: 1 to 8.
+    #[must_use]
+    pub const fn m3508(id: u8) -> Self {
+        Self::new(Model::M3508, id)
+    }
+
+    /// Takes the id of a GM6020 as it is delivered, commanded in volts: 1 to 7.
+    #[must_use]
+    pub const fn gm6020_voltage(id: u8) -> Self {
+        Self::new(Model::Gm6020Voltage, id)
+    }
+
+    /// Takes the id of a GM6020 with current control switched on: 1 to 7.
+    #[must_use]
+    pub const fn gm6020_current(id: u8) -> Self {
+        Self::new(Model::Gm6020Current, id)
+    }
+
+    pub(crate) const fn new(model: Model, id: u8) -> Self {
         Self {
             model,
             id,
             line: Line::Can1,
-            lost_command: LostCommand::HoldLast,
+            command_timeout: None,
             supply_v: 24.0,
             load_inertia_kg_m2: 0.0,
             load_friction_nm: 0.0,
@@ -113,16 +98,22 @@ impl MotorConfig {
         }
     }
 
+    /// Returns what the wire and the data sheets say about the motor.
+    #[must_use]
+    pub const fn facts(&self) -> &'static Facts {
+        self.model.facts()
+    }
+
     /// Puts the motor on a bus other than the first.
     #[must_use]
     pub const fn with_line(self, line: Line) -> Self {
         Self { line, ..self }
     }
 
-    /// Chooses what the ESC does when commands stop; by default it holds the last one.
+    /// Makes the ESC go to zero so long after the last command; by default it goes on with it for ever.
     #[must_use]
-    pub const fn with_lost_command(self, lost_command: LostCommand) -> Self {
-        Self { lost_command, ..self }
+    pub const fn with_command_timeout(self, timeout: Duration) -> Self {
+        Self { command_timeout: Some(timeout), ..self }
     }
 
     /// Sets the supply in volts, 24 by default; what is not a positive number counts as 24.
@@ -185,27 +176,52 @@ impl MotorConfig {
     }
 }
 
-/// A motor of a [`World`](super::World).
+/// A motor of a [`Simulation`](super::Simulation): one with an ESC, or a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct MotorKey(pub(crate) u8);
+pub struct MotorKey(u8);
+
+/// The number of motors with ESCs in a world.
+pub(crate) const MOTORS: usize = 16;
+/// The number of joints in a world, whose keys follow.
+pub(crate) const JOINTS: usize = 12;
 
 impl MotorKey {
-    /// The number of motors in a world.
-    pub const CAPACITY: usize = 16;
-
+    /// Returns the key of a motor with an ESC.
     pub(crate) fn new(index: usize) -> Option<Self> {
-        u8::try_from(index).ok().filter(|_| index < Self::CAPACITY).map(Self)
+        u8::try_from(index).ok().filter(|_| index < MOTORS).map(Self)
+    }
+
+    /// Returns the key of a joint.
+    pub(crate) fn of_joint(index: usize) -> Option<Self> {
+        u8::try_from(index + MOTORS).ok().filter(|_| index < JOINTS).map(Self)
+    }
+
+    /// Returns the place among the motors with ESCs; that of a joint is beyond all of them.
+    pub(crate) const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) const fn is_joint(self) -> bool {
+        self.joint_index().is_some()
+    }
+
+    /// Returns the place among the joints.
+    pub(crate) const fn joint_index(self) -> Option<usize> {
+        self.index().checked_sub(MOTORS)
     }
 }
 
 /// The true state of a simulated motor, before anything is rounded for the wire. Counter-clockwise is positive.
+///
+/// What a joint is not simulated for (its drive goes where it is told, whatever that takes) is NaN: current, torque, power and
+/// temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MotorState {
-    /// The rotor's angle since it started, in counts of which a turn has 8192: the first turn begins at 0.
-    pub rotor_counts: i64,
+    /// Turns and angle of the output shaft, from where [`encoder_counts`](Self::encoder_counts) is 0.
+    pub position: Position,
     /// The velocity of the output shaft.
     pub velocity: AngularVelocity,
     /// The torque current.
@@ -217,8 +233,56 @@ pub struct MotorState {
     pub power_w: f32,
     /// The temperature that the ESC measures, in °C.
     pub temperature_c: f32,
-    /// The command that the ESC acts on, as on the wire.
-    pub command: i16,
+    /// The angle as its encoder shows it since the start, whatever its drive forgot: 8192 a turn of an ESC's rotor, whose first
+    /// turn begins at 0; 65536 a turn of a joint.
+    pub encoder_counts: i64,
+    /// The same as its drive counts it, from the zero that it took at its last start, in 32 bits that wrap. An ESC sends it
+    /// within a turn.
+    pub drive_counts: i32,
+    /// The command that the drive acts on, as on the wire: the word of an ESC, the target of a joint in pulses.
+    pub command: i32,
+    /// Whether the drive moves the shaft, or holds it: an ESC does while it has its supply, a joint while it is enabled.
+    pub is_enabled: bool,
+    /// Answers to requests of a joint, feedback frames of an ESC; those too that found no room in its mailboxes.
+    pub replies: u32,
+    /// How often a frame of the controller with its id began in the same bit as its reply: on a real bus both would have
+    /// been destroyed. Here the controller goes first. Only a joint has one id for both.
+    pub collisions: u32,
+}
+
+/// A motor of the driver's family [`dji`] with its ESC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) enum Model {
+    M2006,
+    M3508,
+    Gm6020Voltage,
+    Gm6020Current,
+}
+
+impl Model {
+    /// Returns what the wire and the data sheets say about it.
+    pub(crate) const fn facts(self) -> &'static Facts {
+        match self {
+            Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
+            Self::M3508 => <dji::M3508 as dji::Model>::FACTS,
+            Self::Gm6020Voltage => <dji::Gm6020Voltage as dji::Model>::FACTS,
+            Self::Gm6020Current => <dji::Gm6020Current as dji::Model>::FACTS,
+        }
+    }
+}
+
+/// A counter of 32 bits wraps.
+#[expect(clippy::cast_possible_truncation, reason = "wraps")]
+pub(crate) const fn wrapped(counts: i64) -> i32 {
+    counts as i32
+}
+
+/// Returns the position that is so many turns.
+#[expect(clippy::cast_possible_truncation, reason = "an angle within a turn")]
+pub(crate) fn position(turns: f64) -> Position {
+    let whole = turns as i64;
+    Position::new(whole, Angle::from_turns((turns - whole as f64) as f32))
 }
 
 /// The physical constants of a model, at the output shaft. Units are SI.

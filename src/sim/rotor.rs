@@ -156,6 +156,12 @@ impl Rotor {
         self.angle.wrapping_add(self.travel(dt_s)) >> 19
     }
 
+    /// Returns the turns of the output shaft `dt_s` after the last step.
+    pub(crate) fn shaft_turns(&self, dt_s: f32) -> f64 {
+        let turns = self.angle.wrapping_add(self.travel(dt_s)) as f64 / f64::from(TURN);
+        turns / f64::from(self.gear)
+    }
+
     /// Returns the angle of the output shaft within a turn in rad, from that of the rotor's zero at the start.
     #[expect(clippy::cast_possible_truncation, reason = "within a turn")]
     pub(crate) fn shaft_rad(&self) -> f32 {
@@ -205,7 +211,7 @@ const AMBIENT_C: f32 = 25.0;
 
 #[cfg(test)]
 mod tests {
-    use super::super::Model;
+    use super::super::motor::Model;
     use super::*;
     use crate::dji::Unit;
 

@@ -26,39 +26,23 @@ pub struct SerialLine {
     /// When the last byte is over.
     free_ns: u64,
     queue: Ring<(u64, u8), CAPACITY>,
-    noise: Noise,
+    /// Probabilities for a byte.
+    flipped: f32,
+    dropped: f32,
+    inserted: f32,
     is_cut: bool,
     random: Random,
-    counts: SerialCounts,
+    counts: Counts,
 }
 
-/// What happens to the bytes of a [`SerialLine`]; each a probability for a byte, 0 to 1.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Noise {
-    /// One of its bits is wrong.
-    pub flipped: f32,
-    /// It is missing.
-    pub dropped: f32,
-    /// A byte of chance stands before it.
-    pub inserted: f32,
-}
-
-/// What went over a [`SerialLine`]. All counts saturate.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct SerialCounts {
-    /// Bytes that were sent, damaged and lost ones too.
-    pub sent: u32,
-    /// Bytes that came out.
-    pub received: u32,
-    /// Bytes with a wrong bit.
-    pub flipped: u32,
-    /// Bytes that are missing: dropped, or sent while the line was cut.
-    pub lost: u32,
-    /// Bytes that nobody sent.
-    pub inserted: u32,
+/// What went over a line.
+#[derive(Debug, Default, Clone, Copy)]
+struct Counts {
+    sent: u32,
+    received: u32,
+    flipped: u32,
+    lost: u32,
+    inserted: u32,
 }
 
 impl SerialLine {
@@ -69,16 +53,28 @@ impl SerialLine {
             byte_ns: (BITS_A_BYTE * 1_000_000_000) / u64::from(baud.max(1)),
             free_ns: 0,
             queue: Ring::new(),
-            noise: Noise::default(),
+            flipped: 0.0,
+            dropped: 0.0,
+            inserted: 0.0,
             is_cut: false,
             random: Random::new(seed, 1 << 41),
-            counts: SerialCounts::default(),
+            counts: Counts::default(),
         }
     }
 
-    /// Sets what happens to bytes that are sent from now on.
-    pub const fn set_noise(&mut self, noise: Noise) {
-        self.noise = noise;
+    /// Sets how probable it is that one bit of a byte is wrong, from now on: 0 to 1, by default 0.
+    pub const fn set_flipped(&mut self, probability: f32) {
+        self.flipped = probability;
+    }
+
+    /// Sets how probable it is that a byte is missing, from now on: 0 to 1, by default 0.
+    pub const fn set_dropped(&mut self, probability: f32) {
+        self.dropped = probability;
+    }
+
+    /// Sets how probable it is that a byte of chance stands before a byte, from now on: 0 to 1, by default 0.
+    pub const fn set_inserted(&mut self, probability: f32) {
+        self.inserted = probability;
     }
 
     /// Cuts the line, or mends it: what is sent while it is cut comes out nowhere.
@@ -103,16 +99,16 @@ impl SerialLine {
         let counts = &mut self.counts;
         counts.sent = counts.sent.saturating_add(1);
         self.free_ns += self.byte_ns;
-        if self.is_cut || self.random.chance(self.noise.dropped) {
+        if self.is_cut || self.random.chance(self.dropped) {
             counts.lost = counts.lost.saturating_add(1);
             return;
         }
-        if self.random.chance(self.noise.inserted) {
+        if self.random.chance(self.inserted) {
             counts.inserted = counts.inserted.saturating_add(1);
             let [stray, ..] = self.random.next_u32().to_le_bytes();
             _ = self.queue.push((self.free_ns, stray));
         }
-        let flips = self.random.chance(self.noise.flipped);
+        let flips = self.random.chance(self.flipped);
         let wrong = if flips { 1 << self.random.below(8) } else { 0 };
         counts.flipped = counts.flipped.saturating_add(u32::from(flips));
         _ = self.queue.push((self.free_ns, byte ^ wrong));
@@ -135,10 +131,34 @@ impl SerialLine {
         out.get(..length).unwrap_or(&[])
     }
 
-    /// Returns what went over it so far.
+    /// Returns how many bytes were sent, damaged and lost ones too. Saturates, as all counts do.
     #[must_use]
-    pub const fn counts(&self) -> SerialCounts {
-        self.counts
+    pub const fn sent(&self) -> u32 {
+        self.counts.sent
+    }
+
+    /// Returns how many bytes came out.
+    #[must_use]
+    pub const fn received(&self) -> u32 {
+        self.counts.received
+    }
+
+    /// Returns how many bytes had a wrong bit.
+    #[must_use]
+    pub const fn flipped(&self) -> u32 {
+        self.counts.flipped
+    }
+
+    /// Returns how many bytes are missing: dropped, or sent while the line was cut.
+    #[must_use]
+    pub const fn lost(&self) -> u32 {
+        self.counts.lost
+    }
+
+    /// Returns how many bytes came out that nobody sent.
+    #[must_use]
+    pub const fn inserted(&self) -> u32 {
+        self.counts.inserted
     }
 }
 
@@ -153,15 +173,17 @@ mod tests {
             now += 1_000;
             while !line.receive(Instant::from_micros(now), &mut out).is_empty() {}
         }
-        line.counts().received
+        line.received()
     }
 
     #[test]
     fn bytes_add_up_whatever_the_noise_does() {
         let mut line = SerialLine::new(115_200, 3);
-        line.set_noise(Noise { flipped: 0.1, dropped: 0.05, inserted: 0.02 });
+        line.set_flipped(0.1);
+        line.set_dropped(0.05);
+        line.set_inserted(0.02);
         let received = through(&mut line, 100_000);
-        let counts = line.counts();
+        let counts = line.counts;
         assert_eq!((counts.sent, received), (100_000, 100_000 - counts.lost + counts.inserted));
         assert!(counts.flipped.abs_diff(9_500) < 400 && counts.lost.abs_diff(5_000) < 300);
     }

@@ -17,16 +17,16 @@ use crate::units::Angle;
 /// # Examples
 /// ```
 /// use drivetrain::geometry::Vec2;
-/// use drivetrain::sim::{Model, MotorConfig, Wheel, World};
+/// use drivetrain::sim::{MotorConfig, Wheel, Simulation};
 /// use drivetrain::units::Angle;
 ///
-/// let world = World::new(1);
-/// let drive = world.attach(MotorConfig::new(Model::M3508, 1))?;
-/// let steering = world.attach(MotorConfig::new(Model::Gm6020Voltage, 1).with_rotor_angle(2048))?;
+/// let world = Simulation::new(1);
+/// let drive = world.attach(MotorConfig::m3508(1))?;
+/// let steering = world.attach(MotorConfig::gm6020_voltage(1).with_rotor_angle(2048))?;
 /// // The module points forward when its absolute encoder shows 90 degrees, as it does now.
 /// let wheel = Wheel::steered(drive, 0.06, Vec2::new(0.2, 0.2), steering, Angle::from_degrees(90.0));
 /// assert_eq!(wheel.position_m(), Vec2::new(0.2, 0.2));
-/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// # Ok::<(), drivetrain::sim::SimError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -106,6 +106,9 @@ impl Wheel {
     /// Names what makes no sense.
     pub(crate) fn validate(&self) -> Result<(), &'static str> {
         let near = |length: f32| length.abs() <= 1e3;
+        if self.motor.is_joint() || self.steering.is_some_and(|(motor, _)| motor.is_joint()) {
+            return Err("motor");
+        }
         if !(self.radius_m > 0.0 && near(self.radius_m)) {
             return Err("wheel_radius_m");
         }

@@ -5,12 +5,11 @@ mod writing;
 
 use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
-use super::{AttachError, Config, Joint, Register, Reply, Settings, State};
+use super::{AttachError, Config, Joint, Offset, Register, Reply, Settings, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
-use crate::wire::host_link::Offset;
 use core::f32::consts::TAU;
 use health::Standing;
 

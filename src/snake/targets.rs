@@ -1,11 +1,10 @@
 //! What the application asks of the joints.
 
 use super::slot::{Slot, to_pulses};
-use super::{AttachError, Joint, Joints, PULSES_PER_TURN, Register, Reply, Settings};
+use super::{AttachError, Joint, Joints, Offset, PULSES_PER_TURN, Register, Reply, Settings};
 use crate::encoder::Position;
 use crate::motor::TargetError;
 use crate::units::AngularVelocity;
-use crate::wire::host_link::Offset;
 
 /// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
 /// ([`Timeouts::command`](crate::motor::Timeouts::command)): an application that stops setting targets has its joints

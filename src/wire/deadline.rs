@@ -4,7 +4,7 @@ use crate::time::{Duration, Instant};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Edge {
+pub enum SignalEdge {
     /// Data came, for the first time or again.
     Heard {
         /// When it came.
@@ -19,14 +19,14 @@ pub enum Edge {
 
 /// Watches that something happens again within a time limit, and latches each change.
 ///
-/// It begins as not live. An [`Edge`] is kept until it is fetched. When the source came and went more than once
+/// It begins as not live. An [`SignalEdge`] is kept until it is fetched. When the source came and went more than once
 /// between two calls of [`edge`](Self::edge), the changes that cancel each other are left out; [`losses`](Self::losses)
 /// still counts them all.
 ///
 /// # Examples
 /// ```
 /// use drivetrain::time::{Duration, Instant};
-/// use drivetrain::wire::{Deadline, Edge};
+/// use drivetrain::wire::{Deadline, SignalEdge};
 ///
 /// let ms = |ms| Instant::START + Duration::from_millis(ms);
 /// let mut host = Deadline::new(Duration::from_millis(100));
@@ -34,8 +34,8 @@ pub enum Edge {
 /// host.meet(ms(5));
 /// assert!(host.is_live(ms(105)));
 /// assert!(!host.is_live(ms(106)));
-/// assert_eq!(host.edge(ms(300)), Some(Edge::Heard { at: ms(5) }));
-/// assert_eq!(host.edge(ms(300)), Some(Edge::Lost { at: ms(105) }));
+/// assert_eq!(host.edge(ms(300)), Some(SignalEdge::Heard { at: ms(5) }));
+/// assert_eq!(host.edge(ms(300)), Some(SignalEdge::Lost { at: ms(105) }));
 /// assert_eq!(host.edge(ms(300)), None);
 /// ```
 #[derive(Debug, Clone)]
@@ -44,7 +44,7 @@ pub struct Deadline {
     met: Instant,
     live: bool,
     losses: u32,
-    pending: [Option<Edge>; 2],
+    pending: [Option<SignalEdge>; 2],
 }
 
 impl Deadline {
@@ -60,7 +60,7 @@ impl Deadline {
         self.met = now;
         if !self.live {
             self.live = true;
-            self.latch(Edge::Heard { at: now });
+            self.latch(SignalEdge::Heard { at: now });
         }
     }
 
@@ -80,7 +80,7 @@ impl Deadline {
 
     /// Returns the oldest change that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
         self.expire(now);
         let [first, second] = self.pending;
         self.pending = [second, None];
@@ -102,10 +102,10 @@ impl Deadline {
     fn lose(&mut self, at: Instant) {
         self.live = false;
         self.losses = self.losses.saturating_add(1);
-        self.latch(Edge::Lost { at });
+        self.latch(SignalEdge::Lost { at });
     }
 
-    fn latch(&mut self, edge: Edge) {
+    fn latch(&mut self, edge: SignalEdge) {
         self.pending = match self.pending {
             [None, _] => [Some(edge), None],
             [first, None] => [first, Some(edge)],
@@ -126,10 +126,10 @@ mod tests {
     fn a_loss_between_two_frames_is_seen_though_nobody_asked_meanwhile() {
         let mut deadline = Deadline::new(Duration::from_millis(10));
         deadline.meet(ms(0));
-        assert_eq!(deadline.edge(ms(0)), Some(Edge::Heard { at: ms(0) }));
+        assert_eq!(deadline.edge(ms(0)), Some(SignalEdge::Heard { at: ms(0) }));
         deadline.meet(ms(50));
-        assert_eq!(deadline.edge(ms(50)), Some(Edge::Lost { at: ms(10) }));
-        assert_eq!(deadline.edge(ms(50)), Some(Edge::Heard { at: ms(50) }));
+        assert_eq!(deadline.edge(ms(50)), Some(SignalEdge::Lost { at: ms(10) }));
+        assert_eq!(deadline.edge(ms(50)), Some(SignalEdge::Heard { at: ms(50) }));
         assert_eq!(deadline.edge(ms(50)), None);
     }
 
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(deadline.losses(), 98 + 1);
     }
 
-    fn is_heard(edge: Edge) -> bool {
-        matches!(edge, Edge::Heard { .. })
+    fn is_heard(edge: SignalEdge) -> bool {
+        matches!(edge, SignalEdge::Heard { .. })
     }
 }

@@ -1,52 +1,52 @@
 use core::fmt;
 
-/// The facts of a framed protocol: how a frame begins, how long it is, and what it says.
+/// A frame that a [`Deframer`] finds in bytes: how it begins, how long it is, and what it says.
 ///
-/// [`Deframer`] supplies everything else. An implementation holds the options of the protocol (a byte order, say), not
-/// its state.
+/// The [`Deframer`] supplies everything else.
 ///
 /// # Examples
 /// A frame of a mark, a length, so many data bytes and their sum:
 /// ```
-/// use drivetrain::wire::{Deframer, Protocol, Reject};
+/// use drivetrain::wire::{Decode, Deframer, Reject};
 ///
-/// struct Tiny;
+/// #[derive(Debug, PartialEq)]
+/// struct Sum(u8);
 ///
-/// impl Protocol for Tiny {
-///     type Frame = u8; // the sum
+/// impl Decode for Sum {
+///     type Options = ();
 ///     const PREFIX: usize = 2;
-///     fn header(&self) -> &[u8] { &[0x7E] }
-///     fn length(&self, prefix: &[u8]) -> Option<usize> {
+///     fn header(_: &()) -> &[u8] { &[0x7E] }
+///     fn length(_: &(), prefix: &[u8]) -> Option<usize> {
 ///         prefix.get(1).filter(|length| **length > 0).map(|length| usize::from(*length) + 3)
 ///     }
-///     fn parse(&self, frame: &[u8]) -> Result<u8, Reject> {
+///     fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
 ///         let (sum, data) = frame[2..].split_last().ok_or(Reject::Length)?;
-///         if data.iter().sum::<u8>() == *sum { Ok(*sum) } else { Err(Reject::Checksum) }
+///         if data.iter().sum::<u8>() == *sum { Ok(Self(*sum)) } else { Err(Reject::Checksum) }
 ///     }
 /// }
 ///
-/// let mut decoder = Deframer::<Tiny, 16>::new(Tiny);
+/// let mut decoder = Deframer::<Sum, 16>::new();
 /// let mut bytes = &[0x7E, 0x7E, 2, 30, 12, 42][..]; // a mark too many
-/// assert_eq!(decoder.read(&mut bytes), Some(42));
+/// assert_eq!(decoder.read(&mut bytes), Some(Sum(42)));
 /// ```
-pub trait Protocol {
-    /// What a good frame holds.
-    type Frame;
+pub trait Decode: Sized {
+    /// What has to be known besides the bytes (a byte order, say); `()` for most frames.
+    type Options: Clone + fmt::Debug;
 
     /// How many bytes of a frame tell its length, the header included: at least 1.
     const PREFIX: usize;
 
     /// Returns the bytes that every frame begins with; none for a protocol that marks only the end of a frame.
-    fn header(&self) -> &[u8];
+    fn header(options: &Self::Options) -> &[u8];
 
     /// Returns the length of the whole frame in bytes, from its first [`PREFIX`](Self::PREFIX) bytes; `None` when no
     /// frame can have the length that they state.
-    fn length(&self, prefix: &[u8]) -> Option<usize>;
+    fn length(options: &Self::Options, prefix: &[u8]) -> Option<usize>;
 
-    /// Returns whether `frame` says something new; `false` when its source is frozen and repeats `previous`.
+    /// Returns whether it says something new; `false` when its source is frozen and repeats `previous`.
     ///
-    /// [`Link`](super::Link) takes only new frames for a sign of life.
-    fn is_new(&self, _previous: &Self::Frame, _frame: &Self::Frame) -> bool {
+    /// [`Receiver`](super::Receiver) takes only new frames for a sign of life.
+    fn is_new(&self, _previous: &Self) -> bool {
         true
     }
 
@@ -55,7 +55,7 @@ pub trait Protocol {
     /// # Errors
     /// [`Reject`] says what is wrong with the frame. After [`Reject::Foreign`] it is skipped as a whole, after any other its
     /// bytes are searched again.
-    fn parse(&self, frame: &[u8]) -> Result<Self::Frame, Reject>;
+    fn decode(options: &Self::Options, frame: &[u8]) -> Result<Self, Reject>;
 }
 
 /// Why bytes that began like a frame gave no value.
@@ -82,19 +82,19 @@ pub enum Reject {
 pub struct Counts {
     /// Good frames.
     pub frames: u32,
-    /// Headers followed by a length of zero, or by one too large for the protocol or the buffer.
+    /// Headers followed by a length of zero, or by one too large for the protocol or the buffer; frames that ended early.
     pub length_errors: u32,
     /// Whole frames whose checksum did not fit.
     pub checksum_errors: u32,
     /// Good frames of a kind that is not read.
     pub foreign_frames: u32,
-    /// Frames with a fitting checksum and an impossible value.
+    /// Frames with a fitting checksum, or none, and an impossible value.
     pub content_errors: u32,
     /// Bytes that belonged to no good frame: noise, and what is left of damaged frames.
     pub skipped_bytes: u32,
 }
 
-/// A streaming decoder of one [`Protocol`], with a buffer of `N` bytes.
+/// A streaming decoder of one kind of frames, with a buffer of `N` bytes.
 ///
 /// It takes the bytes in any portions, and finds the same frames in them however they are split. When a frame turns
 /// out to be damaged, only its first byte is given up and the rest is searched again: a good frame that begins inside
@@ -110,15 +110,15 @@ pub struct Counts {
 /// ```
 /// use drivetrain::wire::{Deframer, feetech};
 ///
-/// let mut decoder = Deframer::<feetech::Sts, 64>::new(feetech::Sts);
+/// let mut decoder = Deframer::<feetech::Status, 64>::new();
 /// for byte in [0xFF, 0xFF, 0x01, 0x02, 0x00] {
 ///     assert_eq!(decoder.read(&mut &[byte][..]), None);
 /// }
 /// assert!(decoder.read(&mut &[0xFC][..]).is_some());
 /// ```
 #[derive(Clone)]
-pub struct Deframer<P, const N: usize> {
-    protocol: P,
+pub struct Deframer<F: Decode, const N: usize> {
+    options: F::Options,
     buffer: [u8; N],
     /// How many bytes of the buffer are in use: they begin like a frame.
     length: usize,
@@ -127,12 +127,26 @@ pub struct Deframer<P, const N: usize> {
     counts: Counts,
 }
 
-impl<P: Protocol, const N: usize> Deframer<P, N> {
+impl<F: Decode<Options = ()>, const N: usize> Deframer<F, N> {
+    /// Starts with an empty buffer, for frames without options.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::with_options(())
+    }
+}
+
+impl<F: Decode<Options = ()>, const N: usize> Default for Deframer<F, N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<F: Decode, const N: usize> Deframer<F, N> {
     /// Starts with an empty buffer.
     #[must_use]
-    pub const fn new(protocol: P) -> Self {
-        const { assert!(P::PREFIX > 0 && P::PREFIX <= N, "the buffer is too small for any frame") };
-        Self { protocol, buffer: [0; N], length: 0, wanted: P::PREFIX, counts: Counts::new() }
+    pub const fn with_options(options: F::Options) -> Self {
+        const { assert!(F::PREFIX > 0 && F::PREFIX <= N, "the buffer is too small for any frame") };
+        Self { options, buffer: [0; N], length: 0, wanted: F::PREFIX, counts: Counts::new() }
     }
 
     /// Returns the next frame, and takes from `input` the bytes that it looked at. `None` when `input` is used up: the
@@ -140,7 +154,7 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
     ///
     /// Call it until it returns `None`, as in `while let Some(frame) = decoder.read(&mut input) { .. }`.
     #[must_use]
-    pub fn read(&mut self, input: &mut &[u8]) -> Option<P::Frame> {
+    pub fn read(&mut self, input: &mut &[u8]) -> Option<F> {
         loop {
             self.fill(input);
             if self.length < self.wanted {
@@ -167,10 +181,10 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
         self.counts
     }
 
-    /// Returns the options of the protocol.
+    /// Returns the options of the frames.
     #[must_use]
-    pub const fn protocol(&self) -> &P {
-        &self.protocol
+    pub const fn options(&self) -> &F::Options {
+        &self.options
     }
 
     /// Copies as many bytes as are needed for the next decision, or as there are.
@@ -187,19 +201,20 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
 
     /// Decides about the bytes in the buffer. Each call gives bytes up, asks for more, or finds a frame, so a loop
     /// over it ends.
-    fn step(&mut self) -> Option<P::Frame> {
+    fn step(&mut self) -> Option<F> {
         let bytes = self.buffer.get(..self.length).unwrap_or(&[]);
-        let noise = noise_before(bytes, self.protocol.header());
+        let noise = noise_before(bytes, F::header(&self.options));
         if noise > 0 {
             self.give_up(noise);
-            self.wanted = P::PREFIX;
+            self.wanted = F::PREFIX;
             return None;
         }
-        let Some(prefix) = bytes.get(..P::PREFIX) else {
-            self.wanted = P::PREFIX;
+        let Some(prefix) = bytes.get(..F::PREFIX) else {
+            self.wanted = F::PREFIX;
             return None;
         };
-        let total = self.protocol.length(prefix).filter(|total| (P::PREFIX..=N).contains(total));
+        let total =
+            F::length(&self.options, prefix).filter(|total| (F::PREFIX..=N).contains(total));
         let Some(total) = total else {
             self.reject(Reject::Length, 1);
             return None;
@@ -209,7 +224,7 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
             self.wanted = total;
             return None;
         };
-        match self.protocol.parse(frame) {
+        match F::decode(&self.options, frame) {
             Ok(frame) => {
                 count(&mut self.counts.frames, 1);
                 self.discard(total);
@@ -246,7 +261,7 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
 
     /// Takes `count` bytes off the front of the buffer.
     fn discard(&mut self, count: usize) {
-        self.wanted = P::PREFIX;
+        self.wanted = F::PREFIX;
         let used = self.buffer.get_mut(..self.length).unwrap_or_default();
         if count < used.len() {
             used.copy_within(count.., 0);
@@ -257,10 +272,10 @@ impl<P: Protocol, const N: usize> Deframer<P, N> {
     }
 }
 
-impl<P: fmt::Debug, const N: usize> fmt::Debug for Deframer<P, N> {
+impl<F: Decode, const N: usize> fmt::Debug for Deframer<F, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Deframer")
-            .field("protocol", &self.protocol)
+            .field("options", &self.options)
             .field("buffered", &self.length)
             .field("counts", &self.counts)
             .finish_non_exhaustive()
@@ -268,7 +283,7 @@ impl<P: fmt::Debug, const N: usize> fmt::Debug for Deframer<P, N> {
 }
 
 impl Counts {
-    const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             frames: 0,
             length_errors: 0,
@@ -280,7 +295,7 @@ impl Counts {
     }
 }
 
-fn count(counter: &mut u32, more: u32) {
+pub(super) fn count(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
 

@@ -1,31 +1,6 @@
 //! Takes fields from the front of a slice, and puts them there.
 
-/// The caller's buffer is shorter than the frame to be written into it. Nothing useful was written.
-///
-/// # Examples
-/// ```
-/// use drivetrain::wire::{feetech, BufferTooSmall};
-///
-/// let error = feetech::ping(feetech::ServoId::ONE, &mut [0; 5]).unwrap_err();
-/// assert_eq!(error, BufferTooSmall { needed: 6, given: 5 });
-/// assert_eq!(error.to_string(), "the frame needs 6 bytes, the buffer has 5");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct BufferTooSmall {
-    /// The length of the frame in bytes.
-    pub needed: usize,
-    /// The length of the buffer in bytes.
-    pub given: usize,
-}
-
-impl core::fmt::Display for BufferTooSmall {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "the frame needs {} bytes, the buffer has {}", self.needed, self.given)
-    }
-}
-
-impl core::error::Error for BufferTooSmall {}
+use super::EncodeError;
 
 /// Reads from the front. Every method gives `None` when the bytes are used up.
 #[derive(Debug, Clone, Copy)]
@@ -88,9 +63,9 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// Takes exactly `needed` bytes of `out`.
-    pub(super) fn new(out: &'a mut [u8], needed: usize) -> Result<Self, BufferTooSmall> {
+    pub(super) fn new(out: &'a mut [u8], needed: usize) -> Result<Self, EncodeError> {
         let given = out.len();
-        let out = out.get_mut(..needed).ok_or(BufferTooSmall { needed, given })?;
+        let out = out.get_mut(..needed).ok_or(EncodeError::BufferTooSmall { needed, given })?;
         Ok(Self { out, at: 0 })
     }
 

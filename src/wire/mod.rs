@@ -12,8 +12,8 @@
 //!
 //! All of them are sans-I/O: bytes in, values out, and back; who moves the bytes (interrupt, DMA, async task, file) is
 //! no concern of theirs. The framed protocols share one decoder, [`Deframer`], and with it one law: **the frames
-//! found do not depend on how the bytes were split, and no damage to one frame loses the next.** Each protocol adds
-//! only its facts ([`Protocol`]). Encoders write into a slice of the caller's and return the part they filled, so that
+//! found do not depend on how the bytes were split, and no damage to one frame loses the next.** Each frame adds
+//! only its facts ([`Decode`]). Encoders write into a slice of the caller's and return the part they filled, so that
 //! a serial port takes it as it is:
 //!
 //! ```
@@ -23,13 +23,13 @@
 //! let ping = feetech::ping(feetech::ServoId::ONE, &mut buffer)?; // -> uart.write_all(ping)
 //! assert_eq!(ping, [0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB]);
 //!
-//! let mut replies = Deframer::<feetech::Sts, 64>::new(feetech::Sts);
+//! let mut replies = Deframer::<feetech::Status, 64>::new();
 //! let mut received = &[0x00, 0xFF, 0xFF, 0x01, 0x02, 0x00, 0xFC][..]; // <- uart.read(..)
 //! while let Some(status) = replies.read(&mut received) {
 //!     assert_eq!(status.id(), 1);
 //! }
 //! assert_eq!((replies.counts().frames, replies.counts().skipped_bytes), (1, 1));
-//! # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+//! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
 //! With `embedded-io` the two arrows are `port.write_all(ping)?` and `let n = port.read(&mut bytes)?;
@@ -49,10 +49,11 @@ pub mod vofa;
 
 mod deadline;
 mod deframer;
+mod error;
 mod field;
-mod link;
+mod receiver;
 
-pub use deadline::{Deadline, Edge};
-pub use deframer::{Counts, Deframer, Protocol, Reject};
-pub use field::BufferTooSmall;
-pub use link::Link;
+pub use deadline::{Deadline, SignalEdge};
+pub use deframer::{Counts, Decode, Deframer, Reject};
+pub use error::EncodeError;
+pub use receiver::Receiver;

@@ -17,11 +17,11 @@
 //! let mut buffer = [0; 32];
 //! let mut bytes = justfloat(&[1.0, -2.5], &mut buffer)?;
 //! assert_eq!(bytes, [0, 0, 0x80, 0x3F, 0, 0, 0x20, 0xC0, 0, 0, 0x80, 0x7F]);
-//! let mut reader = Deframer::<JustFloat<2>, 12>::new(JustFloat);
-//! assert_eq!(reader.read(&mut bytes), Some([1.0, -2.5]));
+//! let mut reader = Deframer::<JustFloat<2>, 12>::new();
+//! assert_eq!(reader.read(&mut bytes), Some(JustFloat([1.0, -2.5])));
 //!
 //! assert_eq!(text_line("rpm", &[482.0, -0.25], &mut buffer)?, b"rpm:482.000,-0.250\n");
-//! # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+//! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
 //! Limits: a reader that starts in the middle of a frame, behind noise, may take the noise for the first channels of that
@@ -33,7 +33,7 @@
 use core::fmt::Write;
 
 use super::field::{Reader, Writer};
-use super::{BufferTooSmall, Protocol, Reject};
+use super::{Decode, EncodeError, Reject};
 
 /// The end of a frame: +infinity.
 const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];
@@ -41,8 +41,8 @@ const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];
 /// Writes one `JustFloat` frame: `values`, then the tail. Returns the part of `out` that it fills.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when `out` has less than 4 bytes a value and 4 more.
-pub fn justfloat<'a>(values: &[f32], out: &'a mut [u8]) -> Result<&'a [u8], BufferTooSmall> {
+/// [`EncodeError::BufferTooSmall`] when `out` has less than 4 bytes a value and 4 more.
+pub fn justfloat<'a>(values: &[f32], out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {
     let needed = values.len().saturating_add(1).saturating_mul(4);
     let mut frame = Writer::new(out, needed)?;
     let mut previous = [0xFF; 4];
@@ -68,12 +68,12 @@ fn makes_tail([_, a, b, c]: [u8; 4], [d, e, f, _]: [u8; 4]) -> bool {
 /// Writes `name:1.000,-2.500` and a line end, with three decimals. Returns the part of `out` that it fills.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when the line does not fit; it says how long the line is.
+/// [`EncodeError::BufferTooSmall`] when the line does not fit; it says how long the line is.
 pub fn text_line<'a>(
     name: &str,
     values: &[f32],
     out: &'a mut [u8],
-) -> Result<&'a [u8], BufferTooSmall> {
+) -> Result<&'a [u8], EncodeError> {
     let mut line = Line { out, length: 0 };
     // `Line` takes everything, so that writing to it cannot fail.
     let _ = line.write_str(name);
@@ -83,7 +83,7 @@ pub fn text_line<'a>(
     let _ = line.write_char('\n');
     let Line { out, length } = line;
     let given = out.len();
-    out.get(..length).ok_or(BufferTooSmall { needed: length, given })
+    out.get(..length).ok_or(EncodeError::BufferTooSmall { needed: length, given })
 }
 
 /// Keeps what fits, and counts all of it.
@@ -103,25 +103,29 @@ impl Write for Line<'_> {
     }
 }
 
-/// The format of `JustFloat` frames of `C` channels, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct JustFloat<const C: usize>;
+/// A `JustFloat` frame of `C` channels, for a [`Deframer`](super::Deframer) of `4 * C + 4` bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct JustFloat<const C: usize>(
+    /// The channels.
+    pub [f32; C],
+);
 
-impl<const C: usize> Protocol for JustFloat<C> {
-    type Frame = [f32; C];
+impl<const C: usize> Decode for JustFloat<C> {
+    type Options = ();
     const PREFIX: usize = TAIL.len();
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &[]
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), _prefix: &[u8]) -> Option<usize> {
         Some(4 * C + TAIL.len())
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<[f32; C], Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         let values = frame.strip_suffix(&TAIL).ok_or(Reject::Unframed)?;
-        Reader(values).array(Reader::f32_le).ok_or(Reject::Length)
+        Reader(values).array(Reader::f32_le).map(Self).ok_or(Reject::Length)
     }
 }
 
@@ -141,8 +145,8 @@ mod tests {
         let mut buffer = [0; 16];
         let mut bytes = justfloat(&[f32::INFINITY, f32::NEG_INFINITY, 1.0], &mut buffer).unwrap();
         assert_eq!(tails(bytes), 1);
-        let mut reader = Deframer::<JustFloat<3>, 16>::new(JustFloat);
-        assert_eq!(reader.read(&mut bytes), Some([f32::MAX, f32::NEG_INFINITY, 1.0]));
+        let mut reader = Deframer::<JustFloat<3>, 16>::new();
+        assert_eq!(reader.read(&mut bytes), Some(JustFloat([f32::MAX, f32::NEG_INFINITY, 1.0])));
     }
 
     #[test]
@@ -162,7 +166,10 @@ mod tests {
     #[test]
     fn a_line_that_does_not_fit_says_how_long_it_is() {
         let error = text_line("speed", &[1.0, f32::NAN], &mut [0; 10]).unwrap_err();
-        assert_eq!(error, BufferTooSmall { needed: "speed:1.000,NaN\n".len(), given: 10 });
+        assert_eq!(
+            error,
+            EncodeError::BufferTooSmall { needed: "speed:1.000,NaN\n".len(), given: 10 }
+        );
         assert_eq!(text_line("x", &[], &mut [0; 2]), Ok(&b"x\n"[..]));
     }
 

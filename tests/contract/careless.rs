@@ -4,7 +4,7 @@ use super::dji::OneModel;
 use super::*;
 use drivetrain::dji::M3508;
 use drivetrain::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Visitor, WrongSetting};
-use drivetrain::sim::{Rule, Violation};
+use drivetrain::sim::contract::{Rule, Violation};
 use drivetrain::time::{Duration, Instant, Tick};
 
 /// What a careless device gets wrong.

@@ -18,7 +18,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     Claim, Devices, Ingest, MotorName, Order, Own, OwnMotor, TargetError, VelocityDrive, Vitals,
 };
-use drivetrain::sim::{Subject, check_contract};
+use drivetrain::sim::contract::{Subject, check_contract};
 use drivetrain::units::AngularVelocity;
 use embedded_can::Frame;
 

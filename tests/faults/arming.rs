@@ -10,7 +10,7 @@ use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Devices, TargetError};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Fault, Line, Model, MotorConfig, Sender, World};
+use drivetrain::sim::{Fault, Line, MotorConfig, Sender, Simulation};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
 
@@ -25,8 +25,8 @@ pub(crate) const CASES: &[Case] = cases![
 /// At 330c201: driven in 3792 of the 3795 ticks after the first trip.
 #[cfg_attr(test, test)]
 fn f68_a_program_that_arms_in_each_tick_never_rearms_what_ran_away() {
-    let world = World::new(1);
-    let key = world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let world = Simulation::new(1);
+    let key = world.attach(MotorConfig::m3508(1)).unwrap();
     world.fault(Fault::ReversedTorque(key), ..).unwrap();
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)).unwrap();
@@ -235,8 +235,8 @@ fn f69_arming_opens_the_output_from_zero_whatever_target_stands() {
 #[cfg_attr(test, test)]
 fn f69_a_position_loop_starts_from_where_the_shaft_is() {
     let run = |opening: Duration| {
-        let world = World::new(4);
-        let key = world.attach(MotorConfig::new(Model::Gm6020Voltage, 1)).unwrap();
+        let world = Simulation::new(4);
+        let key = world.attach(MotorConfig::gm6020_voltage(1)).unwrap();
         let (to_angle, volts) = (PidConfig::new(15.0, 0.0, 0.0), PidConfig::new(1.0, 5.0, 0.0));
         let yaw = Config::<Gm6020Voltage>::new(1).position_loop(to_angle, volts);
         let mut bus = Bus::new();
@@ -280,9 +280,9 @@ fn f69_a_position_loop_starts_from_where_the_shaft_is() {
     let (soft, hard) = (run(Duration::from_millis(200)), run(Duration::ZERO));
     for (ms, word) in (0_u64..).zip(&soft) {
         let open = open_raw(ms.saturating_sub(100) * 1_000, 200_000, 25_000);
-        assert!(word.abs() <= open, "{word} of {open} at {ms} ms");
+        assert!(word.abs() <= i32::from(open), "{word} of {open} at {ms} ms");
     }
-    let jump = |words: &[i16]| words.windows(2).map(|pair| (pair[1] - pair[0]).abs()).max();
+    let jump = |words: &[i32]| words.windows(2).map(|pair| (pair[1] - pair[0]).abs()).max();
     let (soft, hard) = (jump(&soft).unwrap(), jump(&hard).unwrap());
     // The range opens once in a round of 12 updates: by 6 %, and so does what the position loop asks for.
     assert!(soft < 4_000 && hard > 20_000, "the largest step of the output: {soft}, {hard}");

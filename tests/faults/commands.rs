@@ -7,7 +7,7 @@ use drivetrain::dji::{Bus, Config, CurrentControlled, Gm6020Current, Gm6020Volta
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::motor::{ArmError, TargetError};
 use drivetrain::runner::EmergencyStop;
-use drivetrain::sim::{Fault, Line, World};
+use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, Current, Voltage};
 
@@ -188,7 +188,7 @@ fn f39_wind_up_is_bounded_and_unwinds_at_once() {
 #[cfg_attr(test, test)]
 fn f40_a_change_of_target_kind_under_load_does_not_jump() {
     let loops = (PidConfig::new(8.0, 0.0, 0.0), PidConfig::new(0.6, 6.0, 0.0));
-    let world = World::new(5);
+    let world = Simulation::new(5);
     let mut rig = Rig::with(&world, Line::Can1, 1, |config| config.position_loop(loops.0, loops.1));
     let wheel = rig.wheels[0];
     world.set_load_nm(rig.keys[0], -1.0);
@@ -230,7 +230,7 @@ fn f41_a_refused_command_says_why_and_is_not_kept() {
     assert_eq!(step(&mut bus, 2), Some([0; 4]), "not kept while disarmed");
     assert_eq!(bus.set_velocity(wheel, rpm(1.0)), Err(TargetError::NoLoop));
 
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     world.fault(Fault::Silent(rig.keys[0]), at_ms(100)..at_ms(400)).unwrap();
     let wheel = rig.wheels[0];
@@ -258,7 +258,7 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
 
     // From an interrupt.
     static STOP: EmergencyStop = EmergencyStop::new();
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 2);
     rig.runner = rig.runner.with_emergency_stop(&STOP);
     rig.drive(300);

@@ -8,7 +8,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     ArmError, Condition, Conditions, HealthConfig, Ingest, Reaction, TargetError,
 };
-use drivetrain::sim::{Fault, Line, Model, MotorConfig, World};
+use drivetrain::sim::{Fault, Line, MotorConfig, Simulation};
 use drivetrain::units::{Angle, Current};
 
 /// The cases of this file.
@@ -44,7 +44,7 @@ fn f05_a_second_master_is_an_edge_refuses_arming_and_relaxes_where_configured() 
         HealthConfig::new().with_reaction(Condition::SecondMaster, Reaction::Relax);
     static USUAL: HealthConfig = HealthConfig::new();
     for (health, relaxes) in [(&USUAL, false), (&RELAX, true)] {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::with(&world, Line::Can1, 2, |config| config.with_health(health));
         rig.drive(300);
         assert_eq!(edges(rig.runner.device_mut()), []);
@@ -93,11 +93,11 @@ fn f05_a_second_master_is_an_edge_refuses_arming_and_relaxes_where_configured() 
 #[cfg_attr(test, test)]
 fn f08_two_escs_with_one_id_are_an_edge_and_relax_it() {
     for seed in 1..=3 {
-        let world = World::new(seed);
+        let world = Simulation::new(seed);
         let mut rig = Rig::new(&world, Line::Can1, 2);
         rig.drive(2_500);
         assert_eq!(edges(rig.runner.device_mut()), []);
-        world.attach(MotorConfig::new(Model::M3508, 1).with_line(Line::Can1)).unwrap();
+        world.attach(MotorConfig::m3508(1).with_line(Line::Can1)).unwrap();
         let begin = rig.sent.len();
         rig.drive(2_300);
         let told = edges(rig.runner.device_mut());
@@ -135,7 +135,7 @@ fn f14_an_ambiguous_gap_is_an_edge_until_the_position_is_set() {
 
 #[cfg_attr(test, test)]
 fn f15_a_power_cycle_has_its_edges_in_order() {
-    let world = World::new(3);
+    let world = Simulation::new(3);
     let mut rig = Rig::new(&world, Line::Can1, 2);
     rig.drive(100);
     let wheel = rig.wheels[0];
@@ -189,7 +189,7 @@ fn f17_a_speed_beyond_twice_no_load_is_an_edge_and_counts_no_turns() {
 #[cfg_attr(test, test)]
 fn f18_heat_derates_on_a_line_to_zero_and_back_with_hysteresis() {
     static COOL: HealthConfig = HealthConfig::new().with_temperatures(60, 80);
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut rig = Rig::with(&world, Line::Can1, 2, |config| config.with_health(&COOL));
     rig.drive(300); // until the output range is open
     let wheels = rig.wheels.clone();
@@ -236,6 +236,11 @@ fn f18_heat_derates_on_a_line_to_zero_and_back_with_hysteresis() {
 
 #[cfg_attr(test, test)]
 fn f19_each_error_code_is_an_edge_and_faults_relax() {
+    #[derive(Debug, Clone, Copy)]
+    enum Model {
+        M3508,
+        M2006,
+    }
     let (fault, warning) = (Condition::Fault, Condition::Warning);
     for (model, code, expected) in (1..=8)
         .chain([200])
@@ -248,7 +253,7 @@ fn f19_each_error_code_is_an_edge_and_faults_relax() {
         let mut bus = Bus::new();
         let motor = match model {
             Model::M2006 => bus.attach(at_once::<M2006>(1)).unwrap().erase(),
-            _ => bus.attach(at_once::<M3508>(1)).unwrap().erase(),
+            Model::M3508 => bus.attach(at_once::<M3508>(1)).unwrap().erase(),
         };
         let mut ms = 0;
         let mut hear = |bus: &mut Bus, code: u8, ticks: u64| {
@@ -322,7 +327,7 @@ fn f21_a_stall_in_either_direction_is_reported_limited_or_relaxed() {
         HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
     for (health, expected) in [(&REPORT, 16_384), (&LIMIT, 1_638), (&RELAX, 0)] {
         for direction in [1.0, -1.0] {
-            let world = World::new(1);
+            let world = Simulation::new(1);
             let mut rig = Rig::with(&world, Line::Can1, 1, |config| config.with_health(health));
             let wheel = rig.wheels[0];
             let drive = |bus: &mut Bus, _| _ = bus.set_velocity(wheel, rpm(300.0 * direction));
@@ -360,7 +365,7 @@ fn f21_a_stall_in_either_direction_is_reported_limited_or_relaxed() {
 #[cfg_attr(test, test)]
 fn f22_a_runaway_is_relaxed_and_latched() {
     for direction in [1.0, -1.0] {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::new(&world, Line::Can1, 2);
         let wheels = rig.wheels.clone();
         let drive = |bus: &mut Bus, _| {
@@ -390,7 +395,7 @@ fn f22_a_runaway_is_relaxed_and_latched() {
 fn f23_frozen_feedback_is_an_edge_and_a_true_standstill_is_none() {
     let swing = |ms: u64| if (ms / 200).is_multiple_of(2) { 250.0 } else { -150.0 };
     let run = |fault: fn(drivetrain::sim::MotorKey) -> Fault, until: u64| {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::new(&world, Line::Can1, 1);
         world.fault(fault(rig.keys[0]), at_ms(550)..at_ms(until)).unwrap();
         let wheel = rig.wheels[0];
@@ -408,7 +413,7 @@ fn f23_frozen_feedback_is_an_edge_and_a_true_standstill_is_none() {
     assert_eq!(began(&told, Condition::Frozen), 0, "{told:?}");
     // Pushed with a constant current, and at rest without any, for a minute.
     for amperes in [0.0, 20.0] {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::new(&world, Line::Can1, 1);
         world.fault(Fault::BlockedShaft(rig.keys[0]), ..).unwrap();
         let wheel = rig.wheels[0];
@@ -416,8 +421,8 @@ fn f23_frozen_feedback_is_an_edge_and_a_true_standstill_is_none() {
         assert_eq!(began(&edges(rig.runner.device_mut()), Condition::Frozen), 0);
     }
     // A gimbal in voltage mode that is held.
-    let world = World::new(1);
-    let key = world.attach(MotorConfig::new(Model::Gm6020Voltage, 1)).unwrap();
+    let world = Simulation::new(1);
+    let key = world.attach(MotorConfig::gm6020_voltage(1)).unwrap();
     world.fault(Fault::BlockedShaft(key), ..).unwrap();
     let mut bus = Bus::new();
     let yaw = bus.attach(Config::<Gm6020Voltage>::new(1)).unwrap();
@@ -461,7 +466,7 @@ fn f24_late_and_offline_are_edges_each_once() {
             ],
         ),
     ] {
-        let world = World::new(2);
+        let world = Simulation::new(2);
         let mut rig = Rig::new(&world, Line::Can1, 4);
         world.fault(Fault::Silent(rig.keys[2]), at_ms(500)..at_ms(500 + silent)).unwrap();
         rig.run(900, |_, _| {});
@@ -480,7 +485,7 @@ fn f42_a_soft_limit_lets_only_inward_output_through() {
         HealthConfig::new().with_soft_limits(Angle::from_degrees(-90.0), Angle::from_degrees(90.0));
     const POSITION: PidConfig = PidConfig::new(8.0, 0.0, 0.0);
     for (reversed, direction) in [(false, 1.0), (false, -1.0), (true, 1.0), (true, -1.0)] {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::with(&world, Line::Can1, 1, |config| {
             let config = config.with_health(&LIMITS).position_loop(POSITION, crate::rig::SPEED);
             if reversed { config.reversed() } else { config }

@@ -5,7 +5,7 @@ use crate::rig::{Rig, armed, at_ms, feedback, ticks_since};
 use drivetrain::dji::{Bus, Config, ErrorCode, Gm6020Voltage, M2006, M3508};
 use drivetrain::encoder::Homing;
 use drivetrain::motor::{Ingest, Link};
-use drivetrain::sim::{Fault, Line, World};
+use drivetrain::sim::{Fault, Line, Simulation};
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
@@ -38,7 +38,7 @@ fn f13_the_first_frame_sets_the_angle_without_a_turn() {
 #[cfg_attr(test, test)]
 fn f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent() {
     for seed in 1..=5 {
-        let world = World::new(seed);
+        let world = Simulation::new(seed);
         let mut rig = Rig::new(&world, Line::Can1, 1);
         let lossy = Fault::LostFrames { line: Line::Can1, id: None, probability: 0.4 };
         world.fault(lossy, at_ms(100)..at_ms(2_900)).unwrap();
@@ -48,7 +48,7 @@ fn f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent() {
             _ = bus.set_velocity(wheel, crate::rig::rpm(target));
         });
         let state = rig.runner.device().state(wheel).unwrap();
-        let truth = world.motor(rig.keys[0]).unwrap().rotor_counts;
+        let truth = world.motor(rig.keys[0]).unwrap().encoder_counts;
         let off = (state.rotor_counts - truth).abs();
         assert!(off < 1_500 || state.ambiguous_gaps > 0, "seed {seed}: {off} counts, no flag");
     }
@@ -65,7 +65,7 @@ fn f14_a_gap_is_resolved_with_the_speed_or_flagged_but_never_silent() {
 #[cfg_attr(test, test)]
 fn f15_a_power_cycle_in_motion_relaxes_and_makes_the_position_uncertain() {
     for forgets_angle in [false, true] {
-        let world = World::new(3);
+        let world = Simulation::new(3);
         let mut rig = Rig::new(&world, Line::Can1, 2);
         rig.drive(100);
         let wheel = rig.wheels[0];

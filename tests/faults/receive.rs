@@ -7,7 +7,7 @@ use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Ingest, Link, Malformed};
 use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
-use drivetrain::sim::{Fault, Line, World};
+use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use embedded_can::{ExtendedId, Frame, StandardId};
 
@@ -28,7 +28,7 @@ pub(crate) const CASES: &[Case] = cases![
 #[cfg_attr(test, test)]
 fn f01_a_wrong_length_is_counted_and_keeps_nothing_fresh() {
     for length in 0..8 {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let mut rig = Rig::new(&world, Line::Can1, 2);
         world
             .fault(Fault::WrongLength { motor: rig.keys[0], length }, at_ms(600)..at_ms(650))
@@ -50,7 +50,7 @@ fn f01_a_wrong_length_is_counted_and_keeps_nothing_fresh() {
 
 #[cfg_attr(test, test)]
 fn f02_a_remote_frame_is_handed_back() {
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     let remote = CanFrame::new_remote(StandardId::new(0x201).unwrap(), 8).unwrap();
     rig.drive(100);
@@ -77,7 +77,7 @@ fn f03_an_extended_frame_of_the_same_number_is_handed_back() {
 
 #[cfg_attr(test, test)]
 fn f04_every_unknown_id_is_handed_back_untouched_and_counted_apart() {
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     rig.drive(50);
     let foreign = |id| CanFrame::standard(id, [0x5A; 8]).unwrap();
@@ -104,7 +104,7 @@ fn f06_an_angle_above_8191_refuses_the_whole_frame() {
     assert_eq!(bus.state(wheel), Some(before), "no half update");
     assert_eq!(bus.counters().bad_field, 3);
 
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 2);
     let wrong = Fault::WrongAngle { motor: rig.keys[0], raw: 8192 };
     world.fault(wrong, at_ms(200)..at_ms(400)).unwrap();
@@ -129,7 +129,7 @@ fn f07_feedback_of_an_unattached_motor_has_its_own_counter() {
 #[cfg_attr(test, test)]
 fn f09_duplicated_frames_change_nothing() {
     let run = |duplicated| {
-        let world = World::new(4);
+        let world = Simulation::new(4);
         let mut rig = Rig::new(&world, Line::Can1, 1);
         if duplicated {
             let all = Fault::DuplicateFrames { line: Line::Can1, id: None };
@@ -137,7 +137,7 @@ fn f09_duplicated_frames_change_nothing() {
         }
         rig.drive(1_000);
         let state = rig.runner.device().state(rig.wheels[0]).unwrap();
-        (state.rotor_counts, world.motor(rig.keys[0]).unwrap().rotor_counts, state.ambiguous_gaps)
+        (state.rotor_counts, world.motor(rig.keys[0]).unwrap().encoder_counts, state.ambiguous_gaps)
     };
     assert_eq!(run(true), run(false));
 
@@ -215,7 +215,7 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     let mut queue = FrameQueue::<4>::new();
     let (mut interrupt, mut task) = queue.split();
     let clock = ManualClock::new(at_ms(1));
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let (bus, _) = armed([Config::new(1)]);
     let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
     for ms in 2..3_000 {
@@ -231,7 +231,7 @@ fn f12_a_full_queue_and_an_overrun_are_counted_and_freshness_does_the_rest() {
     let edges: Vec<String> = runner.edges().map(|edge| edge.to_string()).collect();
     assert_eq!(edges, ["receive overrun began at 2000 us", "receive overrun ended at 1999000 us"]);
 
-    let world = World::new(1).with_receive_depth(Line::Can1, 4);
+    let world = Simulation::new(1).with_receive_depth(Line::Can1, 4);
     let mut rig = Rig::new(&world, Line::Can1, 4);
     rig.drive(100);
     world.advance(Duration::from_millis(20)); // the application hangs

@@ -5,9 +5,7 @@ use drivetrain::dji::{self, Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Link;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{
-    Controller, Line, Model, MotorConfig, MotorKey, Record, Sender, SimClock, World,
-};
+use drivetrain::sim::{Controller, Line, MotorConfig, MotorKey, Sender, Simulation, Transmission};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 
@@ -73,10 +71,10 @@ pub(crate) struct Sent {
 }
 
 pub(crate) struct Rig<'w> {
-    pub(crate) world: &'w World,
+    pub(crate) world: &'w Simulation,
     pub(crate) keys: Vec<MotorKey>,
     pub(crate) wheels: Vec<Handle<M3508>>,
-    pub(crate) runner: Runner<Nb<Controller<'w>>, SimClock<'w>, Bus>,
+    pub(crate) runner: Runner<Nb<Controller<'w>>, &'w Simulation, Bus>,
     /// Every 0x200 frame.
     pub(crate) sent: Vec<Sent>,
     /// Frames that were handed back.
@@ -87,19 +85,19 @@ pub(crate) struct Rig<'w> {
 }
 
 impl<'w> Rig<'w> {
-    pub(crate) fn new(world: &'w World, line: Line, motors: u8) -> Self {
+    pub(crate) fn new(world: &'w Simulation, line: Line, motors: u8) -> Self {
         Self::with(world, line, motors, |config| config)
     }
 
     pub(crate) fn with(
-        world: &'w World,
+        world: &'w Simulation,
         line: Line,
         motors: u8,
         config: impl Fn(Config<M3508>) -> Config<M3508>,
     ) -> Self {
         let mut bus = Bus::new();
         let ids = 1..=motors;
-        let motor = |id| MotorConfig::new(Model::M3508, id).with_line(line);
+        let motor = |id| MotorConfig::m3508(id).with_line(line);
         Self {
             world,
             keys: ids.clone().map(|id| world.attach(motor(id)).unwrap()).collect(),
@@ -179,7 +177,7 @@ impl<'w> Rig<'w> {
 }
 
 /// I2, I3 and I4, for every frame.
-fn check(record: &Record, stale_since: &[Option<Instant>], trust_mailboxes: bool) {
+fn check(record: &Transmission, stale_since: &[Option<Instant>], trust_mailboxes: bool) {
     use embedded_can::Frame;
     let frame = &record.frame;
     assert!(frame.is_data_frame() && frame.length() == 8 && frame.header() == 0x200, "{record}");

@@ -6,7 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::motor::{ArmError, Condition, Link, Recovery, TargetError};
 use drivetrain::runner::{BusCondition, Nb, Runner};
-use drivetrain::sim::{Fault, Line, World};
+use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
 
 /// The cases of this file.
@@ -28,7 +28,7 @@ pub(crate) const CASES: &[Case] = cases![
 #[cfg_attr(test, test)]
 fn f24_lost_feedback_is_zero_within_a_tick_and_the_others_do_not_notice() {
     let run = |silent: Option<u64>| {
-        let world = World::new(2);
+        let world = Simulation::new(2);
         let mut rig = Rig::new(&world, Line::Can1, 4);
         if let Some(ms) = silent {
             world.fault(Fault::Silent(rig.keys[2]), at_ms(500)..at_ms(500 + ms)).unwrap();
@@ -75,7 +75,7 @@ fn armed_at_rest(speed: PidConfig) -> (Bus, [drivetrain::dji::Handle<M3508>; 1])
 
 #[cfg_attr(test, test)]
 fn f25_with_all_feedback_lost_frames_are_still_offered() {
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 4);
     for key in rig.keys.clone() {
         world.fault(Fault::Silent(key), at_ms(300)..at_ms(900)).unwrap();
@@ -99,7 +99,7 @@ fn f25_with_all_feedback_lost_frames_are_still_offered() {
     assert!(!edge.began && (at_ms(900)..=at_ms(903)).contains(&edge.at), "{edge}");
 
     // One motor of four is no silence of the bus, and neither is a bus on which nothing was ever heard.
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 4);
     for key in rig.keys.clone().into_iter().skip(1) {
         world.fault(Fault::Silent(key), ..).unwrap();
@@ -125,7 +125,7 @@ fn f27_a_heartbeat_stops_with_any_part_of_the_loop() {
     // A hardware watchdog of 5 ms, fed as the documentation says; 200 ms in which one part stops after 50.
     let resets_at = |stops: Stops| {
         let clock = ManualClock::new(at_ms(1));
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let (bus, [wheel]) = armed([Config::new(1)]);
         let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
         if stops == Stops::Bus {
@@ -164,7 +164,7 @@ fn f27_a_heartbeat_stops_with_any_part_of_the_loop() {
 
 #[cfg_attr(test, test)]
 fn f26_an_application_that_stops_is_zero_after_the_deadline() {
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let mut rig = Rig::new(&world, Line::Can1, 2);
     rig.drive(300);
     rig.run(300, |_, _| {}); // ticks and frames go on, targets do not
@@ -243,7 +243,7 @@ fn f29_time_that_stands_or_goes_back_is_never_fresh_for_ever() {
     // Standing: the runner has no tick for as long as a clock may be coarse, and a tick by hand sends zeros.
     let clock = ManualClock::new(at_ms(10));
     let (bus, [wheel]) = armed([Config::new(1)]);
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut runner = Runner::new(Nb(world.controller()), &clock, bus);
     let tick = runner.due().unwrap();
     _ = runner.ingest(&feedback(0x201, 0, 0), at_ms(10));
@@ -353,7 +353,7 @@ fn f32_a_huge_time_step_moves_no_integral() {
         assert!((late - before).abs() <= 26, "{before} to {late}"); // half a tick at most
     }
     let clock = ManualClock::new(at_ms(1));
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut runner = Runner::new(Nb(world.controller()), &clock, Bus::new());
     let tick = runner.due().unwrap();
     runner.tick(tick);
@@ -397,7 +397,7 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
     let first = step(&mut bus, 295).unwrap()[0];
     assert!(first < 200, "the old integral is gone: {first}");
 
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let opening = Duration::from_millis(200);
     let mut rig = Rig::with(&world, Line::Can1, 1, |config| {
         config.with_recovery(Recovery::Resume).with_opening(opening)

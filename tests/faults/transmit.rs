@@ -6,7 +6,7 @@ use drivetrain::dji::{Config, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Link};
 use drivetrain::runner::{BusCondition, Nb, Runner};
-use drivetrain::sim::{Fault, Line, World};
+use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, ManualClock, Tick};
 use embedded_can::ErrorKind;
 use std::collections::VecDeque;
@@ -132,7 +132,7 @@ fn f53_driver_errors_are_counted_by_kind_and_the_loop_goes_on() {
     );
     assert!(of(&taken, 0x200).len() >= 400 && of(&taken, 0x1FF).len() >= 400);
 
-    let world = World::new(1);
+    let world = Simulation::new(1);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     let errors = Fault::DriverErrors { line: Line::Can1, probability: 0.5 };
     world.fault(errors, at_ms(600)..at_ms(1_100)).unwrap();
@@ -153,7 +153,7 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
     for (fault, stale_at_most) in
         [(Fault::BusOff(Line::Can1), 3), (Fault::Unplugged(Line::Can1), 3)]
     {
-        let world = World::new(6);
+        let world = Simulation::new(6);
         let mut rig = Rig::new(&world, Line::Can1, 1);
         rig.trust_mailboxes = false;
         world.fault(fault, at_ms(300)..at_ms(600)).unwrap();
@@ -181,7 +181,7 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
         saw(format!("{fault:?}: {stale} stale, then zeros until armed"));
     }
     // With the driver's abort there is no stale frame at all.
-    let world = World::new(6);
+    let world = Simulation::new(6);
     let mut rig = Rig::new(&world, Line::Can1, 1);
     rig.trust_mailboxes = false;
     world.fault(Fault::Unplugged(Line::Can1), at_ms(300)..at_ms(600)).unwrap();
@@ -195,7 +195,7 @@ fn f54_after_bus_off_only_stale_mailboxes_and_then_zeros_until_rearmed() {
 
 #[cfg_attr(test, test)]
 fn f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody() {
-    let world = World::new(7);
+    let world = Simulation::new(7);
     let mut rig = Rig::new(&world, Line::Can1, 2);
     let foreign = CanFrame::standard(0x7A5, [0x55; 8]).unwrap();
     let flood =
@@ -217,7 +217,7 @@ fn f55_a_flood_of_foreign_frames_is_handed_back_in_order_and_hurts_nobody() {
 #[cfg_attr(test, test)]
 fn f56_two_buses_share_nothing() {
     let run = |trouble: bool| {
-        let world = World::new(8);
+        let world = Simulation::new(8);
         let mut left = Rig::new(&world, Line::Can1, 2);
         let mut right = Rig::new(&world, Line::Can2, 2);
         if trouble {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::ends::{ends, is_there, signal};
 use crate::judge::end_with_zeros;
-use drivetrain::sim::{Model, MotorConfig, MotorKey, World};
+use drivetrain::sim::{MotorConfig, MotorKey, Simulation};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
 use std::fs;
 use std::io::{BufRead, Write};
@@ -29,9 +29,9 @@ struct Bus {
 
 /// Half a second later the motors turn.
 fn driven() -> (Bus, Example) {
-    let world = World::new(4);
-    let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::new(Model::M3508, id)).collect();
-    configs.push(MotorConfig::new(Model::Gm6020Voltage, 5));
+    let world = Simulation::new(4);
+    let mut configs: Vec<_> = (1..=4).map(MotorConfig::m3508).collect();
+    configs.push(MotorConfig::gm6020_voltage(5));
     let motors = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut bus = Bus {
         robot: Robot::on(FAR, world),

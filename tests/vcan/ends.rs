@@ -3,7 +3,7 @@
 
 use super::{END, Example, Robot, Witness, output, queueing, result, said, wait_until};
 use crate::judge::end_with_zeros;
-use drivetrain::sim::{Model, MotorConfig, World};
+use drivetrain::sim::{MotorConfig, Simulation};
 use std::fs::File;
 use std::io::{BufRead, Write};
 use std::net::Shutdown;
@@ -15,8 +15,8 @@ const ZEROS: &str = "200#0000000000000000";
 const ASKED: [&str; 4] = ["--motors", "m3508:1", "--rpm", "60"];
 
 fn robot() -> Robot {
-    let world = World::new(3);
-    world.attach(MotorConfig::new(Model::M3508, 1)).unwrap();
+    let world = Simulation::new(3);
+    world.attach(MotorConfig::m3508(1)).unwrap();
     Robot::new(world)
 }
 

@@ -17,7 +17,7 @@ mod judge;
 
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::Vec2;
-use drivetrain::sim::{ChassisConfig, Line, Model, MotorConfig, Sender, Wheel, World};
+use drivetrain::sim::{ChassisConfig, Line, MotorConfig, Sender, Simulation, Wheel};
 use drivetrain::time::Duration;
 use judge::{Judge, Phase, Written, end_with_zeros, line_of};
 use socketcan::{
@@ -168,7 +168,7 @@ impl Witness {
 }
 
 struct Robot {
-    world: World,
+    world: Simulation,
     socket: CanSocket,
     written: Written,
     /// What it received, as candump would write it.
@@ -177,11 +177,11 @@ struct Robot {
 }
 
 impl Robot {
-    fn new(world: World) -> Self {
+    fn new(world: Simulation) -> Self {
         Self::on(BUS, world)
     }
 
-    fn on(interface: &str, world: World) -> Self {
+    fn on(interface: &str, world: Simulation) -> Self {
         let socket = CanSocket::open(interface).unwrap();
         socket.set_nonblocking(true).unwrap();
         Self { world, socket, written: Written::default(), received: Vec::new(), ms: 0 }
@@ -268,9 +268,9 @@ impl Robot {
 #[ignore = "needs vcan0, candump and tc: tests/vcan/run starts a Linux that has them"]
 fn every_frame_on_a_real_can_stack_is_accounted_for() {
     let witness = Witness::new();
-    let world = World::new(1);
-    let mut configs: Vec<_> = (1..=4).map(|id| MotorConfig::new(Model::M3508, id)).collect();
-    configs.push(MotorConfig::new(Model::Gm6020Voltage, 5));
+    let world = Simulation::new(1);
+    let mut configs: Vec<_> = (1..=4).map(MotorConfig::m3508).collect();
+    configs.push(MotorConfig::gm6020_voltage(5));
     let keys: Vec<_> = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut robot = Robot::new(world);
     let (motors, rpm, log) = ("m3508:1-4,gm6020:5", RPM.to_string(), result("ours.log"));
@@ -350,12 +350,12 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_mecanum_chassis_moves_as_it_is_asked_and_is_left_at_zero() {
     let (ahead, left, turn) = (0.6, -0.3, 0.8);
-    let world = World::new(2);
+    let world = Simulation::new(2);
     let places = [(0.20, -0.18), (0.20, 0.18), (-0.20, 0.18), (-0.20, -0.18)];
     let wheels: Vec<_> = (1..)
         .zip(places)
         .map(|(id, (x, y))| {
-            let motor = world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+            let motor = world.attach(MotorConfig::m3508(id)).unwrap();
             let wheel = Wheel::mecanum(motor, 0.076, Vec2::new(x, y));
             if y < 0.0 { wheel.reversed() } else { wheel }
         })

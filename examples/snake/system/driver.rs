@@ -1,7 +1,7 @@
 //! The CAN driver of the firmware: a queue before the three mailboxes, as a transmit interrupt would feed them.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{Controller, ControllerError};
+use drivetrain::sim::{Controller, SimError};
 use embedded_can::nb::Can;
 use std::collections::VecDeque;
 
@@ -35,9 +35,9 @@ impl<'w> Queued<'w> {
 
 impl Can for Queued<'_> {
     type Frame = CanFrame;
-    type Error = ControllerError;
+    type Error = SimError;
 
-    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ControllerError> {
+    fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, SimError> {
         if self.waiting.len() >= LONGEST {
             return Err(nb::Error::WouldBlock);
         }
@@ -46,7 +46,7 @@ impl Can for Queued<'_> {
         Ok(None)
     }
 
-    fn receive(&mut self) -> nb::Result<CanFrame, ControllerError> {
+    fn receive(&mut self) -> nb::Result<CanFrame, SimError> {
         self.can.receive()
     }
 }

@@ -4,7 +4,7 @@ use super::{JOINTS, at, degrees, gait, pulses, seconds};
 use drivetrain::math::sin_cos;
 use drivetrain::time::{Duration, Instant};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, Command, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
 use drivetrain::wire::{Counts, Deframer};
 use std::f32::consts::TAU;
@@ -95,11 +95,11 @@ impl Operator {
 pub(crate) struct Host {
     pub(crate) operator: Operator,
     due: Instant,
-    telemetry: Deframer<TelemetryFormat, TELEMETRY_LENGTH>,
+    telemetry: Deframer<Telemetry, TELEMETRY_LENGTH>,
     pub(crate) latest: Option<Telemetry>,
     received_s: f32,
     /// All that was sent.
-    pub(crate) sent: Vec<Command>,
+    pub(crate) sent: Vec<HostCommand>,
     pub(crate) sent_bytes: u32,
     /// The largest angle of a joint that came back during the gait, in degrees.
     pub(crate) furthest_deg: f32,
@@ -110,7 +110,7 @@ impl Host {
         Self {
             operator,
             due: Instant::START,
-            telemetry: Deframer::new(TelemetryFormat::new()),
+            telemetry: Deframer::with_options(TelemetryFormat::new()),
             latest: None,
             received_s: 0.0,
             sent: Vec::new(),
@@ -136,7 +136,7 @@ impl Host {
         command.encode(buffer).ok()
     }
 
-    fn plan(&self, time_s: f32) -> Command {
+    fn plan(&self, time_s: f32) -> HostCommand {
         let from_s = time_s + LATENCY_S;
         let until_s = from_s + PERIOD.as_secs_f32();
         // What the operator will do is not known yet.
@@ -146,7 +146,7 @@ impl Host {
             since_s.map_or(0.0, |since_s| gait::angle_deg(joint, at_s - since_s))
         };
         let swing = GRIPPER_DEG * sin_cos(TAU * GRIPPER_HZ * moving_s).0;
-        Command {
+        HostCommand {
             joints: std::array::from_fn(|joint| {
                 let target = wanted(joint, until_s);
                 let way = target - wanted(joint, from_s) + self.lag_deg(joint, time_s);

@@ -7,16 +7,16 @@ use drivetrain::dji::{self, Bus, Gm6020Voltage, Handle, M2006};
 use drivetrain::encoder::Position;
 use drivetrain::motor::{BusLoad, Devices};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{SimClock, World};
+use drivetrain::sim::Simulation;
 use drivetrain::snake::{Config, Joint, Joints};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Sts, register};
-use drivetrain::wire::hipnuc::{self, EulerOrder, HipNuc};
+use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status, register};
+use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
-    COMMAND_LENGTH, Command, CommandFormat, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
+    COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
-use drivetrain::wire::{Counts, Deframer, Edge, Link};
+use drivetrain::wire::{Counts, Deframer, Receiver, SignalEdge};
 use std::error::Error;
 
 /// Three commands may be damaged in a row.
@@ -56,16 +56,16 @@ pub(crate) struct Output {
     pub(crate) servo: Vec<u8>,
 }
 
-type Shell<'w> = Runner<Nb<Queued<'w>>, SimClock<'w>, (Joints, Bus)>;
+type Shell<'w> = Runner<Nb<Queued<'w>>, &'w Simulation, (Joints, Bus)>;
 
 pub(crate) struct Robot<'w> {
     pub(crate) runner: Shell<'w>,
     pub(crate) joints: [Joint; JOINTS],
     pub(crate) yaw: Handle<Gm6020Voltage>,
     pub(crate) finger: Handle<M2006>,
-    host: Link<CommandFormat, COMMAND_LENGTH>,
-    imus: [Link<HipNuc, { hipnuc::MAX_FRAME }>; 4],
-    servo: Deframer<Sts, { feetech::MAX_FRAME }>,
+    host: Receiver<HostCommand, COMMAND_LENGTH>,
+    imus: [Receiver<Imu, { hipnuc::MAX_FRAME }>; 4],
+    servo: Deframer<Status, { feetech::MAX_FRAME }>,
     pub(crate) servo_position: Option<Present>,
     /// When the last command came, and how fast its targets moved, in pulses a second.
     heard: Instant,
@@ -74,12 +74,12 @@ pub(crate) struct Robot<'w> {
     reset: Reset,
     drives: bool,
     ticks: u32,
-    pub(crate) accepted: Vec<Command>,
+    pub(crate) accepted: Vec<HostCommand>,
     pub(crate) events: Vec<(f32, Event)>,
 }
 
 impl<'w> Robot<'w> {
-    pub(crate) fn new(world: &'w World) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn new(world: &'w Simulation) -> Result<Self, Box<dyn Error>> {
         let mut joints = Joints::new();
         let mut handles = Vec::new();
         for id in 1..=12 {
@@ -96,9 +96,9 @@ impl<'w> Robot<'w> {
             joints: handles.try_into().map_err(|_| "12 joints")?,
             yaw,
             finger,
-            host: Link::new(CommandFormat, HOST_DEADLINE),
-            imus: std::array::from_fn(|_| Link::new(HipNuc, IMU_DEADLINE)),
-            servo: Deframer::new(Sts),
+            host: Receiver::new(HOST_DEADLINE),
+            imus: std::array::from_fn(|_| Receiver::new(IMU_DEADLINE)),
+            servo: Deframer::new(),
             servo_position: None,
             heard: Instant::START,
             rates: [0.0; JOINTS],
@@ -160,8 +160,8 @@ impl<'w> Robot<'w> {
         let now = tick.now();
         while let Some(edge) = self.host.edge(now) {
             let (at, event) = match edge {
-                Edge::Heard { at } => (at, Event::HostHeard),
-                Edge::Lost { at } => (at, Event::HostLost),
+                SignalEdge::Heard { at } => (at, Event::HostHeard),
+                SignalEdge::Lost { at } => (at, Event::HostLost),
             };
             self.events.push((seconds(at), event));
         }
@@ -236,7 +236,7 @@ impl<'w> Robot<'w> {
     }
 
     /// Targets in RAM only; refused ones are those of motors that are not armed.
-    fn follow(&mut self, command: &Command, missing: u64) {
+    fn follow(&mut self, command: &HostCommand, missing: u64) {
         let further_s = missing.min(2) as f32 * COMMAND_PERIOD.as_secs_f32();
         let (joints, bus) = self.runner.device_mut();
         let targets = command.joints.iter().zip(self.rates);
@@ -263,8 +263,7 @@ impl<'w> Robot<'w> {
                 let goal = Goal { acceleration: 50, position, time: 0, speed: 2_250 };
                 feetech::write(ServoId::ONE, Goal::ADDRESS, &goal.to_bytes(), &mut buffer)
             }
-            12 => feetech::read(ServoId::ONE, Present::ADDRESS, Present::LENGTH, &mut buffer)
-                .map_err(Into::into),
+            12 => feetech::read(ServoId::ONE, Present::ADDRESS, Present::LENGTH, &mut buffer),
             _ => return,
         };
         output.servo.extend_from_slice(instruction.unwrap_or(&[]));
@@ -285,7 +284,7 @@ impl<'w> Robot<'w> {
                 .map_or(0, |state| turned(state.position.as_turns())),
             imu_angles_deg: self.imus.each_ref().map(|imu| match imu.latest(now) {
                 Some(imu) => {
-                    let (roll, pitch, yaw) = imu.attitude.euler(EulerOrder::RollX);
+                    let (roll, pitch, yaw) = imu.euler_roll_x();
                     [pitch, roll, yaw].map(Angle::as_degrees)
                 }
                 // Better no angle than an old one.
@@ -303,7 +302,7 @@ impl<'w> Robot<'w> {
     }
 
     pub(crate) fn imu_counts(&self) -> [Counts; 4] {
-        self.imus.each_ref().map(Link::counts)
+        self.imus.each_ref().map(Receiver::counts)
     }
 
     pub(crate) fn servo_counts(&self) -> Counts {

@@ -5,17 +5,17 @@ use super::plant::Plant;
 use super::robot::{Event, Output, Robot};
 use super::{JOINTS, at, degrees, seconds};
 use drivetrain::motor::BusLoad;
-use drivetrain::sim::{Fault, Line, Noise, Record, SerialCounts, SerialLine, Traffic, World};
+use drivetrain::sim::{Fault, Line, SerialLine, Simulation, Traffic, Transmission};
 use drivetrain::snake::{Counters, State};
 use drivetrain::wire::Counts;
-use drivetrain::wire::host_link::{COMMAND_LENGTH, Command, Reset, Telemetry};
+use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset, Telemetry};
 use std::error::Error;
 
 pub(crate) const BAUD: u32 = 115_200;
-/// A usual line: about one frame in fifty is damaged.
-const NOISE: Noise = Noise { flipped: 2e-4, dropped: 5e-5, inserted: 5e-5 };
+/// Bytes with a wrong bit, missing, and made up, by their share. A usual line: about one frame in fifty is damaged.
+const NOISE: [f32; 3] = [2e-4, 5e-5, 5e-5];
 /// One frame in a thousand gets through.
-const STORM: Noise = Noise { flipped: 0.08, dropped: 0.02, inserted: 0.02 };
+const STORM: [f32; 3] = [0.08, 0.02, 0.02];
 /// When a fault begins, and when the operator tries again.
 pub(crate) const FAULT_S: f32 = 4.0;
 pub(crate) const AGAIN_S: f32 = 5.6;
@@ -112,10 +112,10 @@ pub(crate) struct Run {
     /// From the full swing on, to the fault.
     pub(crate) traffic: Traffic,
     pub(crate) budget: BusLoad,
-    pub(crate) down: (SerialCounts, Counts),
-    pub(crate) up: (SerialCounts, Counts),
-    pub(crate) sent: Vec<Command>,
-    pub(crate) accepted: Vec<Command>,
+    pub(crate) down: (SerialLine, Counts),
+    pub(crate) up: (SerialLine, Counts),
+    pub(crate) sent: Vec<HostCommand>,
+    pub(crate) accepted: Vec<HostCommand>,
     pub(crate) last_telemetry: Option<Telemetry>,
     pub(crate) host_losses: u32,
     pub(crate) imus: [(u32, Counts); 4],
@@ -135,8 +135,8 @@ impl Setup {
     }
 
     /// Shows each frame on the bus.
-    pub(crate) fn run(&self, mut show: impl FnMut(&Record)) -> Result<Run, Box<dyn Error>> {
-        let world = World::new(self.seed);
+    pub(crate) fn run(&self, mut show: impl FnMut(&Transmission)) -> Result<Run, Box<dyn Error>> {
+        let world = Simulation::new(self.seed);
         let mut plant = Plant::new(&world, self.seed)?;
         let mut robot = Robot::new(&world)?;
         let mut host = Host::new(self.trouble.map_or_else(Operator::start, Trouble::operator));
@@ -196,8 +196,8 @@ impl Setup {
             events,
             traffic: traffic.unwrap_or_default().since(&before.unwrap_or_default()),
             budget: robot.load(),
-            down: (down.counts(), robot.host_counts()),
-            up: (up.counts(), host.counts()),
+            down: (down, robot.host_counts()),
+            up: (up, host.counts()),
             last_telemetry: host.latest,
             sent: host.sent,
             accepted,
@@ -212,11 +212,11 @@ impl Setup {
         })
     }
 
-    fn schedule(&self, world: &World, plant: &Plant<'_>) -> Result<(), Box<dyn Error>> {
+    fn schedule(&self, world: &Simulation, plant: &Plant<'_>) -> Result<(), Box<dyn Error>> {
         let key = *plant.joints.get(HIT).ok_or("no such joint")?;
         let fault = match self.trouble {
-            Some(Trouble::SilentJoint) => Fault::SilentJoint(key),
-            Some(Trouble::JointPowerLoss) => Fault::JointPowerLoss(key),
+            Some(Trouble::SilentJoint) => Fault::Silent(key),
+            Some(Trouble::JointPowerLoss) => Fault::PowerLoss { motor: key, forgets_angle: true },
             _ => return Ok(()),
         };
         let length_s = self.trouble.map_or(0.0, Trouble::length_s);
@@ -229,10 +229,12 @@ impl Setup {
             let window = FAULT_S..FAULT_S + trouble.length_s();
             self.trouble == Some(trouble) && window.contains(&time_s)
         };
-        let noise = if hits(Trouble::CorruptStream) { STORM } else { NOISE };
+        let [flipped, dropped, inserted] = if hits(Trouble::CorruptStream) { STORM } else { NOISE };
         for line in [down, up] {
             line.set_cut(hits(Trouble::HostLineCut));
-            line.set_noise(noise);
+            line.set_flipped(flipped);
+            line.set_dropped(dropped);
+            line.set_inserted(inserted);
         }
     }
 }
@@ -244,7 +246,7 @@ fn observe(time_s: f32, host: &Host, robot: &mut Robot<'_>, plant: &Plant<'_>) -
     let offsets = robot.joints.map(|joint| joints.offset(joint).unwrap_or_default());
     let mut true_deg = [0.0; JOINTS];
     for ((angle, state), offset) in true_deg.iter_mut().zip(states).zip(offsets) {
-        *angle = state.map_or(0.0, |state| degrees(offset.shown(state.counter)));
+        *angle = state.map_or(0.0, |state| degrees(offset.shown(state.drive_counts)));
     }
     let asked = robot.accepted.last().copied().unwrap_or_default();
     let (_, bus) = robot.runner.device();
@@ -255,7 +257,8 @@ fn observe(time_s: f32, host: &Host, robot: &mut Robot<'_>, plant: &Plant<'_>) -
         time_s,
         wanted_deg: std::array::from_fn(|joint| host.operator.wanted_deg(joint, time_s)),
         true_deg,
-        absolute_deg: states.map(|state| state.map_or(0.0, |state| state.degrees())),
+        absolute_deg: states
+            .map(|state| state.map_or(0.0, |state| state.position.as_angle().as_degrees())),
         rate_deg_s: states.map(|state| state.map_or(0.0, |s| s.velocity.as_degrees_per_s())),
         gripper_deg: [
             (asked.gm6020_position.into(), yaw),

@@ -4,7 +4,7 @@ use super::host::{Action, Host, Operator};
 use super::plant::Plant;
 use super::robot::{Event, Output, Robot};
 use super::{at, seconds};
-use drivetrain::sim::World;
+use drivetrain::sim::Simulation;
 use drivetrain::time::Instant;
 use drivetrain::wire::Counts;
 use drivetrain::wire::host_link::{COMMAND_LENGTH, TELEMETRY_LENGTH};
@@ -65,7 +65,7 @@ pub(crate) fn robot(
     mut hitch: impl FnMut(),
 ) -> Result<Report, Box<dyn Error>> {
     let mut stream = accept(listener)?;
-    let world = World::new(seed);
+    let world = Simulation::new(seed);
     let mut plant = Plant::new(&world, seed)?;
     let mut robot = Robot::new(&world)?;
     let mut output = Output::default();
@@ -114,7 +114,7 @@ pub(crate) fn robot(
         let states = plant.states();
         let angles = robot.joints.iter().zip(states).filter_map(|(joint, state)| {
             let offset = robot.runner.device().0.offset(*joint)?;
-            Some(super::degrees(offset.shown(state?.counter)).abs())
+            Some(super::degrees(offset.shown(state?.drive_counts)).abs())
         });
         report.furthest_deg = angles.fold(report.furthest_deg, f32::max);
     }

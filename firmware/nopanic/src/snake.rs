@@ -64,6 +64,10 @@ pub fn call_all() {
     Joints::relax.call();
     Joints::zero.call();
     Joints::set_offset.call();
+    Offset::new.call();
+    Offset::shown.call();
+    Offset::target.call();
+    Offset::rezero.call();
     Joints::offset.call();
     Joints::read.call();
     Joints::answer.call();

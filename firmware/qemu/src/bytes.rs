@@ -5,14 +5,14 @@ use crate::row;
 use core::hint::black_box;
 use drivetrain::time::Instant;
 use drivetrain::wire::dbus::Dbus;
-use drivetrain::wire::feetech::{self, Goal, ServoId, Sts};
-use drivetrain::wire::hipnuc::HipNuc;
-use drivetrain::wire::host_link::{Command, CommandFormat, Telemetry, TelemetryFormat};
+use drivetrain::wire::feetech::{self, Goal, ServoId, Status};
+use drivetrain::wire::hipnuc::Imu;
+use drivetrain::wire::host_link::{HostCommand, Telemetry, TelemetryFormat};
 use drivetrain::wire::{Deframer, vofa};
 
-type Hosts = Deframer<CommandFormat, 79>;
-type Imus = Deframer<HipNuc, 128>;
-type Servos = Deframer<Sts, 64>;
+type Hosts = Deframer<HostCommand, 79>;
+type Imus = Deframer<Imu, 128>;
+type Servos = Deframer<Status, 64>;
 
 /// Functions out of line that say how much came out.
 macro_rules! functions {
@@ -32,7 +32,7 @@ functions! {
     bytes_hipnuc(reader: &mut Imus, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes)).is_some(), bytes);
     bytes_sts_status(reader: &mut Servos, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes)).is_some(), bytes);
     bytes_dbus(reader: &mut Dbus, bytes: &[u8]) = count(|bytes| black_box(reader.read(bytes, Instant::START)).is_some(), bytes);
-    bytes_command(command: &Command, out: &mut [u8; 128]) = command.encode(out).map_or(0, <[u8]>::len);
+    bytes_command(command: &HostCommand, out: &mut [u8; 128]) = command.encode(out).map_or(0, <[u8]>::len);
     bytes_telemetry(telemetry: &Telemetry, out: &mut [u8; 128]) = TelemetryFormat::new().encode(telemetry, out).map_or(0, <[u8]>::len);
     bytes_goal(goal: &Goal, out: &mut [u8; 128]) = feetech::write(ServoId::ONE, 41, &goal.to_bytes(), out).map_or(0, <[u8]>::len);
     bytes_justfloat(values: &[f32; 4], out: &mut [u8; 128]) = vofa::justfloat(values, out).map_or(0, <[u8]>::len);
@@ -58,7 +58,7 @@ const NOISE: [u8; 100] = [0x11; 100];
 /// Frames in and out.
 pub fn rows() {
     let mut out = [0; 128];
-    let command = black_box(Command::default());
+    let command = black_box(HostCommand::default());
     let mut bytes = [0; 79];
     _ = command.encode(&mut bytes);
     let bytes = black_box(bytes);
@@ -72,16 +72,15 @@ pub fn rows() {
             )*
         };
     }
-    let (mut hosts, mut imus, mut servos) =
-        (Hosts::new(CommandFormat), Imus::new(HipNuc), Servos::new(Sts));
-    let (mut noisy, mut remotes) = (Imus::new(HipNuc), Dbus::new());
+    let (mut hosts, mut imus, mut servos) = (Hosts::new(), Imus::new(), Servos::new());
+    let (mut noisy, mut remotes) = (Imus::new(), Dbus::new());
     row! {
         "wire_host_command" bytes_host_command(&mut hosts, &bytes): fn(&mut Hosts, &[u8]) -> usize;
         "wire_hipnuc" bytes_hipnuc(&mut imus, black_box(&IMU)): fn(&mut Imus, &[u8]) -> usize;
         "wire_sts_status" bytes_sts_status(&mut servos, black_box(&STATUS)): fn(&mut Servos, &[u8]) -> usize;
         "wire_dbus" bytes_dbus(&mut remotes, black_box(&REMOTE)): fn(&mut Dbus, &[u8]) -> usize;
         "wire_noise" bytes_hipnuc(&mut noisy, black_box(&NOISE)): fn(&mut Imus, &[u8]) -> usize;
-        "wire_command" bytes_command(&command, &mut out): fn(&Command, &mut [u8; 128]) -> usize;
+        "wire_command" bytes_command(&command, &mut out): fn(&HostCommand, &mut [u8; 128]) -> usize;
         "wire_telemetry" bytes_telemetry(&black_box(Telemetry::default()), &mut out): fn(&Telemetry, &mut [u8; 128]) -> usize;
         "wire_goal" bytes_goal(&black_box(Goal { speed: 2250, ..Goal::default() }), &mut out): fn(&Goal, &mut [u8; 128]) -> usize;
         "wire_justfloat" bytes_justfloat(black_box(&[1.0, 2.0, 3.0, 4.0]), &mut out): fn(&[f32; 4], &mut [u8; 128]) -> usize;
@@ -98,9 +97,9 @@ pub fn rows() {
         };
     }
     byte! {
-        "wire_host_byte" bytes_host_command(Hosts::new(CommandFormat), bytes): fn(&mut Hosts, &[u8]) -> usize;
-        "wire_hipnuc_byte" bytes_hipnuc(Imus::new(HipNuc), IMU): fn(&mut Imus, &[u8]) -> usize;
-        "wire_sts_byte" bytes_sts_status(Servos::new(Sts), STATUS): fn(&mut Servos, &[u8]) -> usize;
+        "wire_host_byte" bytes_host_command(Hosts::new(), bytes): fn(&mut Hosts, &[u8]) -> usize;
+        "wire_hipnuc_byte" bytes_hipnuc(Imus::new(), IMU): fn(&mut Imus, &[u8]) -> usize;
+        "wire_sts_byte" bytes_sts_status(Servos::new(), STATUS): fn(&mut Servos, &[u8]) -> usize;
         "wire_dbus_byte" bytes_dbus(Dbus::new(), REMOTE): fn(&mut Dbus, &[u8]) -> usize;
     }
     // A reader that found nothing would be cheap.

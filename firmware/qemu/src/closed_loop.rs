@@ -6,7 +6,7 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{Fault, Line, Model, MotorConfig, World};
+use drivetrain::sim::{Fault, Line, MotorConfig, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -48,12 +48,12 @@ pub(crate) fn run() -> (u64, u32) {
     const YAW: PidConfig = PidConfig::new(12.0, 0.0, 0.0);
     let at = |ms: u64| Instant::from_micros(ms * 1_000);
 
-    let world = World::new(2_026);
+    let world = Simulation::new(2_026);
     let mut bus = Bus::new();
     for id in 1..=4 {
-        world.attach(MotorConfig::new(Model::M3508, id)).unwrap();
+        world.attach(MotorConfig::m3508(id)).unwrap();
     }
-    world.attach(MotorConfig::new(Model::Gm6020Voltage, 5)).unwrap();
+    world.attach(MotorConfig::gm6020_voltage(5)).unwrap();
     let lost = Fault::LostFrames { line: Line::Can1, id: None, probability: 0.05 };
     world.fault(lost, at(300)..at(600)).unwrap();
     world.fault(Fault::Unplugged(Line::Can1), at(1_000)..at(1_130)).unwrap();

@@ -1,4 +1,4 @@
-//! Whether a device keeps what `Devices` promises.
+//! Checks any device, yours too, against what [`Devices`] promises: for tests only.
 
 mod edges;
 mod rules;
@@ -174,7 +174,7 @@ impl core::error::Error for Violation {}
 /// use drivetrain::dji::{Bus, Config, Handle, M3508};
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::TargetError;
-/// use drivetrain::sim::{Rule, Subject, check_contract};
+/// use drivetrain::sim::contract::{Subject, check_contract};
 /// use drivetrain::units::Current;
 ///
 /// struct OneWheel(Bus, Handle<M3508>);

@@ -1,10 +1,11 @@
 use super::super::mailbox::Mailboxes;
+use super::super::motor::{MotorState, position, wrapped};
 use super::super::random::Random;
-use super::{JointConfig, JointState};
+use super::JointConfig;
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use crate::snake::{IDS, PULSES_PER_TURN, Register};
-use crate::units::AngularVelocity;
+use crate::units::{AngularVelocity, Current};
 use embedded_can::{Frame, StandardId};
 
 /// The longest time that a reply is later than the least. An estimate.
@@ -124,8 +125,8 @@ impl Drive {
     pub(crate) fn reply(&mut self, silent: bool) {
         let Some((_, register)) = self.due.take() else { return };
         let value = match register {
-            Register::ActualPosition => nearest(self.shaft - self.zero),
-            Register::ActualSpeed => nearest(self.velocity.into()),
+            Register::ActualPosition => wrapped(nearest(self.shaft - self.zero)),
+            Register::ActualSpeed => wrapped(nearest(self.velocity.into())),
             other => self.registers.place(other).copied().unwrap_or(0),
         };
         let [a, b, c, d] = value.to_be_bytes();
@@ -195,14 +196,19 @@ impl Drive {
     }
 
     /// Returns the true state.
-    pub(crate) fn state(&self) -> JointState {
+    pub(crate) fn state(&self) -> MotorState {
         let turns_per_s = self.velocity / PULSES_PER_TURN as f32;
-        JointState {
-            pulses: nearest(self.shaft),
-            counter: nearest(self.shaft - self.zero),
+        MotorState {
+            position: position(self.shaft / f64::from(PULSES_PER_TURN)),
             velocity: AngularVelocity::from_rpm(turns_per_s * 60.0),
+            current: Current::from_amperes(f32::NAN),
+            torque_nm: f32::NAN,
+            power_w: f32::NAN,
+            temperature_c: f32::NAN,
+            encoder_counts: nearest(self.shaft),
+            drive_counts: wrapped(nearest(self.shaft - self.zero)),
+            command: self.registers.position,
             is_enabled: self.powered && self.registers.moves(),
-            target: self.registers.position,
             replies: self.replies,
             collisions: self.collisions,
         }
@@ -214,10 +220,9 @@ const fn narrow(pulses: f64) -> f32 {
     pulses as f32
 }
 
-/// The counter of the drive has 32 bits, and wraps.
-#[expect(clippy::cast_possible_truncation, reason = "wraps")]
-fn nearest(pulses: f64) -> i32 {
-    (pulses + 0.5_f64.copysign(pulses)) as i64 as i32
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+fn nearest(pulses: f64) -> i64 {
+    (pulses + 0.5_f64.copysign(pulses)) as i64
 }
 
 #[cfg(test)]
@@ -269,13 +274,13 @@ mod tests {
             fastest = fastest.max(before);
         }
         assert!((fastest - 65_536.0).abs() < 1.0);
-        assert!(drive.state().pulses == 65_536 && drive.velocity.abs() < 1.0);
+        assert!(drive.state().encoder_counts == 65_536 && drive.velocity.abs() < 1.0);
         // 0.1 s up and 0.2 s down at 1 turn/s: a turn takes 1.15 s.
         let mut again = self::drive();
         steps(&mut again, 11_000);
-        assert!(again.state().pulses < 65_500);
+        assert!(again.state().encoder_counts < 65_500);
         steps(&mut again, 800);
-        assert!(again.state().pulses >= 65_530);
+        assert!(again.state().encoder_counts >= 65_530);
     }
 
     #[test]
@@ -283,10 +288,10 @@ mod tests {
         let mut drive = drive();
         steps(&mut drive, 3_000);
         write(&mut drive, 0x0A, -65_536);
-        let mut before = drive.state().pulses;
+        let mut before = drive.state().encoder_counts;
         for _ in 0..40_000 {
             drive.step(STEP);
-            let now = drive.state().pulses;
+            let now = drive.state().encoder_counts;
             assert!((now - before).abs() <= 8);
             before = now;
         }
@@ -300,9 +305,9 @@ mod tests {
             steps(&mut drive, 3_000);
             write(&mut drive, register, 0);
             steps(&mut drive, 1_000);
-            let rest = drive.state().pulses;
+            let rest = drive.state().encoder_counts;
             steps(&mut drive, 1_000);
-            assert_eq!((drive.state().pulses, drive.state().is_enabled), (rest, false));
+            assert_eq!((drive.state().encoder_counts, drive.state().is_enabled), (rest, false));
         }
     }
 
@@ -327,11 +332,11 @@ mod tests {
         drive.receive(&frame(&[3, 7]), 0);
         assert_eq!((drive.due(), drive.state().is_enabled), (None, false));
         steps(&mut drive, 2_000);
-        let rest = drive.state().pulses;
+        let rest = drive.state().encoder_counts;
         drive.set_powered(true);
         drive.receive(&frame(&[3, 7]), 0);
         drive.reply(false);
         assert_eq!(drive.mailboxes.candidate().unwrap().data(), [4, 7, 0, 0, 0, 0]);
-        assert_eq!((drive.state().pulses, drive.state().is_enabled), (rest, false));
+        assert_eq!((drive.state().encoder_counts, drive.state().is_enabled), (rest, false));
     }
 }

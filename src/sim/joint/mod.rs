@@ -4,12 +4,10 @@ mod drive;
 
 pub(crate) use drive::Drive;
 
-use super::{AttachError, Line, World};
-use crate::snake::PULSES_PER_TURN;
+use super::{Line, MotorKey, SimError, Simulation};
 use crate::time::Duration;
-use crate::units::AngularVelocity;
 
-/// A joint of a snake robot to attach to a [`World`].
+/// A joint of a snake robot to attach to a [`Simulation`].
 ///
 /// It speaks the protocol of [`snake`](crate::snake). **Its behaviour is an estimate**: it goes to its target with the
 /// speed, acceleration and deceleration of its registers, its shaft 2 ms behind; it answers 150 to 250 µs after a request;
@@ -18,12 +16,12 @@ use crate::units::AngularVelocity;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{JointConfig, World};
+/// use drivetrain::sim::{JointConfig, Simulation};
 /// use drivetrain::snake::{Command, Register};
 /// use drivetrain::time::Duration;
 /// use embedded_can::nb::Can;
 ///
-/// let world = World::new(7);
+/// let world = Simulation::new(7);
 /// let neck = world.attach_joint(JointConfig::new(3).with_position(0))?;
 /// let mut can = world.controller();
 /// let setup = [Register::Mode, Register::Current, Register::Enable].map(|register| (register, 1));
@@ -39,10 +37,12 @@ use crate::units::AngularVelocity;
 ///     world.advance(Duration::from_millis(1));
 /// }
 /// world.advance(Duration::from_millis(300)); // 60 ms to speed up, then in uniform motion
-/// let state = world.joint(neck).ok_or("not attached")?;
+/// let state = world.motor(neck).ok_or("not attached")?;
 /// assert!((state.velocity.as_rpm() - 60.0).abs() < 0.1 && state.is_enabled);
 /// world.advance(Duration::from_millis(400));
-/// assert_eq!(world.joint(neck).map(|joint| joint.pulses), Some(32_768));
+/// let state = world.motor(neck).ok_or("not attached")?;
+/// assert_eq!((state.encoder_counts, state.command), (32_768, 32_768));
+/// assert!((state.position.as_turns() - 0.5).abs() < 1e-5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,62 +80,12 @@ impl JointConfig {
     }
 }
 
-/// A joint of a [`World`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct JointKey(pub(crate) u8);
-
-impl JointKey {
-    /// The number of joints in a world.
-    pub const CAPACITY: usize = 12;
-
-    pub(crate) fn new(index: usize) -> Option<Self> {
-        u8::try_from(index).ok().filter(|_| index < Self::CAPACITY).map(Self)
-    }
-}
-
-/// The true state of a simulated joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct JointState {
-    /// Where the shaft is, in pulses since the start, whatever its drive forgot.
-    pub pulses: i32,
-    /// What the drive's own counter shows: the same, until it forgot where its zero was.
-    pub counter: i32,
-    /// How fast it turns.
-    pub velocity: AngularVelocity,
-    /// Whether its drive moves it, or holds it.
-    pub is_enabled: bool,
-    /// The target in the drive's register, in pulses.
-    pub target: i32,
-    /// Requests that it answered.
-    pub replies: u32,
-    /// How often a frame of the controller with its id began in the same bit as its reply: on a real bus both would have
-    /// been destroyed. Here the controller goes first.
-    pub collisions: u32,
-}
-
-impl JointState {
-    /// Returns where the shaft is, in degrees since the start.
-    #[must_use]
-    pub fn degrees(&self) -> f32 {
-        self.pulses as f32 * (360.0 / PULSES_PER_TURN as f32)
-    }
-}
-
-impl World {
+impl Simulation {
     /// Puts a joint on a bus. Two with the same id are possible, as in reality.
     ///
     /// # Errors
     /// When there is no such id, or when there are 12 joints already.
-    pub fn attach_joint(&self, config: JointConfig) -> Result<JointKey, AttachError> {
+    pub fn attach_joint(&self, config: JointConfig) -> Result<MotorKey, SimError> {
         self.with(|engine| engine.attach_joint(config))
-    }
-
-    /// Returns the true state of a joint; `None` for a key of another world.
-    #[must_use]
-    pub fn joint(&self, joint: JointKey) -> Option<JointState> {
-        self.with(|engine| engine.joint(joint))
     }
 }

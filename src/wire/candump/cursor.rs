@@ -2,7 +2,7 @@
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-use super::{Expected, ParseError};
+use super::ParseError;
 use crate::frame::CanFrame;
 use crate::time::Instant;
 
@@ -20,8 +20,9 @@ impl<'a> Cursor<'a> {
         Self { line, at: 0 }
     }
 
-    pub(super) const fn error(&self, expected: Expected) -> ParseError {
-        ParseError { column: self.at + 1, expected }
+    /// Says what is wrong here.
+    pub(super) fn error(&self, what: impl FnOnce(usize) -> ParseError) -> ParseError {
+        what(self.at + 1)
     }
 
     pub(super) fn peek(&self) -> Option<u8> {
@@ -34,8 +35,12 @@ impl<'a> Cursor<'a> {
         found
     }
 
-    fn require(&mut self, byte: u8, expected: Expected) -> Result<(), ParseError> {
-        if self.accept(byte) { Ok(()) } else { Err(self.error(expected)) }
+    fn require(
+        &mut self,
+        byte: u8,
+        what: impl FnOnce(usize) -> ParseError,
+    ) -> Result<(), ParseError> {
+        if self.accept(byte) { Ok(()) } else { Err(self.error(what)) }
     }
 
     pub(super) fn skip_spaces(&mut self) {
@@ -56,7 +61,7 @@ impl<'a> Cursor<'a> {
         }
         self.skip_spaces();
         let (seconds, _) = self.decimal()?;
-        self.require(b'.', Expected::Time)?;
+        self.require(b'.', ParseError::Time)?;
         let (fraction, digits) = self.decimal()?;
         // Up to nine digits fit 32 bits, whose division small cores have.
         let short = u32::try_from(fraction).unwrap_or(u32::MAX);
@@ -65,11 +70,11 @@ impl<'a> Cursor<'a> {
             7 => u64::from(short / 10),
             8 => u64::from(short / 100),
             9 => u64::from(short / 1_000),
-            _ => return Err(self.error(Expected::Time)),
+            _ => return Err(self.error(ParseError::Time)),
         };
         let total = seconds.checked_mul(1_000_000).and_then(|total| total.checked_add(micros));
-        let total = total.ok_or(self.error(Expected::Time))?;
-        self.require(b')', Expected::Time)?;
+        let total = total.ok_or(self.error(ParseError::Time))?;
+        self.require(b')', ParseError::Time)?;
         self.skip_spaces();
         Ok(Some(Instant::from_micros(total)))
     }
@@ -80,15 +85,15 @@ impl<'a> Cursor<'a> {
         while let Some(digit) = self.peek().filter(u8::is_ascii_digit) {
             let next = value.checked_mul(10);
             let next = next.and_then(|value| value.checked_add(u64::from(digit - b'0')));
-            value = next.ok_or(self.error(Expected::Time))?;
+            value = next.ok_or(self.error(ParseError::Time))?;
             digits = digits.saturating_add(1);
             self.at += 1;
         }
-        if digits == 0 { Err(self.error(Expected::Time)) } else { Ok((value, digits)) }
+        if digits == 0 { Err(self.error(ParseError::Time)) } else { Ok((value, digits)) }
     }
 
     pub(super) fn interface(&mut self) -> Result<&'a str, ParseError> {
-        let error = self.error(Expected::Interface);
+        let error = self.error(ParseError::Interface);
         let name = self.word();
         let printable = matches!(name.len(), 1..=15) && name.iter().all(u8::is_ascii_graphic);
         let name = core::str::from_utf8(name).ok().filter(|_| printable).ok_or(error);
@@ -111,7 +116,8 @@ impl<'a> Cursor<'a> {
     }
 
     pub(super) fn id(&mut self) -> Result<Id, ParseError> {
-        let error = self.error(Expected::Id);
+        let error = self.error(ParseError::Id);
+        let not_an_error_frame = self.error(ParseError::ErrorFrame);
         let start = self.at;
         let mut raw = 0_u32;
         while let Some(digit) = self.peek().and_then(nibble) {
@@ -121,7 +127,7 @@ impl<'a> Cursor<'a> {
         let id = match self.at - start {
             3 => u16::try_from(raw).ok().and_then(StandardId::new).map(Id::Standard),
             8 if raw & !ExtendedId::MAX.as_raw() == ERROR_FRAME => {
-                return Err(ParseError { expected: Expected::NotAnErrorFrame, ..error });
+                return Err(not_an_error_frame);
             }
             8 => ExtendedId::new(raw).map(Id::Extended),
             _ => None,
@@ -132,12 +138,12 @@ impl<'a> Cursor<'a> {
     /// Reads what follows `#`.
     pub(super) fn packed(&mut self, id: Id) -> Result<CanFrame, ParseError> {
         if self.peek() == Some(b'#') {
-            return Err(self.error(Expected::ClassicFrame));
+            return Err(self.error(ParseError::CanFd));
         }
         if self.accept(b'R') {
             let length = self.peek().filter(u8::is_ascii_digit).map_or(0, |digit| digit - b'0');
             let frame = CanFrame::new_remote(id, usize::from(length));
-            let frame = frame.ok_or(self.error(Expected::Length))?;
+            let frame = frame.ok_or(self.error(ParseError::Length))?;
             self.at += usize::from(self.peek().is_some_and(|digit| digit.is_ascii_digit()));
             return self.packed_end(frame);
         }
@@ -145,7 +151,7 @@ impl<'a> Cursor<'a> {
         while self.peek().is_some_and(|byte| !byte.is_ascii_whitespace() && byte != b'_') {
             data.push(self)?;
         }
-        let frame = CanFrame::new(id, data.bytes()).ok_or(self.error(Expected::End))?;
+        let frame = CanFrame::new(id, data.bytes()).ok_or(self.error(ParseError::End))?;
         self.packed_end(frame)
     }
 
@@ -153,14 +159,14 @@ impl<'a> Cursor<'a> {
     fn packed_end(&mut self, frame: CanFrame) -> Result<CanFrame, ParseError> {
         if frame.length() == 8 && self.accept(b'_') {
             let code = self.peek().and_then(nibble).filter(|code| *code > 8);
-            code.ok_or(self.error(Expected::End))?;
+            code.ok_or(self.error(ParseError::End))?;
             self.at += 1;
         }
         if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
-            return Err(self.error(Expected::End));
+            return Err(self.error(ParseError::End));
         }
         self.skip_spaces();
-        let error = self.error(Expected::End);
+        let error = self.error(ParseError::End);
         if matches!(self.word(), b"" | b"R" | b"T") && self.peek().is_none() {
             Ok(frame)
         } else {
@@ -171,17 +177,17 @@ impl<'a> Cursor<'a> {
     /// Reads `[8]  0E 16 ..` or `[8]  remote request`.
     pub(super) fn columns(&mut self, id: Id) -> Result<CanFrame, ParseError> {
         if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
-            return Err(self.error(Expected::Id));
+            return Err(self.error(ParseError::Id));
         }
         self.skip_spaces();
-        self.require(b'[', Expected::Length)?;
+        self.require(b'[', ParseError::Length)?;
         let declared = self.peek().filter(|byte| matches!(byte, b'0'..=b'8'));
-        let length = declared.map(|digit| digit - b'0').ok_or(self.error(Expected::Length))?;
+        let length = declared.map(|digit| digit - b'0').ok_or(self.error(ParseError::Length))?;
         self.at += 1;
         if self.peek().is_some_and(|byte| byte.is_ascii_digit()) {
-            return Err(self.error(Expected::ClassicFrame)); // two digits: candump's mark of CAN FD
+            return Err(self.error(ParseError::CanFd)); // two digits: candump's mark of CAN FD
         }
-        self.require(b']', Expected::Length)?;
+        self.require(b']', ParseError::Length)?;
         self.skip_spaces();
         let rest = self.line.get(self.at..).unwrap_or(&[]);
         let frame = if rest.starts_with(b"remote request") {
@@ -192,7 +198,7 @@ impl<'a> Cursor<'a> {
             for _ in 0..length {
                 data.push(self)?;
                 if self.peek().is_some_and(|byte| !byte.is_ascii_whitespace()) {
-                    return Err(self.error(Expected::DataByte));
+                    return Err(self.error(ParseError::DataByte));
                 }
                 self.skip_spaces();
             }
@@ -201,7 +207,7 @@ impl<'a> Cursor<'a> {
         self.skip_spaces();
         match (self.peek(), frame) {
             (None | Some(b'\''), Some(frame)) => Ok(frame), // a quote begins the text column of -a
-            _ => Err(self.error(Expected::End)),
+            _ => Err(self.error(ParseError::End)),
         }
     }
 }
@@ -215,11 +221,11 @@ struct Data {
 
 impl Data {
     fn push(&mut self, cursor: &mut Cursor<'_>) -> Result<(), ParseError> {
-        let place = self.bytes.get_mut(self.length).ok_or(cursor.error(Expected::End))?;
+        let place = self.bytes.get_mut(self.length).ok_or(cursor.error(ParseError::End))?;
         *place = 0;
         for _ in 0..2 {
             let digit = cursor.peek().and_then(nibble);
-            *place = *place << 4 | digit.ok_or(cursor.error(Expected::DataByte))?;
+            *place = *place << 4 | digit.ok_or(cursor.error(ParseError::DataByte))?;
             cursor.at += 1;
         }
         self.length += 1;

@@ -65,7 +65,7 @@ impl<'a> Record<'a> {
         let mut cursor = Cursor::new(line.trim_ascii_end());
         cursor.skip_spaces();
         if cursor.peek().is_none() {
-            return Err(cursor.error(Expected::Line));
+            return Err(cursor.error(ParseError::Blank));
         }
         let time = cursor.time()?;
         let interface = cursor.interface()?;
@@ -76,63 +76,72 @@ impl<'a> Record<'a> {
     }
 }
 
-/// What a line of candump has wrong, and where.
+/// What a line of candump has wrong, and where: the byte at which reading stopped, counted from 1.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::wire::candump::Record;
+/// use drivetrain::wire::candump::{ParseError, Record};
 ///
 /// let error = Record::parse(b"can0 201#0E1").unwrap_err();
+/// assert_eq!(error, ParseError::DataByte(13));
 /// assert_eq!(error.to_string(), "column 13: expected two hexadecimal digits");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ParseError {
-    /// The byte of the line at which reading stopped, counted from 1.
-    pub column: usize,
-    /// What should have stood there.
-    pub expected: Expected,
+#[non_exhaustive]
+pub enum ParseError {
+    /// The line is blank.
+    Blank(usize),
+    /// There is no time stamp `(seconds.fraction)` that fits 64 bits of microseconds; dates (`-tA`) are not read.
+    Time(usize),
+    /// There is no name of 1 to 15 printable ASCII characters.
+    Interface(usize),
+    /// There is no id of 3 or 8 hexadecimal digits, up to `7FF` or `1FFFFFFF`.
+    Id(usize),
+    /// There is an error frame of the driver, not a data or remote frame.
+    ErrorFrame(usize),
+    /// There is a CAN FD frame, not a classic frame of up to 8 bytes.
+    CanFd(usize),
+    /// There is no length `[0]` to `[8]`, nor `#` and the data.
+    Length(usize),
+    /// There are no two hexadecimal digits.
+    DataByte(usize),
+    /// There is more than the line should have.
+    End(usize),
 }
 
-/// What should have stood where a line of candump could not be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Expected {
-    /// Anything at all: the line is blank.
-    Line,
-    /// A time stamp `(seconds.fraction)` that fits 64 bits of microseconds; dates (`-tA`) are not read.
-    Time,
-    /// A name of 1 to 15 printable ASCII characters.
-    Interface,
-    /// An id of 3 or 8 hexadecimal digits, up to `7FF` or `1FFFFFFF`.
-    Id,
-    /// A data or remote frame; an error frame of the driver stood there.
-    NotAnErrorFrame,
-    /// A classic frame of up to 8 bytes; a CAN FD frame stood there.
-    ClassicFrame,
-    /// A length `[0]` to `[8]`, or `#` and the data.
-    Length,
-    /// Two hexadecimal digits.
-    DataByte,
-    /// The end of the line.
-    End,
+impl ParseError {
+    /// Returns the byte of the line at which reading stopped, counted from 1.
+    #[must_use]
+    pub const fn column(&self) -> usize {
+        match self {
+            Self::Blank(column)
+            | Self::Time(column)
+            | Self::Interface(column)
+            | Self::Id(column)
+            | Self::ErrorFrame(column)
+            | Self::CanFd(column)
+            | Self::Length(column)
+            | Self::DataByte(column)
+            | Self::End(column) => *column,
+        }
+    }
 }
 
 impl core::fmt::Display for ParseError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let what = match self.expected {
-            Expected::Line => "expected a frame, the line is blank",
-            Expected::Time => "expected a time stamp (seconds.fraction)",
-            Expected::Interface => "expected the name of an interface, as can0",
-            Expected::Id => "expected an id of 3 digits up to 7FF or 8 digits up to 1FFFFFFF",
-            Expected::NotAnErrorFrame => "expected a data or remote frame, not an error frame",
-            Expected::ClassicFrame => "expected a classic CAN frame, not CAN FD",
-            Expected::Length => "expected a length [0] to [8], or # and data",
-            Expected::DataByte => "expected two hexadecimal digits",
-            Expected::End => "expected the end of the line",
+        let what = match self {
+            Self::Blank(_) => "expected a frame, the line is blank",
+            Self::Time(_) => "expected a time stamp (seconds.fraction)",
+            Self::Interface(_) => "expected the name of an interface, as can0",
+            Self::Id(_) => "expected an id of 3 digits up to 7FF or 8 digits up to 1FFFFFFF",
+            Self::ErrorFrame(_) => "expected a data or remote frame, not an error frame",
+            Self::CanFd(_) => "expected a classic CAN frame, not CAN FD",
+            Self::Length(_) => "expected a length [0] to [8], or # and data",
+            Self::DataByte(_) => "expected two hexadecimal digits",
+            Self::End(_) => "expected the end of the line",
         };
-        write!(f, "column {}: {what}", self.column)
+        write!(f, "column {}: {what}", self.column())
     }
 }
 
@@ -187,9 +196,8 @@ mod tests {
         Record::parse(line.as_bytes()).unwrap().frame
     }
 
-    fn refused(line: &str) -> (usize, Expected) {
-        let error = Record::parse(line.as_bytes()).unwrap_err();
-        (error.column, error.expected)
+    fn refused(line: &str) -> ParseError {
+        Record::parse(line.as_bytes()).unwrap_err()
     }
 
     #[test]
@@ -242,47 +250,47 @@ mod tests {
         let extended = CanFrame::new(ExtendedId::new(0x201).unwrap(), &[1]).unwrap();
         assert_eq!(parsed("can0  00000201   [1]  01"), extended);
         assert_eq!(parsed("can0 00000201#01"), extended);
-        assert_eq!(refused("can0 201201#01"), (6, Expected::Id));
-        assert_eq!(refused("can0 800#01"), (6, Expected::Id));
-        assert_eq!(refused("can0 40000000#01"), (6, Expected::Id));
-        assert_eq!(refused("can0 000000201#01"), (6, Expected::Id));
+        assert_eq!(refused("can0 201201#01"), ParseError::Id(6));
+        assert_eq!(refused("can0 800#01"), ParseError::Id(6));
+        assert_eq!(refused("can0 40000000#01"), ParseError::Id(6));
+        assert_eq!(refused("can0 000000201#01"), ParseError::Id(6));
     }
 
     #[test]
     fn error_frames_and_can_fd_are_refused_by_name() {
         let error_frame = "can0  20000088   [8]  00 00 00 00 00 00 00 00   ERRORFRAME";
-        assert_eq!(refused(error_frame), (7, Expected::NotAnErrorFrame));
-        assert_eq!(refused("can0 20000004#0000000000000000"), (6, Expected::NotAnErrorFrame));
-        assert_eq!(refused("can0 201##1112233"), (10, Expected::ClassicFrame));
-        assert_eq!(refused("can0  201  [12]  00 00"), (14, Expected::ClassicFrame));
-        assert_eq!(refused("can0  201  [08]  00 00"), (14, Expected::ClassicFrame));
+        assert_eq!(refused(error_frame), ParseError::ErrorFrame(7));
+        assert_eq!(refused("can0 20000004#0000000000000000"), ParseError::ErrorFrame(6));
+        assert_eq!(refused("can0 201##1112233"), ParseError::CanFd(10));
+        assert_eq!(refused("can0  201  [12]  00 00"), ParseError::CanFd(14));
+        assert_eq!(refused("can0  201  [08]  00 00"), ParseError::CanFd(14));
     }
 
     #[test]
     fn a_broken_line_names_the_column() {
-        assert_eq!(refused(""), (1, Expected::Line));
-        assert_eq!(refused("  \r\n"), (1, Expected::Line));
-        assert_eq!(refused("(2026-01-01 00:00:00.1) can0 201#"), (6, Expected::Time));
-        assert_eq!(refused("(18446744073710.0) can0 201#"), (18, Expected::Time));
-        assert_eq!(refused("(1.0000000000) can0 201#"), (14, Expected::Time));
-        assert_eq!(refused("(1.0"), (5, Expected::Time));
-        assert_eq!(refused("(1.0)"), (6, Expected::Interface));
-        assert_eq!(refused("a-name-of-16-ch. 201#"), (1, Expected::Interface));
-        assert_eq!(refused("can\u{e9} 201#"), (1, Expected::Interface));
-        assert_eq!(refused("can0"), (5, Expected::Id));
-        assert_eq!(refused("can0 201"), (9, Expected::Length));
-        assert_eq!(refused("can0 201=01"), (9, Expected::Id));
-        assert_eq!(refused("can0 201 [9] 01"), (11, Expected::Length));
-        assert_eq!(refused("can0 201 [2] 01"), (16, Expected::DataByte));
-        assert_eq!(refused("can0 201 [2] 01 0G"), (18, Expected::DataByte));
-        assert_eq!(refused("can0 201 [2] 01 023"), (19, Expected::DataByte));
-        assert_eq!(refused("can0 201 [2] 01 02 03"), (20, Expected::End));
-        assert_eq!(refused("can0 201#0102030405060708 x"), (27, Expected::End));
-        assert_eq!(refused("can0 201#010203040506070809"), (26, Expected::End));
-        assert_eq!(refused("can0 201 [2] remote request 1"), (29, Expected::End));
-        assert_eq!(refused("can0 201#R9"), (11, Expected::Length));
-        assert_eq!(refused("can0 201#R88"), (12, Expected::End));
-        assert_eq!(refused("can0 201#0102030405060708_8"), (27, Expected::End));
+        assert_eq!(refused(""), ParseError::Blank(1));
+        assert_eq!(refused("  \r\n"), ParseError::Blank(1));
+        assert_eq!(refused("(2026-01-01 00:00:00.1) can0 201#"), ParseError::Time(6));
+        assert_eq!(refused("(18446744073710.0) can0 201#"), ParseError::Time(18));
+        assert_eq!(refused("(1.0000000000) can0 201#"), ParseError::Time(14));
+        assert_eq!(refused("(1.0"), ParseError::Time(5));
+        assert_eq!(refused("(1.0)"), ParseError::Interface(6));
+        assert_eq!(refused("a-name-of-16-ch. 201#"), ParseError::Interface(1));
+        assert_eq!(refused("can\u{e9} 201#"), ParseError::Interface(1));
+        assert_eq!(refused("can0"), ParseError::Id(5));
+        assert_eq!(refused("can0 201"), ParseError::Length(9));
+        assert_eq!(refused("can0 201=01"), ParseError::Id(9));
+        assert_eq!(refused("can0 201 [9] 01"), ParseError::Length(11));
+        assert_eq!(refused("can0 201 [2] 01"), ParseError::DataByte(16));
+        assert_eq!(refused("can0 201 [2] 01 0G"), ParseError::DataByte(18));
+        assert_eq!(refused("can0 201 [2] 01 023"), ParseError::DataByte(19));
+        assert_eq!(refused("can0 201 [2] 01 02 03"), ParseError::End(20));
+        assert_eq!(refused("can0 201#0102030405060708 x"), ParseError::End(27));
+        assert_eq!(refused("can0 201#010203040506070809"), ParseError::End(26));
+        assert_eq!(refused("can0 201 [2] remote request 1"), ParseError::End(29));
+        assert_eq!(refused("can0 201#R9"), ParseError::Length(11));
+        assert_eq!(refused("can0 201#R88"), ParseError::End(12));
+        assert_eq!(refused("can0 201#0102030405060708_8"), ParseError::End(27));
     }
 
     fn any_frame() -> impl Strategy<Value = CanFrame> {
@@ -317,7 +325,7 @@ mod tests {
         #[test]
         fn any_bytes_give_a_frame_or_a_column_of_the_line(line in prop::collection::vec(any::<u8>(), 0..80)) {
             if let Err(error) = Record::parse(&line) {
-                prop_assert!((1..=line.len() + 1).contains(&error.column));
+                prop_assert!((1..=line.len() + 1).contains(&error.column()));
             }
         }
 

@@ -13,16 +13,16 @@
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
-//! use drivetrain::wire::dbus::{Dbus, Key, Remote, Switch};
+//! use drivetrain::wire::dbus::{Dbus, Keys, Remote, Switch};
 //!
 //! let mut dbus = Dbus::new();
 //! let now = Instant::START;
 //! let mut received: &[u8] =
 //!     &[0x94, 0x66, 0x0B, 0xA5, 0xD9, 0x92, 0, 0, 0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0];
 //! while let Some(remote) = dbus.read(&mut received, now) {
-//!     assert_eq!((remote.right.x, remote.right.y), (1.0, -1.0));
+//!     assert_eq!((remote.right_x, remote.right_y), (1.0, -1.0));
 //!     assert_eq!(remote.right_switch, Switch::Up);
-//!     assert!(remote.keys.is_pressed(Key::Shift));
+//!     assert!(remote.keys.contains(Keys::SHIFT));
 //! }
 //! let later = now + Duration::from_millis(101);
 //! assert_eq!(dbus.remote(later), Remote::default()); // lost: neutral
@@ -37,28 +37,14 @@
 
 mod remote;
 
-pub use remote::{Key, Keys, Mouse, Remote, Stick, Switch};
+pub use remote::{Keys, Remote, Switch};
 
-use super::{Deadline, Edge};
+use super::deframer::count;
+use super::{Counts, Deadline, SignalEdge};
 use crate::time::{Duration, Instant};
 
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 18;
-
-/// How many frames came, and what was thrown away. All counts saturate.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct DbusCounts {
-    /// Good frames.
-    pub frames: u32,
-    /// Frames with a value that its field cannot have.
-    pub implausible: u32,
-    /// Frames that ended early: less than 18 bytes before a pause.
-    pub truncated: u32,
-    /// Bytes that belonged to no frame, or to a truncated one.
-    pub skipped_bytes: u32,
-}
 
 /// A streaming decoder of DBUS that watches the signal.
 #[derive(Debug, Clone)]
@@ -72,7 +58,7 @@ pub struct Dbus {
     last_byte: Option<Instant>,
     latest: Remote,
     deadline: Deadline,
-    counts: DbusCounts,
+    counts: Counts,
 }
 
 impl Default for Dbus {
@@ -94,7 +80,7 @@ impl Dbus {
             last_byte: None,
             latest: Remote::NEUTRAL,
             deadline: Deadline::new(Duration::from_millis(100)),
-            counts: DbusCounts { frames: 0, implausible: 0, truncated: 0, skipped_bytes: 0 },
+            counts: Counts::new(),
         }
     }
 
@@ -154,7 +140,7 @@ impl Dbus {
     /// For the idle interrupt of a serial port. Without it, [`read`](Self::read) tells a pause by its time.
     pub fn note_pause(&mut self) {
         if self.length > 0 {
-            count(&mut self.counts.truncated, 1);
+            count(&mut self.counts.length_errors, 1);
             count(&mut self.counts.skipped_bytes, u32::try_from(self.length).unwrap_or(u32::MAX));
         }
         self.length = 0;
@@ -176,13 +162,16 @@ impl Dbus {
 
     /// Returns the oldest change between heard and lost that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
         self.deadline.edge(now)
     }
 
     /// Returns how many frames came, and what was thrown away.
+    ///
+    /// A content error is a frame with a value that its field cannot have; a length error is one that ended early: less than
+    /// 18 bytes before a pause. There are no others, because a frame has no checksum.
     #[must_use]
-    pub const fn counts(&self) -> DbusCounts {
+    pub const fn counts(&self) -> Counts {
         self.counts
     }
 
@@ -195,17 +184,13 @@ impl Dbus {
                 self.deadline.meet(now);
             }
             None => {
-                count(&mut self.counts.implausible, 1);
+                count(&mut self.counts.content_errors, 1);
                 self.lost_step = true;
                 self.deadline.revoke(now);
             }
         }
         remote
     }
-}
-
-fn count(counter: &mut u32, more: u32) {
-    *counter = counter.saturating_add(more);
 }
 
 #[cfg(test)]
@@ -225,7 +210,7 @@ mod tests {
         for at in [0, 14, 28] {
             assert!(dbus.read(&mut &FRAME[..], ms(at)).is_some());
         }
-        assert_eq!(dbus.counts(), DbusCounts { frames: 3, ..DbusCounts::default() });
+        assert_eq!(dbus.counts(), Counts { frames: 3, ..Counts::default() });
     }
 
     #[test]
@@ -235,7 +220,7 @@ mod tests {
         assert!(dbus.read(&mut &FRAME[9..], ms(5)).is_some()); // 3 ms would have cut it
         assert_eq!(dbus.read(&mut &FRAME[..9], ms(20)), None);
         assert_eq!(dbus.read(&mut &FRAME[9..], ms(26)), None);
-        assert_eq!(dbus.counts().truncated, 1);
+        assert_eq!(dbus.counts().length_errors, 1);
     }
 
     #[test]

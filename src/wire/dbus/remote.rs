@@ -10,31 +10,33 @@ const SPAN: u16 = 660;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Remote {
-    /// The right stick.
-    pub right: Stick,
-    /// The left stick.
-    pub left: Stick,
+    /// The right stick across, -1 to 1, zero within the dead band: right is positive.
+    pub right_x: f32,
+    /// The right stick along, the same: away from the person is positive.
+    pub right_y: f32,
+    /// The left stick across, the same: right is positive.
+    pub left_x: f32,
+    /// The left stick along, the same: away from the person is positive.
+    pub left_y: f32,
     /// The dial at the corner: -1 to 1; 0 from receivers that do not send it.
     pub dial: f32,
     /// The switch above the right stick.
     pub right_switch: Switch,
     /// The switch above the left stick.
     pub left_switch: Switch,
-    /// The mouse of the computer that the remote control is plugged into.
-    pub mouse: Mouse,
+    /// The counts by which the mouse of the computer that the remote control is plugged into moved since the last frame:
+    /// right is positive.
+    pub mouse_x: i16,
+    /// The same: towards the person is positive.
+    pub mouse_y: i16,
+    /// The same of the wheel.
+    pub mouse_z: i16,
+    /// Whether the left button of the mouse is down.
+    pub mouse_left: bool,
+    /// Whether the right button of the mouse is down.
+    pub mouse_right: bool,
     /// The keyboard of that computer.
     pub keys: Keys,
-}
-
-/// The two channels of a stick, -1 to 1, zero within the dead band.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Stick {
-    /// Right is positive.
-    pub x: f32,
-    /// Away from the person is positive.
-    pub y: f32,
 }
 
 /// The position of a switch.
@@ -53,79 +55,67 @@ pub enum Switch {
     Middle,
 }
 
-/// The mouse: counts moved since the last frame, and its buttons.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Mouse {
-    /// Right is positive.
-    pub x: i16,
-    /// Towards the person is positive.
-    pub y: i16,
-    /// The wheel.
-    pub z: i16,
-    /// Whether the left button is down.
-    pub left: bool,
-    /// Whether the right button is down.
-    pub right: bool,
-}
-
-/// The keys that are down.
+/// The keys that are down, one bit a key, as it came.
+///
+/// # Examples
+/// ```
+/// use drivetrain::wire::dbus::Keys;
+///
+/// let down = Keys(0b10_0001);
+/// assert!(down.contains(Keys::W) && down.contains(Keys::CTRL));
+/// assert!(!down.contains(Keys::A));
+/// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Keys(
-    /// One bit a key, as it came.
+    /// Bit 0 is W, bit 15 is B.
     pub u16,
 );
 
-/// A key of the keyboard, by its bit.
 #[expect(missing_docs, reason = "the names are those on the keys")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Key {
-    W,
-    S,
-    A,
-    D,
-    Shift,
-    Ctrl,
-    Q,
-    E,
-    R,
-    F,
-    G,
-    Z,
-    X,
-    C,
-    V,
-    B,
+impl Keys {
+    pub const W: Self = Self(1 << 0);
+    pub const S: Self = Self(1 << 1);
+    pub const A: Self = Self(1 << 2);
+    pub const D: Self = Self(1 << 3);
+    pub const SHIFT: Self = Self(1 << 4);
+    pub const CTRL: Self = Self(1 << 5);
+    pub const Q: Self = Self(1 << 6);
+    pub const E: Self = Self(1 << 7);
+    pub const R: Self = Self(1 << 8);
+    pub const F: Self = Self(1 << 9);
+    pub const G: Self = Self(1 << 10);
+    pub const Z: Self = Self(1 << 11);
+    pub const X: Self = Self(1 << 12);
+    pub const C: Self = Self(1 << 13);
+    pub const V: Self = Self(1 << 14);
+    pub const B: Self = Self(1 << 15);
 }
 
 impl Keys {
-    /// Returns whether `key` is down.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::wire::dbus::{Key, Keys};
-    ///
-    /// assert!(Keys(0b10_0001).is_pressed(Key::W) && Keys(0b10_0001).is_pressed(Key::Ctrl));
-    /// ```
+    /// Returns whether all keys of `keys` are down.
     #[must_use]
-    pub const fn is_pressed(self, key: Key) -> bool {
-        self.0 >> key as u16 & 1 != 0
+    pub const fn contains(self, keys: Self) -> bool {
+        self.0 & keys.0 == keys.0
     }
 }
 
 impl Remote {
     /// Nothing moved, nothing pressed, switches absent.
     pub(super) const NEUTRAL: Self = Self {
-        right: Stick { x: 0.0, y: 0.0 },
-        left: Stick { x: 0.0, y: 0.0 },
+        right_x: 0.0,
+        right_y: 0.0,
+        left_x: 0.0,
+        left_y: 0.0,
         dial: 0.0,
         right_switch: Switch::Absent,
         left_switch: Switch::Absent,
-        mouse: Mouse { x: 0, y: 0, z: 0, left: false, right: false },
+        mouse_x: 0,
+        mouse_y: 0,
+        mouse_z: 0,
+        mouse_left: false,
+        mouse_right: false,
         keys: Keys(0),
     };
 
@@ -140,18 +130,18 @@ impl Remote {
             raw => scaled(raw, dead_band)?,
         };
         Some(Self {
-            right: Stick { x: channel(0)?, y: channel(11)? },
-            left: Stick { x: channel(22)?, y: channel(33)? },
+            right_x: channel(0)?,
+            right_y: channel(11)?,
+            left_x: channel(22)?,
+            left_y: channel(33)?,
             dial,
             right_switch: switch(field(bits, 44, 3))?,
             left_switch: switch(field(bits, 46, 3))?,
-            mouse: Mouse {
-                x: i16::from_le_bytes([x0, x1]),
-                y: i16::from_le_bytes([y0, y1]),
-                z: i16::from_le_bytes([z0, z1]),
-                left: button(l)?,
-                right: button(r)?,
-            },
+            mouse_x: i16::from_le_bytes([x0, x1]),
+            mouse_y: i16::from_le_bytes([y0, y1]),
+            mouse_z: i16::from_le_bytes([z0, z1]),
+            mouse_left: button(l)?,
+            mouse_right: button(r)?,
             keys: Keys(u16::from_le_bytes([k0, k1])),
         })
     }
@@ -196,11 +186,27 @@ mod tests {
 
     #[test]
     fn a_key_is_its_own_bit_and_no_other() {
-        use Key::{A, B, C, Ctrl, D, E, F, G, Q, R, S, Shift, V, W, X, Z};
-        for (bit, key) in [W, S, A, D, Shift, Ctrl, Q, E, R, F, G, Z, X, C, V, B].iter().enumerate()
-        {
-            assert!(Keys(1 << bit).is_pressed(*key), "{key:?} is bit {bit}");
-            assert!(!Keys(!(1 << bit)).is_pressed(*key), "{key:?} has no other bit");
+        let keys = [
+            Keys::W,
+            Keys::S,
+            Keys::A,
+            Keys::D,
+            Keys::SHIFT,
+            Keys::CTRL,
+            Keys::Q,
+            Keys::E,
+            Keys::R,
+            Keys::F,
+            Keys::G,
+            Keys::Z,
+            Keys::X,
+            Keys::C,
+            Keys::V,
+            Keys::B,
+        ];
+        for (bit, key) in keys.into_iter().enumerate() {
+            assert!(Keys(1 << bit).contains(key), "{key:?} is bit {bit}");
+            assert!(!Keys(!(1 << bit)).contains(key), "{key:?} has no other bit");
         }
     }
 

@@ -1,7 +1,5 @@
-use core::fmt;
-
 use super::{ServoId, checksum};
-use crate::wire::BufferTooSmall;
+use crate::wire::EncodeError;
 use crate::wire::field::Writer;
 
 const PING: u8 = 0x01;
@@ -13,52 +11,19 @@ const RESET: u8 = 0x06;
 const SYNC_READ: u8 = 0x82;
 const SYNC_WRITE: u8 = 0x83;
 
-/// An instruction that cannot be written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum InstructionError {
-    /// The caller's buffer is shorter than the frame.
-    Buffer(BufferTooSmall),
-    /// The parameters are more than the length byte can tell.
-    TooLong {
-        /// The number of parameter bytes asked for; at most 253 fit.
-        parameters: usize,
-    },
-}
-
-impl fmt::Display for InstructionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Buffer(error) => error.fmt(f),
-            Self::TooLong { parameters } => {
-                write!(f, "{parameters} parameter bytes, one frame takes 253: split it")
-            }
-        }
-    }
-}
-
-impl core::error::Error for InstructionError {}
-
-impl From<BufferTooSmall> for InstructionError {
-    fn from(error: BufferTooSmall) -> Self {
-        Self::Buffer(error)
-    }
-}
-
 /// Asks a servo for a status without parameters.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when `out` has less than 6 bytes.
-pub fn ping(id: ServoId, out: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
+/// [`EncodeError::BufferTooSmall`] when `out` has less than 6 bytes.
+pub fn ping(id: ServoId, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     simple(id, PING, out)
 }
 
 /// Asks for `count` bytes from register `address` on.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when `out` has less than 8 bytes.
-pub fn read(id: ServoId, address: u8, count: u8, out: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
+/// [`EncodeError::BufferTooSmall`] when `out` has less than 8 bytes.
+pub fn read(id: ServoId, address: u8, count: u8, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     let mut frame = Writer::new(out, 8)?;
     frame.put(&[0xFF, 0xFF, id.as_raw(), 4, READ, address, count]);
     Ok(seal(frame))
@@ -67,55 +32,55 @@ pub fn read(id: ServoId, address: u8, count: u8, out: &mut [u8]) -> Result<&[u8]
 /// Writes bytes from register `address` on.
 ///
 /// # Errors
-/// [`InstructionError`] when the buffer is too small or there are more than 252 bytes.
+/// [`EncodeError`] when the buffer is too small or there are more than 252 bytes.
 pub fn write<'a>(
     id: ServoId,
     address: u8,
     data: &[u8],
     out: &'a mut [u8],
-) -> Result<&'a [u8], InstructionError> {
+) -> Result<&'a [u8], EncodeError> {
     addressed(id, WRITE, address, data, out)
 }
 
 /// Writes bytes from register `address` on, to take effect at the next [`action`].
 ///
 /// # Errors
-/// [`InstructionError`] when the buffer is too small or there are more than 252 bytes.
+/// [`EncodeError`] when the buffer is too small or there are more than 252 bytes.
 pub fn reg_write<'a>(
     id: ServoId,
     address: u8,
     data: &[u8],
     out: &'a mut [u8],
-) -> Result<&'a [u8], InstructionError> {
+) -> Result<&'a [u8], EncodeError> {
     addressed(id, REG_WRITE, address, data, out)
 }
 
 /// Puts what [`reg_write`] left in the servos into effect.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when `out` has less than 6 bytes.
-pub fn action(id: ServoId, out: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
+/// [`EncodeError::BufferTooSmall`] when `out` has less than 6 bytes.
+pub fn action(id: ServoId, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     simple(id, ACTION, out)
 }
 
 /// Sets the registers of a servo back to the state of delivery.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when `out` has less than 6 bytes.
-pub fn reset(id: ServoId, out: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
+/// [`EncodeError::BufferTooSmall`] when `out` has less than 6 bytes.
+pub fn reset(id: ServoId, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     simple(id, RESET, out)
 }
 
 /// Asks several servos for `count` bytes each, from register `address` on. They answer one after the other.
 ///
 /// # Errors
-/// [`InstructionError`] when the buffer is too small or there are more than 251 servos.
+/// [`EncodeError`] when the buffer is too small or there are more than 251 servos.
 pub fn sync_read<'a>(
     servos: &[ServoId],
     address: u8,
     count: u8,
     out: &'a mut [u8],
-) -> Result<&'a [u8], InstructionError> {
+) -> Result<&'a [u8], EncodeError> {
     let mut frame = begin(ServoId::BROADCAST, SYNC_READ, 2 + servos.len(), out)?;
     frame.put(&[address, count]);
     servos.iter().for_each(|id| frame.put(&[id.as_raw()]));
@@ -132,16 +97,16 @@ pub fn sync_read<'a>(
 /// let mut buffer = [0; 32];
 /// let frame = feetech::sync_write(Goal::ADDRESS, &[(ServoId::ONE, goal)], &mut buffer)?;
 /// assert_eq!(frame.len(), 6 + 2 + 1 + goal.len());
-/// # Ok::<(), feetech::InstructionError>(())
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 ///
 /// # Errors
-/// [`InstructionError`] when the buffer is too small or there are more than 251 bytes, the servos' ids included.
+/// [`EncodeError`] when the buffer is too small or there are more than 251 bytes, the servos' ids included.
 pub fn sync_write<'a, const K: usize>(
     address: u8,
     servos: &[(ServoId, [u8; K])],
     out: &'a mut [u8],
-) -> Result<&'a [u8], InstructionError> {
+) -> Result<&'a [u8], EncodeError> {
     let parameters = servos.len().saturating_mul(K.saturating_add(1)).saturating_add(2);
     let mut frame = begin(ServoId::BROADCAST, SYNC_WRITE, parameters, out)?;
     frame.put(&[address, u8::try_from(K).unwrap_or(u8::MAX)]);
@@ -152,7 +117,7 @@ pub fn sync_write<'a, const K: usize>(
     Ok(seal(frame))
 }
 
-fn simple(id: ServoId, instruction: u8, out: &mut [u8]) -> Result<&[u8], BufferTooSmall> {
+fn simple(id: ServoId, instruction: u8, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     let mut frame = Writer::new(out, 6)?;
     frame.put(&[0xFF, 0xFF, id.as_raw(), 2, instruction]);
     Ok(seal(frame))
@@ -164,7 +129,7 @@ fn addressed<'a>(
     address: u8,
     data: &[u8],
     out: &'a mut [u8],
-) -> Result<&'a [u8], InstructionError> {
+) -> Result<&'a [u8], EncodeError> {
     let mut frame = begin(id, instruction, data.len().saturating_add(1), out)?;
     frame.put(&[address]);
     frame.put(data);
@@ -176,9 +141,9 @@ fn begin(
     instruction: u8,
     parameters: usize,
     out: &mut [u8],
-) -> Result<Writer<'_>, InstructionError> {
+) -> Result<Writer<'_>, EncodeError> {
     let length = parameters.checked_add(2).and_then(|length| u8::try_from(length).ok());
-    let length = length.ok_or(InstructionError::TooLong { parameters })?;
+    let length = length.ok_or(EncodeError::TooManyParameters { parameters })?;
     let mut frame = Writer::new(out, usize::from(length) + 4)?;
     frame.put(&[0xFF, 0xFF, id.as_raw(), length, instruction]);
     Ok(frame)

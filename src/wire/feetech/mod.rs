@@ -12,14 +12,14 @@
 //! adapter that hears itself, throw as many received bytes away as were sent before giving the rest to the decoder.
 //!
 //! ```
-//! use drivetrain::wire::{Deframer, feetech::{self, Goal, Present, ServoId, Sts, MAX_FRAME}};
+//! use drivetrain::wire::{Deframer, feetech::{self, Goal, Present, ServoId, Status, MAX_FRAME}};
 //!
 //! let mut buffer = [0; MAX_FRAME];
 //! let goal = Goal { position: 4095, speed: 2250, acceleration: 50, time: 0 };
 //! feetech::write(ServoId::ONE, Goal::ADDRESS, &goal.to_bytes(), &mut buffer)?;
 //! feetech::read(ServoId::ONE, Present::ADDRESS, Present::LENGTH, &mut buffer)?;
 //!
-//! let mut replies = Deframer::<Sts, MAX_FRAME>::new(Sts);
+//! let mut replies = Deframer::<Status, MAX_FRAME>::new();
 //! let mut received: &[u8] = &[0xFF, 0xFF, 1, 10, 0, 0, 8, 0, 0, 0, 0, 0x79, 0x1E, 0x55];
 //! let status = replies.read(&mut received).ok_or("no status")?;
 //! let present = Present::from_status(&status).ok_or("another length was asked for")?;
@@ -36,11 +36,9 @@ mod values;
 
 pub mod register;
 
-pub use instruction::{
-    InstructionError, action, ping, read, reg_write, reset, sync_read, sync_write, write,
-};
+pub use instruction::{action, ping, read, reg_write, reset, sync_read, sync_write, write};
 
-pub use status::{MAX_FRAME, MAX_PARAMETERS, ServoErrors, Status, Sts};
+pub use status::{MAX_FRAME, MAX_PARAMETERS, Status};
 pub use values::{COUNTS_PER_TURN, Goal, Present, from_sign_magnitude, to_sign_magnitude};
 
 /// The number of a servo on its line: 0 to 253, or all of them.

@@ -15,21 +15,21 @@
 //!
 //! **Use the quaternion.** It is normalised here (a live sensor was seen to send 0.99904), and a frame without a usable
 //! one is refused. The three Euler angles on the wire mean different rotations in different firmware, and no field says
-//! which, see [`EulerOrder`]; [`Attitude::euler`] computes them from the quaternion in the order you name.
+//! which; [`Imu::euler_roll_x`] and [`Imu::euler_pitch_x`] compute them from the quaternion, each in its order.
 //!
-//! A heading that stands still may be a robot at rest or a dead sensor. Put the decoder into a
-//! [`Link`](super::Link): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
+//! A heading that stands still may be a robot at rest or a dead sensor. Read it with a
+//! [`Receiver`](super::Receiver): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
 //! latched when no new one came in time.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
-//! use drivetrain::wire::{Link, hipnuc::{EulerOrder, HipNuc, MAX_FRAME}};
+//! use drivetrain::wire::{Receiver, hipnuc::{Imu, MAX_FRAME}};
 //!
-//! let mut imu = Link::<HipNuc, MAX_FRAME>::new(HipNuc, Duration::from_millis(50));
+//! let mut imu = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
 //! let now = Instant::START;
 //! let mut received: &[u8] = &[0x5A, 0xA5]; // from the serial port
 //! while let Some(frame) = imu.read(&mut received, now) {
-//!     let (roll, pitch, yaw) = frame.attitude.euler(EulerOrder::PitchX);
+//!     let (roll, pitch, yaw) = frame.euler_pitch_x();
 //! }
 //! assert!(imu.latest(now).is_none()); // no heading to trust yet
 //! ```
@@ -39,10 +39,9 @@
 mod attitude;
 mod payload;
 
-pub use attitude::{Attitude, EulerOrder};
-
 use super::field::Reader;
-use super::{Protocol, Reject};
+use super::{Decode, Reject};
+use crate::geometry::Rotation3;
 use crate::units::{Angle, AngularVelocity};
 
 /// A buffer for every frame that the sensors send by themselves (the longest, `81`, has 110 bytes).
@@ -56,7 +55,7 @@ const OVERHEAD: usize = 6;
 
 static CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_XMODEM);
 
-/// One measurement of an IMU. Its numbers are finite, but for pressure and magnetic field on sensors that have none.
+/// One measurement of a HiPNUC IMU. Its numbers are finite, but for pressure and magnetic field on sensors that have none.
 ///
 /// Axes are those printed on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,39 +76,35 @@ pub struct Imu {
     pub angular_velocity: [AngularVelocity; 3],
     /// Magnetic field along x, y, z in microtesla, as it came.
     pub magnetic_field_ut: [f32; 3],
-    /// Roll as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    /// Roll as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub roll: Angle,
-    /// Pitch as the sensor computed it; which axis it means depends on the firmware ([`EulerOrder`]).
+    /// Pitch as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub pitch: Angle,
     /// Yaw as the sensor computed it.
     pub yaw: Angle,
-    /// The orientation, from the quaternion of the frame, normalised.
-    pub attitude: Attitude,
+    /// The orientation, from the quaternion of the frame, normalised: turns the sensor's axes into the world's (z up).
+    pub attitude: Rotation3,
 }
 
-/// The format of HiPNUC frames, for a [`Deframer`](super::Deframer) or a [`Link`](super::Link).
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct HipNuc;
-
-impl Protocol for HipNuc {
-    type Frame = Imu;
+impl Decode for Imu {
+    type Options = ();
     const PREFIX: usize = 4;
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &[0x5A, 0xA5]
     }
 
-    fn length(&self, prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), prefix: &[u8]) -> Option<usize> {
         let (_, length) = prefix.split_last_chunk()?;
         let length = u16::from_le_bytes(*length);
         matches!(length, 1..=MAX_PAYLOAD).then_some(usize::from(length) + OVERHEAD)
     }
 
-    fn is_new(&self, previous: &Imu, imu: &Imu) -> bool {
-        imu.time_ms.is_none() || imu.time_ms != previous.time_ms
+    fn is_new(&self, previous: &Self) -> bool {
+        self.time_ms.is_none() || self.time_ms != previous.time_ms
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<Imu, Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         let (head, rest) = frame.split_first_chunk::<4>().ok_or(Reject::Length)?;
         let (crc, payload) = rest.split_first_chunk().ok_or(Reject::Length)?;
         let mut digest = CRC.digest();
@@ -124,7 +119,7 @@ impl Protocol for HipNuc {
             (0x92, 48) => payload::read_92(Reader(fields)),
             _ => return Err(Reject::Foreign),
         };
-        imu.filter(Imu::is_finite).ok_or(Reject::Content)
+        imu.filter(Self::is_finite).ok_or(Reject::Content)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The fields of the two payloads, behind the tag. `None`: too short, or no usable quaternion.
 
-use super::{Attitude, Imu};
+use super::{Imu, attitude};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::field::Reader;
 
@@ -41,7 +41,7 @@ pub(super) fn read_91(mut fields: Reader<'_>) -> Option<Imu> {
         roll,
         pitch,
         yaw,
-        attitude: Attitude::new(quaternion)?,
+        attitude: attitude::normalised(quaternion)?,
     })
 }
 
@@ -76,6 +76,8 @@ pub(super) fn read_92(mut fields: Reader<'_>) -> Option<Imu> {
         roll,
         pitch,
         yaw,
-        attitude: Attitude::new(quaternion.map(|raw| f32::from(raw) * scale_92::QUATERNION))?,
+        attitude: attitude::normalised(
+            quaternion.map(|raw| f32::from(raw) * scale_92::QUATERNION),
+        )?,
     })
 }

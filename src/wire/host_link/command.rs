@@ -1,6 +1,6 @@
 use super::{JOINTS, PULSES_PER_TURN, check, seal};
 use crate::wire::field::{Reader, Writer};
-use crate::wire::{BufferTooSmall, Protocol, Reject};
+use crate::wire::{Decode, EncodeError, Reject};
 
 /// The length of a command frame in bytes.
 pub const COMMAND_LENGTH: usize = 79;
@@ -14,17 +14,17 @@ const TAGS: [u8; 4] = [13, 14, 15, 16];
 ///
 /// # Examples
 /// ```
-/// use drivetrain::wire::host_link::{Command, Reset, COMMAND_LENGTH};
+/// use drivetrain::wire::host_link::{HostCommand, Reset, COMMAND_LENGTH};
 ///
-/// let stop = Command { reset: Reset::Disable, ..Command::default() };
+/// let stop = HostCommand { reset: Reset::Disable, ..HostCommand::default() };
 /// let mut buffer = [0; COMMAND_LENGTH];
 /// assert_eq!(stop.encode(&mut buffer)?[76], 6);
-/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Command {
+pub struct HostCommand {
     /// The targets of the 12 joints.
     pub joints: [JointTarget; JOINTS],
     /// Target of the gripper's GM6020, in the firmware's unit.
@@ -52,7 +52,7 @@ pub struct Command {
 pub struct JointTarget {
     /// How fast to go there, in rpm: the byte has no sign, the position gives the direction.
     pub speed_rpm: u8,
-    /// Where to go, in pulses from the offset (see [`Offset`](super::Offset)); 65536 a turn.
+    /// Where to go, in pulses from the zero of the joint; 65536 a turn.
     pub position_pulses: i32,
 }
 
@@ -108,12 +108,12 @@ impl Reset {
     }
 }
 
-impl Command {
+impl HostCommand {
     /// Writes the frame, and returns the part of `out` that it fills.
     ///
     /// # Errors
-    /// [`BufferTooSmall`] when `out` has less than [`COMMAND_LENGTH`] bytes.
-    pub fn encode<'a>(&self, out: &'a mut [u8]) -> Result<&'a [u8], BufferTooSmall> {
+    /// [`EncodeError::BufferTooSmall`] when `out` has less than [`COMMAND_LENGTH`] bytes.
+    pub fn encode<'a>(&self, out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {
         let mut writer = Writer::new(out, COMMAND_LENGTH)?;
         writer.put(&HEADER);
         for joint in &self.joints {
@@ -134,28 +134,24 @@ impl Command {
     }
 }
 
-/// The format of [`Command`] frames, for a [`Deframer`](crate::wire::Deframer) or a [`Link`](crate::wire::Link).
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub struct CommandFormat;
-
-impl Protocol for CommandFormat {
-    type Frame = Command;
+impl Decode for HostCommand {
+    type Options = ();
     const PREFIX: usize = HEADER.len();
 
-    fn header(&self) -> &[u8] {
+    fn header(_: &()) -> &[u8] {
         &HEADER
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &(), _prefix: &[u8]) -> Option<usize> {
         Some(COMMAND_LENGTH)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<Command, Reject> {
+    fn decode(_: &(), frame: &[u8]) -> Result<Self, Reject> {
         read(check(frame)?).ok_or(Reject::Length)
     }
 }
 
-fn read(mut body: Reader<'_>) -> Option<Command> {
+fn read(mut body: Reader<'_>) -> Option<HostCommand> {
     let _header: [u8; 6] = body.take()?;
     let joints = body.array(|body| {
         Some(JointTarget { speed_rpm: body.u8()?, position_pulses: body.i32_be()? })
@@ -167,5 +163,5 @@ fn read(mut body: Reader<'_>) -> Option<Command> {
     let (gm6020_position, c610_position, sts3032_degrees) = (tagged()?, tagged()?, tagged()?);
     let [_tag, reset] = body.take()?;
     let reset = Reset::from_raw(reset);
-    Some(Command { joints, gm6020_position, c610_position, sts3032_degrees, reset })
+    Some(HostCommand { joints, gm6020_position, c610_position, sts3032_degrees, reset })
 }

@@ -16,40 +16,38 @@
 //!
 //! | question | the robot's document | its newer firmware | here |
 //! |---|---|---|---|
-//! | header of telemetry | `AA 55` | `BB 66` | both; [`TelemetryHeader::Firmware`] is the default: what runs speaks it, and it cannot be taken for a command |
-//! | byte order of the floats | not said | little-endian: memory of a Cortex-M | both; [`ByteOrder::Little`] is the default, as the only one seen |
+//! | header of telemetry | `AA 55` | `BB 66` | both; the firmware's is the default: what runs speaks it, and it cannot be taken for a command ([`TelemetryFormat`]) |
+//! | byte order of the floats | not said | little-endian: memory of a Cortex-M | both; little-endian is the default, as the only one seen |
 //! | `4B` in the command | up to the CRC | 75 bytes from the function code, CRC included | the firmware's, the only count that fits |
 //! | the four tags | left out | skipped unread | written as 13 to 16, skipped when read |
 //! | IMUs | USART 2, 7, 8, 6; pitch, roll, yaw | USART 6, 2, 7, 8 | in the order of the wire, without names |
 //!
-//! A host that is silent must not keep a robot going: put a decoder of commands into a [`Link`](super::Link), and relax
+//! A host that is silent must not keep a robot going: read its commands with a [`Receiver`](super::Receiver), and relax
 //! the motors while its `latest` is `None`.
 //!
 //! ```
 //! use drivetrain::wire::Deframer;
 //! use drivetrain::wire::host_link::*;
 //!
-//! let mut command = Command::default();
+//! let mut command = HostCommand::default();
 //! command.joints[4] = JointTarget { speed_rpm: 10, position_pulses: 2 * PULSES_PER_TURN };
 //! command.reset = Reset::Enable;
 //!
 //! let mut buffer = [0; COMMAND_LENGTH];
 //! let mut bytes = command.encode(&mut buffer)?;
-//! let mut decoder = Deframer::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat);
+//! let mut decoder = Deframer::<HostCommand, COMMAND_LENGTH>::new();
 //! assert_eq!(decoder.read(&mut bytes), Some(command));
-//! # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+//! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
 //! Source: the robot's data-flow document, and where that is wrong or silent its public firmware (`uart3.c`,
 //! `chasis_task.c`).
 
 mod command;
-mod offset;
 mod telemetry;
 
-pub use command::{COMMAND_LENGTH, Command, CommandFormat, JointTarget, Reset};
-pub use offset::Offset;
-pub use telemetry::{ByteOrder, TELEMETRY_LENGTH, Telemetry, TelemetryFormat, TelemetryHeader};
+pub use command::{COMMAND_LENGTH, HostCommand, JointTarget, Reset};
+pub use telemetry::{TELEMETRY_LENGTH, Telemetry, TelemetryFormat};
 
 use super::Reject;
 use super::field::{Reader, Writer};

@@ -1,6 +1,6 @@
 use super::{JOINTS, check, seal};
 use crate::wire::field::{Reader, Writer};
-use crate::wire::{BufferTooSmall, Protocol, Reject};
+use crate::wire::{Decode, EncodeError, Reject};
 
 /// The length of a telemetry frame in bytes: 10.5 ms at 115200 baud, of the 50 ms between two frames.
 pub const TELEMETRY_LENGTH: usize = 121;
@@ -13,7 +13,7 @@ const PAYLOAD: u8 = 116;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Telemetry {
-    /// Positions of the joints in pulses from their offset; 65536 a turn.
+    /// Positions of the joints in pulses from their zero; 65536 a turn.
     pub positions_pulses: [i32; JOINTS],
     /// Speeds of the joints in rpm.
     pub speeds_rpm: [i8; JOINTS],
@@ -26,28 +26,6 @@ pub struct Telemetry {
     pub imu_angles_deg: [[f32; 3]; 4],
 }
 
-/// The first two bytes of a telemetry frame.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum TelemetryHeader {
-    /// `AA 55`, the same as of a command: the robot's document.
-    Document,
-    /// `BB 66`: the robot's newer firmware.
-    #[default]
-    Firmware,
-}
-
-/// The order of the bytes of a number.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum ByteOrder {
-    /// Low byte first: the memory of a Cortex-M.
-    #[default]
-    Little,
-    /// High byte first.
-    Big,
-}
-
 /// The format of [`Telemetry`] frames: the two things in which the sources differ.
 ///
 /// # Examples
@@ -55,53 +33,54 @@ pub enum ByteOrder {
 /// use drivetrain::wire::Deframer;
 /// use drivetrain::wire::host_link::*;
 ///
-/// let format = TelemetryFormat::new().with_header(TelemetryHeader::Document);
+/// let format = TelemetryFormat::new().with_document_header();
 /// let telemetry = Telemetry { speeds_rpm: [-3; JOINTS], ..Telemetry::default() };
 /// let mut buffer = [0; TELEMETRY_LENGTH];
 /// let mut bytes = format.encode(&telemetry, &mut buffer)?;
 /// assert_eq!(bytes[..3], [0xAA, 0x55, 116]);
 ///
-/// let mut decoder = Deframer::<_, TELEMETRY_LENGTH>::new(format);
+/// let mut decoder = Deframer::<Telemetry, TELEMETRY_LENGTH>::with_options(format);
 /// assert_eq!(decoder.read(&mut bytes), Some(telemetry));
-/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TelemetryFormat {
-    header: TelemetryHeader,
-    floats: ByteOrder,
+    /// `AA 55` instead of `BB 66`.
+    document_header: bool,
+    big_endian_floats: bool,
 }
 
 impl TelemetryFormat {
     /// Header `BB 66`, floats low byte first: what the newer firmware sends.
     #[must_use]
     pub const fn new() -> Self {
-        Self { header: TelemetryHeader::Firmware, floats: ByteOrder::Little }
+        Self { document_header: false, big_endian_floats: false }
     }
 
-    /// Sets the first two bytes.
+    /// Makes the first two bytes `AA 55`, as the robot's document has them: the same as of a command.
     #[must_use]
-    pub const fn with_header(self, header: TelemetryHeader) -> Self {
-        Self { header, ..self }
+    pub const fn with_document_header(self) -> Self {
+        Self { document_header: true, ..self }
     }
 
-    /// Sets the byte order of the Euler angles. The integers and the CRC have their high byte first in any case.
+    /// Puts the high byte of the Euler angles first. The integers and the CRC have it first in any case.
     #[must_use]
-    pub const fn with_floats(self, floats: ByteOrder) -> Self {
-        Self { floats, ..self }
+    pub const fn with_big_endian_floats(self) -> Self {
+        Self { big_endian_floats: true, ..self }
     }
 
     /// Writes the frame, and returns the part of `out` that it fills.
     ///
     /// # Errors
-    /// [`BufferTooSmall`] when `out` has less than [`TELEMETRY_LENGTH`] bytes.
+    /// [`EncodeError::BufferTooSmall`] when `out` has less than [`TELEMETRY_LENGTH`] bytes.
     pub fn encode<'a>(
         &self,
         telemetry: &Telemetry,
         out: &'a mut [u8],
-    ) -> Result<&'a [u8], BufferTooSmall> {
+    ) -> Result<&'a [u8], EncodeError> {
         let mut writer = Writer::new(out, TELEMETRY_LENGTH)?;
-        writer.put(self.header());
+        writer.put(Telemetry::header(self));
         for position in telemetry.positions_pulses {
             writer.put(&position.to_be_bytes());
         }
@@ -111,9 +90,10 @@ impl TelemetryFormat {
         writer.put(&telemetry.gm6020_position.to_be_bytes());
         writer.put(&telemetry.c610_position.to_be_bytes());
         for angle in telemetry.imu_angles_deg.as_flattened() {
-            writer.put(&match self.floats {
-                ByteOrder::Little => angle.to_le_bytes(),
-                ByteOrder::Big => angle.to_be_bytes(),
+            writer.put(&if self.big_endian_floats {
+                angle.to_be_bytes()
+            } else {
+                angle.to_le_bytes()
             });
         }
         Ok(seal(writer))
@@ -123,9 +103,10 @@ impl TelemetryFormat {
         let _header: [u8; 3] = body.take()?;
         let float = |body: &mut Reader<'_>| {
             let bytes = body.take()?;
-            Some(match self.floats {
-                ByteOrder::Little => f32::from_le_bytes(bytes),
-                ByteOrder::Big => f32::from_be_bytes(bytes),
+            Some(if self.big_endian_floats {
+                f32::from_be_bytes(bytes)
+            } else {
+                f32::from_le_bytes(bytes)
             })
         };
         Some(Telemetry {
@@ -138,22 +119,19 @@ impl TelemetryFormat {
     }
 }
 
-impl Protocol for TelemetryFormat {
-    type Frame = Telemetry;
+impl Decode for Telemetry {
+    type Options = TelemetryFormat;
     const PREFIX: usize = 3;
 
-    fn header(&self) -> &[u8] {
-        match self.header {
-            TelemetryHeader::Document => &[0xAA, 0x55, PAYLOAD],
-            TelemetryHeader::Firmware => &[0xBB, 0x66, PAYLOAD],
-        }
+    fn header(format: &TelemetryFormat) -> &[u8] {
+        if format.document_header { &[0xAA, 0x55, PAYLOAD] } else { &[0xBB, 0x66, PAYLOAD] }
     }
 
-    fn length(&self, _prefix: &[u8]) -> Option<usize> {
+    fn length(_: &TelemetryFormat, _prefix: &[u8]) -> Option<usize> {
         Some(TELEMETRY_LENGTH)
     }
 
-    fn parse(&self, frame: &[u8]) -> Result<Telemetry, Reject> {
-        self.read(check(frame)?).ok_or(Reject::Length)
+    fn decode(format: &TelemetryFormat, frame: &[u8]) -> Result<Self, Reject> {
+        format.read(check(frame)?).ok_or(Reject::Length)
     }
 }

@@ -12,9 +12,9 @@ use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
-use drivetrain::wire::dbus::{Dbus, Remote, Stick, Switch};
-use drivetrain::wire::hipnuc::{EulerOrder, HipNuc, MAX_FRAME};
-use drivetrain::wire::{Edge, Link};
+use drivetrain::wire::dbus::{Dbus, Remote, Switch};
+use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
+use drivetrain::wire::{Receiver, SignalEdge};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
 const WHEEL: WheelTuning = WheelTuning {
@@ -63,7 +63,7 @@ pub struct Pilot {
     wheels: MecanumWheels<Handle<M3508>>,
     chassis: Chassis<Mecanum>,
     dbus: Dbus,
-    imu: Link<HipNuc, MAX_FRAME>,
+    imu: Receiver<Imu, MAX_FRAME>,
     switch: Switch,
     forward: Forward,
 }
@@ -89,7 +89,7 @@ impl Pilot {
         let limits =
             ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
-        let imu = Link::new(HipNuc, IMU_DEADLINE);
+        let imu = Receiver::new(IMU_DEADLINE);
         let (switch, forward) = (Switch::Absent, Forward::Chassis);
         Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch, forward })
     }
@@ -105,7 +105,7 @@ impl Pilot {
     }
 
     /// Hands over who was heard and lost since, for the log.
-    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, Edge)) {
+    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, SignalEdge)) {
         while let Some(edge) = self.dbus.edge(now) {
             log("remote control", edge);
         }
@@ -136,11 +136,10 @@ impl Pilot {
     }
 
     fn steer(&mut self, remote: &Remote, now: Instant) {
-        let Stick { x, y } = remote.right;
-        let turn = -remote.left.x * FASTEST_RAD_S;
-        let (vx, vy) = (y * FASTEST_M_S, -x * FASTEST_M_S);
+        let turn = -remote.left_x * FASTEST_RAD_S;
+        let (vx, vy) = (remote.right_y * FASTEST_M_S, -remote.right_x * FASTEST_M_S);
         let yaw = self.imu.latest(now).map(|imu| {
-            let (_, _, yaw) = imu.attitude.euler(EulerOrder::RollX);
+            let (_, _, yaw) = imu.euler_roll_x();
             Heading::new(yaw)
         });
         self.forward = match (self.forward, yaw) {
@@ -158,7 +157,7 @@ impl Pilot {
 }
 
 fn at_rest(remote: &Remote) -> bool {
-    [remote.right, remote.left].iter().all(|stick| stick.x == 0.0 && stick.y == 0.0)
+    [remote.right_x, remote.right_y, remote.left_x, remote.left_y].iter().all(|share| *share == 0.0)
 }
 
 #[cfg(test)]

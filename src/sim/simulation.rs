@@ -1,8 +1,9 @@
 use super::chassis::Chassis;
 use super::engine::Engine;
+use super::motor::{JOINTS, MOTORS};
 use super::{
-    AttachError, ChassisConfig, ChassisState, Controller, Fault, FaultsFull, Line, MotorConfig,
-    MotorKey, MotorState, Record, Traffic,
+    ChassisConfig, ChassisState, Controller, Fault, Line, MotorConfig, MotorKey, MotorState,
+    SimError, Traffic, Transmission,
 };
 use crate::frame::CanFrame;
 use crate::time::{Clock, Duration, Instant};
@@ -12,24 +13,30 @@ use core::ops::RangeBounds;
 /// Three CAN buses with motors on them, and the time.
 ///
 /// It is shared by reference, so that the code under test can own the driver's end of a bus while the test goes
-/// on to move time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block.
+/// on to move time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block. A
+/// reference to it is a [`Clock`] that shows its time.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::sim::{Line, Model, MotorConfig, World};
+/// use drivetrain::sim::{Line, MotorConfig, Simulation};
 /// use drivetrain::time::{Duration, Instant};
 ///
-/// let world = World::new(7);
-/// world.attach(MotorConfig::new(Model::Gm6020Voltage, 1))?;
+/// let world = Simulation::new(7);
+/// world.attach(MotorConfig::gm6020_voltage(1))?;
 /// world.advance(Duration::from_millis(10));
 /// assert_eq!(world.now(), Instant::from_micros(10_000));
 /// assert_eq!(world.traffic(Line::Can1).frames, 10);
-/// # Ok::<(), drivetrain::sim::AttachError>(())
+/// # Ok::<(), drivetrain::sim::SimError>(())
 /// ```
 #[derive(Debug)]
-pub struct World(RefCell<Engine>);
+pub struct Simulation(RefCell<Engine>);
 
-impl World {
+impl Simulation {
+    /// The number of motors with ESCs that it holds.
+    pub const MAX_MOTORS: usize = MOTORS;
+    /// The number of joints that it holds.
+    pub const MAX_JOINTS: usize = JOINTS;
+
     /// Makes empty buses at 1 Mbit/s. The seed decides phases, clock errors, start angles and every chance.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
@@ -62,7 +69,7 @@ impl World {
     ///
     /// # Errors
     /// When the model has no such id, or when there are 16 motors already.
-    pub fn attach(&self, config: MotorConfig) -> Result<MotorKey, AttachError> {
+    pub fn attach(&self, config: MotorConfig) -> Result<MotorKey, SimError> {
         self.with(|engine| engine.attach(config))
     }
 
@@ -78,10 +85,10 @@ impl World {
         Controller::new(self, line)
     }
 
-    /// Returns a clock that shows the time of this world.
+    /// Returns a clock that shows the time of this world: a reference to it.
     #[must_use]
-    pub const fn clock(&self) -> SimClock<'_> {
-        SimClock(self)
+    pub const fn clock(&self) -> &Self {
+        self
     }
 
     /// Returns the time, in whole microseconds.
@@ -109,11 +116,11 @@ impl World {
     /// A node that answers every remote request for 0x123 with one byte:
     /// ```
     /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::sim::{Line, World};
+    /// use drivetrain::sim::{Line, Simulation};
     /// use drivetrain::time::Duration;
     /// use embedded_can::{Frame, StandardId, nb::Can};
     ///
-    /// let world = World::new(1);
+    /// let world = Simulation::new(1);
     /// let id = StandardId::new(0x123).ok_or("id")?;
     /// let request = CanFrame::new_remote(id, 1).ok_or("length")?;
     /// let answer = CanFrame::new(id, &[42]).ok_or("length")?;
@@ -126,7 +133,7 @@ impl World {
     /// assert_eq!(world.controller().receive(), Ok(answer));
     /// # Ok::<(), &str>(())
     /// ```
-    pub fn advance_with(&self, duration: Duration, mut show: impl FnMut(&Record)) {
+    pub fn advance_with(&self, duration: Duration, mut show: impl FnMut(&Transmission)) {
         while let Some(record) = self.with(|engine| engine.unseen.pop()) {
             show(&record);
         }
@@ -138,19 +145,19 @@ impl World {
         }
     }
 
-    /// Returns the true state of a motor; `None` for a key of another world.
+    /// Returns the true state of a motor or joint; `None` for a key of another world.
     #[must_use]
     pub fn motor(&self, motor: MotorKey) -> Option<MotorState> {
         self.with(|engine| engine.motor(motor))
     }
 
-    /// Puts a chassis on its motors; their shafts then carry it. They may sit on both buses. A second chassis
+    /// Puts a chassis on its motors; their shafts then carry it. They may sit on different buses. A second chassis
     /// replaces the first.
     ///
     /// # Errors
     /// Names the parameter that makes no sense.
-    pub fn attach_chassis(&self, config: ChassisConfig) -> Result<(), AttachError> {
-        config.validate().map_err(AttachError::Chassis)?;
+    pub fn attach_chassis(&self, config: ChassisConfig) -> Result<(), SimError> {
+        config.validate().map_err(SimError::Chassis)?;
         let chassis = Chassis::new(&config);
         self.with(|engine| engine.chassis = Some(chassis));
         Ok(())
@@ -175,7 +182,7 @@ impl World {
     }
 
     /// Puts a torque on the output shaft of a motor, in Nm; positive turns it counter-clockwise. What is not
-    /// finite counts as zero.
+    /// finite counts as zero. A joint does not feel it: its drive is strong enough for everything.
     pub fn set_load_nm(&self, motor: MotorKey, torque_nm: f32) {
         let torque_nm = if torque_nm.is_finite() { torque_nm } else { 0.0 };
         self.with(|engine| {
@@ -185,7 +192,7 @@ impl World {
         });
     }
 
-    /// Sets the temperature of a motor in °C, from which it goes on. What is not finite changes nothing.
+    /// Sets the temperature of a motor in °C, from which it goes on. What is not finite changes nothing, and a joint has none.
     pub fn set_temperature_c(&self, motor: MotorKey, celsius: f32) {
         self.with(|engine| {
             if let Some(esc) = engine.esc_mut(motor).filter(|_| celsius.is_finite()) {
@@ -206,11 +213,11 @@ impl World {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::sim::{Fault, Line, Model, MotorConfig, World};
+    /// use drivetrain::sim::{Fault, Line, MotorConfig, Simulation};
     /// use drivetrain::time::{Duration, Instant};
     ///
-    /// let world = World::new(1);
-    /// let wheel = world.attach(MotorConfig::new(Model::M3508, 1))?;
+    /// let world = Simulation::new(1);
+    /// let wheel = world.attach(MotorConfig::m3508(1))?;
     /// world.fault(Fault::Silent(wheel), Instant::from_micros(20_000)..Instant::from_micros(50_000))?;
     /// world.advance(Duration::from_millis(100));
     /// assert_eq!(world.traffic(Line::Can1).frames, 70); // 30 of 100 are missing
@@ -218,8 +225,8 @@ impl World {
     /// ```
     ///
     /// # Errors
-    /// When 16 faults are scheduled that are not over yet.
-    pub fn fault(&self, fault: Fault, window: impl RangeBounds<Instant>) -> Result<(), FaultsFull> {
+    /// When 16 faults are scheduled that are not over yet, and when a joint cannot have the fault.
+    pub fn fault(&self, fault: Fault, window: impl RangeBounds<Instant>) -> Result<(), SimError> {
         self.with(|engine| {
             let (seed, now_ns) = (engine.seed, engine.now_ns);
             engine.faults.schedule(fault, window, seed, now_ns)
@@ -238,20 +245,17 @@ impl World {
     }
 }
 
-/// A clock that shows the time of a [`World`].
-#[derive(Debug, Clone, Copy)]
-pub struct SimClock<'a>(&'a World);
-
-impl Clock for SimClock<'_> {
+impl Clock for &Simulation {
     fn now(&mut self) -> Instant {
-        self.0.now()
+        Simulation::now(self)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Model, Sender};
+    use crate::sim::motor::Model;
+    use crate::sim::{JointConfig, Sender};
     use embedded_can::{Frame, nb::Can};
     use std::string::{String, ToString};
     use std::vec::Vec;
@@ -264,7 +268,7 @@ mod tests {
         MotorConfig::new(Model::M3508, id)
     }
 
-    fn log(world: &World, millis: u64) -> Vec<Record> {
+    fn log(world: &Simulation, millis: u64) -> Vec<Transmission> {
         let mut records = Vec::new();
         world.advance_with(Duration::from_millis(millis), |record| records.push(*record));
         records
@@ -277,7 +281,7 @@ mod tests {
 
     /// Four motors and a controller that changes its mind, with `micros` between two looks at the time.
     fn story(seed: u64, micros: u64) -> String {
-        let world = World::new(seed);
+        let world = Simulation::new(seed);
         let keys = [1, 2, 3, 4].map(|id| world.attach(m3508(id)).unwrap());
         let lossy = Fault::LostFrames { line: Line::Can1, id: None, probability: 0.1 };
         world.fault(lossy, at(20)..).unwrap();
@@ -294,7 +298,7 @@ mod tests {
         for key in keys {
             let motor = world.motor(key).unwrap();
             let velocity = motor.velocity.as_rad_per_s().to_bits();
-            text += &std::format!("{} {velocity:08x}\n", motor.rotor_counts);
+            text += &std::format!("{} {velocity:08x}\n", motor.encoder_counts);
         }
         text
     }
@@ -322,11 +326,11 @@ mod tests {
     #[test]
     fn one_more_motor_does_not_change_the_others() {
         let phases = |count: u8| {
-            let world = World::new(3);
+            let world = Simulation::new(3);
             for id in 1..=count {
                 world.attach(m3508(id)).unwrap();
             }
-            let first = |id| move |record: &&Record| record.frame.header() == id;
+            let first = |id| move |record: &&Transmission| record.frame.header() == id;
             let records = log(&world, 2);
             [0x201, 0x202].map(|id| records.iter().find(first(id)).unwrap().frame)
         };
@@ -335,7 +339,7 @@ mod tests {
 
     #[test]
     fn eight_motors_and_two_command_frames_need_more_than_the_bus_has() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         for id in 1..=8 {
             world.attach(m3508(id)).unwrap();
         }
@@ -353,34 +357,81 @@ mod tests {
 
     #[test]
     fn a_full_world_refuses_the_seventeenth_motor() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         for index in 0..16 {
             world.attach(m3508(index % 8 + 1)).unwrap();
         }
-        assert_eq!(world.attach(m3508(1)), Err(AttachError::Full));
-        let wrong = AttachError::Id { model: Model::M3508, id: 9 };
-        assert_eq!(World::new(1).attach(m3508(9)), Err(wrong));
+        assert_eq!(world.attach(m3508(1)), Err(SimError::Full));
+        let wrong = SimError::Id { model: "M3508", id: 9 };
+        assert_eq!(Simulation::new(1).attach(m3508(9)), Err(wrong));
         assert_eq!(wrong.to_string(), "M3508 has no id 9");
     }
 
     #[test]
+    fn the_angle_of_the_shaft_is_what_its_encoder_counts() {
+        let world = Simulation::new(1);
+        let wheel = world.attach(m3508(1).with_rotor_angle(4_096)).unwrap();
+        let joint = world.attach_joint(JointConfig::new(1).with_position(-16_384)).unwrap();
+        let state = |key| world.motor(key).unwrap();
+        let gear = m3508(1).facts().gear.as_f32();
+        assert!((state(wheel).position.as_turns() * gear - 0.5).abs() < 1e-6);
+        assert!((state(joint).position.as_angle().as_degrees() + 90.0).abs() < 1e-4);
+        world.set_load_nm(wheel, 1.0);
+        world.advance(Duration::from_secs(1));
+        let MotorState { position, encoder_counts, drive_counts, .. } = state(wheel);
+        let counted = encoder_counts as f32 / 8_192.0 / gear;
+        assert!(position.turns() > 0 && (position.as_turns() - counted).abs() < 1e-4);
+        assert_eq!(i64::from(drive_counts), encoder_counts);
+        assert!(state(joint).torque_nm.is_nan() && state(joint).current.as_amperes().is_nan());
+    }
+
+    #[test]
+    fn a_drive_that_forgot_its_angle_counts_from_there() {
+        let world = Simulation::new(1);
+        let wheel = world.attach(m3508(1).with_rotor_angle(1_000)).unwrap();
+        let loss = Fault::PowerLoss { motor: wheel, forgets_angle: true };
+        world.fault(loss, at(10)..at(20)).unwrap();
+        world.advance(Duration::from_millis(15));
+        assert!(!world.motor(wheel).unwrap().is_enabled);
+        world.advance(Duration::from_millis(15));
+        let state = world.motor(wheel).unwrap();
+        assert_eq!((state.encoder_counts, state.drive_counts, state.is_enabled), (1_000, 0, true));
+        assert_eq!(state.replies, world.traffic(Line::Can1).frames);
+    }
+
+    #[test]
+    fn a_joint_has_no_fault_of_an_esc() {
+        let world = Simulation::new(1);
+        let joint = world.attach_joint(JointConfig::new(1)).unwrap();
+        for fault in [
+            Fault::StuckEncoder(joint),
+            Fault::FrozenFeedback(joint),
+            Fault::BlockedShaft(joint),
+            Fault::ErrorCode { motor: joint, code: 1 },
+        ] {
+            assert_eq!(world.fault(fault, ..), Err(SimError::NoFaultOfJoint));
+        }
+        assert_eq!(world.fault(Fault::Silent(joint), ..), Ok(()));
+    }
+
+    #[test]
     fn a_load_turns_the_shaft_and_a_key_of_another_world_does_nothing() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let key = world.attach(m3508(1).with_rotor_angle(0)).unwrap();
         world.set_load_nm(key, -1.0);
         world.advance(Duration::from_millis(50));
-        assert!(world.motor(key).unwrap().rotor_counts < -100);
+        assert!(world.motor(key).unwrap().encoder_counts < -100);
         world.set_load_nm(key, f32::NAN);
         world.advance(Duration::from_secs(2));
         assert_eq!(world.motor(key).unwrap().velocity.as_rad_per_s().to_bits(), 0);
-        let empty = World::new(1);
+        let empty = Simulation::new(1);
         empty.set_load_nm(key, 1.0);
         assert_eq!(empty.motor(key), None);
     }
 
     /// The feedback of one motor in the 100 ms around a fault that holds from 20 to 50 ms.
     fn feedback_around(fault: impl Fn(MotorKey) -> Fault) -> Vec<(u64, CanFrame)> {
-        let world = World::new(5);
+        let world = Simulation::new(5);
         let key = world.attach(m3508(1)).unwrap();
         let mut can = world.controller();
         world.fault(fault(key), at(20)..at(50)).unwrap();
@@ -441,7 +492,7 @@ mod tests {
         assert!(stuck.iter().all(|frame| frame.bytes()[..4] == stuck[0].bytes()[..4]));
         let frozen = within(&feedback_around(Fault::FrozenFeedback));
         assert!(frozen.iter().all(|frame| *frame == frozen[0]));
-        let sound = within(&feedback_around(|_| Fault::Silent(MotorKey(9))));
+        let sound = within(&feedback_around(|_| Fault::Silent(MotorKey::new(9).unwrap())));
         assert!(!sound.windows(2).any(|pair| pair[0].bytes()[..2] == pair[1].bytes()[..2]));
         for heard in [wrong, short, code, stuck, frozen, sound] {
             assert!((27..=29).contains(&heard.len()));
@@ -452,7 +503,7 @@ mod tests {
     fn a_blocked_shaft_stands_and_a_reversed_torque_drives_it_the_other_way_up_to_its_no_load_speed()
      {
         let end = |fault: fn(MotorKey) -> Fault| {
-            let world = World::new(5);
+            let world = Simulation::new(5);
             let key = world.attach(m3508(1)).unwrap();
             assert_eq!(world.controller().transmit(&command(8_192)), Ok(None));
             world.advance(Duration::from_millis(20));
@@ -469,7 +520,7 @@ mod tests {
 
     #[test]
     fn a_flood_takes_what_the_ids_leave_it() {
-        let world = World::new(2);
+        let world = Simulation::new(2);
         world.attach(m3508(1)).unwrap();
         let frame = CanFrame::standard(0x7FF, [0x55; 8]).unwrap();
         let flood = Fault::Flood { line: Line::Can1, frame, period: Duration::from_micros(50) };
@@ -482,7 +533,7 @@ mod tests {
 
     #[test]
     fn feedback_runs_on_clocks_of_its_own() {
-        let world = World::new(4);
+        let world = Simulation::new(4);
         world.attach(m3508(1)).unwrap();
         world.attach(m3508(2)).unwrap();
         let records = log(&world, 1_000);
@@ -501,7 +552,7 @@ mod tests {
 
     #[test]
     fn a_line_of_the_log_is_as_candump_writes_it() {
-        let world = World::new(1);
+        let world = Simulation::new(1);
         let id = embedded_can::ExtendedId::new(0x12345).unwrap();
         world.inject(Line::Can2, CanFrame::new_remote(id, 3).unwrap()).unwrap();
         world.inject(Line::Can1, CanFrame::new(id, &[]).unwrap()).unwrap();

@@ -1,4 +1,4 @@
-use super::{Counts, Deadline, Deframer, Edge, Protocol};
+use super::{Counts, Deadline, Decode, Deframer, SignalEdge};
 use crate::time::{Duration, Instant};
 
 /// A [`Deframer`] that keeps its latest frame, and takes it away when no new one came in time.
@@ -6,35 +6,43 @@ use crate::time::{Duration, Instant};
 /// # Examples
 /// ```
 /// use drivetrain::time::{Duration, Instant};
-/// use drivetrain::wire::host_link::{Command, CommandFormat, COMMAND_LENGTH};
-/// use drivetrain::wire::{Edge, Link};
+/// use drivetrain::wire::host_link::{HostCommand, COMMAND_LENGTH};
+/// use drivetrain::wire::{SignalEdge, Receiver};
 ///
 /// let ms = |ms| Instant::START + Duration::from_millis(ms);
-/// let mut host = Link::<CommandFormat, COMMAND_LENGTH>::new(CommandFormat, Duration::from_millis(100));
+/// let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
 /// let mut buffer = [0; COMMAND_LENGTH];
-/// let mut received = Command::default().encode(&mut buffer)?;
-/// assert_eq!(host.read(&mut received, ms(1)), Some(Command::default()));
+/// let mut received = HostCommand::default().encode(&mut buffer)?;
+/// assert_eq!(host.read(&mut received, ms(1)), Some(HostCommand::default()));
 ///
 /// assert!(host.latest(ms(101)).is_some());
 /// assert!(host.latest(ms(102)).is_none()); // relax the robot
-/// assert_eq!(host.edge(ms(102)), Some(Edge::Heard { at: ms(1) }));
-/// assert_eq!(host.edge(ms(102)), Some(Edge::Lost { at: ms(101) }));
-/// # Ok::<(), drivetrain::wire::BufferTooSmall>(())
+/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Heard { at: ms(1) }));
+/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Lost { at: ms(101) }));
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Link<P: Protocol, const N: usize> {
-    decoder: Deframer<P, N>,
+pub struct Receiver<F: Decode, const N: usize> {
+    decoder: Deframer<F, N>,
     deadline: Deadline,
-    latest: Option<P::Frame>,
+    latest: Option<F>,
     frozen_frames: u32,
 }
 
-impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
-    /// Takes the protocol, and the age at which its last frame no longer counts.
+impl<F: Decode<Options = ()> + Copy, const N: usize> Receiver<F, N> {
+    /// Takes the age at which the last frame no longer counts, for frames without options.
     #[must_use]
-    pub const fn new(protocol: P, deadline: Duration) -> Self {
+    pub const fn new(deadline: Duration) -> Self {
+        Self::with_options((), deadline)
+    }
+}
+
+impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
+    /// Takes the options of the frames, and the age at which the last one no longer counts.
+    #[must_use]
+    pub const fn with_options(options: F::Options, deadline: Duration) -> Self {
         Self {
-            decoder: Deframer::new(protocol),
+            decoder: Deframer::with_options(options),
             deadline: Deadline::new(deadline),
             latest: None,
             frozen_frames: 0,
@@ -43,13 +51,12 @@ impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
 
     /// Returns the next frame of `input`, as [`Deframer::read`] does; `now` is when the bytes arrived.
     ///
-    /// Frames that only repeat the one before (see [`Protocol::is_new`]) are returned too, but do not keep the link
+    /// Frames that only repeat the one before (see [`Decode::is_new`]) are returned too, but do not keep the link
     /// alive.
     #[must_use]
-    pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<P::Frame> {
+    pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<F> {
         let frame = self.decoder.read(input)?;
-        let protocol = self.decoder.protocol();
-        if self.latest.is_none_or(|previous| protocol.is_new(&previous, &frame)) {
+        if self.latest.is_none_or(|previous| frame.is_new(&previous)) {
             self.deadline.meet(now);
         } else {
             self.frozen_frames = self.frozen_frames.saturating_add(1);
@@ -65,13 +72,13 @@ impl<P: Protocol<Frame: Copy>, const N: usize> Link<P, N> {
 
     /// Returns the latest frame; `None` before the first and when the last new one is older than the deadline.
     #[must_use]
-    pub fn latest(&self, now: Instant) -> Option<P::Frame> {
+    pub fn latest(&self, now: Instant) -> Option<F> {
         self.latest.filter(|_| self.deadline.is_live(now))
     }
 
     /// Returns the oldest change between heard and lost that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<Edge> {
+    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
         self.deadline.edge(now)
     }
 

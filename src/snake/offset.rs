@@ -3,13 +3,13 @@
 /// ```text
 /// position shown = raw - offset        target sent = wanted + offset
 /// ```
-/// [`Reset::Rezero`](super::Reset::Rezero) makes the present position zero. The robot's document does it as
+/// [`Reset::Rezero`](crate::wire::host_link::Reset::Rezero) makes the present position zero. The robot's document does it as
 /// `offset = shown + offset` and doubts that; as `shown + offset` is the raw position, it is right, and it is what
 /// [`rezero`](Self::rezero) does. All arithmetic wraps as the motor's own 32-bit counter does.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::wire::host_link::Offset;
+/// use drivetrain::snake::Offset;
 ///
 /// let mut offset = Offset::default();
 /// offset.rezero(70_000); // the motor stands at raw 70 000
