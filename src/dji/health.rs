@@ -27,8 +27,8 @@ pub(super) struct Rounds {
     /// The length of the round before.
     elapsed: u8,
     /// Whose turn it is.
-    next: u8,
-    closes_window: bool,
+    pub(super) next: u8,
+    pub(super) closes_window: bool,
     has_begun: bool,
     /// Frames that are sent are heard again.
     echoes: bool,
@@ -50,7 +50,7 @@ impl Rounds {
     /// A new round begins: one tick for each place, and one for this.
     #[cold]
     #[inline(never)]
-    fn begin(&mut self, now: u32) {
+    pub(super) fn begin(&mut self, now: u32) {
         self.next = 0;
         self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
         self.begun = now;
@@ -145,22 +145,8 @@ impl<B> Bus<B> {
         })
     }
 
-    /// Looks at what need not be looked at in every tick, in one motor a tick.
-    #[inline]
-    pub(super) fn check_one_slot(&mut self) {
-        let motor = self.rounds.next;
-        let Some(slot) = self.slots.get_mut(usize::from(motor)) else {
-            return self.rounds.begin(self.guard.now());
-        };
-        self.rounds.next = motor + 1;
-        let word = self.outbox.get(slot.place);
-        if self.rounds.closes_window || !slot.is_well(word) {
-            self.check_closely(motor, word);
-        }
-    }
-
     #[inline(never)]
-    fn check_closely(&mut self, motor: u8, word: i16) {
+    pub(super) fn check_closely(&mut self, motor: u8, word: i16) {
         let look = Look {
             now: self.guard.now(),
             elapsed: self.rounds.elapsed,

@@ -113,6 +113,12 @@ impl CanFrame {
         self.missing
     }
 
+    /// Tells whether this is a standard data frame of 8 bytes.
+    #[inline]
+    pub(crate) const fn is_whole(&self) -> bool {
+        self.header <= 0x7FF && self.missing == 0
+    }
+
     /// [`Frame::is_remote_frame`], for `const` code.
     pub(crate) const fn is_remote(&self) -> bool {
         self.header & REMOTE != 0
@@ -123,7 +129,16 @@ impl CanFrame {
         self.header & EXTENDED != 0
     }
 
+    #[inline]
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
+        match data.try_into() {
+            Ok(data) => Some(Self { header, data, missing: 0 }),
+            Err(_) => Self::shorter(header, data),
+        }
+    }
+
+    #[inline(never)]
+    fn shorter(header: u32, data: &[u8]) -> Option<Self> {
         let missing = u8::try_from(8_usize.checked_sub(data.len())?).ok()?;
         let mut frame = Self { header, data: [0; 8], missing };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
@@ -157,12 +172,15 @@ impl Frame for CanFrame {
     }
 
     fn id(&self) -> Id {
-        let raw = self.header & ID_MASK;
-        let standard = u16::try_from(raw).ok().and_then(StandardId::new);
-        match standard {
-            Some(id) if !self.is_extended() => Id::Standard(id),
-            _ => Id::Extended(ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO)),
+        if !self.has_extended_id() {
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "at most 0x7FF, and a flag above the lower half"
+            )]
+            let raw = self.header as u16;
+            return Id::Standard(StandardId::new(raw).unwrap_or(StandardId::ZERO));
         }
+        Id::Extended(ExtendedId::new(self.header & ID_MASK).unwrap_or(ExtendedId::ZERO))
     }
 
     fn dlc(&self) -> usize {

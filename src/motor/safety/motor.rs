@@ -1,7 +1,6 @@
 //! The rules of one motor.
 
-use super::device::{Known, LONGEST_PAUSE_US};
-use super::stamp::{age, is_near};
+use super::stamp::{LONGEST_PAUSE_US, age, is_near};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
@@ -25,6 +24,13 @@ pub(crate) enum Rest {
     Pause,
     /// Nothing was asked of it: the loops start afresh.
     Relaxed,
+}
+
+/// What a device has to know of a motor before a change of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub(super) latch: Latch,
+    pub(super) is_armed: bool,
 }
 
 /// Decides whether one motor may be driven. See the [module](super) for its states.
