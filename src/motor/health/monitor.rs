@@ -324,6 +324,13 @@ impl Traffic {
         self.frames = self.frames.wrapping_add(1);
     }
 
+    /// Counts frames that were counted elsewhere.
+    pub(crate) const fn add(&mut self, frames: u32) {
+        #[expect(clippy::cast_possible_truncation, reason = "wraps")]
+        let frames = frames as u16;
+        self.frames = self.frames.wrapping_add(frames);
+    }
+
     /// Notes the time since the frame before, in µs.
     #[inline]
     pub(crate) const fn gap(&mut self, gap_us: u32) {
