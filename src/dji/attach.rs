@@ -112,4 +112,41 @@ impl<B> Bus<B> {
             self.outbox.close(place.frame());
         }
     }
+
+    /// Iterates over the attached motors, in the order of their feedback ids.
+    pub fn motors(&self) -> impl Iterator<Item = (AnyHandle<B>, MotorName)> + '_ {
+        (0..).zip(&self.slots).filter_map(|(index, slot)| {
+            let key = Key::new(index, slot.next_generation()?);
+            Some((AnyHandle::new(key), slot.name()?))
+        })
+    }
+
+    /// Returns id and mask for a hardware filter that lets all attached motors' feedback through.
+    ///
+    /// A frame passes when `frame id & mask == id & mask`. A mask cannot name any set of ids exactly, so a few
+    /// others may pass too. Without motors nothing but 0x7FF passes.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus = Bus::new();
+    /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.acceptance_filter(), (0x200, 0x7F8)); // 0x201..=0x204 need three open bits
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub fn acceptance_filter(&self) -> (u16, u16) {
+        let ids = || {
+            self.slots
+                .iter()
+                .zip(0x201_u16..)
+                .filter(|(slot, _)| slot.facts().is_some())
+                .map(|(_, id)| id)
+        };
+        let Some(first) = ids().next() else { return (0x7FF, 0x7FF) };
+        let differing = ids().fold(0, |bits, id| bits | (id ^ first));
+        let open = if differing == 0 { 0 } else { u16::MAX >> differing.leading_zeros() };
+        (first & !open, 0x7FF & !open)
+    }
 }

@@ -1,12 +1,11 @@
 use super::budget::Budget;
 use super::command::Outbox;
-use super::handle::Key;
 use super::health::Rounds;
 use super::slot::Slot;
 use super::{AnyHandle, CommandFrame, Feedback, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, Ingest, Link, MotorName, Timeouts};
+use crate::motor::{DeviceGuard, Devices, Ingest, Link, Malformed, Timeouts, Visitor};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
 
@@ -172,16 +171,58 @@ impl<B> Bus<B> {
     // A call of its own costs as much as a tenth of what it does.
     #[inline(always)]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
+        let index = frame.key().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
         if let Some(slot) = self.slots.get_mut(index) {
             let feedback = Feedback::without_error(frame);
             if feedback.is_some_and(|feedback| slot.receive(feedback, now.stamp())) {
                 return Ingest::Taken;
             }
-        } else if frame.header().wrapping_sub(LOWEST_COMMAND_ID) > COMMAND_IDS {
+        } else if is_of_others(frame) {
             return Ingest::Unrelated;
         }
         self.ingest_unusual(frame, now)
+    }
+
+    /// Takes any frame: also the first one of a motor, one after a gap, one with an error, and what is no feedback at all.
+    #[cold]
+    #[inline(never)]
+    fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
+        let Some(slot) = self.slots.get_mut(index) else {
+            self.ingest_command(frame, now);
+            return Ingest::Unrelated;
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
+        let motor = index as u8;
+        let Some(facts) = slot.facts() else {
+            self.rejects.unattached = self.rejects.unattached.saturating_add(1);
+            return Ingest::Unrelated;
+        };
+        if frame.length() != 8 {
+            self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let Ok(feedback) = Feedback::decode(frame.bytes()) else {
+            self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
+            return Ingest::Malformed(Malformed::Field);
+        };
+        let (timeouts, running) = (*self.guard.timeouts(), self.guard.is_running());
+        if !running {
+            let before = self.guard.pass_unwatched(now);
+            self.forget_bygones(before);
+        }
+        let in_time = self.change(motor, now, |slot| {
+            let in_time = slot.receive(feedback, now.stamp());
+            if !in_time {
+                slot.receive_after_gap(facts, feedback, now.stamp(), &timeouts, running);
+            }
+            slot.hear_error(facts, feedback.error());
+            in_time
+        });
+        if in_time == Some(false) {
+            self.guard.disturb();
+        }
+        Ingest::Taken
     }
 
     /// Takes a received standard data frame from a driver without an `embedded-can` frame type.
@@ -237,6 +278,20 @@ impl<B> Bus<B> {
         !step.is_hold()
     }
 
+    /// Looks at what need not be looked at in every tick, in one motor a tick.
+    #[inline]
+    fn check_one_slot(&mut self) {
+        let motor = self.rounds.next;
+        let Some(slot) = self.slots.get_mut(usize::from(motor)) else {
+            return self.check_without_glance();
+        };
+        self.rounds.next = motor + 1;
+        let word = self.outbox.get(slot.place);
+        if !slot.is_well(word) {
+            self.check_closely(motor, word);
+        }
+    }
+
     /// Returns a command frame that waits to be sent, and takes it off the list.
     #[inline]
     pub fn next_frame(&mut self) -> Option<CanFrame> {
@@ -266,14 +321,6 @@ impl<B> Bus<B> {
         self.slot(motor.into()).is_some_and(|slot| slot.guard.is_armed())
     }
 
-    /// Iterates over the attached motors, in the order of their feedback ids.
-    pub fn motors(&self) -> impl Iterator<Item = (AnyHandle<B>, MotorName)> + '_ {
-        (0..).zip(&self.slots).filter_map(|(index, slot)| {
-            let key = Key::new(index, slot.next_generation()?);
-            Some((AnyHandle::new(key), slot.name()?))
-        })
-    }
-
     /// Returns what the bus has counted.
     #[must_use]
     pub const fn counters(&self) -> Counters {
@@ -281,35 +328,6 @@ impl<B> Bus<B> {
         let bad_steps = self.guard.bad_steps();
         let (packed, superseded) = (self.outbox.packed, self.outbox.superseded);
         Counters { bad_length, bad_field, unattached, bad_steps, packed, superseded }
-    }
-
-    /// Returns id and mask for a hardware filter that lets all attached motors' feedback through.
-    ///
-    /// A frame passes when `frame id & mask == id & mask`. A mask cannot name any set of ids exactly, so a few
-    /// others may pass too. Without motors nothing but 0x7FF passes.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    ///
-    /// let mut bus = Bus::new();
-    /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
-    /// assert_eq!(bus.acceptance_filter(), (0x200, 0x7F8)); // 0x201..=0x204 need three open bits
-    /// # Ok::<(), drivetrain::dji::AttachError>(())
-    /// ```
-    #[must_use]
-    pub fn acceptance_filter(&self) -> (u16, u16) {
-        let ids = || {
-            self.slots
-                .iter()
-                .zip(0x201_u16..)
-                .filter(|(slot, _)| slot.facts().is_some())
-                .map(|(_, id)| id)
-        };
-        let Some(first) = ids().next() else { return (0x7FF, 0x7FF) };
-        let differing = ids().fold(0, |bits, id| bits | (id ^ first));
-        let open = if differing == 0 { 0 } else { u16::MAX >> differing.leading_zeros() };
-        (first & !open, 0x7FF & !open)
     }
 
     /// Changes a slot, and sees to what follows.
@@ -334,4 +352,33 @@ impl<B> Bus<B> {
     pub(super) fn slot_mut(&mut self, motor: AnyHandle<B>) -> Option<&mut Slot> {
         self.slots.get_mut(motor.key().index()).filter(|slot| slot.matches(motor.key()))
     }
+}
+
+/// One device needs no search among several: each goes straight to the bus.
+impl<B> Devices for Bus<B> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        Self::ingest(self, frame, now)
+    }
+
+    #[inline]
+    fn update(&mut self, tick: Tick) {
+        Self::update(self, tick);
+    }
+
+    #[inline]
+    fn next_frame(&mut self, _: u32) -> Option<CanFrame> {
+        Self::next_frame(self)
+    }
+}
+
+/// Tells whether a frame is of no id of this family. Twice the header: then it takes no mask to leave the bit of short frames out.
+#[inline]
+const fn is_of_others(frame: &CanFrame) -> bool {
+    (frame.header() << 1).wrapping_sub(LOWEST_COMMAND_ID << 1) > (COMMAND_IDS << 1 | 1)
 }

@@ -4,8 +4,7 @@ use super::slot::Slot;
 use super::{AnyHandle, Bus};
 use crate::frame::CanFrame;
 use crate::motor::{
-    ArmError, CanDevice, Claim, Devices, Edge, Ingest, Link, Missing, MotorName, Role, Visitor,
-    WrongSetting,
+    ArmError, CanDevice, Claim, Devices, Edge, Ingest, Link, Missing, MotorName, Role, WrongSetting,
 };
 use crate::time::{Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
@@ -102,13 +101,6 @@ impl<B> CanDevice for Bus<B> {
 
     fn is_stopped(&self) -> bool {
         Self::is_stopped(self)
-    }
-}
-
-impl<B> Devices for Bus<B> {
-    #[inline]
-    fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(self);
     }
 }
 

@@ -89,16 +89,15 @@ mod budget;
 mod bus;
 mod command;
 mod config;
+mod deadlines;
 mod device;
 mod error;
 mod feedback;
 mod handle;
 mod health;
 mod limit;
-mod measured;
 mod model;
 mod range;
-mod rare;
 mod slot;
 mod state;
 mod targets;
@@ -109,7 +108,7 @@ mod word_gains;
 pub use bus::{Bus, Counters};
 pub use command::CommandFrame;
 pub use config::Config;
-pub use error::{AttachError, Collision, Message, SteepGain};
+pub use error::{AttachError, Collision, LoopError, Message, SteepGain};
 pub use feedback::{ErrorCode, Feedback, FeedbackError};
 pub use handle::{AnyHandle, Handle};
 pub use model::{
@@ -117,5 +116,4 @@ pub use model::{
     VoltageControlled,
 };
 pub use state::State;
-pub use targets::LoopError;
 pub use word_gains::WordGains;

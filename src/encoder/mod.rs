@@ -19,30 +19,13 @@
 
 mod gap;
 mod gear;
-mod position;
+mod homing;
 mod shaft;
 
 pub use gap::Gap;
 pub use gear::{GearError, GearRatio};
-pub use position::{Homing, Position};
-pub use shaft::Shaft;
+pub use homing::Homing;
+pub use shaft::{Position, Shaft, shortest};
 
 /// Counts in one rotor turn of a 13-bit encoder.
 pub const COUNTS_PER_TURN: u16 = 8192;
-
-/// Returns the shortest way from one 13-bit angle to the next, in counts: -4096 to 4095.
-///
-/// Half a turn is undecidable and is taken as -4096.
-///
-/// # Examples
-/// ```
-/// use drivetrain::encoder::shortest;
-///
-/// assert_eq!(shortest(8190, 1), 3); // over the top
-/// assert_eq!(shortest(1, 8190), -3); // and back
-/// ```
-#[must_use]
-pub const fn shortest(previous: u16, next: u16) -> i32 {
-    const UNUSED_BITS: u32 = 32 - COUNTS_PER_TURN.trailing_zeros();
-    ((next as i32 - previous as i32) << UNUSED_BITS) >> UNUSED_BITS
-}

@@ -21,24 +21,26 @@
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-const EXTENDED: u32 = 1 << 31;
+const EXTENDED: u32 = 1 << 29;
 const REMOTE: u32 = 1 << 30;
+/// Bytes are missing: one comparison tells a whole standard data frame from all others.
+const SHORT: u32 = 1 << 31;
 const ID_MASK: u32 = 0x1FFF_FFFF;
 
 /// A classic CAN data or remote frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
-    header: u32,
+    /// Id and flags; [`SHORT`] unless there are 8 bytes.
+    key: u32,
     data: [u8; 8],
-    /// How many of the 8 bytes are not there: none of a full frame, which so is told together with other bits.
-    missing: u8,
+    length: u8,
 }
 
 impl CanFrame {
     /// Builds a standard data frame of 8 bytes; `None` for an id above `0x7FF`.
     #[must_use]
     pub const fn standard(id: u16, data: [u8; 8]) -> Option<Self> {
-        if id <= 0x7FF { Some(Self { header: id as u32, data, missing: 0 }) } else { None }
+        if id <= 0x7FF { Some(Self { key: id as u32, data, length: 8 }) } else { None }
     }
 
     /// Builds a data frame of up to 8 bytes. An array of more than 8 bytes does not compile.
@@ -59,13 +61,13 @@ impl CanFrame {
     #[must_use]
     pub fn of<const N: usize>(id: impl Into<Id>, data: [u8; N]) -> Self {
         const { assert!(N <= 8, "a classic CAN frame has at most 8 bytes") };
-        let mut frame = Self { header: header_of(id.into()), data: [0; 8], missing: 0 };
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        let length = const { N as u8 };
+        let mut frame = Self { key: key_of(header_of(id.into()), length), data: [0; 8], length };
         for (place, byte) in frame.data.iter_mut().zip(data) {
             *place = byte;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
-        let missing = const { (8 - N) as u8 };
-        Self { missing, ..frame }
+        frame
     }
 
     /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
@@ -93,7 +95,7 @@ impl CanFrame {
     /// For a standard data frame, and only for that, it is at most `0x7FF`: one comparison tells all three.
     #[must_use]
     pub const fn header(&self) -> u32 {
-        self.header
+        self.key & !SHORT
     }
 
     /// Returns all 8 data bytes; those beyond the length are zero.
@@ -105,30 +107,50 @@ impl CanFrame {
     /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
     #[must_use]
     pub const fn length(&self) -> u8 {
-        8 - self.missing
+        self.length
     }
 
-    /// Returns how many of the 8 data bytes are not there.
-    pub(crate) const fn missing(&self) -> u8 {
-        self.missing
+    /// Returns the [header](Self::header) of a frame of 8 bytes. It is another one for frames with fewer, and above `0x7FF`.
+    #[inline]
+    pub(crate) const fn key(&self) -> u32 {
+        self.key
+    }
+
+    /// Tells whether this is a standard data frame of 8 bytes.
+    #[inline]
+    pub(crate) const fn is_whole(&self) -> bool {
+        self.key <= 0x7FF
     }
 
     /// [`Frame::is_remote_frame`], for `const` code.
     pub(crate) const fn is_remote(&self) -> bool {
-        self.header & REMOTE != 0
+        self.key & REMOTE != 0
     }
 
     /// [`Frame::is_extended`], for `const` code.
     pub(crate) const fn has_extended_id(&self) -> bool {
-        self.header & EXTENDED != 0
+        self.key & EXTENDED != 0
     }
 
+    #[inline]
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
-        let missing = u8::try_from(8_usize.checked_sub(data.len())?).ok()?;
-        let mut frame = Self { header, data: [0; 8], missing };
+        match data.try_into() {
+            Ok(data) => Some(Self { key: header, data, length: 8 }),
+            Err(_) => Self::shorter(header, data),
+        }
+    }
+
+    #[inline(never)]
+    fn shorter(header: u32, data: &[u8]) -> Option<Self> {
+        let length = u8::try_from(data.len()).ok().filter(|length| *length <= 8)?;
+        let mut frame = Self { key: key_of(header, length), data: [0; 8], length };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
         Some(frame)
     }
+}
+
+const fn key_of(header: u32, length: u8) -> u32 {
+    if length == 8 { header } else { header | SHORT }
 }
 
 fn header_of(id: Id) -> u32 {
@@ -144,8 +166,9 @@ impl Frame for CanFrame {
     }
 
     fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
-        let missing = u8::try_from(8_usize.checked_sub(dlc)?).ok()?;
-        Some(Self { header: header_of(id.into()) | REMOTE, data: [0; 8], missing })
+        let length = u8::try_from(dlc).ok().filter(|length| *length <= 8)?;
+        let key = key_of(header_of(id.into()) | REMOTE, length);
+        Some(Self { key, data: [0; 8], length })
     }
 
     fn is_extended(&self) -> bool {
@@ -157,12 +180,15 @@ impl Frame for CanFrame {
     }
 
     fn id(&self) -> Id {
-        let raw = self.header & ID_MASK;
-        let standard = u16::try_from(raw).ok().and_then(StandardId::new);
-        match standard {
-            Some(id) if !self.is_extended() => Id::Standard(id),
-            _ => Id::Extended(ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO)),
+        if !self.has_extended_id() {
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "at most 0x7FF, and a flag above the lower half"
+            )]
+            let raw = self.key as u16;
+            return Id::Standard(StandardId::new(raw).unwrap_or(StandardId::ZERO));
         }
+        Id::Extended(ExtendedId::new(self.key & ID_MASK).unwrap_or(ExtendedId::ZERO))
     }
 
     fn dlc(&self) -> usize {
@@ -192,7 +218,13 @@ impl core::fmt::Debug for CanFrame {
 #[cfg(feature = "defmt")]
 impl defmt::Format for CanFrame {
     fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u32:03X} [{=u8}] {=[u8]:02X}", self.header, self.length(), self.data());
+        defmt::write!(
+            f,
+            "{=u32:03X} [{=u8}] {=[u8]:02X}",
+            self.header(),
+            self.length(),
+            self.data()
+        );
     }
 }
 

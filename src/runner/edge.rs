@@ -91,7 +91,11 @@ const CALM: Duration = Duration::from_secs(1);
 
 /// The conditions and the edges that wait to be read.
 #[derive(Debug)]
-pub(super) struct Edges([Latch; BusCondition::ALL.len()]);
+pub(super) struct Edges {
+    latches: [Latch; BusCondition::ALL.len()],
+    /// No condition is there.
+    pub(super) is_calm: bool,
+}
 
 #[derive(Debug, Clone, Copy)]
 struct Latch {
@@ -113,11 +117,11 @@ impl Edges {
             end_waits: false,
             active: false,
         };
-        Self([calm; BusCondition::ALL.len()])
+        Self { latches: [calm; BusCondition::ALL.len()], is_calm: true }
     }
 
     pub(super) const fn is_active(&self, condition: BusCondition) -> bool {
-        let [down, silent, receive, tick, standstill, reversal] = &self.0;
+        let [down, silent, receive, tick, standstill, reversal] = &self.latches;
         match condition {
             BusCondition::Down => down.active,
             BusCondition::Silent => silent.active,
@@ -130,31 +134,33 @@ impl Edges {
 
     /// Notes that a condition is there; returns whether it was not before.
     pub(super) fn begin(&mut self, condition: BusCondition, at: Instant) -> bool {
-        self.0.get_mut(condition as usize).is_some_and(|latch| latch.begin(at))
+        self.is_calm = false;
+        self.latches.get_mut(condition as usize).is_some_and(|latch| latch.begin(at))
     }
 
     pub(super) fn end(&mut self, condition: BusCondition, at: Instant) {
-        if let Some(latch) = self.0.get_mut(condition as usize) {
+        if let Some(latch) = self.latches.get_mut(condition as usize) {
             latch.end(at);
         }
     }
 
-    /// Ends the repeated conditions that did not come again.
+    /// Ends the repeated conditions that did not come again. To be called in each tick, unless all is calm.
     pub(super) fn settle(&mut self, now: Instant) {
-        for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.0) {
+        for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.latches) {
             // The clock may have gone back.
             latch.seen = latch.seen.min(now);
             if condition.is_repeated() && now.since(latch.seen) >= CALM {
                 latch.end(now);
             }
         }
+        self.is_calm = self.latches.iter().all(|latch| !latch.active);
     }
 
     /// Takes the oldest edge.
     pub(super) fn next(&mut self) -> Option<BusEdge> {
         let waiting = BusCondition::ALL
             .into_iter()
-            .zip(&mut self.0)
+            .zip(&mut self.latches)
             .filter_map(|(condition, latch)| Some((latch.waiting(condition)?, latch)));
         let (edge, latch) = waiting.min_by_key(|(edge, _)| edge.at)?;
         latch.take(edge);

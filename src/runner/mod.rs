@@ -19,15 +19,10 @@
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
-mod cadence;
 mod edge;
-mod meter;
 mod port;
 #[cfg(feature = "queue")]
 mod queue;
-mod receive;
-mod send;
-mod standstill;
 mod statistics;
 mod stop;
 #[cfg(test)]
@@ -35,18 +30,16 @@ mod tests;
 mod watch;
 
 pub use edge::{BusCondition, BusEdge};
-pub use meter::MeasuredLoad;
 pub use port::{BlockingTx, Nb, Port, Received, Sent};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
-pub use statistics::{ErrorCounts, Statistics};
+pub use statistics::{ErrorCounts, MeasuredLoad, Statistics};
 pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};
 use crate::time::{Clock, Duration, Tick, Ticker};
-use meter::Meter;
-use statistics::increment;
+use statistics::{Meter, increment};
 use watch::Watch;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
@@ -108,30 +101,54 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             ticker: Ticker::new(Duration::from_millis(1)),
             waiting: None,
             turn: 0,
-            statistics: Statistics {
-                received: 0,
-                taken: 0,
-                unrelated: 0,
-                malformed: 0,
-                receive_errors: NO_ERRORS,
-                offered: 0,
-                sent: 0,
-                refused: 0,
-                send_errors: NO_ERRORS,
-                evicted: 0,
-                evicted_unrelated: 0,
-                superseded: 0,
-                lost: 0,
-                overruns: 0,
-                bus_losses: 0,
-                clock_standstills: 0,
-                clock_reversals: 0,
-            },
+            statistics: Statistics::NONE,
             stop: None,
             watch: Watch::new(),
             meter: Meter::new(),
             yields: None,
         }
+    }
+
+    /// Sets another period than 1 ms.
+    #[must_use]
+    pub fn with_period(mut self, period: Duration) -> Self {
+        self.ticker = Ticker::new(period);
+        self
+    }
+
+    /// Sets how many readings in a row without a later time mean that the clock stands, at least 1, instead of the limit that
+    /// [`due`](Self::due) learns.
+    ///
+    /// Make it several times what a loop reads while the clock, if it counts in coarse ticks, shows one time: a step that comes by
+    /// mistake relaxes every motor.
+    ///
+    /// # Examples
+    /// A loop that waits 10 ms in each turn, for a clock in microseconds: zeros go out 0.2 s after the clock stopped.
+    /// ```
+    /// use drivetrain::dji::Bus;
+    /// use drivetrain::runner::{Nb, Runner};
+    /// use drivetrain::time::{Duration, Instant, ManualClock};
+    /// # use drivetrain::sim::Simulation;
+    /// # let world = Simulation::new(1);
+    /// # let can = world.controller();
+    ///
+    /// let clock = ManualClock::new(Instant::START);
+    /// let mut runner = Runner::new(Nb(can), &clock, Bus::new())
+    ///     .with_period(Duration::from_millis(10))
+    ///     .with_standstill_after(20);
+    /// for _ in 0..100 {
+    ///     clock.advance(Duration::from_millis(10));
+    ///     if let Some(tick) = runner.due() {
+    ///         runner.tick(tick);
+    ///     }
+    /// }
+    /// assert!((1..20).all(|_| runner.due().is_none()));
+    /// assert!(runner.due().is_some_and(|tick| tick.dt_s() == 0.0));
+    /// ```
+    #[must_use]
+    pub fn with_standstill_after(mut self, readings: u32) -> Self {
+        self.watch.standstill.fix(readings);
+        self
     }
 
     /// Sets the bit rate, in bits a second, for [`measured_load`](Self::measured_load); 1 000 000 at first.
@@ -223,7 +240,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             overruns: self.statistics.overruns.saturating_add(self.ticker.overruns()),
             clock_standstills: self.watch.standstills,
             clock_reversals: self.watch.reversals,
-            ..self.statistics
+            ..self.statistics.with_sums()
         }
     }
 
@@ -349,6 +366,3 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         (self.port, self.clock, self.device)
     }
 }
-
-const NO_ERRORS: ErrorCounts =
-    ErrorCounts { overrun: 0, bit: 0, stuff: 0, crc: 0, form: 0, acknowledge: 0, other: 0 };

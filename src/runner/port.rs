@@ -1,4 +1,12 @@
+//! Frames through the driver: received ones to the device, commands from it.
+
+#[cfg(feature = "queue")]
+use super::FrameReceiver;
+use super::statistics::increment;
+use super::{BusCondition, Runner};
 use crate::frame::CanFrame;
+use crate::motor::{Devices, Ingest};
+use crate::time::{Clock, Instant};
 use embedded_can::{Error, ErrorKind};
 
 mod sealed {
@@ -96,6 +104,215 @@ impl<C: embedded_can::blocking::Can> Port for BlockingTx<C> {
 
     fn try_receive(&mut self) -> Received {
         Received::Empty
+    }
+}
+
+/// A bound on the frames of one tick, for devices that would offer frames for ever.
+const FRAMES_A_TICK: usize = 64;
+
+/// A frame that fails so often in a row takes another turn: not before, because a driver whose errors alternate with
+/// successes would fail it there as well.
+const PATIENCE: u8 = 3;
+
+impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
+    /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
+    pub fn poll(&mut self, budget: usize) -> usize {
+        self.poll_with(budget, |_| {})
+    }
+
+    /// Takes at most `budget` received frames from the driver and hands those of others to `unrelated`. Returns how
+    /// many came.
+    ///
+    /// Never waits, goes on after errors, and ends: an error counts against the budget as well.
+    pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
+        self.watch.receive_ran();
+        let mut frames = 0;
+        for _ in 0..budget {
+            match self.port.try_receive() {
+                Received::Frame(frame) => {
+                    frames += 1;
+                    let now = self.read_clock();
+                    if self.ingest(&frame, now) == Ingest::Unrelated {
+                        unrelated(&frame);
+                    }
+                }
+                Received::Foreign => {
+                    frames += 1;
+                    increment(&mut self.statistics.unrelated);
+                }
+                Received::Empty => break,
+                Received::Failed(kind) => {
+                    self.statistics.receive_errors.count(kind);
+                    if kind == ErrorKind::Overrun {
+                        let now = self.read_clock();
+                        self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
+                    }
+                }
+            }
+        }
+        frames
+    }
+
+    /// Takes at most `budget` frames from a queue, with the times of their arrival; those of others are dropped. Returns
+    /// how many came.
+    #[cfg(feature = "queue")]
+    pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
+        self.poll_queue_with(queue, budget, |_| {})
+    }
+
+    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands those of others to
+    /// `unrelated`. Returns how many came.
+    ///
+    /// Frames that the queue dropped since the last call are noted as [`lost`](super::Statistics::lost).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::runner::{BusCondition, FrameQueue, Nb, Runner};
+    /// use drivetrain::time::{Instant, ManualClock};
+    /// # use drivetrain::sim::Simulation;
+    /// # let world = Simulation::new(1);
+    /// # let can = world.controller();
+    ///
+    /// let clock = ManualClock::new(Instant::from_micros(9));
+    /// let mut bus = Bus::new();
+    /// bus.attach(Config::<M3508>::new(1))?;
+    /// let mut runner = Runner::new(Nb(can), &clock, bus);
+    /// let mut queue = FrameQueue::<4>::new();
+    /// let (mut interrupt, mut received) = queue.split();
+    /// let frame = CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?;
+    /// for at in 1..=5 {
+    ///     interrupt.push(&frame, Instant::from_micros(at)); // there is room for three
+    /// }
+    /// assert_eq!(runner.poll_queue_with(&mut received, 16, |_| {}), 3);
+    /// assert_eq!(runner.statistics().lost, 2);
+    /// assert!(runner.has(BusCondition::ReceiveOverrun));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[cfg(feature = "queue")]
+    pub fn poll_queue_with(
+        &mut self,
+        queue: &mut FrameReceiver<'_>,
+        budget: usize,
+        mut unrelated: impl FnMut(&CanFrame),
+    ) -> usize {
+        self.watch.receive_ran();
+        self.note_lost(queue.take_dropped());
+        let mut frames = 0;
+        while frames < budget {
+            let Some((frame, arrived)) = queue.pop() else { break };
+            frames += 1;
+            if self.ingest(&frame, arrived) == Ingest::Unrelated {
+                unrelated(&frame);
+            }
+        }
+        frames
+    }
+
+    /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
+    pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        self.watch.standstill.receive();
+        self.meter.count(frame);
+        let outcome = self.device.ingest(frame, now);
+        increment(match outcome {
+            Ingest::Taken => {
+                self.watch.hear();
+                &mut self.statistics.taken
+            }
+            Ingest::Unrelated => &mut self.statistics.unrelated,
+            Ingest::Malformed(_) => &mut self.statistics.malformed,
+        });
+        outcome
+    }
+
+    /// Notes received frames that were lost before they came here: what a queue of your own dropped. 0 changes nothing.
+    pub fn note_lost(&mut self, frames: u32) {
+        if frames > 0 {
+            self.statistics.lost = self.statistics.lost.saturating_add(frames);
+            let now = self.read_clock();
+            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
+        }
+    }
+}
+
+impl<P: Port, K, D: Devices> Runner<P, K, D> {
+    /// Offers the frames of one tick to the driver; hands frames of others that it evicts to `evicted`.
+    ///
+    /// A frame for which there is no place goes first in the next tick. One that fails again and again takes another
+    /// turn: the last if it was the first, the first otherwise. So a driver that fails one call in each tick, always the
+    /// first or always the last, keeps no frame from the bus.
+    pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
+        let yields = self.yields.take();
+        let (mut held, mut goes_first, mut refused) = (None, None, None);
+        let mut is_first = true;
+        for _ in 0..FRAMES_A_TICK {
+            let frame = match self.device.next_frame(self.turn) {
+                Some(frame) if yields == Some(frame.header()) && held.is_none() => {
+                    held = Some(frame);
+                    continue;
+                }
+                Some(frame) => frame,
+                None => match held.take() {
+                    Some(frame) => frame,
+                    None => break,
+                },
+            };
+            match self.port.try_send(&frame) {
+                Sent::Accepted => {
+                    self.count_sent(&frame);
+                    self.watch.accepted(frame.header(), now);
+                }
+                Sent::Evicted(other) => {
+                    self.count_sent(&frame);
+                    if self.device.requeue(&other) {
+                        increment(&mut self.statistics.evicted);
+                        self.meter.discount(&other);
+                        // Before the frame that took its place: they may be of one id.
+                        self.watch.evicted(other.header(), now);
+                    } else {
+                        increment(&mut self.statistics.evicted_unrelated);
+                        evicted(&other);
+                    }
+                    if other.header() != frame.header() {
+                        self.watch.accepted(frame.header(), now);
+                    }
+                }
+                Sent::EvictedForeign => {
+                    self.count_sent(&frame);
+                    increment(&mut self.statistics.evicted_unrelated);
+                    self.watch.accepted(frame.header(), now);
+                }
+                Sent::Full => {
+                    increment(&mut self.statistics.refused);
+                    self.watch.refused(frame.header(), now);
+                    refused = Some(frame);
+                    break;
+                }
+                Sent::Failed(kind) => {
+                    self.statistics.send_errors.count(kind);
+                    let tries = self.watch.refused(frame.header(), now);
+                    if tries >= PATIENCE && !is_first && goes_first.is_none() {
+                        goes_first = Some(frame);
+                    } else {
+                        self.device.requeue(&frame);
+                        if tries >= PATIENCE && is_first {
+                            self.yields = Some(frame.header());
+                        }
+                    }
+                }
+            }
+            is_first = false;
+        }
+        // What is given back last goes first.
+        for frame in [held, goes_first, refused].into_iter().flatten() {
+            self.device.requeue(&frame);
+        }
+    }
+
+    fn count_sent(&mut self, frame: &CanFrame) {
+        increment(&mut self.statistics.sent);
+        self.meter.count(frame);
     }
 }
 

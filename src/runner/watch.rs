@@ -1,9 +1,85 @@
-//! Whether the loop runs: heard, sent, on time, with a clock that goes on.
+//! Whether the loop runs: on time, with a clock that goes on, heard and sent.
 
 use super::edge::Edges;
-use super::standstill::Standstill;
-use super::{BusCondition, BusEdge};
-use crate::time::{Duration, Instant};
+use super::statistics::increment;
+use super::{BusCondition, BusEdge, Port, Runner};
+use crate::motor::Devices;
+use crate::time::{Clock, Duration, Instant, Tick};
+
+impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
+    /// Reads the clock and returns the step that is due, if any.
+    ///
+    /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
+    /// until it is armed again.
+    ///
+    /// A clock stands when too many readings in a row show no later time, by this method and by [`poll`](Self::poll). The limit is
+    /// learned from the clock while it goes on: 100 times as many readings as it ever needed to show a later time, and at least
+    /// 2 for each microsecond of its resolution; from 1000 to 200 000, and 200 000 until it has moved on once. 1600 received
+    /// frames are as good as the limit.
+    ///
+    /// | loop | resolution of the clock | the step comes after |
+    /// |---|---|--:|
+    /// | polls 1 000 000 times a second | 1 µs | 1 ms |
+    /// | the same | 1 ms | 0.1 s |
+    /// | the same | 10 ms | 0.2 s |
+    /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
+    /// | wakes up each ms | 1 µs | 1 s; 2 s if it is never early or late |
+    /// | the same | 1 ms | 2 s |
+    /// | the same | of a clock that has never moved | 200 s |
+    /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
+    ///
+    /// Slower loops set a limit of their own: [`with_standstill_after`](Self::with_standstill_after).
+    ///
+    /// A step that was not run stays due: it is returned again, until [`tick`](Self::tick) or its kin ran a step. When the next one
+    /// comes due before, that one takes its place, with a `dt_s` that covers both, and the step that was left out is an overrun;
+    /// one with a `dt_s` of 0 stays. So two runners can wait for each other:
+    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
+    pub fn due(&mut self) -> Option<Tick> {
+        let now = self.read_clock();
+        if self.watch.standstill.take() {
+            // Not after the last step that was run, so that it does not count as time that moved on.
+            let last = self.ticker.last();
+            let at = self.watch.ticked().map_or(last, |ticked| ticked.min(last));
+            self.waiting = Some(Tick::new(at, 0.0));
+            return self.waiting;
+        }
+        let before = self.ticker.overruns();
+        let next = self.ticker.due(now);
+        let mut is_late = self.ticker.overruns() != before;
+        if let Some(next) = next {
+            self.watch.standstill.restart(now);
+            is_late |= self.waiting.is_some();
+            self.waiting = Some(match self.waiting {
+                None => next,
+                Some(waiting) => {
+                    increment(&mut self.statistics.overruns);
+                    together(waiting, next)
+                }
+            });
+        }
+        if is_late {
+            self.watch.edges.begin(BusCondition::TickOverrun, now);
+        }
+        self.waiting
+    }
+
+    pub(super) fn read_clock(&mut self) -> Instant {
+        let now = self.clock.now();
+        self.watch.read(now);
+        now
+    }
+}
+
+/// A step in the place of one that was not run and the next one: no time that passed is lost, nor a clock that stood or went back.
+fn together(waiting: Tick, next: Tick) -> Tick {
+    if next.dt_s() <= 0.0 {
+        next
+    } else if waiting.dt_s() <= 0.0 {
+        waiting
+    } else {
+        Tick::new(next.now(), waiting.dt_s() + next.dt_s())
+    }
+}
 
 /// Without feedback for this long, or with a command frame that waits for this long, something is wrong with the bus.
 const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
@@ -38,6 +114,7 @@ pub(super) struct Watch {
     reading: Instant,
     ticked: Option<Instant>,
     unsent: [Option<Unsent>; WATCHED_FRAMES],
+    has_unsent: bool,
 }
 
 impl Watch {
@@ -54,6 +131,7 @@ impl Watch {
             reading: Instant::START,
             ticked: None,
             unsent: [None; WATCHED_FRAMES],
+            has_unsent: false,
         }
     }
 
@@ -95,7 +173,14 @@ impl Watch {
     }
 
     /// Notes a frame that the driver took. It counts as sent when it does not come back until the next tick has ended.
+    #[inline]
     pub(super) fn accepted(&mut self, header: u32, now: Instant) {
+        if self.has_unsent {
+            self.accept_unsent(header, now);
+        }
+    }
+
+    fn accept_unsent(&mut self, header: u32, now: Instant) {
         for place in &mut self.unsent {
             let Some(unsent) = place.as_mut().filter(|unsent| unsent.header == header) else {
                 continue;
@@ -134,6 +219,7 @@ impl Watch {
     fn begin(&mut self, header: u32, now: Instant) {
         if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
             *place = Some(Unsent { header, since: now, offered: now, accepted: None, tries: 1 });
+            self.has_unsent = true;
         }
     }
 
@@ -149,6 +235,10 @@ impl Watch {
         }
         self.ticked = Some(now);
         self.listen(now);
+        if self.edges.is_calm {
+            // Neither down nor silent, nor anything that may be over.
+            return self.has_unsent && self.watch_sending(now);
+        }
         self.edges.settle(now);
         self.watch_sending(now)
     }
@@ -156,7 +246,9 @@ impl Watch {
     fn listen(&mut self, now: Instant) {
         if core::mem::take(&mut self.heard) {
             self.heard_at = Some(now);
-            self.edges.end(BusCondition::Silent, now);
+            if !self.edges.is_calm {
+                self.edges.end(BusCondition::Silent, now);
+            }
         } else if let Some(heard_at) = &mut self.heard_at {
             // The clock may have gone back.
             *heard_at = now.min(*heard_at);
@@ -179,6 +271,7 @@ impl Watch {
                 lost |= now.since(unsent.since) >= BUS_LOST_AFTER;
             }
         }
+        self.has_unsent = self.unsent.iter().any(Option::is_some);
         if lost {
             return self.edges.begin(BusCondition::Down, now);
         }
@@ -192,5 +285,362 @@ impl Watch {
 
     pub(super) fn next_edge(&mut self) -> Option<BusEdge> {
         self.edges.next()
+    }
+}
+
+/// The largest limit; it holds until the clock has moved on once. A fast loop takes 0.1 s to 1 s for so many readings.
+const MOST_READINGS: u32 = 200_000;
+
+/// The smallest limit that is learned.
+const LEAST_READINGS: u32 = 1_000;
+
+/// The limit is so many times the readings that the clock ever needed to show a later time.
+const TIMES_THE_LONGEST: u32 = 100;
+
+/// Readings in a microsecond of the clock's resolution: a fast loop polls 1 000 000 times a second.
+const READINGS_A_MICRO: u32 = 2;
+
+/// So many received frames are as good as the limit, for loops that sleep until a frame comes: a bus of 1 Mbit/s takes 80 ms and
+/// more for them.
+const FRAMES: u32 = 1_600;
+
+/// Counts readings that show no later time, and learns how many of them are usual.
+#[derive(Debug)]
+pub(super) struct Standstill {
+    limit: u32,
+    is_fixed: bool,
+    /// The latest reading since the last step.
+    furthest: Option<Instant>,
+    readings: u32,
+    frames: u32,
+    longest: u32,
+    /// At least the resolution of the clock, in µs: the smallest advance, or difference of two.
+    finest: u32,
+    advance: u32,
+}
+
+impl Standstill {
+    pub(super) const fn new() -> Self {
+        Self {
+            limit: MOST_READINGS,
+            is_fixed: false,
+            furthest: None,
+            readings: 0,
+            frames: 0,
+            longest: 0,
+            finest: u32::MAX,
+            advance: 0,
+        }
+    }
+
+    /// Sets the limit, at least 1; nothing is learned then.
+    pub(super) const fn fix(&mut self, readings: u32) {
+        self.limit = if readings == 0 { 1 } else { readings };
+        self.is_fixed = true;
+    }
+
+    /// Notes a received frame: time passed.
+    pub(super) const fn receive(&mut self) {
+        self.frames = self.frames.saturating_add(1);
+    }
+
+    /// Notes a reading of the clock.
+    pub(super) fn read(&mut self, now: Instant) {
+        match self.furthest {
+            Some(furthest) if now <= furthest => self.readings = self.readings.saturating_add(1),
+            Some(furthest) => {
+                self.learn(now.since(furthest).micros_u32().unwrap_or(u32::MAX));
+                self.restart(now);
+            }
+            None => self.restart(now),
+        }
+    }
+
+    fn learn(&mut self, advance: u32) {
+        let difference = advance.abs_diff(core::mem::replace(&mut self.advance, advance));
+        let finest = if difference == 0 { advance } else { difference.min(advance) };
+        if self.readings <= self.longest && finest >= self.finest {
+            return;
+        }
+        self.longest = self.longest.max(self.readings);
+        self.finest = self.finest.min(finest);
+        if !self.is_fixed {
+            let usual = self.longest.saturating_mul(TIMES_THE_LONGEST);
+            let coarse = self.finest.saturating_mul(READINGS_A_MICRO);
+            self.limit = usual.max(coarse).clamp(LEAST_READINGS, MOST_READINGS);
+        }
+    }
+
+    /// Counts from this time on: the clock may have gone back to it.
+    pub(super) const fn restart(&mut self, now: Instant) {
+        self.furthest = Some(now);
+        (self.readings, self.frames) = (0, 0);
+    }
+
+    /// Tells whether the clock stands; once for each time that it takes to be sure.
+    pub(super) const fn take(&mut self) -> bool {
+        let a_frame = if self.limit < FRAMES { 1 } else { self.limit / FRAMES };
+        let passed = self.readings.saturating_add(self.frames.saturating_mul(a_frame));
+        let stands = passed >= self.limit;
+        if stands {
+            (self.readings, self.frames) = (0, 0);
+        }
+        stands
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dji::{Bus, Config, M3508};
+    use crate::frame::CanFrame;
+    use crate::motor::Condition;
+    use crate::runner::Nb;
+    use crate::time::ManualClock;
+    use embedded_can::ErrorKind;
+
+    /// Takes every frame, and counts those that drive.
+    #[derive(Default)]
+    struct Sink {
+        driving: u32,
+    }
+
+    impl embedded_can::nb::Can for Sink {
+        type Frame = CanFrame;
+        type Error = ErrorKind;
+        fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+            self.driving += u32::from(*frame.bytes() != [0; 8]);
+            Ok(None)
+        }
+        fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> {
+            Err(nb::Error::WouldBlock)
+        }
+    }
+
+    fn at_us(us: u64) -> Instant {
+        Instant::from_micros(us)
+    }
+
+    type TestRunner<'c> = Runner<Nb<Sink>, &'c ManualClock, Bus>;
+
+    /// A motor that is driven, just after the step at 10 ms.
+    fn driving(clock: &ManualClock) -> TestRunner<'_> {
+        clock.set(at_us(10_000));
+        let mut bus = Bus::new();
+        let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+        let mut runner = Runner::new(Nb(Sink::default()), clock, bus);
+        let tick = runner.due().unwrap();
+        _ = runner.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), clock.now());
+        runner.arm(tick).unwrap();
+        runner.device_mut().set_raw(wheel, 900).unwrap();
+        runner.tick(tick);
+        assert_eq!((runner.port_mut().0.driving, runner.due()), (1, None));
+        runner
+    }
+
+    #[test]
+    fn a_step_that_was_not_run_stays_due_and_the_next_one_covers_both() {
+        let clock = ManualClock::default();
+        let mut runner = driving(&clock);
+        clock.set(at_us(11_000));
+        let first = runner.due();
+        assert_eq!(first, Some(Tick::new(at_us(11_000), 0.001)));
+        clock.set(at_us(11_900));
+        assert_eq!(runner.due(), first);
+        assert_eq!((runner.statistics().overruns, runner.next_edge()), (0, None));
+        clock.set(at_us(13_100));
+        let both = runner.due().unwrap();
+        assert_eq!((both.now(), both.dt_s()), (at_us(13_100), 0.001 + 0.002_1));
+        // 11 ms was left out by the program, 12 ms by the clock.
+        assert_eq!(runner.statistics().overruns, 2);
+        assert!(runner.has(BusCondition::TickOverrun));
+        runner.tick(both);
+        assert_eq!(runner.due(), None);
+        clock.set(at_us(14_000));
+        let next = runner.due().unwrap();
+        assert!((next.dt_s() - 0.000_9).abs() < 1e-9 && runner.statistics().overruns == 2);
+    }
+
+    #[test]
+    fn a_step_by_hand_takes_the_place_of_the_one_that_is_due() {
+        let clock = ManualClock::default();
+        let mut runner = driving(&clock);
+        clock.set(at_us(11_000));
+        assert!(runner.due().is_some());
+        runner.tick(Tick::new(at_us(11_000), 0.001));
+        assert_eq!(runner.due(), None);
+    }
+
+    /// The zeros of a clock that stands or went back are sent, however many steps the program leaves out.
+    #[test]
+    fn a_step_without_a_length_stays_due_until_it_is_run() {
+        for back in [false, true] {
+            let clock = ManualClock::default();
+            let mut runner = driving(&clock).with_standstill_after(50);
+            if back {
+                clock.set(at_us(3_000));
+            }
+            let stopped = (0..51).find_map(|_| runner.due()).unwrap();
+            assert_eq!((stopped.dt_s(), stopped.now() <= at_us(10_000)), (0.0, true), "{back}");
+            for ms in 1..20 {
+                clock.set(stopped.now() + Duration::from_millis(ms));
+                assert_eq!(runner.due(), Some(stopped), "{back}");
+            }
+            assert!(runner.is_armed());
+            runner.tick(stopped);
+            assert!(!runner.is_armed() && runner.port_mut().0.driving == 1);
+            let told = core::iter::from_fn(|| runner.device_mut().next_edge());
+            assert!(told.into_iter().any(|edge| edge.condition == Condition::ClockFault));
+            assert_eq!(runner.due(), None);
+        }
+    }
+
+    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` with a clock that goes on in between.
+    #[test]
+    fn two_runners_that_wait_for_each_other_lose_no_step() {
+        let clock = ManualClock::new(at_us(0));
+        let [mut one, mut other] =
+            [(); 2].map(|()| Runner::new(Nb(Sink::default()), &clock, Bus::new()));
+        let (mut steps, mut time_s) = ([0; 2], [0.0; 2]);
+        for turn in 0..100_000 {
+            let first = one.due();
+            clock.advance(Duration::from_micros(turn % 5));
+            let second = other.due();
+            clock.advance(Duration::from_micros(13 - turn % 5));
+            let (Some(first), Some(second)) = (first, second) else { continue };
+            for (index, (runner, tick)) in
+                [(&mut one, first), (&mut other, second)].into_iter().enumerate()
+            {
+                runner.tick(tick);
+                steps[index] += 1;
+                time_s[index] += tick.dt_s();
+            }
+        }
+        assert_eq!((one.statistics().overruns, other.statistics().overruns), (0, 0));
+        assert_eq!(steps, [1_300; 2]);
+        assert!(time_s.iter().all(|time_s| (time_s - 1.3_f32).abs() < 2e-3), "{time_s:?}");
+    }
+
+    #[test]
+    fn a_clock_that_repeats_itself_for_200_000_readings_stands() {
+        let clock = ManualClock::new(at_us(7));
+        let mut runner = Runner::new(Nb(Sink::default()), &clock, Bus::new());
+        let standstills = |runner: &mut TestRunner<'_>, readings| {
+            for _ in 0..readings {
+                if let Some(tick) = runner.due() {
+                    runner.tick(tick);
+                }
+            }
+            runner.statistics().clock_standstills
+        };
+        assert_eq!(standstills(&mut runner, 200_000), 0); // the first one is new
+        assert_eq!(standstills(&mut runner, 1), 1);
+        assert_eq!(standstills(&mut runner, 199_999), 1);
+        assert_eq!(standstills(&mut runner, 1), 2);
+        let edge = runner.next_edge().unwrap();
+        assert_eq!((edge.condition, edge.began), (BusCondition::ClockStandstill, true));
+        assert_eq!(runner.heartbeat(), 0);
+    }
+}
+
+#[cfg(test)]
+mod standstill_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Reads a clock of this resolution after each of these gaps in ns, `times` times in a row; returns how often it stood.
+    fn stood(resolution_us: u64, phases: &[(u64, u32)]) -> usize {
+        let (mut standstill, mut ns, mut stood) = (Standstill::new(), 12_345_678, 0);
+        let mut heard_ns = ns;
+        for (gap_ns, times) in phases {
+            for _ in 0..*times {
+                ns += gap_ns;
+                // As many frames as a bus of 1 Mbit/s carries.
+                while heard_ns + 111_000 <= ns {
+                    heard_ns += 111_000;
+                    standstill.receive();
+                }
+                let us = ns / 1_000 / resolution_us * resolution_us;
+                standstill.read(Instant::from_micros(us));
+                stood += usize::from(standstill.take());
+            }
+        }
+        stood
+    }
+
+    /// Reads a clock of this resolution each `gap_us` for 2 s, then one that stands; returns after how many µs it is one.
+    fn noticed_us(resolution_us: u64, gap_us: u64) -> u64 {
+        let mut standstill = Standstill::new();
+        let mut now = Instant::START;
+        for us in (0..2_000_000).step_by(usize::try_from(gap_us).unwrap()) {
+            // Loops are never quite regular.
+            let us = us + us / gap_us % 7 * gap_us / 10;
+            now = Instant::from_micros(us / resolution_us * resolution_us);
+            standstill.read(now);
+            assert!(!standstill.take());
+        }
+        let stands = |standstill: &mut Standstill| {
+            standstill.read(now);
+            standstill.take()
+        };
+        (1..).find(|_| stands(&mut standstill)).unwrap() * gap_us
+    }
+
+    #[test]
+    fn a_clock_that_stands_is_noticed_within_a_second_by_any_loop_of_a_kilohertz_or_more() {
+        let ms = |us| us / 1_000;
+        assert_eq!(ms(noticed_us(1, 1)), 1);
+        assert_eq!(ms(noticed_us(1, 10)), 10);
+        assert_eq!(ms(noticed_us(1, 250)), 250);
+        assert_eq!(ms(noticed_us(1, 1_000)), 1_000);
+        // Ticks of 1 ms and of 10 ms, polled 1 000 000 times a second.
+        assert!((95..=100).contains(&ms(noticed_us(1_000, 1))));
+        assert!((185..=200).contains(&ms(noticed_us(10_000, 1))));
+        assert!((490..=500).contains(&ms(noticed_us(1_000, 250))));
+        // It may be read faster at any time.
+        assert!((1_990..=2_000).contains(&ms(noticed_us(1_000, 1_000))));
+    }
+
+    #[test]
+    fn a_limit_that_was_set_is_kept() {
+        for (fixed, limit) in [(0, 1), (100, 100), (1_000_000, 1_000_000)] {
+            let mut standstill = Standstill::new();
+            standstill.fix(fixed);
+            for ms in 1..100 {
+                standstill.read(Instant::from_micros(1_000 * ms));
+            }
+            let now = Instant::from_micros(99_000);
+            let stands = |standstill: &mut Standstill| {
+                standstill.read(now);
+                standstill.take()
+            };
+            assert!((1..limit).all(|_| !stands(&mut standstill)));
+            assert!(stands(&mut standstill));
+        }
+    }
+
+    fn gap_ns() -> impl Strategy<Value = u64> {
+        prop_oneof![501..2_000_u64, 2_000..1_000_000_u64, 1_000_000..20_000_000_u64]
+    }
+
+    proptest! {
+        /// Law: a clock of any resolution that goes on is none that stands, however the pace of the loop changes, up to
+        /// 2 000 000 readings a second.
+        #[test]
+        fn a_clock_that_goes_on_never_stands(
+            resolution_us in prop_oneof![1..100_u64, 100..1_000_u64, Just(1_000), Just(10_000)],
+            phases in prop::collection::vec((gap_ns(), 1..20_000_u32), 1..6),
+        ) {
+            prop_assert_eq!(stood(resolution_us, &phases), 0);
+        }
+
+        /// Law: nor when the pace is the same all the time, up to 10 000 000 readings a second.
+        #[test]
+        fn a_clock_that_is_read_at_one_pace_never_stands(
+            resolution_us in prop_oneof![1..20_000_u64, Just(1_000), Just(10_000)],
+            gap_ns in 100..1_000_000_u64,
+        ) {
+            prop_assert_eq!(stood(resolution_us, &[(gap_ns, 200_000)]), 0);
+        }
     }
 }

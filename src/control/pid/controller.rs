@@ -2,7 +2,7 @@ use super::config::{
     DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, PidConfig, REST_DERIVATIVE,
     TRACK_OUTPUT, TRACKING,
 };
-use super::gate::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
+use super::law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 use crate::control::error::{ConfigError, check, gains};
 use crate::control::number::{finite, limited};
 
@@ -286,6 +286,34 @@ impl Pid {
     #[inline]
     pub(super) const fn tracking_r(&self) -> f32 {
         f32::from_bits(self.way_gate)
+    }
+
+    /// Returns the feed-forward for the setpoint as [`terms`](Self::terms) can know it too.
+    #[inline]
+    pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
+        let setpoint = measurement + error;
+        let moving = self.parameters.velocity_gain * setpoint;
+        if setpoint > 0.0 {
+            moving + self.parameters.static_gain
+        } else if setpoint < 0.0 {
+            moving - self.parameters.static_gain
+        } else {
+            moving
+        }
+    }
+
+    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel is not
+    /// that of one step.
+    pub(in crate::control) const fn refuse(&mut self, rests: bool) -> f32 {
+        self.rejected = self.rejected.saturating_add(1);
+        if rests {
+            self.rest_derivative();
+        }
+        self.output
+    }
+
+    pub(in crate::control) const fn rest_derivative(&mut self) {
+        self.set_options(self.options | REST_DERIVATIVE);
     }
 
     /// Stores a configuration that was checked.

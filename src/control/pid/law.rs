@@ -11,7 +11,6 @@ use super::config::{
     PERIOD, REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, TRACKING,
 };
 use super::controller::Pid;
-use super::gate::{UNKNOWN, limit_of, passes};
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 use crate::math;
@@ -272,6 +271,12 @@ impl Pid {
         (proportional, growth)
     }
 
+    /// Tells whether the output has limits.
+    #[inline]
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
     #[inline]
     const fn keep(&mut self, output: f32, measurement: f32, error: f32, rate: f32, integral: f32) {
         self.output = output;
@@ -327,20 +332,6 @@ impl Pid {
         if size >= none { 0.0 } else { (none - size) / (none - self.parameters.full_rate_below) }
     }
 
-    /// Returns the feed-forward for the setpoint as [`terms`](Self::terms) can know it too.
-    #[inline]
-    pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
-        let setpoint = measurement + error;
-        let moving = self.parameters.velocity_gain * setpoint;
-        if setpoint > 0.0 {
-            moving + self.parameters.static_gain
-        } else if setpoint < 0.0 {
-            moving - self.parameters.static_gain
-        } else {
-            moving
-        }
-    }
-
     /// Returns the integral after anti-windup, for an `excess` that the limits cut off the output.
     #[inline]
     fn without_windup(&self, excess: f32, before: f32, integral: f32, step: &TimeStep) -> f32 {
@@ -359,20 +350,39 @@ impl Pid {
             limit_of(gate).copysign(drained)
         }
     }
+}
 
-    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel is not
-    /// that of one step.
-    pub(in crate::control) const fn refuse(&mut self, rests: bool) -> f32 {
-        self.rejected = self.rejected.saturating_add(1);
-        if rests {
-            self.rest_derivative();
-        }
-        self.output
-    }
+/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
+pub(super) const UNKNOWN: f32 = f32::INFINITY;
 
-    pub(in crate::control) const fn rest_derivative(&mut self) {
-        self.set_options(self.options | REST_DERIVATIVE);
-    }
+/// A gate that nothing passes.
+pub(super) const CLOSED: u32 = 0;
+
+/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
+pub(super) const fn gate(limit: f32) -> u32 {
+    open_gate(limit) + 1
+}
+
+/// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
+pub(super) const fn open_gate(limit: f32) -> u32 {
+    limit.to_bits() << 1
+}
+
+/// Returns the limit that a gate encodes.
+#[inline]
+pub(super) const fn limit_of(gate: u32) -> f32 {
+    f32::from_bits(gate >> 1)
+}
+
+#[inline]
+pub(super) const fn passes(value: f32, gate: u32) -> bool {
+    magnitude(value) < gate
+}
+
+/// Sizes in an order that one integer comparison tells; NaN is larger than all numbers.
+#[inline]
+const fn magnitude(value: f32) -> u32 {
+    value.to_bits() << 1
 }
 
 #[cfg(test)]

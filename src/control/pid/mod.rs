@@ -2,7 +2,6 @@
 
 mod config;
 mod controller;
-mod gate;
 mod law;
 
 pub use config::PidConfig;

@@ -1,19 +1,18 @@
-//! What is looked at in one motor a tick.
+//! What is looked at in one motor a tick, and what is known of it.
 
-use super::Slot;
-use crate::dji::Facts;
+use super::{Slot, coarse};
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
-use crate::encoder::{Homing, Position};
-use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};
+use crate::dji::{Facts, State};
+use crate::encoder::Homing;
+use crate::motor::{
+    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, age,
+};
 use crate::time::Duration;
-use crate::units::Angle;
+use crate::units::Current;
 
 /// Inside of a soft limit by this much the motor is no longer at it.
 const CLEAR_RAD: f32 = 0.01;
-
-/// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
-const CALM_CURRENT: i32 = 2_000;
 
 /// The temperature byte that stands for -40 °C.
 const FIRST_BELOW_ZERO: u8 = 216;
@@ -37,27 +36,6 @@ pub(in crate::dji) struct Look {
 }
 
 impl Slot {
-    /// Tells at a glance whether all is well, as it is nearly always: online, cool, turning, moderately driven, nothing
-    /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
-    #[inline]
-    pub(in crate::dji) fn is_well(&mut self, word: i16) -> bool {
-        let (feedback, driven) = (self.feedback, i32::from(word));
-        let Some(facts) = self.facts else { return true };
-        let (calm, fastest) = (i32::from(self.calm_word), i32::from(facts.rotor_no_load_rpm()));
-        feedback.error_and_temperature() < u32::from(self.cool_below)
-            && is_within(driven, calm)
-            && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
-            && is_within(feedback.rpm().into(), fastest)
-            && self.monitor.glance(feedback.angle(), coarse(word))
-    }
-
-    /// Returns below which command a motor need not be looked at closely.
-    pub(super) const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
-        // A stall, and half of the command for a runaway.
-        let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
-        to_raw(effort, full_limit as f32, full_limit).unsigned_abs()
-    }
-
     /// Something began: the motor is looked at closely until all is [well](Self::relent) again.
     pub(super) const fn attend(&mut self) {
         self.cool_below = 0;
@@ -71,7 +49,7 @@ impl Slot {
             && !self.guard.is_opening()
             && self.error_code == 0
             && self.range == Range::within(self.full_limit)
-            && self.health.soft_limits().is_none();
+            && self.health.soft_limits.is_none();
         if is_well {
             let (warning, _) = temperatures(facts, self.health);
             let known = u8::try_from(warning.max(0)).unwrap_or(FIRST_BELOW_ZERO);
@@ -175,7 +153,7 @@ impl Slot {
     fn hold_back(&mut self) {
         let end = |raw: i16| f32::from(self.range.nearest(raw.into())) / self.raw_per_unit;
         let (one, other) = (end(i16::MIN), end(i16::MAX));
-        self.loops.speed_mut().keep_integral_between(one.min(other), one.max(other));
+        self.speed.keep_integral_between(one.min(other), one.max(other));
     }
 
     /// Tells whether there is a motor, and nothing that keeps it from being armed.
@@ -218,7 +196,7 @@ impl Slot {
 
     /// Returns whether the shaft may turn up only, and whether down only.
     fn soft_limits(&mut self, ahead: u8) -> (bool, bool) {
-        let Some((lower, upper)) = self.health.soft_limits() else { return (false, false) };
+        let Some((lower, upper)) = self.health.soft_limits else { return (false, false) };
         if self.homing == Homing::Relative {
             self.guard.latch_mut().set(Condition::SoftLimit, false);
             return (false, false);
@@ -233,19 +211,6 @@ impl Slot {
         (below, above)
     }
 
-    /// Returns the nearest position that is within the soft limits.
-    pub(super) fn inside(&self, position: Position) -> Position {
-        let Some((lower, upper)) = self.health.soft_limits() else { return position };
-        let radians = position.as_angle().as_radians();
-        if radians < lower {
-            Position::from_angle(Angle::from_radians(lower))
-        } else if radians > upper {
-            Position::from_angle(Angle::from_radians(upper))
-        } else {
-            position
-        }
-    }
-
     fn end_what_is_over(&mut self, look: &Look) {
         self.guard.end_what_is_over();
         if look.is_alone {
@@ -256,6 +221,7 @@ impl Slot {
     fn close_window(&mut self, window: u16, feedback_hz: u32) {
         let was_crowded = self.traffic.is_crowded();
         let double = self.traffic.is_double();
+        self.traffic.add(self.guard.take_in_time());
         self.traffic.close(window, feedback_hz);
         if self.traffic.is_crowded() {
             // Every frame is compared from now on.
@@ -309,22 +275,46 @@ impl Slot {
     pub(in crate::dji) fn is_faulty(&self) -> bool {
         !self.guard.latch().active().and(OBSTACLES).and(self.health.relaxing()).is_empty()
     }
+
+    /// Returns what is known; `None` before the first frame.
+    pub(in crate::dji) fn state(&self) -> Option<State> {
+        let facts = self.facts?;
+        if self.guard.link() == Link::Unheard {
+            return None;
+        }
+        let amperes =
+            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
+                / f32::from(facts.current_raw);
+        Some(State {
+            motor: MotorName::new(facts.name, self.id(facts)),
+            position: self.shaft.position(),
+            homing: self.homing,
+            velocity: self.velocity(),
+            current: Current::from_amperes(amperes),
+            torque_nm: amperes * self.nm_per_a,
+            temperature_c: facts.has_temperature.then_some(celsius(self.feedback.temperature())),
+            error: facts.errors.read(self.feedback.error()),
+            rotor_counts: self.shaft.rotor_counts(),
+            ambiguous_gaps: self.ambiguous_gaps,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+            conditions: self.guard.latch().active(),
+            link: self.guard.link(),
+            feedback: self.feedback,
+        })
+    }
+
+    /// Time did not move on. A free slot loses nothing.
+    pub(in crate::dji) fn lose_time(&mut self) {
+        if self.facts.is_some() {
+            self.guard.lose_time();
+        }
+    }
 }
 
 /// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).
 const fn mixed(one: u16, other: u16) -> u16 {
     one.wrapping_mul(0x9E37) ^ other.wrapping_mul(0x79B9)
-}
-
-/// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.
-const fn is_within(value: i32, limit: i32) -> bool {
-    (value + limit).cast_unsigned() < 2 * limit.cast_unsigned()
-}
-
-/// A command in units of 256.
-const fn coarse(word: i16) -> i8 {
-    let [high, _] = word.to_be_bytes();
-    high.cast_signed()
 }
 
 /// Returns from which temperature on the motor is warm, and from which on it is hot.
@@ -336,7 +326,7 @@ const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
 }
 
 /// The byte is signed in some drivers and unsigned in others: -40 to -1 is meant rather than 216 to 255.
-pub(super) fn celsius(byte: u8) -> i16 {
+fn celsius(byte: u8) -> i16 {
     if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
 }
 

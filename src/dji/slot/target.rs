@@ -1,93 +1,11 @@
-use super::{Slot, is_loop, steep};
-use crate::control::{Pid, PidConfig};
-use crate::dji::command::{Outbox, to_raw};
+//! Targets: all that is not a velocity or a position that goes on.
+
+use super::{Action, Duty, Goal, Slot, needs};
+use crate::control::{Pid, TimeStep};
+use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
-use crate::dji::{LoopError, SteepGain};
 use crate::encoder::Position;
-use crate::motor::{Link, Rest, TargetError};
-
-/// What a motor is asked to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Action {
-    Rest,
-    Raw,
-    Velocity,
-    /// The shortest way.
-    Angle,
-    Position,
-    /// The way that another sensor leaves.
-    Measured,
-}
-
-impl Action {
-    /// Tells whether it goes to a place of the shaft.
-    pub(super) const fn is_way(self) -> bool {
-        matches!(self, Self::Angle | Self::Position)
-    }
-}
-
-/// What an update does: the action, where that is as simple as it nearly always is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Duty {
-    Rest,
-    /// Whatever is asked for, for the first time since a rest.
-    First,
-    Raw,
-    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
-    Velocity,
-    /// Both loops, as above.
-    Position,
-    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
-    Other,
-}
-
-/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Goal {
-    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
-    turns: u32,
-    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
-    value: i32,
-}
-
-impl Goal {
-    pub(super) const NONE: Self = Self::of(0);
-
-    const fn of(value: i32) -> Self {
-        Self { turns: 0, value }
-    }
-
-    pub(super) const fn raw(&self) -> i32 {
-        self.value
-    }
-
-    pub(super) const fn rad_per_s(&self) -> f32 {
-        f32::from_bits(self.value.cast_unsigned())
-    }
-
-    pub(super) const fn phase(&self) -> i32 {
-        self.value
-    }
-
-    pub(super) const fn turns(&self) -> u32 {
-        self.turns
-    }
-
-    /// A way in rad, and the rate in rad/s that goes with it.
-    pub(super) const fn measured(way: f32, rad_per_s: f32) -> Self {
-        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
-    }
-
-    pub(super) const fn way(&self) -> f32 {
-        f32::from_bits(self.value.cast_unsigned())
-    }
-
-    pub(super) const fn rate(&self) -> f32 {
-        f32::from_bits(self.turns)
-    }
-}
+use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
 
 impl Slot {
     /// Asks for nothing: zero output, loops reset.
@@ -112,19 +30,6 @@ impl Slot {
         Ok(())
     }
 
-    /// Takes rad/s of the output shaft.
-    #[inline]
-    pub(in crate::dji) fn set_velocity(
-        &mut self,
-        rad_per_s: f32,
-        now: u32,
-    ) -> Result<(), TargetError> {
-        self.admit(rad_per_s.is_finite())?;
-        needs(self.loops.speed())?;
-        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
-        Ok(())
-    }
-
     /// Takes an absolute angle of the output shaft: the shortest way.
     pub(in crate::dji) fn set_angle(
         &mut self,
@@ -132,7 +37,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
-        needs(self.loops.position())?;
+        needs(&self.position)?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -141,71 +46,40 @@ impl Slot {
         Ok(())
     }
 
-    /// Takes turns and angle of the output shaft.
-    pub(in crate::dji) fn set_position(
+    /// Takes the way that another sensor leaves, in rad, and the rate that it measures, in rad/s; `at` is `None` when that
+    /// was too long ago for a stamp.
+    pub(in crate::dji) fn set_measured(
         &mut self,
-        position: Position,
+        way: f32,
+        rad_per_s: f32,
+        at: Option<u32>,
         now: u32,
+        timeouts: &Timeouts,
     ) -> Result<(), TargetError> {
-        self.admit(position.is_finite())?;
-        needs(self.loops.position())?;
-        let (turns, phase) = self.shaft.locate(self.inside(position));
-        let goal = Goal { turns: self.shaft.near(turns), value: phase };
-        self.start(Action::Position, goal, now);
+        self.admit(way.is_finite() && rad_per_s.is_finite())?;
+        needs(&self.position)?;
+        let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
+        else {
+            if self.guard.has_target() {
+                self.guard.forget_target();
+                self.settle();
+            }
+            return Err(TargetError::StaleMeasurement);
+        };
+        self.start(Action::Measured, Goal::measured(way, rad_per_s), stamp);
         Ok(())
-    }
-
-    /// Changes the gains of the speed loop without a jump of its output.
-    pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
-        let facts = self.facts.ok_or(LoopError::Detached)?;
-        let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
-        let steep = steep::speed(&config, facts, self.rad_per_s_per_rpm);
-        self.rest_loops();
-        let replaced = replace(self.loops.speed_mut(), config, limit, steep);
-        self.settle();
-        replaced
-    }
-
-    /// Changes the gains of the position loop without a jump of its output.
-    pub(in crate::dji) fn set_position_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
-        let facts = self.facts.ok_or(LoopError::Detached)?;
-        let limit = super::no_load_velocity(facts, self.rad_per_s_per_rpm);
-        let steep = steep::position(&config, facts);
-        self.rest_loops();
-        let replaced = replace(self.loops.position_mut(), config, limit, steep);
-        self.settle();
-        replaced
-    }
-
-    /// Tells whether a target may be taken; where not, the one before may be over.
-    #[inline]
-    pub(super) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        match self.guard.admit(is_finite) {
-            Ok(()) => Ok(()),
-            Err(error) => Err(self.refuse(error)),
-        }
     }
 
     #[cold]
     #[inline(never)]
-    fn refuse(&mut self, error: TargetError) -> TargetError {
+    pub(super) fn refuse(&mut self, error: TargetError) -> TargetError {
         self.settle();
         error
     }
 
-    #[inline]
-    pub(super) fn start(&mut self, action: Action, goal: Goal, now: u32) {
-        self.goal = goal;
-        if self.asked == action {
-            self.guard.renew_target(now);
-        } else {
-            self.start_anew(action, now);
-        }
-    }
-
     #[cold]
     #[inline(never)]
-    fn start_anew(&mut self, action: Action, now: u32) {
+    pub(super) fn start_anew(&mut self, action: Action, now: u32) {
         self.asked = action;
         self.guard.take_target(now);
         self.settle();
@@ -226,7 +100,7 @@ impl Slot {
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
             self.attend();
         }
-        let is_free = self.range == Range::within(self.full_limit) && self.loops.speed().is_plain();
+        let is_free = self.range == Range::within(self.full_limit) && self.speed.is_plain();
         self.duty = match self.asked {
             _ if !is_online => Duty::Rest,
             Action::Rest => Duty::Rest,
@@ -234,13 +108,55 @@ impl Slot {
             _ if self.acted != self.asked => Duty::Other,
             Action::Raw => Duty::Raw,
             Action::Velocity if is_free => Duty::Velocity,
-            Action::Position if is_free && self.loops.position().is_plain() => Duty::Position,
+            Action::Position if is_free && self.position.is_plain() => Duty::Position,
             _ => Duty::Other,
         };
     }
 
+    // Cold, so that the usual way of an update runs straight on.
+
+    /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn update_carefully(&mut self, step: &TimeStep, sent: &Outbox) -> i16 {
+        match self.duty {
+            Duty::Rest => return 0,
+            Duty::First => self.end_rest(),
+            _ => {}
+        }
+        if self.acted != self.asked {
+            self.take_over(sent);
+        }
+        let mut velocity = self.velocity().as_rad_per_s();
+        let way = match self.asked {
+            Action::Velocity => {
+                return self.follow_velocity(self.goal.rad_per_s(), velocity, step);
+            }
+            Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
+            Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
+            Action::Measured => {
+                velocity = self.goal.rate();
+                self.goal.way()
+            }
+            Action::Raw => return saturate(self.goal.raw(), self.range),
+            Action::Rest => return 0,
+        };
+        let goal = self.position.step_error(way, velocity, step);
+        self.follow_velocity(goal * self.opened_part(), velocity, step)
+    }
+
+    /// Returns which part of its velocity a position loop may ask for: while the output range opens, that of the range.
+    fn opened_part(&self) -> f32 {
+        if !self.guard.is_opening() {
+            return 1.0;
+        }
+        f32::from(
+            self.range.nearest(i32::from(i16::MAX)).max(-self.range.nearest(i32::from(i16::MIN))),
+        ) / f32::from(self.full_limit)
+    }
+
     /// What is asked for has an output from now on.
-    pub(super) fn end_rest(&mut self) {
+    fn end_rest(&mut self) {
         self.rest_loops();
         self.acted = Action::Rest;
         self.duty = Duty::Other;
@@ -248,10 +164,10 @@ impl Slot {
     }
 
     /// Has the loops rest as the motor did.
-    fn rest_loops(&mut self) {
+    pub(super) fn rest_loops(&mut self) {
         match self.guard.end_rest() {
-            Rest::Relaxed => self.loops.reset(),
-            Rest::Pause => self.loops.interrupt(),
+            Rest::Relaxed => self.reset_loops(),
+            Rest::Pause => self.interrupt_loops(),
             Rest::None => {}
         }
     }
@@ -260,60 +176,64 @@ impl Slot {
     /// sent last, so that their output does not jump. What was asked for in between, and never done, is nothing to go on from.
     #[cold]
     #[inline(never)]
-    pub(super) fn take_over(&mut self, sent: &Outbox) {
+    fn take_over(&mut self, sent: &Outbox) {
         let before = core::mem::replace(&mut self.acted, self.asked);
         match before {
-            _ if self.asked == Action::Raw => self.loops.reset(),
+            _ if self.asked == Action::Raw => self.reset_loops(),
             Action::Raw => {
                 let last = self.in_units(sent.get(self.place));
-                self.loops.speed_mut().reset_to(last);
+                self.speed.reset_to(last);
             }
             // Another sensor: its last reading says nothing of the next one.
-            Action::Measured => self.loops.interrupt(),
+            Action::Measured => self.interrupt_loops(),
             _ => {}
         }
         let is_placed = before == Action::Rest || before.is_way();
         match self.asked {
             Action::Measured => {
                 if !is_placed {
-                    self.loops.position_mut().reset_to(self.goal.rate());
+                    self.position.reset_to(self.goal.rate());
                 }
                 // No kick for the step from one velocity to the other.
-                self.loops.interrupt();
+                self.interrupt_loops();
             }
             _ if self.asked.is_way() && !is_placed => {
                 let velocity = self.velocity().as_rad_per_s();
-                self.loops.position_mut().reset_to(velocity);
+                self.position.reset_to(velocity);
             }
             _ => {}
         }
         self.settle();
     }
-}
 
-pub(super) fn needs(pid: &Pid) -> Result<(), TargetError> {
-    if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
-}
+    const fn reset_loops(&mut self) {
+        self.position.reset();
+        self.speed.reset();
+    }
 
-fn replace(
-    pid: &mut Pid,
-    config: PidConfig,
-    limit: f32,
-    steep: Option<SteepGain>,
-) -> Result<(), LoopError> {
-    if !is_loop(pid) {
-        return Err(LoopError::NoLoop);
+    const fn interrupt_loops(&mut self) {
+        self.position.interrupt();
+        self.speed.interrupt();
     }
-    if let Some(gain) = steep {
-        return Err(LoopError::Gain(gain));
+
+    /// Returns a raw command in A or V, in the direction of the shaft.
+    pub(in crate::dji) fn in_units(&self, raw: i16) -> f32 {
+        f32::from(raw) / self.raw_per_unit
     }
-    pid.set_config(super::within(Some(config), limit))
-        .map_err(|error| LoopError::Parameter(error.parameter()))
+
+    pub(in crate::dji) const fn speed_loop_mut(&mut self) -> &mut Pid {
+        &mut self.speed
+    }
+
+    pub(super) fn direction(&self) -> f32 {
+        1.0_f32.copysign(self.raw_per_unit)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::PidConfig;
     use crate::dji::{Bus, Config, M3508};
     use crate::frame::CanFrame;
     use crate::motor::Timeouts;

@@ -52,7 +52,8 @@ pub struct HealthConfig {
     stall_speed: f32,
     stall_window: u16,
     stall_hold: f32,
-    soft_limits: Option<(f32, f32)>,
+    /// Radians of the output shaft.
+    pub(crate) soft_limits: Option<(f32, f32)>,
 }
 
 impl HealthConfig {
@@ -164,11 +165,6 @@ impl HealthConfig {
 
     pub(crate) const fn temperatures_c(&self) -> Option<(i16, i16)> {
         self.temperatures_c
-    }
-
-    /// Radians of the output shaft.
-    pub(crate) const fn soft_limits(&self) -> Option<(f32, f32)> {
-        self.soft_limits
     }
 
     pub(crate) const fn stall_effort(&self) -> f32 {

@@ -25,19 +25,12 @@
 mod condition;
 mod config;
 mod edge;
-mod frozen;
 mod monitor;
 mod report;
-mod runaway;
-mod stall;
-mod thermal;
-mod traffic;
 
 pub use condition::{Condition, Conditions};
 pub use config::{HealthConfig, Reaction};
 pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
-use monitor::Timer;
-pub(crate) use monitor::{Monitor, Sample, elapsed};
+pub(crate) use monitor::{Monitor, Sample, Traffic, elapsed};
 pub use report::Health;
-pub(crate) use traffic::Traffic;

@@ -1,6 +1,6 @@
-use super::frozen::Frozen;
-use super::runaway::Runaway;
-use super::{Condition, HealthConfig, Latch, stall, thermal};
+//! The checks of one motor: how often it is heard, and all that need not be looked at in every tick.
+
+use super::{Condition, HealthConfig, Latch};
 
 /// Returns a time between two looks as the checks take it.
 pub(crate) fn elapsed(micros: Option<u32>) -> u8 {
@@ -11,13 +11,13 @@ pub(crate) fn elapsed(micros: Option<u32>) -> u8 {
 
 /// For how long something holds, in units of 1.024 ms; saturates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Timer(u16);
+struct Timer(u16);
 
 impl Timer {
-    pub(super) const ZERO: Self = Self(0);
+    const ZERO: Self = Self(0);
 
     /// Goes on while it holds, and starts anew when it does not.
-    pub(super) const fn run(&mut self, holds: bool, elapsed: u8) -> u16 {
+    const fn run(&mut self, holds: bool, elapsed: u8) -> u16 {
         self.0 = if holds { self.0.saturating_add(elapsed as u16) } else { 0 };
         self.0
     }
@@ -49,7 +49,7 @@ pub(crate) struct Sample {
 
 impl Sample {
     #[cfg(test)]
-    pub(super) const AT_REST: Self = Self {
+    const AT_REST: Self = Self {
         elapsed: 0,
         fresh: true,
         effort: 0.0,
@@ -118,10 +118,10 @@ impl Monitor {
         if let Some((celsius, (warning, limit))) = sample.temperature {
             let warning = (!config.ignores(Condition::Warm)).then_some(warning);
             let limit = (!config.ignores(Condition::Hot)).then_some(limit);
-            share = thermal::check(latch, celsius, warning, limit);
+            share = check_temperature(latch, celsius, warning, limit);
         }
         if !config.ignores(Condition::Stalled) {
-            share = share.min(stall::check(&mut self.stall, latch, sample, config));
+            share = share.min(check_stall(&mut self.stall, latch, sample, config));
         }
         if !config.ignores(Condition::Runaway) {
             self.runaway.check(latch, sample);
@@ -133,5 +133,566 @@ impl Monitor {
             latch.set(Condition::Overspeed, sample.speed.abs() > 2.0);
         }
         share
+    }
+}
+
+/// Below this share of the no-load speed a rotor moves too little between two looks to tell.
+const MOVES: f32 = 0.05;
+/// 100 ms, in units of 1.024 ms.
+const FROZEN_WINDOW: u8 = 98;
+
+/// An angle has 13 bits.
+const ANGLE: u16 = 0x1FFF;
+
+/// What the feedback was when it was looked at last.
+#[derive(Debug, Clone, Copy)]
+struct Frozen {
+    lasted: u8,
+    /// The angle, and three bits that change with the current: by chance they do not, but not ten times in a row.
+    feedback: u16,
+    /// The command when the feedback became what it is.
+    word: i8,
+}
+
+impl Frozen {
+    const NONE: Self = Self { lasted: 0, feedback: 0, word: 0 };
+
+    /// Tells whether an angle is another one than when it was looked at last.
+    #[inline]
+    const fn has_moved(&self, angle: u16) -> bool {
+        (self.feedback ^ angle) & ANGLE != 0
+    }
+
+    /// Takes feedback that moved.
+    #[inline]
+    const fn follow(&mut self, angle: u16, word: i8) {
+        *self = Self { lasted: 0, feedback: angle, word };
+    }
+
+    /// Looks for feedback that stands still and cannot be true.
+    ///
+    /// A motor that truly stands, even one that is blocked at a constant current, may send the same bits for ever. So
+    /// sameness is not enough; it has to contradict something:
+    ///
+    /// * the angle does not move while the reported speed says that it does, or
+    /// * nothing moves, not even the current, although the command has changed by a fifth of full scale since.
+    ///
+    /// Without a new frame there is nothing to look at.
+    fn check(&mut self, latch: &mut Latch, sample: &Sample) {
+        if !sample.fresh {
+            return;
+        }
+        let feedback = (sample.angle & ANGLE) | (sample.rest & !ANGLE);
+        let changes = feedback ^ self.feedback;
+        self.feedback = feedback;
+        if changes != 0 {
+            self.word = sample.word;
+        }
+        let change = sample.word.abs_diff(self.word);
+        let answers_not = changes == 0 && change >= sample.word_change;
+        let contradicts = changes & ANGLE == 0 && sample.speed.abs() >= MOVES;
+        let holds = answers_not || contradicts;
+        self.lasted = if holds { self.lasted.saturating_add(sample.elapsed) } else { 0 };
+        latch.set(Condition::Frozen, self.lasted >= FROZEN_WINDOW);
+    }
+}
+
+/// Speeds are kept in 64ths of the no-load speed.
+const SCALE: f32 = 64.0;
+/// 30 % of the no-load speed.
+const GAIN: u8 = 19;
+/// A speed that is this much lower than the highest has fallen: 5 %.
+const FALL: u8 = 3;
+/// It has to last 100 ms, and the speed must be gained within 0.5 s, in units of 2.048 ms: more slowly than that, it is
+/// a slope or somebody who pushes.
+const SHORTEST: u8 = 49;
+const LONGEST: u8 = 244;
+
+/// What was seen of a motor that turns the wrong way.
+#[derive(Debug, Clone, Copy)]
+struct Runaway {
+    lasted: u8,
+    from: u8,
+    highest: u8,
+}
+
+impl Runaway {
+    const NONE: Self = Self { lasted: 0, from: 0, highest: 0 };
+
+    /// Looks for a motor that speeds up although its command says otherwise. Latched: it ends when it is armed.
+    ///
+    /// A motor slows down when its command opposes its motion, and when there is none. So it runs away when its speed
+    /// rises, and never falls meanwhile,
+    ///
+    /// * against at least half of the full command: the sign of the torque is wrong, say; or
+    /// * without a command, while its *current* drives it: the ESC follows somebody else, or nobody. Without the current
+    ///   it is pushed from outside, which is not its fault.
+    fn check(&mut self, latch: &mut Latch, sample: &Sample) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let speed = (sample.speed.abs() * SCALE) as u8;
+        let effort = sample.effort * 1.0_f32.copysign(sample.speed);
+        let current = sample.current * 1.0_f32.copysign(sample.speed);
+        let wrong = effort <= -0.5 || (effort.abs() < 0.05 && current >= 0.2);
+        let falls = speed.saturating_add(FALL) < self.highest;
+        if falls || self.lasted == 0 || self.lasted > LONGEST {
+            *self = Self { lasted: 0, from: speed, highest: speed };
+        }
+        self.lasted =
+            if wrong { self.lasted.saturating_add(sample.elapsed.div_ceil(2)) } else { 0 };
+        self.highest = self.highest.max(speed);
+        if self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN) {
+            latch.set(Condition::Runaway, true);
+        }
+    }
+}
+
+/// Looks for a motor that is driven and does not turn, in either direction, and returns the share of the output that it
+/// is left with.
+///
+/// It is over when the motor turns at twice the speed below which it counts as standing, or when half of what it was
+/// left with is not asked for.
+fn check_stall(
+    timer: &mut Timer,
+    latch: &mut Latch,
+    sample: &Sample,
+    config: &HealthConfig,
+) -> f32 {
+    let (effort, speed) = (sample.effort.abs(), sample.speed.abs());
+    let stalled = if latch.has(Condition::Stalled) {
+        let (pushed, hold) = (config.stall_effort(), config.stall_hold());
+        let least = if pushed < hold { pushed } else { hold };
+        effort > 0.0 && effort >= 0.5 * least && speed < 2.0 * config.stall_speed()
+    } else {
+        let holds = effort >= config.stall_effort() && speed <= config.stall_speed();
+        timer.run(holds, sample.elapsed) >= config.stall_window() && holds
+    };
+    latch.set(Condition::Stalled, stalled);
+    if stalled { config.stall_hold() } else { 1.0 }
+}
+
+/// A condition ends this far below the temperature at which it began.
+const HYSTERESIS_K: i16 = 5;
+
+/// Looks at a temperature and returns the share of the output that it leaves: 1 up to the warning, 0 from the limit on,
+/// a straight line between; 0 also until a motor that was at the limit is 5 K below it. What is not looked for is `None`, and
+/// takes nothing away.
+fn check_temperature(
+    latch: &mut Latch,
+    celsius: i16,
+    warning: Option<i16>,
+    limit: Option<i16>,
+) -> f32 {
+    for (condition, from) in [(Condition::Warm, warning), (Condition::Hot, limit)] {
+        let Some(from) = from else { continue };
+        let below = celsius < from.saturating_sub(HYSTERESIS_K);
+        latch.set(condition, celsius >= from || (latch.has(condition) && !below));
+    }
+    match (warning, limit) {
+        _ if latch.has(Condition::Hot) => 0.0,
+        (Some(warning), Some(limit)) if celsius > warning => {
+            f32::from(limit.saturating_sub(celsius)) / f32::from(limit.saturating_sub(warning))
+        }
+        _ => 1.0,
+    }
+}
+
+/// A gap is kept in units of 16 µs: up to a second.
+const GAP_SHIFT: u32 = 4;
+/// From this many jumps to and fro on, two motors answer.
+const JUMPS: u8 = 16;
+
+/// How often and how regularly a motor is heard: counted over windows of about a second.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Traffic {
+    frames: u16,
+    longest_gap: u16,
+    /// What the last whole window had.
+    rate_hz: u16,
+    last_gap: u16,
+    /// Jumps of the angle to and fro, while more frames come than should; and how it jumped last, as a sign.
+    jumps: i8,
+    crowded: bool,
+}
+
+impl Traffic {
+    pub(crate) const NONE: Self =
+        Self { frames: 0, longest_gap: 0, rate_hz: 0, last_gap: 0, jumps: 0, crowded: false };
+
+    /// Counts a frame.
+    #[inline]
+    pub(crate) const fn count(&mut self) {
+        self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Counts frames that were counted elsewhere.
+    pub(crate) const fn add(&mut self, frames: u32) {
+        #[expect(clippy::cast_possible_truncation, reason = "wraps")]
+        let frames = frames as u16;
+        self.frames = self.frames.wrapping_add(frames);
+    }
+
+    /// Notes the time since the frame before, in µs.
+    #[inline]
+    pub(crate) const fn gap(&mut self, gap_us: u32) {
+        let gap = saturated(gap_us >> GAP_SHIFT);
+        if gap > self.longest_gap {
+            self.longest_gap = gap;
+        }
+    }
+
+    /// Tells whether more frames come than one motor sends, so that each has to be [compared](Self::compare).
+    pub(crate) const fn is_crowded(&self) -> bool {
+        self.crowded
+    }
+
+    /// Compares the way that the angle went with the one that the speed predicts, in counts, give or take `tolerance`.
+    ///
+    /// Two motors with one id take turns, and so the angle jumps to and fro between theirs, each time by more than the
+    /// speed explains. One motor may seem to jump, after a gap or when frames are stamped late, but not back again and
+    /// again.
+    pub(crate) const fn compare(&mut self, counts: i32, predicted: i32, tolerance: i32) {
+        let off = counts.wrapping_sub(predicted);
+        if off.unsigned_abs() <= tolerance.unsigned_abs() {
+            return;
+        }
+        // To and fro: one more, in the other direction. The same way again: as many as before.
+        if (off < 0) != (self.jumps < 0) || self.jumps == 0 {
+            let jumps = self.jumps.saturating_abs().saturating_add(1);
+            self.jumps = if off < 0 { -jumps } else { jumps };
+        }
+    }
+
+    /// Tells whether two motors answer, as far as this window has seen it.
+    pub(crate) const fn is_double(&self) -> bool {
+        self.jumps.unsigned_abs() >= JUMPS
+    }
+
+    /// Ends a window of `window` units of 1.024 ms. Half as many frames again as `nominal_hz` are a crowd.
+    pub(crate) const fn close(&mut self, window: u16, nominal_hz: u32) {
+        let per_window = self.frames as u32 * 15_625 / 16; // 10^6 / 1024
+        let rate = match per_window.checked_div(window as u32) {
+            Some(rate) => saturated(rate),
+            None => u16::MAX,
+        };
+        *self = Self {
+            frames: 0,
+            longest_gap: 0,
+            rate_hz: rate,
+            last_gap: self.longest_gap,
+            jumps: 0,
+            crowded: rate as u32 * 2 > nominal_hz.saturating_mul(3),
+        };
+    }
+
+    /// Returns the frames a second of the last whole window; 0 before there was one.
+    pub(crate) const fn rate_hz(&self) -> u16 {
+        self.rate_hz
+    }
+
+    /// Returns the longest time between two frames in µs, rounded down to 16: of the last whole window and of this one.
+    pub(crate) const fn longest_gap_us(&self) -> u32 {
+        let gap = if self.last_gap > self.longest_gap { self.last_gap } else { self.longest_gap };
+        (gap as u32) << GAP_SHIFT
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "compared right before")]
+const fn saturated(value: u32) -> u16 {
+    if value < u16::MAX as u32 { value as u16 } else { u16::MAX }
+}
+
+#[cfg(test)]
+mod frozen_tests {
+    use super::*;
+
+    fn look(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
+        let mut latch = Latch::NONE;
+        #[expect(clippy::cast_possible_truncation, reason = "at most 100")]
+        let word = (effort * 100.0) as i8;
+        let sample = Sample { angle, rest, word, speed, elapsed: 11, ..Sample::AT_REST };
+        frozen.check(&mut latch, &sample);
+        latch.has(Condition::Frozen)
+    }
+
+    #[test]
+    fn a_true_standstill_is_not_frozen_however_long_and_however_hard_it_is_pushed() {
+        for effort in [0.0, 0.04, -0.7, 1.0] {
+            let mut frozen = Frozen::NONE;
+            assert!((0..1_000).all(|_| !look(&mut frozen, 77, 5, effort, 0.0)));
+        }
+        // Blocked under a command that swings: the current answers.
+        let mut frozen = Frozen::NONE;
+        for step in 0..1_000_u16 {
+            let effort = f32::from(step % 200) / 200.0;
+            assert!(!look(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
+        }
+    }
+
+    #[test]
+    fn an_angle_that_rests_while_the_speed_does_not_is_frozen_and_ends() {
+        let mut frozen = Frozen::NONE;
+        let looks =
+            (0..20_u16).map(|step| look(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
+        assert_eq!(looks, Some(9), "100 ms");
+        assert!(!look(&mut frozen, 78, 0, 0.1, -0.3));
+    }
+
+    #[test]
+    fn feedback_that_does_not_answer_a_change_of_the_command_is_frozen() {
+        let mut frozen = Frozen::NONE;
+        let mut step = |effort| look(&mut frozen, 77, 5, effort, 0.0);
+        assert!((0..50).all(|_| !step(0.1)));
+        let looks = (0..20).map(|_| step(0.4)).position(|frozen| frozen);
+        assert_eq!(looks, Some(8));
+    }
+}
+
+#[cfg(test)]
+mod runaway_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const STEP: u8 = 11;
+
+    /// Lets a motor with this effort, current and no-load speed of 1 run for a second.
+    fn runs_away(motor: impl Fn(f32) -> (f32, f32, f32)) -> bool {
+        let (mut runaway, mut latch) = (Runaway::NONE, Latch::NONE);
+        for step in 0..90_u8 {
+            let (effort, current, speed) = motor(f32::from(step) * 0.011);
+            runaway.check(
+                &mut latch,
+                &Sample { effort, current, speed, elapsed: STEP, ..Sample::AT_REST },
+            );
+        }
+        latch.has(Condition::Runaway)
+    }
+
+    #[test]
+    fn a_wrong_sign_is_found_in_both_directions_and_a_right_one_is_not() {
+        for sign in [1.0, -1.0] {
+            let speed = |t: f32| sign * (t * 8.0).min(1.0);
+            assert!(runs_away(|t| (-sign, -sign, speed(t))));
+            assert!(!runs_away(|t| (sign, sign, speed(t))));
+            assert!(!runs_away(|t| (-0.4 * sign, sign, speed(t))), "a light brake");
+        }
+    }
+
+    #[test]
+    fn braking_reversing_and_a_slope_are_healthy() {
+        for sign in [1.0, -1.0] {
+            // From full speed through zero to full speed the other way.
+            assert!(!runs_away(|t| (-sign, -sign, sign * (1.0 - 4.0 * t).max(-1.0))));
+            // Held back on a slope, at a speed that is let rise slowly.
+            assert!(!runs_away(|t| (-0.8 * sign, -0.8 * sign, sign * (0.2 + 0.4 * t))));
+        }
+    }
+
+    #[test]
+    fn without_a_command_only_a_current_makes_it_a_runaway() {
+        for sign in [1.0, -1.0] {
+            let speed = |t: f32| sign * (t * 3.0).min(1.0);
+            assert!(runs_away(|t| (0.0, 0.5 * sign, speed(t))));
+            assert!(!runs_away(|t| (0.0, 0.0, speed(t))), "pushed");
+            assert!(!runs_away(|t| (0.0, -0.5 * sign, speed(t))), "pushed against its brake");
+        }
+    }
+
+    proptest! {
+        /// Law: a motor whose speed follows its torque, against friction and a moderate load, never runs away.
+        #[test]
+        fn a_motor_that_follows_its_torque_never_runs_away(
+            efforts in proptest::collection::vec(-1.0_f32..=1.0, 1..400),
+            gain in 0.5_f32..15.0,
+            load in -0.45_f32..0.45,
+        ) {
+            let (mut runaway, mut latch, mut speed) = (Runaway::NONE, Latch::NONE, 0.0_f32);
+            for effort in efforts {
+                let current = effort.clamp(-1.0 - speed, 1.0 - speed);
+                speed += gain * (current + load - 0.05_f32.copysign(speed)) * 0.011;
+                let sample = Sample { effort, current, speed, elapsed: STEP, ..Sample::AT_REST };
+                runaway.check(&mut latch, &sample);
+                prop_assert!(!latch.has(Condition::Runaway));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod stall_tests {
+    use super::*;
+    use crate::time::Duration;
+
+    fn sample(effort: f32, speed: f32) -> Sample {
+        Sample { effort, speed, elapsed: 10, ..Sample::AT_REST }
+    }
+
+    #[test]
+    fn a_stall_begins_after_its_window_in_both_directions() {
+        let config = HealthConfig::new().with_stall(0.5, 0.02, Duration::from_micros(100 << 10));
+        for direction in [1.0, -1.0] {
+            let (mut timer, mut latch) = (Timer::ZERO, Latch::NONE);
+            let mut look = |effort, speed| {
+                check_stall(&mut timer, &mut latch, &sample(effort, speed), &config);
+                latch.has(Condition::Stalled)
+            };
+            assert!(!look(0.9 * direction, 0.5 * direction), "turns");
+            for _ in 0..9 {
+                assert!(!look(0.5 * direction, -0.02 * direction));
+            }
+            assert!(look(0.5 * direction, 0.0));
+            assert!(look(0.3 * direction, 0.039), "still pushed, still standing");
+            assert!(!look(0.3 * direction, 0.04 * direction), "turns");
+            for _ in 0..20 {
+                assert!(!look(0.49 * direction, 0.0), "pushed too little");
+            }
+        }
+    }
+
+    #[test]
+    fn the_held_output_does_not_end_the_stall_by_itself() {
+        let config = HealthConfig::new().with_stall_hold(0.1);
+        let (mut timer, mut latch) = (Timer::ZERO, Latch::NONE);
+        let mut effort = 1.0;
+        for _ in 0..100 {
+            effort = check_stall(&mut timer, &mut latch, &sample(effort, 0.0), &config);
+        }
+        assert_eq!((effort, latch.has(Condition::Stalled)), (0.1, true));
+        assert!(check_stall(&mut timer, &mut latch, &sample(0.04, 0.0), &config) >= 1.0);
+        // A hold of nothing is over at once, and then looked for again.
+        let config = HealthConfig::new().with_stall_hold(0.0);
+        assert!(check_stall(&mut timer, &mut latch, &sample(0.0, 0.0), &config) >= 1.0);
+    }
+}
+
+#[cfg(test)]
+mod thermal_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_output_falls_on_a_line_and_comes_back_with_hysteresis() {
+        let mut latch = Latch::NONE;
+        let mut at = |celsius| {
+            let share = check_temperature(&mut latch, celsius, Some(100), Some(120));
+            (share, latch.has(Condition::Warm), latch.has(Condition::Hot))
+        };
+        assert_eq!(at(99), (1.0, false, false));
+        assert_eq!(at(100), (1.0, true, false));
+        assert_eq!(at(105), (0.75, true, false));
+        assert_eq!(at(119), (0.05, true, false));
+        assert_eq!(at(120), (0.0, true, true));
+        assert_eq!(at(115), (0.0, true, true));
+        assert_eq!(at(114), (0.3, true, false));
+        assert_eq!(at(95), (1.0, true, false));
+        assert_eq!(at(94), (1.0, false, false));
+    }
+
+    #[test]
+    fn what_is_not_looked_for_is_no_edge_and_takes_nothing_away() {
+        for (warning, limit) in [(None, Some(120)), (Some(100), None), (None, None)] {
+            let mut latch = Latch::NONE;
+            let share = check_temperature(&mut latch, 119, warning, limit);
+            assert!(share >= 1.0, "{share}");
+            let share = check_temperature(&mut latch, i16::MAX, warning, limit);
+            assert_eq!(share > 0.0, limit.is_none());
+            let seen = (latch.has(Condition::Warm), latch.has(Condition::Hot));
+            assert_eq!(seen, (warning.is_some(), limit.is_some()));
+        }
+    }
+
+    proptest! {
+        /// Law: the share is within 0..=1, and less for a hotter motor with the same past.
+        #[test]
+        fn hotter_is_never_more(celsius: i16, more: u8, warning in -100_i16..300, span in 1_i16..200, hot: bool) {
+            let share = |celsius: i16| {
+                let mut latch = Latch::NONE;
+                if hot {
+                    check_temperature(&mut latch, i16::MAX, Some(warning), Some(warning + span));
+                }
+                check_temperature(&mut latch, celsius, Some(warning), Some(warning + span))
+            };
+            let cool = share(celsius);
+            prop_assert!((0.0..=1.0).contains(&cool));
+            prop_assert!(share(celsius.saturating_add(more.into())) <= cool);
+        }
+    }
+}
+
+#[cfg(test)]
+mod traffic_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn rate_and_longest_gap_are_those_of_the_window() {
+        let mut traffic = Traffic::NONE;
+        for frame in 0..998 {
+            traffic.count();
+            traffic.gap(if frame == 500 { 3_210 } else { 1_000 });
+        }
+        traffic.close(977, 1_000); // 1.0004 s
+        assert_eq!((traffic.rate_hz(), traffic.longest_gap_us()), (997, 3_200));
+        traffic.gap(u32::MAX);
+        assert_eq!(traffic.longest_gap_us(), 1_048_560);
+        traffic.close(0, 1_000);
+        assert_eq!(traffic.rate_hz(), u16::MAX, "frames in no time");
+    }
+
+    #[test]
+    fn a_crowd_is_half_as_many_frames_again() {
+        for (frames, crowded) in [(1_000, false), (1_090, false), (1_510, true), (2_000, true)] {
+            let mut traffic = Traffic::NONE;
+            (0..frames).for_each(|_| traffic.count());
+            traffic.close(977, 1_000);
+            assert_eq!(traffic.is_crowded(), crowded, "{frames}");
+        }
+    }
+
+    #[test]
+    fn angles_that_take_turns_are_two_motors() {
+        for (one, other) in [(100, 4_000), (100, 7_000), (0, 500)] {
+            let mut traffic = Traffic::NONE;
+            let way = crate::encoder::shortest(one, other);
+            for frame in 0..100 {
+                traffic.compare(if frame % 2 == 0 { way } else { -way }, 0, 200);
+            }
+            assert!(traffic.is_double(), "{one} {other}");
+        }
+    }
+
+    proptest! {
+        /// Law: one motor at any speed, however many of its frames are lost, doubled or stamped late in bursts, never
+        /// looks like two.
+        #[test]
+        fn one_motor_never_looks_like_two(
+            counts_per_ms in -1_400_i32..1_400,
+            events in proptest::collection::vec(0_u8..100, 1_000),
+        ) {
+            let mut traffic = Traffic::NONE;
+            let tolerance = 200 + 2 * counts_per_ms.abs();
+            let (mut gap_ms, mut stalled) = (0, 0_u32);
+            for event in events {
+                gap_ms += 1;
+                if stalled > 0 {
+                    stalled -= 1;
+                    continue;
+                }
+                match event {
+                    0..5 => continue,                                         // lost
+                    5..7 => traffic.compare(0, 0, tolerance),                 // doubled
+                    7 => stalled = 8,                                         // and then the queue is full
+                    _ => {}
+                }
+                let way = crate::encoder::shortest(
+                    0,
+                    u16::try_from((counts_per_ms * gap_ms).rem_euclid(8_192)).unwrap(),
+                );
+                if gap_ms <= 2 {
+                    traffic.compare(way, counts_per_ms * gap_ms, tolerance);
+                }
+                gap_ms = 0;
+            }
+            prop_assert!(!traffic.is_double());
+        }
     }
 }

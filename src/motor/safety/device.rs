@@ -1,12 +1,11 @@
 //! The rules that hold for the motors of a device together: time, the request to arm, the emergency stop.
 
 use super::gesture::Gesture;
-use super::{Ages, MotorGuard};
-use crate::motor::{ArmError, Journal, Latch, Timeouts};
+use super::motor::{Known, MotorGuard};
+use super::stamp::LONGEST_PAUSE_US;
+use crate::motor::{ArmError, Journal, Link, Timeouts};
 use crate::time::{Duration, Instant};
 
-/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
-pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
 pub(crate) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
 /// Decides what an update may do, and who may be armed. `N` times of edges are kept.
@@ -42,13 +41,6 @@ pub(crate) enum Hold {
     Rest,
     /// Send zeros, and [relax](MotorGuard::lose_time) every motor until it is armed again: time did not move on.
     LoseTime,
-}
-
-/// What a device has to know of a motor before a change of it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Known {
-    pub(super) latch: Latch,
-    pub(super) is_armed: bool,
 }
 
 impl<const N: usize> DeviceGuard<N> {
@@ -148,7 +140,7 @@ impl<const N: usize> DeviceGuard<N> {
     /// Returns the ages of no motor, or `None` where each motor has to be seen to; that is over then.
     pub(crate) fn ages(&mut self) -> Option<Ages> {
         let is_disturbed = core::mem::replace(&mut self.is_disturbed, false);
-        (!is_disturbed).then(|| Ages::none(self.now, self.timeouts))
+        (!is_disturbed).then(|| Ages::none(self.now, &self.timeouts))
     }
 
     /// No age exceeds its limit for so long.
@@ -265,5 +257,71 @@ impl<const N: usize> DeviceGuard<N> {
 
     pub(crate) const fn is_stopped(&self) -> bool {
         self.is_stopped
+    }
+}
+
+/// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
+/// limit a stamp is near.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ages {
+    now: u32,
+    late_us: u32,
+    command_us: u32,
+    heard: u32,
+    commanded: u32,
+}
+
+impl Ages {
+    /// The ages of no motor; but a target may come at any time from now on.
+    pub(super) const fn none(now: u32, timeouts: &Timeouts) -> Self {
+        let (late_us, command_us) = (timeouts.late_us(), timeouts.command_us());
+        Self { now, late_us, command_us, heard: 0, commanded: command_us }
+    }
+
+    /// Adds the ages of a motor's feedback and target, when it is heard.
+    #[inline]
+    pub(crate) fn add(&mut self, motor: &MotorGuard) {
+        if motor.link != Link::Online {
+            return;
+        }
+        let since = |stamp, limit| self.now.wrapping_add(limit).wrapping_sub(stamp);
+        let heard = since(motor.heard, self.late_us);
+        let commanded = since(motor.commanded, self.command_us);
+        self.heard = self.heard.max(heard);
+        if motor.has_target {
+            self.commanded = self.commanded.max(commanded);
+        }
+    }
+
+    /// Returns after how many µs one of them is above its limit; `None` when one is already.
+    pub(crate) fn within_limits_us(&self) -> Option<u32> {
+        let heard = (2 * self.late_us).checked_sub(self.heard)?;
+        let commanded = (2 * self.command_us).checked_sub(self.commanded)?;
+        Some(heard.min(commanded) + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Below a limit, next to it on both sides, and far above.
+    fn about(limit: u32) -> impl Strategy<Value = u32> {
+        prop_oneof![0..=limit, limit - 2..=limit + 2, limit..=100 * limit]
+    }
+
+    proptest! {
+        /// Law: nothing is above its limit for as long as it is told, and something is a microsecond later.
+        #[test]
+        fn it_is_quiet_until_the_oldest_age_is_above_its_limit(heard in about(20_000), commanded in about(200_000)) {
+            let ages = Ages { heard, commanded, ..Ages::none(0, &Timeouts::new()) };
+            // 10 ms and 100 ms, and as far ahead.
+            let is_within = |passed| heard + passed <= 20_000 && commanded + passed <= 200_000;
+            match ages.within_limits_us() {
+                Some(quiet) => prop_assert!(is_within(quiet - 1) && !is_within(quiet)),
+                None => prop_assert!(!is_within(0)),
+            }
+        }
     }
 }

@@ -37,9 +37,7 @@
 //! Times of a motor are stamps of 32 bits. Ages of several motors are judged together ([`Ages`]): nobody looks at a motor again
 //! before the oldest of them can have exceeded its limit.
 
-mod ages;
 mod device;
-mod edges;
 mod gesture;
 mod guard;
 mod motor;
@@ -47,8 +45,7 @@ mod stamp;
 
 use crate::time::Duration;
 
-pub(crate) use ages::Ages;
-pub(crate) use device::{DeviceGuard, Hold, LONGEST_PAUSE};
+pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
 pub use guard::Guard;
 pub(crate) use motor::{MotorGuard, Rest};
 pub(crate) use stamp::age;

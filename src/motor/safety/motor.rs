@@ -1,7 +1,6 @@
 //! The rules of one motor.
 
-use super::device::{Known, LONGEST_PAUSE_US};
-use super::stamp::{age, is_near};
+use super::stamp::{LONGEST_PAUSE_US, age, is_near};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
@@ -27,6 +26,18 @@ pub(crate) enum Rest {
     Relaxed,
 }
 
+/// What a device has to know of a motor before a change of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub(super) latch: Latch,
+    pub(super) is_armed: bool,
+}
+
+/// Counts up to 32 767, which is 4 s of a bus full of one motor's frames. It is asked for each second; beyond, the gap would
+/// grow by 1 µs each time, for a minute at most: then the pause between two updates is too long for any age to be known.
+const COUNT_BITS: u32 = 15;
+const COUNT: u32 = (1 << COUNT_BITS) - 1;
+
 /// Decides whether one motor may be driven. See the [module](super) for its states.
 #[derive(Debug, Clone, Copy)]
 // In the order of use, so that neighbours are loaded and stored together.
@@ -34,8 +45,9 @@ pub(crate) enum Rest {
 pub(crate) struct MotorGuard {
     /// When its feedback came last.
     pub(super) heard: u32,
-    /// Feedback that comes sooner after the one before needs no closer look; 0 unless online.
-    trusted_gap_us: u32,
+    /// Feedback that comes sooner after the one before needs no closer look: that gap in µs, 0 unless online, above
+    /// [`COUNT_BITS`] bits that count such feedback. Together they are one word to load and to store.
+    in_time: u32,
     /// When its target was set.
     pub(super) commanded: u32,
     pub(super) link: Link,
@@ -61,7 +73,7 @@ impl MotorGuard {
     /// A motor with feedback: disarmed, not heard.
     pub(crate) const NEW: Self = Self {
         heard: 0,
-        trusted_gap_us: 0,
+        in_time: 0,
         commanded: 0,
         link: Link::Unheard,
         arming: Arming::Disarmed,
@@ -150,18 +162,27 @@ impl MotorGuard {
     /// Tells whether feedback comes shortly after the one before, of a motor that is online.
     #[inline]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
-        now.wrapping_sub(self.heard) < self.trusted_gap_us
+        now.wrapping_sub(self.heard) < self.in_time >> COUNT_BITS
     }
 
     /// Notes feedback that is [in time](Self::is_in_time).
     #[inline]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
         self.heard = now;
+        self.in_time = self.in_time.wrapping_add(1);
+    }
+
+    /// Returns how often feedback was in time since this was asked last.
+    pub(crate) const fn take_in_time(&mut self) -> u32 {
+        let count = self.in_time & COUNT;
+        self.in_time &= !COUNT;
+        count
     }
 
     /// Sets which gap is short, as long as the motor is online.
     pub(crate) fn trust(&mut self, gap_us: u32) {
-        self.trusted_gap_us = if self.link == Link::Online { gap_us } else { 0 };
+        let gap_us = if self.link == Link::Online { gap_us.min(u32::MAX >> COUNT_BITS) } else { 0 };
+        self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
     }
 
     /// Notes feedback, whenever the one before came.
@@ -211,7 +232,7 @@ impl MotorGuard {
 
     fn set_late(&mut self) {
         self.link = Link::Late;
-        self.trusted_gap_us = 0;
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.interrupt();
     }
@@ -219,7 +240,7 @@ impl MotorGuard {
     /// The motor is lost: relaxed, and refuses targets until it is armed again or, where that is configured, is back.
     fn lose(&mut self) {
         self.link = Link::Offline;
-        self.trusted_gap_us = 0;
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.latch.set(Condition::Offline, true);
         if self.is_armed() {

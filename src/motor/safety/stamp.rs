@@ -1,5 +1,8 @@
 //! Times as stamps of 32 bits in µs, which repeat after 71 min 35 s.
 
+/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
+pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
+
 /// Tells whether a stamp lies within `limit` of `now`, before or after.
 ///
 /// After, because an interrupt may stamp a frame just after a tick has read the clock; no further, because a clock that

@@ -1,23 +1,11 @@
+//! Feedback that does not come shortly after the one before, and where the shaft then is.
+
 use super::Slot;
 use crate::dji::{Facts, Feedback};
-use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, shortest};
-use crate::motor::{Condition, Link, Timeouts, age};
+use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, Position, shortest};
+use crate::motor::{Condition, Link, TargetError, Timeouts, age};
 
 impl Slot {
-    /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
-    /// returns `false`. A motor that is not online, and a free slot, trust no gap.
-    #[inline]
-    pub(in crate::dji) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
-        let in_time = self.guard.is_in_time(now);
-        if in_time {
-            self.traffic.count();
-            self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
-            self.feedback = feedback;
-            self.guard.hear_in_time(now);
-        }
-        in_time
-    }
-
     /// Takes a feedback frame that arrived at `now`, whenever the one before came.
     pub(in crate::dji) fn receive_after_gap(
         &mut self,
@@ -105,6 +93,28 @@ impl Slot {
         if self.homing == Homing::Homed && !self.shaft.is_direct() {
             self.homing = Homing::Uncertain;
         }
+    }
+
+    /// Calls the present position `position`. A motor that holds an angle or position is relaxed: its target
+    /// was given in the old terms.
+    pub(in crate::dji) fn set_present_position(
+        &mut self,
+        position: Position,
+    ) -> Result<(), TargetError> {
+        if self.guard.link() != Link::Online {
+            return Err(TargetError::NoFeedback);
+        }
+        if !position.is_finite() {
+            return Err(TargetError::NotFinite);
+        }
+        if self.asked.is_way() {
+            self.relax();
+        }
+        self.shaft.set_position(position);
+        self.homing = Homing::Homed;
+        self.guard.latch_mut().set(Condition::PositionUncertain, false);
+        self.keep_inside(0);
+        Ok(())
     }
 }
 

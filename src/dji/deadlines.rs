@@ -1,55 +1,11 @@
-//! What the data path meets seldom, out of its line: the usual case then needs few registers and no copies.
+//! What time brings with it: ages that exceed their limits, keep-alives, updates without a usable step.
 
-use super::Feedback;
-use super::bus::{Bus, FIRST_FEEDBACK_ID};
+use super::Bus;
 use super::slot::Slot;
-use crate::frame::CanFrame;
-use crate::motor::{Ages, Hold, Ingest, Malformed};
+use crate::motor::{Ages, Hold};
 use crate::time::Instant;
 
 impl<B> Bus<B> {
-    /// Takes any frame: also the first one of a motor, one after a gap, one with an error, and what is no feedback at all.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else {
-            self.ingest_command(frame, now);
-            return Ingest::Unrelated;
-        };
-        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
-        let motor = index as u8;
-        let Some(facts) = slot.facts() else {
-            self.rejects.unattached = self.rejects.unattached.saturating_add(1);
-            return Ingest::Unrelated;
-        };
-        if frame.length() != 8 {
-            self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
-            return Ingest::Malformed(Malformed::Length(frame.length()));
-        }
-        let Ok(feedback) = Feedback::decode(frame.bytes()) else {
-            self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
-            return Ingest::Malformed(Malformed::Field);
-        };
-        let (timeouts, running) = (*self.guard.timeouts(), self.guard.is_running());
-        if !running {
-            let before = self.guard.pass_unwatched(now);
-            self.forget_bygones(before);
-        }
-        let in_time = self.change(motor, now, |slot| {
-            let in_time = slot.receive(feedback, now.stamp());
-            if !in_time {
-                slot.receive_after_gap(facts, feedback, now.stamp(), &timeouts, running);
-            }
-            slot.hear_error(facts, feedback.error());
-            in_time
-        });
-        if in_time == Some(false) {
-            self.guard.disturb();
-        }
-        Ingest::Taken
-    }
-
     /// Sees to all that grows old or is due now and then, and finds out until when there is nothing of it; `false` when
     /// the time did not move on.
     #[cold]
@@ -97,7 +53,7 @@ impl<B> Bus<B> {
     /// stamp tells how long it was. Whatever makes time pass without looking at ages has to ask for this.
     #[cold]
     #[inline(never)]
-    fn forget_bygones(&mut self, before: Instant) {
+    pub(super) fn forget_bygones(&mut self, before: Instant) {
         let (now, is_pause) = (self.guard.updated(), self.guard.is_pause(before));
         for motor in 0..self.used {
             self.change(motor, now, |slot| slot.guard.forget_bygones(now.stamp(), is_pause));

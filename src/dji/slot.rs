@@ -1,0 +1,336 @@
+//! One motor in a tick: feedback in, what is asked for, loops, raw command out.
+//!
+//! What a motor needs now and then stands in the files of the folder.
+
+mod config;
+mod gap;
+mod health;
+mod target;
+
+use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
+use super::config::USUAL;
+use super::handle::Key;
+use super::range::Range;
+use super::{Facts, Feedback};
+use crate::control::{Input, Pid, PidConfig, TimeStep};
+use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
+use crate::motor::{HealthConfig, Monitor, MotorGuard, TargetError, Traffic};
+use crate::units::{Angle, AngularVelocity};
+pub(super) use health::Look;
+
+/// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
+const CALM_CURRENT: i32 = 2_000;
+
+#[derive(Debug, Clone, Copy)]
+// In the order of use, so that neighbours are loaded and stored together.
+#[repr(C)]
+pub(super) struct Slot {
+    feedback: Feedback,
+    pub(super) guard: MotorGuard,
+    shaft: Shaft,
+    rad_per_s_per_rpm: f32,
+    /// What an update does: what is asked for, or nothing while the feedback is late.
+    duty: Duty,
+    asked: Action,
+    pub(super) place: Place,
+    homing: Homing,
+    /// What is left of the full limit.
+    range: Range,
+    full_limit: i16,
+    calm_word: u16,
+    raw_per_unit: f32,
+    goal: Goal,
+    speed: Pid,
+    position: Pid,
+    facts: Option<&'static Facts>,
+    nm_per_a: f32,
+    ambiguous_gaps: u16,
+    generation: u8,
+    error_code: u8,
+    /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
+    /// well when it was looked at last, and nothing has begun since.
+    cool_below: u8,
+    /// What the last update did.
+    acted: Action,
+    saturated: u16,
+    health: &'static HealthConfig,
+    monitor: Monitor,
+    traffic: Traffic,
+}
+
+/// What a motor is asked to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Action {
+    Rest,
+    Raw,
+    Velocity,
+    /// The shortest way.
+    Angle,
+    Position,
+    /// The way that another sensor leaves.
+    Measured,
+}
+
+impl Action {
+    /// Tells whether it goes to a place of the shaft.
+    const fn is_way(self) -> bool {
+        matches!(self, Self::Angle | Self::Position)
+    }
+}
+
+/// What an update does: the action, where that is as simple as it nearly always is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Duty {
+    Rest,
+    /// Whatever is asked for, for the first time since a rest.
+    First,
+    Raw,
+    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
+    Velocity,
+    /// Both loops, as above.
+    Position,
+    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
+    Other,
+}
+
+/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
+    turns: u32,
+    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
+    value: i32,
+}
+
+impl Goal {
+    const NONE: Self = Self::of(0);
+
+    const fn of(value: i32) -> Self {
+        Self { turns: 0, value }
+    }
+
+    const fn raw(&self) -> i32 {
+        self.value
+    }
+
+    const fn rad_per_s(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    const fn phase(&self) -> i32 {
+        self.value
+    }
+
+    const fn turns(&self) -> u32 {
+        self.turns
+    }
+
+    /// A way in rad, and the rate in rad/s that goes with it.
+    const fn measured(way: f32, rad_per_s: f32) -> Self {
+        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
+    }
+
+    const fn way(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    const fn rate(&self) -> f32 {
+        f32::from_bits(self.turns)
+    }
+}
+
+/// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
+const NO_GAINS: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
+
+const NO_LOOP: Pid = match Pid::new(NO_GAINS) {
+    Ok(pid) => pid,
+    // Evaluated by the compiler.
+    Err(_) => panic!("zero gains are refused: a bus cannot be made"),
+};
+
+impl Slot {
+    pub(super) const FREE: Self = Self {
+        facts: None,
+        duty: Duty::Rest,
+        asked: Action::Rest,
+        goal: Goal::NONE,
+        shaft: Shaft::new(GearRatio::DIRECT, false),
+        feedback: Feedback::NONE,
+        guard: MotorGuard::NEW,
+        rad_per_s_per_rpm: 0.0,
+        raw_per_unit: 0.0,
+        nm_per_a: 0.0,
+        range: Range::ZERO,
+        full_limit: 0,
+        ambiguous_gaps: 0,
+        speed: NO_LOOP,
+        position: NO_LOOP,
+        generation: 0,
+        place: Place::Nowhere,
+        homing: Homing::Relative,
+        error_code: 0,
+        cool_below: 0,
+        acted: Action::Rest,
+        calm_word: 0,
+        saturated: 0,
+        health: &USUAL,
+        monitor: Monitor::NEW,
+        traffic: Traffic::NONE,
+    };
+
+    /// Tells whether a handle's key names the motor that is here now.
+    pub(super) const fn matches(&self, key: Key) -> bool {
+        self.facts.is_some() && self.generation == key.generation()
+    }
+
+    pub(super) const fn facts(&self) -> Option<&'static Facts> {
+        self.facts
+    }
+
+    /// Returns the velocity of the output shaft.
+    #[inline]
+    pub(super) fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(f32::from(self.feedback.rpm()) * self.rad_per_s_per_rpm)
+    }
+
+    // Feedback.
+
+    /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
+    /// returns `false`. A motor that is not online, and a free slot, trust no gap.
+    #[inline]
+    pub(super) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
+        let in_time = self.guard.is_in_time(now);
+        if in_time {
+            self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
+            self.feedback = feedback;
+            self.guard.hear_in_time(now);
+        }
+        in_time
+    }
+
+    // Targets.
+
+    /// Takes rad/s of the output shaft.
+    #[inline]
+    pub(super) fn set_velocity(&mut self, rad_per_s: f32, now: u32) -> Result<(), TargetError> {
+        self.admit(rad_per_s.is_finite())?;
+        needs(&self.speed)?;
+        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
+        Ok(())
+    }
+
+    /// Takes turns and angle of the output shaft.
+    pub(super) fn set_position(&mut self, position: Position, now: u32) -> Result<(), TargetError> {
+        self.admit(position.is_finite())?;
+        needs(&self.position)?;
+        let (turns, phase) = self.shaft.locate(self.inside(position));
+        let goal = Goal { turns: self.shaft.near(turns), value: phase };
+        self.start(Action::Position, goal, now);
+        Ok(())
+    }
+
+    /// Returns the nearest position that is within the soft limits.
+    fn inside(&self, position: Position) -> Position {
+        let Some((lower, upper)) = self.health.soft_limits else { return position };
+        let radians = position.as_angle().as_radians();
+        if radians < lower {
+            Position::from_angle(Angle::from_radians(lower))
+        } else if radians > upper {
+            Position::from_angle(Angle::from_radians(upper))
+        } else {
+            position
+        }
+    }
+
+    /// Tells whether a target may be taken; where not, the one before may be over.
+    #[inline]
+    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        match self.guard.admit(is_finite) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.refuse(error)),
+        }
+    }
+
+    #[inline]
+    fn start(&mut self, action: Action, goal: Goal, now: u32) {
+        self.goal = goal;
+        if self.asked == action {
+            self.guard.renew_target(now);
+        } else {
+            self.start_anew(action, now);
+        }
+    }
+
+    // Update.
+
+    /// Tells at a glance whether all is well, as it is nearly always: online, cool, turning, moderately driven, nothing
+    /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
+    #[inline]
+    pub(super) fn is_well(&mut self, word: i16) -> bool {
+        let (feedback, driven) = (self.feedback, i32::from(word));
+        let Some(facts) = self.facts else { return true };
+        let (calm, fastest) = (i32::from(self.calm_word), i32::from(facts.rotor_rpm));
+        feedback.error_and_temperature() < u32::from(self.cool_below)
+            && is_within(driven, calm)
+            && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
+            && is_within(feedback.rpm().into(), fastest)
+            && self.monitor.glance(feedback.angle(), coarse(word))
+    }
+
+    /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
+    /// stays in registers, because nobody else gets to see it.
+    #[inline]
+    pub(super) fn update(&mut self, plain: &TimeStep, step: &TimeStep, sent: &Outbox) -> i16 {
+        let velocity = self.velocity().as_rad_per_s();
+        let goal = match self.duty {
+            Duty::Velocity => self.goal.rad_per_s(),
+            Duty::Position => {
+                let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
+                let input = Input::Given { error: way, rate: velocity };
+                match self.position.step_plain(input, plain) {
+                    Ok(goal) => goal,
+                    Err(_) => return self.update_carefully(step, sent),
+                }
+            }
+            Duty::Raw => return saturate(self.goal.raw(), self.range),
+            // Out of line too: a zero for these would be loaded in every update of every motor.
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
+        };
+        let input = Input::Measured { setpoint: goal, measurement: velocity };
+        match self.speed.step_plain(input, plain) {
+            Ok(output) => free_to_raw(output, self.raw_per_unit),
+            Err(_) => self.follow_velocity(goal, velocity, step),
+        }
+    }
+
+    // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
+    #[cold]
+    #[inline(never)]
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
+        let output = self.speed.step(goal, velocity, step);
+        loop_to_raw(output, self.raw_per_unit, self.range)
+    }
+}
+
+/// Tells a loop from [`NO_LOOP`], the only one without limits.
+#[inline]
+const fn is_loop(pid: &Pid) -> bool {
+    pid.is_limited()
+}
+
+fn needs(pid: &Pid) -> Result<(), TargetError> {
+    if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
+}
+
+/// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.
+const fn is_within(value: i32, limit: i32) -> bool {
+    (value + limit).cast_unsigned() < 2 * limit.cast_unsigned()
+}
+
+/// A command in units of 256.
+const fn coarse(word: i16) -> i8 {
+    let [high, _] = word.to_be_bytes();
+    high.cast_signed()
+}
