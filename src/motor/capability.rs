@@ -154,6 +154,6 @@ mod tests {
             assert_eq!(set.to_string(), one.to_string());
         }
         assert_eq!(Capabilities::default().to_string(), "nothing");
-        assert_eq!(Capability::ALL.iter().filter(|it| it.is_target()).count(), 7);
+        assert_eq!(Capability::ALL.iter().filter(|it| it.is_target()).count(), 8);
     }
 }
