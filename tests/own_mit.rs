@@ -13,8 +13,7 @@ use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, StandardId};
 use proptest::prelude::*;
 
-#[expect(dead_code, reason = "the example's own main and simulation")]
-#[path = "../examples/mit_motor.rs"]
+#[path = "mit_motor/mod.rs"]
 mod mit_motor;
 use mit_motor::J4310;
 
@@ -517,9 +516,11 @@ fn an_angle_starts_from_where_the_shaft_is() {
 
 /// The torque that the drive applies where it answers with these counts of position and velocity.
 fn asked_nm(read: Read, position: u16, velocity: u16) -> f64 {
-    let Read::Command { position_rad: wanted_rad, velocity_rad_per_s, kp, kd, torque_nm } = read
-    else {
-        panic!("{read:?}")
+    let (wanted_rad, velocity_rad_per_s, kp, kd, torque_nm) = match read {
+        Read::Enable | Read::Disable => return 0.0, // it follows rest
+        Read::Command { position_rad, velocity_rad_per_s, kp, kd, torque_nm } => {
+            (position_rad, velocity_rad_per_s, kp, kd, torque_nm)
+        }
     };
     let measured = f64::from(velocity) * 60.0 / 4_095.0 - 30.0;
     kp * (wanted_rad - position_rad(position)) + kd * (velocity_rad_per_s - measured) + torque_nm

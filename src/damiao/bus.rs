@@ -43,6 +43,7 @@ const CHECKED: [Register; 4] = [
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, [
 ///     "command of DM-H6215 #2 on 0x202",
+///     "command of DM-H6215 #2 on 0x2", // enabling and disabling
 ///     "command of DM-H6215 #2 on 0x7FF", // registers: shared by all drives
 ///     "feedback of DM-H6215 #2 on 0x10",
 /// ]);
@@ -58,6 +59,8 @@ pub struct Motor<M> {
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     settings: Settings<Register, { CHECKED.len() }>,
+    /// The next enabling or disabling frame goes to the bare id.
+    is_bare: bool,
     /// The drive has confirmed its time-out since it was disabled.
     is_timeout_set: bool,
 }
@@ -80,6 +83,7 @@ impl<M: Mode> Motor<M> {
             mode,
             drive: None,
             settings: Settings::new(CHECKED),
+            is_bare: false,
             is_timeout_set: false,
         })
     }
@@ -89,7 +93,7 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// [`ConfigError::MasterId`] for another id, and for that of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
-        if master_id > 0x7FE || master_id == self.command_id() {
+        if master_id > 0x7FE || [self.command_id(), self.id.into()].contains(&master_id) {
             return Err(ConfigError::MasterId(master_id));
         }
         Ok(Self { master_id, ..self })
@@ -153,12 +157,8 @@ impl<M: Mode> Motor<M> {
         <M as sealed::Mode>::BASE + self.id as u16
     }
 
-    fn frame(&self, data: [u8; 8]) -> CanFrame {
-        CanFrame::of(standard(self.command_id()), data)
-    }
-
     fn frame_of(&self, command: Command) -> CanFrame {
-        self.frame(command.encode(self.model.ranges()))
+        CanFrame::of(standard(self.command_id()), command.encode(self.model.ranges()))
     }
 
     /// Returns the value that a register has to have.
@@ -187,11 +187,12 @@ impl<M: Mode> OwnMotor for Motor<M> {
     /// All drives of the family share the id of the registers.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let claim = |id, role| Claim::new(standard(id), role, self.name());
-        [
-            claim(self.command_id(), Role::Command),
+        let bare = (<M as sealed::Mode>::BASE > 0).then(|| claim(self.id.into(), Role::Command));
+        let shared = [
             claim(REGISTERS, Role::Command).shared(),
             claim(self.master_id, Role::Feedback).shared(),
-        ]
+        ];
+        [claim(self.command_id(), Role::Command)].into_iter().chain(bare).chain(shared)
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
@@ -228,7 +229,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn control(&mut self, order: Order) -> CanFrame {
         let command = self.drive.and_then(|drive| self.mode.command(order, &drive, &self.model));
-        command.map_or_else(|| self.off(), |command| self.frame_of(command))
+        match command {
+            Some(command) => self.frame_of(command),
+            None => self.rest(),
+        }
     }
 
     fn reset(&mut self) {
@@ -245,12 +249,12 @@ impl<M: Mode> OwnMotor for Motor<M> {
             let timeout = Inquiry::Write(Register::Timeout, self.expected(Register::Timeout));
             return Some(inquiry(self.id, self.settings.ask(timeout)));
         }
-        Some(self.frame(mit::ENABLE))
+        Some(self.special(mit::ENABLE))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.is_timeout_set = false;
-        <M as sealed::Mode>::REST.map(|_| self.off())
+        <M as sealed::Mode>::REST.is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
@@ -316,9 +320,17 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
 impl<M: Mode> Motor<M> {
     /// Disables the drive; where it reports an error, clears that, which leaves it disabled.
-    fn off(&self) -> CanFrame {
+    fn off(&mut self) -> CanFrame {
         let has_error = self.drive.is_some_and(|drive| drive.status.is_error());
-        self.frame(if has_error { CLEAR_ERROR } else { mit::DISABLE })
+        self.special(if has_error { CLEAR_ERROR } else { mit::DISABLE })
+    }
+
+    /// Sends a frame that enables or disables to the id of the mode and to the bare id in turn: programs of the vendor use the one,
+    /// three public packages the other.
+    fn special(&mut self, data: [u8; 8]) -> CanFrame {
+        self.is_bare = !self.is_bare;
+        let id = if self.is_bare { self.command_id() } else { self.id.into() };
+        CanFrame::of(standard(id), data)
     }
 }
 

@@ -5,7 +5,7 @@
 //!            0x100 + id  position-velocity   position f32 | velocity limit f32
 //!            0x200 + id  velocity            velocity f32
 //!            0x300 + id  force-position      position f32 | velocity limit u16 | current share u16
-//!            the same    enable, disable, clear error: seven times 0xFF, and 0xFC, 0xFD, 0xFB
+//!            the same, and id alone: enable, disable, clear error: seven times 0xFF, and 0xFC, 0xFD, 0xFB
 //! registers  0x7FF       id 16 | read 0x33, write 0x55, store 0xAA | number | value
 //! feedback   master id   status 4 | id 4 | position 16 | velocity 12 | torque 12 bits | two temperatures
 //! ```
@@ -44,7 +44,8 @@
 //! Sources: the register table and frames as python-damiao-driver (damiao-motor 1.0.6) documents them, which agree with librm and
 //! reBot; the master id, the time-out and the states also from the manual of the DM-J4310-2EC. Frames of public tests are in
 //! `tests/data/wire`. Not known: how a drive behaves that is enabled without a target in the modes other than MIT; so a target
-//! where the shaft stands goes first. Enabling frames go to the id of the mode; some drivers send them to the bare id.
+//! where the shaft stands goes first. Programs of the vendor send enabling and disabling frames to
+//! the id of the mode, public packages to the bare id: here they go to both in turn.
 
 mod bus;
 mod command;

@@ -8,14 +8,14 @@ use crate::wire::mit::Ranges;
 /// A model of motor: its name and the ranges of its fields, which are registers of the drive.
 ///
 /// The torques and speeds of the ranges are those of the protocol, not of the motor: what a motor bears is the
-/// [limit](super::Config::new) that a program states.
+/// limit that a program states with its mode.
 ///
 /// | model | PMAX rad | VMAX rad/s | TMAX Nm | seen in |
 /// |---|--:|--:|--:|---|
 /// | [`J3507`](Self::J3507) | 12.566 | 50 | 5 | damiao-motor, Seeed |
 /// | [`J4310`](Self::J4310) | 12.5 | 30 | 10 | damiao-motor, reBot, Seeed |
 /// | [`J4310P`](Self::J4310P) | 12.5 | 50 | 10 | damiao-motor |
-/// | [`J4340`](Self::J4340) | 12.5 | 8 | 28 | Seeed; damiao-motor has 10 rad/s |
+/// | [`J4340`](Self::J4340) | 12.5 | 10 | 28 | damiao-motor, motorbridge, can-motor-control; Seeed has 8 rad/s |
 /// | [`J4340P`](Self::J4340P) | 12.5 | 10 | 28 | damiao-motor, reBot |
 /// | [`J6006`](Self::J6006) | 12.5 | 45 | 20 | damiao-motor, Seeed |
 /// | [`J8006`](Self::J8006) | 12.5 | 45 | 40 | damiao-motor, Seeed |
@@ -62,7 +62,7 @@ models! {
     J3507 "DM-J3507" 12.566 50.0 5.0,
     J4310 "DM-J4310" 12.5 30.0 10.0,
     J4310P "DM-J4310P" 12.5 50.0 10.0,
-    J4340 "DM-J4340" 12.5 8.0 28.0,
+    J4340 "DM-J4340" 12.5 10.0 28.0,
     J4340P "DM-J4340P" 12.5 10.0 28.0,
     J6006 "DM-J6006" 12.5 45.0 20.0,
     J8006 "DM-J8006" 12.5 45.0 40.0,

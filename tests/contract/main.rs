@@ -2,7 +2,6 @@
 //! motors on pins; and the check finds devices that do not.
 
 #![cfg(test)]
-#![expect(clippy::duplicate_mod, reason = "each example brings its own output")]
 
 mod careless;
 mod damiao;

@@ -5,8 +5,7 @@ use drivetrain::motor::AngleDrive;
 use drivetrain::units::Angle;
 use drivetrain::wire::mit;
 
-#[expect(dead_code, reason = "the example's own main and simulation")]
-#[path = "../../examples/mit_motor.rs"]
+#[path = "../mit_motor/mod.rs"]
 mod mit_motor;
 use mit_motor::J4310;
 

@@ -50,14 +50,20 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let left = self.look(tick.now());
         let drives = self.guard.drives(tick.now());
         let may_drive = drives && !(step.is_hold() && self.held.is_none());
+        self.has_posted = false;
         self.switch(may_drive, tick.now());
-        self.inquire(tick.now());
+        let inquiry = self.inquire(tick.now());
+        let is_at_rest = !may_drive || !self.power.is_ready();
         let command = self.act(may_drive, step, left);
-        self.offer(command);
+        // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
+        let has_other = self.has_posted || inquiry.is_some();
+        let gives_way = is_at_rest && self.has_rested && has_other;
+        self.offer(if gives_way { inquiry } else { command });
+        self.has_rested = is_at_rest && !gives_way;
     }
 
     fn next_frame(&mut self) -> Option<CanFrame> {
-        self.switching.take().or_else(|| self.inquiry.take()).or_else(|| self.command.take())
+        self.switching.take().or_else(|| self.command.take())
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if it is still wanted.
@@ -168,19 +174,20 @@ impl<M: OwnMotor> Own<M> {
         self.motor.forget_settings();
     }
 
-    /// Asks the drive for its settings as long as it is to be disabled.
-    fn inquire(&mut self, now: Instant) {
+    /// Returns a question for a setting, in the place of a frame of rest that was sent before: so no update has more frames, and
+    /// none that is not disabled is asked.
+    fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
         if self.guard.link() == Link::Offline {
             self.motor.forget_settings();
         }
+        let is_idle = !self.power.is_on() && !self.has_posted && self.has_rested;
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
-        if self.power.is_on() || !is_due {
-            return;
+        if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
+            return None;
         }
         self.inquired = now;
-        let inquiry = self.motor.inquire();
-        self.asked = inquiry;
-        self.replace(|own| &mut own.inquiry, inquiry);
+        self.asked = self.motor.inquire();
+        self.asked
     }
 
     /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
@@ -235,6 +242,7 @@ impl<M: OwnMotor> Own<M> {
     /// Offers a frame for the drive's power, instead of the one before.
     fn post(&mut self, frame: Option<CanFrame>) {
         self.switched = frame;
+        self.has_posted = frame.is_some();
         self.replace(|own| &mut own.switching, frame);
     }
 

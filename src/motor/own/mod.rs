@@ -95,8 +95,11 @@ pub struct Own<M> {
     /// The frames that wait to be sent: one for the drive's power, and the command.
     switching: Option<CanFrame>,
     command: Option<CanFrame>,
-    /// The question for a setting that waits to be sent, and the time of the last one.
-    inquiry: Option<CanFrame>,
+    /// This update offers a frame for the drive's power.
+    has_posted: bool,
+    /// The last update offered a frame of rest.
+    has_rested: bool,
+    /// The time of the last question.
     inquired: Instant,
     /// The last question, sent or not.
     asked: Option<CanFrame>,
@@ -126,7 +129,8 @@ impl<M: OwnMotor> Own<M> {
             held: None,
             switching: None,
             command: None,
-            inquiry: None,
+            has_posted: false,
+            has_rested: false,
             asked: None,
             inquired: Instant::START,
             switched: None,

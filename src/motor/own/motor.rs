@@ -8,7 +8,7 @@ use crate::units::{Angle, AngularVelocity};
 /// A motor of your own: its ids, its frames and its loop.
 ///
 /// [`Own`](super::Own) makes a device of it, with everything that all motors have in common. The example `custom_motor` is a
-/// whole one, and `mit_motor` one whose drive is enabled first.
+/// whole one. The family [`damiao`](crate::damiao) is one whose drives are enabled and asked for settings first.
 pub trait OwnMotor {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;
@@ -83,8 +83,8 @@ pub trait OwnMotor {
     /// Returns the next frame that asks the drive for one of its settings, or writes one; `None`, unless said otherwise, for a
     /// drive without settings.
     ///
-    /// [`Own`](super::Own) calls this each 10 ms while the drive is to be disabled, so a setting is read before the motor is
-    /// armed and again before it is armed next. The answer comes to [`decode_answer`](Self::decode_answer).
+    /// [`Own`](super::Own) calls this each 10 ms while the drive is disabled, in the place of a frame of [rest](Self::rest) between
+    /// two others, so a setting is read before the motor is armed and again before it is armed next. The answer comes to [`decode_answer`](Self::decode_answer).
     fn inquire(&mut self) -> Option<CanFrame> {
         None
     }
