@@ -42,7 +42,7 @@ def once(frames):
 
 
 # The differences of commands and feedback that README.md explains, by their notes: all of them, and no other, have to be seen.
-OTHER_RANGES = "models with other ranges"
+OTHER_RANGES = "model(s) with other ranges"
 AVOIDED = "special frames avoided"
 BOUNDARY = "proved to be at a boundary between counts"
 NO_SINGLE = "of a range that is no f32"
@@ -51,8 +51,8 @@ OUTSIDE = "commands outside, which it refuses and gets at the end of the range"
 STATUS = "frames with a status that no drive has, refused by us"
 REGISTER = "frames that it takes for an answer about a register"
 EXPLAINED = {
-    ("damiao-motor", "mit"): {AVOIDED, BOUNDARY, NO_SINGLE},
-    ("damiao-motor", "feedback"): {STATUS},
+    ("damiao-motor", "mit"): {OTHER_RANGES, AVOIDED, BOUNDARY, NO_SINGLE},
+    ("damiao-motor", "feedback"): {OTHER_RANGES, STATUS},
     ("motorbridge", "mit"): {OTHER_RANGES, AVOIDED},
     ("motorbridge", "feedback"): {OTHER_RANGES, STATUS, REGISTER},
     ("can-motor-control", "mit"): {OTHER_RANGES, AVOIDED, BOUNDARY, NEAREST, OUTSIDE},
@@ -113,6 +113,9 @@ class Trial:
                 require(theirs == known, f"{model}: {theirs}, README.md has {known}")
                 require(not is_same, f"{model}: {ours} are the judge's, README.md has another")
                 self.note(OTHER_RANGES)
+                if self.judge.give_ranges:
+                    self.judge.give_ranges(model, ours)
+                    common.append((model, ours, ours))
             else:
                 require(is_same, f"{model}: {ours}, {self.judge.name} has {theirs}")
                 common.append((model, ours, theirs))

@@ -49,8 +49,9 @@ class Master:
     is_single = False
     #: Its name of each of our models.
     models = {}
-    #: Models that have other ranges with this judge, PMAX, VMAX and TMAX, and cannot be given ours.
+    #: Models that have other ranges with this judge: its PMAX, VMAX and TMAX. They are compared if it can be given ours.
     other_ranges = {}
+    give_ranges = None
     #: The ranges by which it decodes feedback, where it has one set for all models.
     feedback_model = None
     #: Whether fields outside their range are refused instead of saturated.
@@ -105,8 +106,7 @@ class DamiaoMotor(Master):
         "DM-H3510": "H3510",
         "DM-H6215": "G6215",
     }
-    #: It has 10 rad/s for the 4340, and takes ours.
-    given_ranges = {"DM-J4340": (12.5, 8.0, 28.0)}
+    other_ranges = {"DM-J4340": (12.5, 10.0, 28.0)}
 
     def __init__(self):
         super().__init__()
@@ -116,13 +116,13 @@ class DamiaoMotor(Master):
         self.table = {
             number: (info.data_type, info.access) for number, info in motor.REGISTER_TABLE.items()
         }
-        self.statuses = set(motor._STATE_NAME_MAP)
+        self.presets = motor.MOTOR_TYPE_PRESETS
         self.queue = []
         with contextlib.redirect_stderr(io.StringIO()):
             self.controller = DaMiaoController(channel="judges", bustype="virtual")
         self.controller.bus.shutdown()
         self.controller.bus = self
-        self.motors = {}
+        self.motors, self.given = {}, {}
 
     # The bus, as python-can has it.
     def send(self, message):
@@ -144,19 +144,20 @@ class DamiaoMotor(Master):
         if key not in self.motors:
             # One with this id at a time: the controller tells them apart by it.
             self.controller.motors.pop(identifier, None)
-            ranges = {}
-            if model in self.given_ranges:
-                p, v, t = self.given_ranges[model]
-                ranges = dict(p_min=-p, p_max=p, v_min=-v, v_max=v, t_min=-t, t_max=t)
             self.motors[key] = self.controller.add_motor(
-                identifier, identifier + 0x10, self.models[model], **ranges
+                identifier, identifier + 0x10, self.models[model], **self.given.get(model, {})
             )
         return self.motors[key]
 
+    def give_ranges(self, model, ranges):
+        p, v, t = ranges
+        self.given[model] = dict(p_min=-p, p_max=p, v_min=-v, v_max=v, t_min=-t, t_max=t)
+        self.motors.pop((model, 1), None)
+
     def ranges(self, model):
-        motor = self.motor(model)
-        assert (motor._p_min, motor._v_min, motor._t_min) == (-motor._p_max, -motor._v_max, -motor._t_max)
-        return motor._p_max, motor._v_max, motor._t_max
+        preset = self.presets[self.models[model]]
+        assert all(preset[f"{name}_min"] == -preset[f"{name}_max"] for name in "pvt")
+        return tuple(preset[f"{name}_max"] for name in "pvt")
 
     def encode(self, model, values):
         encode = self.motor(model).encode_cmd_msg
