@@ -25,7 +25,7 @@ DEFECTS = [
     ("ingest", "targets never grow old", "src/motor/safety/motor.rs",
      "self.has_target && !is_near(now, self.commanded, timeouts.command_us())", "false"),
     ("ingest", "an angle of 8192 is taken", "src/dji/feedback.rs",
-     "| (motion >> 29)", "| (motion.saturating_sub(1 << 16) >> 29)"),
+     "(motion >> 29) |", "(motion.saturating_sub(1 << 16) >> 29) |"),
     ("ingest", "a bad length is not counted", "src/dji/bus.rs",
      "self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);", ""),
     ("ingest", "a motor that leaves stays in its frame", "src/dji/attach.rs",

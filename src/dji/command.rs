@@ -192,6 +192,20 @@ impl Words {
     const ZERO: Self = Self([[[0; 2]; 4]; 8]);
 }
 
+/// Which frames wait (are *dirty*), and which of them come before the others, because their turn is next: none when all were
+/// taken. Side by side, so that one load tells whether there is anything.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(2))]
+struct Waiting([u8; 2]);
+
+impl Waiting {
+    const NONE: Self = Self([0; 2]);
+
+    const fn is_none(self) -> bool {
+        u16::from_le_bytes(self.0) == 0
+    }
+}
+
 /// The command words, and which frames wait.
 ///
 /// A frame waits (is *dirty*) after an update that left it a non-zero word, or that turned its last one to zero;
@@ -203,9 +217,7 @@ pub(super) struct Outbox {
     ever_used: u8,
     /// Had a word that was not zero in the last update, or has to be sent with the next one all the same.
     active: u8,
-    dirty: u8,
-    /// The frames that come before the others, because their turn is next; 0 when all were taken.
-    ahead: u8,
+    waiting: Waiting,
     /// A frame was refused or evicted since the last update.
     came_back: bool,
     keep_alive_us: u32,
@@ -221,8 +233,7 @@ impl Outbox {
             in_use: 0,
             ever_used: 0,
             active: 0,
-            dirty: 0,
-            ahead: 0,
+            waiting: Waiting::NONE,
             came_back: false,
             keep_alive_us: 10_000,
             kept_alive: 0,
@@ -314,36 +325,39 @@ impl Outbox {
     #[inline]
     fn mark(&mut self, frames: u8) {
         self.packed = self.packed.wrapping_add(ones(frames));
-        if self.dirty | self.ahead != 0 {
+        if self.waiting.is_none() {
+            self.waiting.0[0] = frames;
+        } else {
             self.keep_turns(frames);
         }
-        self.dirty |= frames;
     }
 
     /// Frames still wait, or one came back: there are turns to be kept until all were taken, so that none starves.
     #[cold]
     #[inline(never)]
     fn keep_turns(&mut self, frames: u8) {
-        self.superseded = self.superseded.wrapping_add(ones(frames & self.dirty));
+        let [dirty, mut ahead] = self.waiting.0;
+        self.superseded = self.superseded.wrapping_add(ones(frames & dirty));
         let came_back = core::mem::take(&mut self.came_back);
-        if self.dirty == 0 && !came_back {
-            self.ahead = 0;
-        } else if self.ahead == 0 {
-            self.ahead = self.dirty | self.dirty.wrapping_neg();
+        if dirty == 0 && !came_back {
+            ahead = 0;
+        } else if ahead == 0 {
+            ahead = dirty | dirty.wrapping_neg();
         }
+        self.waiting.0 = [dirty | frames, ahead];
     }
 
     /// Takes the next waiting frame: in the order of their index as long as each update finds that all were taken, and
     /// otherwise in turns.
     #[inline]
     pub(super) fn next(&mut self) -> Option<CanFrame> {
-        let waiting = self.dirty;
-        if waiting == 0 {
+        let dirty = self.waiting.0[0];
+        if dirty == 0 {
             return None;
         }
-        let index = if self.ahead == 0 {
-            self.dirty = waiting & (waiting - 1);
-            waiting.trailing_zeros() & 7
+        let index = if self.waiting.0[1] == 0 {
+            self.waiting.0[0] = dirty & (dirty - 1);
+            dirty.trailing_zeros() & 7
         } else {
             self.next_in_turn()
         };
@@ -359,11 +373,11 @@ impl Outbox {
     #[cold]
     #[inline(never)]
     fn next_in_turn(&mut self) -> u32 {
-        let ahead = self.dirty & self.ahead;
-        let index = if ahead == 0 { self.dirty } else { ahead }.trailing_zeros() & 7;
+        let [dirty, ahead] = self.waiting.0;
+        let first = dirty & ahead;
+        let index = if first == 0 { dirty } else { first }.trailing_zeros() & 7;
         let bit = 1_u8 << index;
-        self.dirty &= !bit;
-        self.ahead = (bit << 1).wrapping_neg();
+        self.waiting.0 = [dirty & !bit, (bit << 1).wrapping_neg()];
         index
     }
 
@@ -374,7 +388,7 @@ impl Outbox {
             Some(frame) if self.ever_used & frame.bit() != 0 => {
                 self.active |= frame.bit();
                 self.superseded = self.superseded.wrapping_add(1);
-                self.ahead = frame.bit().wrapping_neg();
+                self.waiting.0[1] = frame.bit().wrapping_neg();
                 self.came_back = true;
                 true
             }

@@ -68,7 +68,8 @@ impl Feedback {
         let words = u64::from_le_bytes(*frame.bytes());
         #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
         let (motion, condition) = ((words as u32).swap_bytes(), (words >> 32) as u32);
-        let unusual = frame.missing() as u32 | (motion >> 29) | (condition >> 24);
+        // Where the id is that of a motor, the compiler knows that the frame is whole.
+        let unusual = !frame.is_whole() as u32 | (motion >> 29) | (condition >> 24);
         if unusual != 0 {
             return None;
         }

@@ -26,9 +26,8 @@ pub(super) struct Rounds {
     window: u16,
     /// The length of the round before.
     elapsed: u8,
-    /// Whose turn it is.
+    /// Whose turn it is; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
     pub(super) next: u8,
-    pub(super) closes_window: bool,
     has_begun: bool,
     /// Frames that are sent are heard again.
     echoes: bool,
@@ -42,21 +41,26 @@ impl Rounds {
         window: 0,
         elapsed: 0,
         next: 0,
-        closes_window: false,
         has_begun: false,
         echoes: false,
     };
 
+    /// In a round that ends a window each motor is looked at closely: no slot has such a number, so nobody asks for it.
+    const CLOSING: u8 = 0x80;
+
+    /// Returns the length of the window that ends in this round, if one does.
+    const fn window(&self) -> Option<u16> {
+        if self.next & Self::CLOSING != 0 { Some(self.window) } else { None }
+    }
+
     /// A new round begins: one tick for each place, and one for this.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn begin(&mut self, now: u32) {
-        self.next = 0;
+    fn begin(&mut self, now: u32) {
         self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
         self.begun = now;
         let elapsed = now.wrapping_sub(self.window_from);
-        self.closes_window = self.has_begun && elapsed >= WINDOW_US;
-        if self.closes_window || !self.has_begun {
+        let closes_window = self.has_begun && elapsed >= WINDOW_US;
+        self.next = if closes_window { Self::CLOSING } else { 0 };
+        if closes_window || !self.has_begun {
             self.window = u16::try_from(elapsed >> 10).unwrap_or(u16::MAX);
             self.window_from = now;
             self.has_begun = true;
@@ -145,13 +149,28 @@ impl<B> Bus<B> {
         })
     }
 
+    /// Looks at a motor in a round that ends a window, or begins a round.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn check_without_glance(&mut self) {
+        let motor = self.rounds.next & !Rounds::CLOSING;
+        match self.slots.get(usize::from(motor)) {
+            Some(slot) => {
+                let word = self.outbox.get(slot.place);
+                self.rounds.next += 1;
+                self.check_closely(motor, word);
+            }
+            None => self.rounds.begin(self.guard.now()),
+        }
+    }
+
     #[inline(never)]
     pub(super) fn check_closely(&mut self, motor: u8, word: i16) {
         let look = Look {
             now: self.guard.now(),
             elapsed: self.rounds.elapsed,
             word,
-            window: self.rounds.closes_window.then_some(self.rounds.window),
+            window: self.rounds.window(),
             feedback_hz: self.budget.feedback_hz,
             is_alone: self.guard.now().wrapping_sub(self.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
         };

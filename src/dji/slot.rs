@@ -203,7 +203,6 @@ impl Slot {
     pub(super) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
         let in_time = self.guard.is_in_time(now);
         if in_time {
-            self.traffic.count();
             self.shaft.advance(shortest(self.feedback.angle(), feedback.angle()));
             self.feedback = feedback;
             self.guard.hear_in_time(now);

@@ -141,7 +141,10 @@ impl Shaft {
         // One comparison for both ends: below zero is far above, unsigned.
         if next.cast_unsigned() < turn.cast_unsigned() {
             self.phase = next;
-        } else if next < 0 {
+            return;
+        }
+        seldom();
+        if next < 0 {
             self.phase = next.wrapping_add(turn);
             self.turns = self.turns.add(-1);
         } else {
@@ -252,6 +255,11 @@ impl Shaft {
         way as f32 * self.radians_per_fine
     }
 }
+
+/// Says that a way is seldom taken: its code stands behind that of the other.
+#[cold]
+#[inline]
+const fn seldom() {}
 
 /// Returns 63 turns in the direction of `way`; seldom, and so out of the line of [`Shaft::way_to`].
 #[cold]

@@ -21,24 +21,58 @@
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-const EXTENDED: u32 = 1 << 31;
+const EXTENDED: u32 = 1 << 29;
 const REMOTE: u32 = 1 << 30;
+/// Bytes are missing: one comparison tells a whole standard data frame from all others.
+const SHORT: u32 = 1 << 31;
 const ID_MASK: u32 = 0x1FFF_FFFF;
+
+/// 0 to 8. The compiler knows that there is no other, so that no frame and a frame take the same room.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+enum Length {
+    L0,
+    L1,
+    L2,
+    L3,
+    L4,
+    L5,
+    L6,
+    L7,
+    L8,
+}
+
+impl Length {
+    const fn new(length: usize) -> Option<Self> {
+        Some(match length {
+            0 => Self::L0,
+            1 => Self::L1,
+            2 => Self::L2,
+            3 => Self::L3,
+            4 => Self::L4,
+            5 => Self::L5,
+            6 => Self::L6,
+            7 => Self::L7,
+            8 => Self::L8,
+            _ => return None,
+        })
+    }
+}
 
 /// A classic CAN data or remote frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
-    header: u32,
+    /// Id and flags; [`SHORT`] unless there are 8 bytes.
+    key: u32,
     data: [u8; 8],
-    /// How many of the 8 bytes are not there: none of a full frame, which so is told together with other bits.
-    missing: u8,
+    length: Length,
 }
 
 impl CanFrame {
     /// Builds a standard data frame of 8 bytes; `None` for an id above `0x7FF`.
     #[must_use]
     pub const fn standard(id: u16, data: [u8; 8]) -> Option<Self> {
-        if id <= 0x7FF { Some(Self { header: id as u32, data, missing: 0 }) } else { None }
+        if id <= 0x7FF { Some(Self { key: id as u32, data, length: Length::L8 }) } else { None }
     }
 
     /// Builds a data frame of up to 8 bytes. An array of more than 8 bytes does not compile.
@@ -59,13 +93,17 @@ impl CanFrame {
     #[must_use]
     pub fn of<const N: usize>(id: impl Into<Id>, data: [u8; N]) -> Self {
         const { assert!(N <= 8, "a classic CAN frame has at most 8 bytes") };
-        let mut frame = Self { header: header_of(id.into()), data: [0; 8], missing: 0 };
+        let length = const {
+            match Length::new(N) {
+                Some(length) => length,
+                None => Length::L8, // refused above
+            }
+        };
+        let mut frame = Self { key: key_of(header_of(id.into()), length), data: [0; 8], length };
         for (place, byte) in frame.data.iter_mut().zip(data) {
             *place = byte;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
-        let missing = const { (8 - N) as u8 };
-        Self { missing, ..frame }
+        frame
     }
 
     /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
@@ -93,7 +131,7 @@ impl CanFrame {
     /// For a standard data frame, and only for that, it is at most `0x7FF`: one comparison tells all three.
     #[must_use]
     pub const fn header(&self) -> u32 {
-        self.header
+        self.key & !SHORT
     }
 
     /// Returns all 8 data bytes; those beyond the length are zero.
@@ -105,45 +143,50 @@ impl CanFrame {
     /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
     #[must_use]
     pub const fn length(&self) -> u8 {
-        8 - self.missing
+        self.length as u8
     }
 
-    /// Returns how many of the 8 data bytes are not there.
-    pub(crate) const fn missing(&self) -> u8 {
-        self.missing
+    /// Returns the [header](Self::header) of a frame of 8 bytes. It is another one for frames with fewer, and above `0x7FF`.
+    #[inline]
+    pub(crate) const fn key(&self) -> u32 {
+        self.key
     }
 
     /// Tells whether this is a standard data frame of 8 bytes.
     #[inline]
     pub(crate) const fn is_whole(&self) -> bool {
-        self.header <= 0x7FF && self.missing == 0
+        self.key <= 0x7FF
     }
 
     /// [`Frame::is_remote_frame`], for `const` code.
     pub(crate) const fn is_remote(&self) -> bool {
-        self.header & REMOTE != 0
+        self.key & REMOTE != 0
     }
 
     /// [`Frame::is_extended`], for `const` code.
     pub(crate) const fn has_extended_id(&self) -> bool {
-        self.header & EXTENDED != 0
+        self.key & EXTENDED != 0
     }
 
     #[inline]
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
         match data.try_into() {
-            Ok(data) => Some(Self { header, data, missing: 0 }),
+            Ok(data) => Some(Self { key: header, data, length: Length::L8 }),
             Err(_) => Self::shorter(header, data),
         }
     }
 
     #[inline(never)]
     fn shorter(header: u32, data: &[u8]) -> Option<Self> {
-        let missing = u8::try_from(8_usize.checked_sub(data.len())?).ok()?;
-        let mut frame = Self { header, data: [0; 8], missing };
+        let length = Length::new(data.len())?;
+        let mut frame = Self { key: key_of(header, length), data: [0; 8], length };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
         Some(frame)
     }
+}
+
+const fn key_of(header: u32, length: Length) -> u32 {
+    if matches!(length, Length::L8) { header } else { header | SHORT }
 }
 
 fn header_of(id: Id) -> u32 {
@@ -159,8 +202,9 @@ impl Frame for CanFrame {
     }
 
     fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
-        let missing = u8::try_from(8_usize.checked_sub(dlc)?).ok()?;
-        Some(Self { header: header_of(id.into()) | REMOTE, data: [0; 8], missing })
+        let length = Length::new(dlc)?;
+        let key = key_of(header_of(id.into()) | REMOTE, length);
+        Some(Self { key, data: [0; 8], length })
     }
 
     fn is_extended(&self) -> bool {
@@ -177,10 +221,10 @@ impl Frame for CanFrame {
                 clippy::cast_possible_truncation,
                 reason = "at most 0x7FF, and a flag above the lower half"
             )]
-            let raw = self.header as u16;
+            let raw = self.key as u16;
             return Id::Standard(StandardId::new(raw).unwrap_or(StandardId::ZERO));
         }
-        Id::Extended(ExtendedId::new(self.header & ID_MASK).unwrap_or(ExtendedId::ZERO))
+        Id::Extended(ExtendedId::new(self.key & ID_MASK).unwrap_or(ExtendedId::ZERO))
     }
 
     fn dlc(&self) -> usize {
@@ -210,7 +254,13 @@ impl core::fmt::Debug for CanFrame {
 #[cfg(feature = "defmt")]
 impl defmt::Format for CanFrame {
     fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u32:03X} [{=u8}] {=[u8]:02X}", self.header, self.length(), self.data());
+        defmt::write!(
+            f,
+            "{=u32:03X} [{=u8}] {=[u8]:02X}",
+            self.header(),
+            self.length(),
+            self.data()
+        );
     }
 }
 

@@ -221,6 +221,7 @@ impl Slot {
     fn close_window(&mut self, window: u16, feedback_hz: u32) {
         let was_crowded = self.traffic.is_crowded();
         let double = self.traffic.is_double();
+        self.traffic.add(self.guard.take_in_time());
         self.traffic.close(window, feedback_hz);
         if self.traffic.is_crowded() {
             // Every frame is compared from now on.

@@ -1,5 +1,3 @@
-//! The checks of one motor: how often it is heard, and all that need not be looked at in every tick.
-
 use super::{Condition, HealthConfig, Latch};
 
 /// Returns a time between two looks as the checks take it.
@@ -322,6 +320,11 @@ impl Traffic {
     #[inline]
     pub(crate) const fn count(&mut self) {
         self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Counts frames that were counted elsewhere.
+    pub(crate) const fn add(&mut self, frames: u16) {
+        self.frames = self.frames.wrapping_add(frames);
     }
 
     /// Notes the time since the frame before, in µs.

@@ -1,6 +1,6 @@
 //! The rules of one motor.
 
-use super::stamp::{LONGEST_PAUSE_US, age, is_near};
+use super::stamp::{LONGEST_PAUSE_US, age, is_near, whole_ms};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
@@ -33,6 +33,11 @@ pub(crate) struct Known {
     pub(super) is_armed: bool,
 }
 
+/// Counts up to 32 767, which is 4 s of a bus full of one motor's frames. It is asked for each second; beyond, the gap would
+/// grow by 1 µs each time, for a minute at most: then the pause between two updates is too long for any age to be known.
+const COUNT_BITS: u32 = 15;
+const COUNT: u32 = (1 << COUNT_BITS) - 1;
+
 /// Decides whether one motor may be driven. See the [module](super) for its states.
 #[derive(Debug, Clone, Copy)]
 // In the order of use, so that neighbours are loaded and stored together.
@@ -40,8 +45,9 @@ pub(crate) struct Known {
 pub(crate) struct MotorGuard {
     /// When its feedback came last.
     pub(super) heard: u32,
-    /// Feedback that comes sooner after the one before needs no closer look; 0 unless online.
-    trusted_gap_us: u32,
+    /// Feedback that comes sooner after the one before needs no closer look: that gap in µs, 0 unless online, above
+    /// [`COUNT_BITS`] bits that count such feedback. Together they are one word to load and to store.
+    in_time: u32,
     /// When its target was set.
     pub(super) commanded: u32,
     pub(super) link: Link,
@@ -67,7 +73,7 @@ impl MotorGuard {
     /// A motor with feedback: disarmed, not heard.
     pub(crate) const NEW: Self = Self {
         heard: 0,
-        trusted_gap_us: 0,
+        in_time: 0,
         commanded: 0,
         link: Link::Unheard,
         arming: Arming::Disarmed,
@@ -156,18 +162,27 @@ impl MotorGuard {
     /// Tells whether feedback comes shortly after the one before, of a motor that is online.
     #[inline]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
-        now.wrapping_sub(self.heard) < self.trusted_gap_us
+        now.wrapping_sub(self.heard) < self.in_time >> COUNT_BITS
     }
 
     /// Notes feedback that is [in time](Self::is_in_time).
     #[inline]
     pub(crate) const fn hear_in_time(&mut self, now: u32) {
         self.heard = now;
+        self.in_time = self.in_time.wrapping_add(1);
+    }
+
+    /// Returns how often feedback was in time since this was asked last.
+    pub(crate) const fn take_in_time(&mut self) -> u16 {
+        let [low, high, ..] = (self.in_time & COUNT).to_le_bytes();
+        self.in_time &= !COUNT;
+        u16::from_le_bytes([low, high])
     }
 
     /// Sets which gap is short, as long as the motor is online.
     pub(crate) fn trust(&mut self, gap_us: u32) {
-        self.trusted_gap_us = if self.link == Link::Online { gap_us } else { 0 };
+        let gap_us = if self.link == Link::Online { gap_us.min(u32::MAX >> COUNT_BITS) } else { 0 };
+        self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
     }
 
     /// Notes feedback, whenever the one before came.
@@ -217,7 +232,7 @@ impl MotorGuard {
 
     fn set_late(&mut self) {
         self.link = Link::Late;
-        self.trusted_gap_us = 0;
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.interrupt();
     }
@@ -225,7 +240,7 @@ impl MotorGuard {
     /// The motor is lost: relaxed, and refuses targets until it is armed again or, where that is configured, is back.
     fn lose(&mut self) {
         self.link = Link::Offline;
-        self.trusted_gap_us = 0;
+        self.in_time &= COUNT;
         self.latch.set(Condition::Late, true);
         self.latch.set(Condition::Offline, true);
         if self.is_armed() {
@@ -379,13 +394,6 @@ impl MotorGuard {
         self.is_opening = self.is_opening && passed < whole;
         if self.is_opening { passed as f32 / whole as f32 } else { 1.0 }
     }
-}
-
-/// Whole milliseconds, at most 65 s.
-const fn whole_ms(time: Duration) -> u16 {
-    let millis = time.as_micros() / 1_000;
-    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
-    if millis < 65_000 { millis as u16 } else { 65_000 }
 }
 
 #[cfg(test)]
