@@ -10,6 +10,7 @@ mod bytes;
 mod closed_loop;
 mod constant_time;
 mod controllers;
+mod cycle;
 mod meter;
 mod rows;
 mod wiring;
@@ -25,6 +26,7 @@ fn main() -> ! {
         let (hash, frames) = closed_loop::run();
         hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
+        cycle::rows();
         rows::control();
         controllers::rows();
         rows::math();

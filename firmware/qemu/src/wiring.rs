@@ -66,28 +66,27 @@ impl Drive {
 
     /// Lets a period pass: new feedback waits, and the targets are set again.
     pub fn advance(&mut self) {
+        self.pass();
+        let (motors, targets) = (self.motors, self.targets);
+        ask(&mut self.bus, motors, targets);
+    }
+
+    /// As [`advance`](Self::advance), with the bus somewhere else.
+    pub fn advance_on(&mut self, bus: &mut Bus) {
+        self.pass();
+        ask(bus, self.motors, self.targets);
+    }
+
+    fn pass(&mut self) {
         self.now = self.now + PERIOD;
         self.angle = (self.angle + COUNTS) % 8192;
         for (id, frame) in (1..).zip(&mut self.frames) {
             *frame = feedback(id, self.angle, RPM);
         }
-        for motor in self.motors {
-            _ = match self.targets {
-                Targets::Speed => {
-                    self.bus.set_velocity(motor, AngularVelocity::from_rad_per_s(1.0))
-                }
-                Targets::HighSpeed => {
-                    self.bus.set_velocity(motor, AngularVelocity::from_rad_per_s(45.0))
-                }
-                Targets::Position => {
-                    let ahead =
-                        self.bus.state(motor).map_or(Position::ZERO, |state| state.position)
-                            + Angle::from_degrees(1.0);
-                    self.bus.set_position(motor, ahead)
-                }
-                Targets::FarPosition => self.bus.set_position(motor, Position::from_turns(-1000)),
-            };
-        }
+    }
+
+    pub fn frames(&self) -> &[CanFrame; MOTORS] {
+        &self.frames
     }
 
     pub fn hear(&mut self) {
@@ -99,6 +98,21 @@ impl Drive {
     /// Returns the arguments of a tick.
     pub fn parts(&mut self) -> (&mut Bus, &[CanFrame; MOTORS], Tick) {
         (&mut self.bus, &self.frames, Tick::new(self.now, 0.001))
+    }
+}
+
+fn ask(bus: &mut Bus, motors: [Handle<M3508>; MOTORS], targets: Targets) {
+    for motor in motors {
+        _ = match targets {
+            Targets::Speed => bus.set_velocity(motor, AngularVelocity::from_rad_per_s(1.0)),
+            Targets::HighSpeed => bus.set_velocity(motor, AngularVelocity::from_rad_per_s(45.0)),
+            Targets::Position => {
+                let ahead = bus.state(motor).map_or(Position::ZERO, |state| state.position)
+                    + Angle::from_degrees(1.0);
+                bus.set_position(motor, ahead)
+            }
+            Targets::FarPosition => bus.set_position(motor, Position::from_turns(-1000)),
+        };
     }
 }
 
