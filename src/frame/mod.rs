@@ -280,6 +280,8 @@ mod tests {
             let frame = CanFrame::new(standard(0x201), &bytes[..length]).unwrap();
             assert_eq!((frame.dlc(), frame.data()), (length, &bytes[..length]));
             assert!(frame.bytes()[length..].iter().all(|byte| *byte == 0));
+            assert_eq!((frame.header(), frame.is_whole()), (0x201, length == 8));
+            assert_eq!(frame.key() == frame.header(), length == 8);
             let remote = CanFrame::new_remote(standard(0x201), length).unwrap();
             assert_eq!((remote.dlc(), remote.data()), (length, &[][..]));
         }

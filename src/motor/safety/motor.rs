@@ -413,4 +413,22 @@ mod tests {
         at_once.open(at_ms(1));
         assert_eq!(at_once.share(at_ms(1)).to_bits(), 1.0_f32.to_bits());
     }
+
+    #[test]
+    fn feedback_in_time_is_counted_beside_the_gap_that_is_trusted() {
+        let mut motor = MotorGuard::NEW;
+        motor.hear(1_000, &Timeouts::new());
+        assert!(!motor.is_in_time(1_000), "no gap is trusted yet");
+        motor.trust(2_741);
+        for us in 1_001..=4_000 {
+            assert!(motor.is_in_time(us + 2_739) && !motor.is_in_time(us + 2_740));
+            motor.hear_in_time(us);
+        }
+        motor.trust(93_250);
+        assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
+        assert_eq!([motor.take_in_time(), motor.take_in_time()], [3_000, 0]);
+        assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
+        motor.trust(u32::MAX);
+        assert!(motor.is_in_time(4_000 + 131_070) && !motor.is_in_time(4_000 + 131_071));
+    }
 }
