@@ -27,20 +27,52 @@ const REMOTE: u32 = 1 << 30;
 const SHORT: u32 = 1 << 31;
 const ID_MASK: u32 = 0x1FFF_FFFF;
 
+/// 0 to 8. The compiler knows that there is no other, so that no frame and a frame take the same room.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+enum Length {
+    L0,
+    L1,
+    L2,
+    L3,
+    L4,
+    L5,
+    L6,
+    L7,
+    L8,
+}
+
+impl Length {
+    const fn new(length: usize) -> Option<Self> {
+        Some(match length {
+            0 => Self::L0,
+            1 => Self::L1,
+            2 => Self::L2,
+            3 => Self::L3,
+            4 => Self::L4,
+            5 => Self::L5,
+            6 => Self::L6,
+            7 => Self::L7,
+            8 => Self::L8,
+            _ => return None,
+        })
+    }
+}
+
 /// A classic CAN data or remote frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     /// Id and flags; [`SHORT`] unless there are 8 bytes.
     key: u32,
     data: [u8; 8],
-    length: u8,
+    length: Length,
 }
 
 impl CanFrame {
     /// Builds a standard data frame of 8 bytes; `None` for an id above `0x7FF`.
     #[must_use]
     pub const fn standard(id: u16, data: [u8; 8]) -> Option<Self> {
-        if id <= 0x7FF { Some(Self { key: id as u32, data, length: 8 }) } else { None }
+        if id <= 0x7FF { Some(Self { key: id as u32, data, length: Length::L8 }) } else { None }
     }
 
     /// Builds a data frame of up to 8 bytes. An array of more than 8 bytes does not compile.
@@ -61,8 +93,12 @@ impl CanFrame {
     #[must_use]
     pub fn of<const N: usize>(id: impl Into<Id>, data: [u8; N]) -> Self {
         const { assert!(N <= 8, "a classic CAN frame has at most 8 bytes") };
-        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
-        let length = const { N as u8 };
+        let length = const {
+            match Length::new(N) {
+                Some(length) => length,
+                None => Length::L8, // refused above
+            }
+        };
         let mut frame = Self { key: key_of(header_of(id.into()), length), data: [0; 8], length };
         for (place, byte) in frame.data.iter_mut().zip(data) {
             *place = byte;
@@ -107,7 +143,7 @@ impl CanFrame {
     /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
     #[must_use]
     pub const fn length(&self) -> u8 {
-        self.length
+        self.length as u8
     }
 
     /// Returns the [header](Self::header) of a frame of 8 bytes. It is another one for frames with fewer, and above `0x7FF`.
@@ -135,22 +171,22 @@ impl CanFrame {
     #[inline]
     fn with_header(header: u32, data: &[u8]) -> Option<Self> {
         match data.try_into() {
-            Ok(data) => Some(Self { key: header, data, length: 8 }),
+            Ok(data) => Some(Self { key: header, data, length: Length::L8 }),
             Err(_) => Self::shorter(header, data),
         }
     }
 
     #[inline(never)]
     fn shorter(header: u32, data: &[u8]) -> Option<Self> {
-        let length = u8::try_from(data.len()).ok().filter(|length| *length <= 8)?;
+        let length = Length::new(data.len())?;
         let mut frame = Self { key: key_of(header, length), data: [0; 8], length };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
         Some(frame)
     }
 }
 
-const fn key_of(header: u32, length: u8) -> u32 {
-    if length == 8 { header } else { header | SHORT }
+const fn key_of(header: u32, length: Length) -> u32 {
+    if matches!(length, Length::L8) { header } else { header | SHORT }
 }
 
 fn header_of(id: Id) -> u32 {
@@ -166,7 +202,7 @@ impl Frame for CanFrame {
     }
 
     fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
-        let length = u8::try_from(dlc).ok().filter(|length| *length <= 8)?;
+        let length = Length::new(dlc)?;
         let key = key_of(header_of(id.into()) | REMOTE, length);
         Some(Self { key, data: [0; 8], length })
     }
@@ -244,6 +280,8 @@ mod tests {
             let frame = CanFrame::new(standard(0x201), &bytes[..length]).unwrap();
             assert_eq!((frame.dlc(), frame.data()), (length, &bytes[..length]));
             assert!(frame.bytes()[length..].iter().all(|byte| *byte == 0));
+            assert_eq!((frame.header(), frame.is_whole()), (0x201, length == 8));
+            assert_eq!(frame.key() == frame.header(), length == 8);
             let remote = CanFrame::new_remote(standard(0x201), length).unwrap();
             assert_eq!((remote.dlc(), remote.data()), (length, &[][..]));
         }

@@ -146,6 +146,7 @@ impl Watch {
     }
 
     /// Notes a reading of the clock.
+    #[inline]
     pub(super) fn read(&mut self, now: Instant) {
         self.standstill.read(now);
         if now < self.reading {
@@ -345,6 +346,7 @@ impl Standstill {
     }
 
     /// Notes a reading of the clock.
+    #[inline]
     pub(super) fn read(&mut self, now: Instant) {
         match self.furthest {
             Some(furthest) if now <= furthest => self.readings = self.readings.saturating_add(1),
@@ -356,6 +358,7 @@ impl Standstill {
         }
     }
 
+    #[inline(never)]
     fn learn(&mut self, advance: u32) {
         let difference = advance.abs_diff(core::mem::replace(&mut self.advance, advance));
         let finest = if difference == 0 { advance } else { difference.min(advance) };

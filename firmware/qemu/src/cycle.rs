@@ -99,7 +99,7 @@ type Loop<'c> = Runner<Nb<Driver>, Time<'c>, Bus>;
 /// One cycle of a program: poll, due, tick.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn row_cycle(runner: &mut Loop<'_>) {
+fn runner_cycle(runner: &mut Loop<'_>) {
     runner.poll(16);
     if let Some(tick) = runner.due() {
         runner.tick(tick);
@@ -108,7 +108,7 @@ fn row_cycle(runner: &mut Loop<'_>) {
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn row_poll(runner: &mut Loop<'_>) {
+fn runner_poll(runner: &mut Loop<'_>) {
     runner.poll(16);
 }
 
@@ -139,7 +139,7 @@ fn cycle(targets: Targets) -> u32 {
     let now = Cell::new(drive.now);
     let bus = core::mem::take(&mut drive.bus);
     let mut runner = Runner::new(Nb(driver()), Time(&now), bus);
-    let whole = instructions(row_cycle as fn(&mut Loop<'_>), |cycle, _| {
+    let whole = instructions(runner_cycle as fn(&mut Loop<'_>), |cycle, _| {
         drive.advance_on(runner.device_mut());
         now.set(drive.now);
         let driver = &mut runner.port_mut().0;
@@ -161,7 +161,7 @@ fn foreign() -> u32 {
     for place in &mut runner.port_mut().0.received {
         *place = of_driver(&CanFrame::standard(0x100, [0; 8]).unwrap());
     }
-    let whole = instructions(row_poll as fn(&mut Loop<'_>), |poll, _| {
+    let whole = instructions(runner_poll as fn(&mut Loop<'_>), |poll, _| {
         runner.port_mut().0.next = 0;
         poll(&mut runner);
     });

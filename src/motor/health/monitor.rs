@@ -1,5 +1,3 @@
-//! The checks of one motor: how often it is heard, and all that need not be looked at in every tick.
-
 use super::{Condition, HealthConfig, Latch};
 
 /// Returns a time between two looks as the checks take it.
@@ -325,9 +323,7 @@ impl Traffic {
     }
 
     /// Counts frames that were counted elsewhere.
-    pub(crate) const fn add(&mut self, frames: u32) {
-        #[expect(clippy::cast_possible_truncation, reason = "wraps")]
-        let frames = frames as u16;
+    pub(crate) const fn add(&mut self, frames: u16) {
         self.frames = self.frames.wrapping_add(frames);
     }
 

@@ -1,6 +1,6 @@
 //! The rules of one motor.
 
-use super::stamp::{LONGEST_PAUSE_US, age, is_near};
+use super::stamp::{LONGEST_PAUSE_US, age, is_near, whole_ms};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
@@ -173,10 +173,10 @@ impl MotorGuard {
     }
 
     /// Returns how often feedback was in time since this was asked last.
-    pub(crate) const fn take_in_time(&mut self) -> u32 {
-        let count = self.in_time & COUNT;
+    pub(crate) const fn take_in_time(&mut self) -> u16 {
+        let [low, high, ..] = (self.in_time & COUNT).to_le_bytes();
         self.in_time &= !COUNT;
-        count
+        u16::from_le_bytes([low, high])
     }
 
     /// Sets which gap is short, as long as the motor is online.
@@ -396,13 +396,6 @@ impl MotorGuard {
     }
 }
 
-/// Whole milliseconds, at most 65 s.
-const fn whole_ms(time: Duration) -> u16 {
-    let millis = time.as_micros() / 1_000;
-    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
-    if millis < 65_000 { millis as u16 } else { 65_000 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::OPENING;
@@ -419,5 +412,23 @@ mod tests {
         let mut at_once = MotorGuard::NEW.with(Duration::ZERO, false);
         at_once.open(at_ms(1));
         assert_eq!(at_once.share(at_ms(1)).to_bits(), 1.0_f32.to_bits());
+    }
+
+    #[test]
+    fn feedback_in_time_is_counted_beside_the_gap_that_is_trusted() {
+        let mut motor = MotorGuard::NEW;
+        motor.hear(1_000, &Timeouts::new());
+        assert!(!motor.is_in_time(1_000), "no gap is trusted yet");
+        motor.trust(2_741);
+        for us in 1_001..=4_000 {
+            assert!(motor.is_in_time(us + 2_739) && !motor.is_in_time(us + 2_740));
+            motor.hear_in_time(us);
+        }
+        motor.trust(93_250);
+        assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
+        assert_eq!([motor.take_in_time(), motor.take_in_time()], [3_000, 0]);
+        assert!(motor.is_in_time(4_000 + 93_249) && !motor.is_in_time(4_000 + 93_250));
+        motor.trust(u32::MAX);
+        assert!(motor.is_in_time(4_000 + 131_070) && !motor.is_in_time(4_000 + 131_071));
     }
 }

@@ -1,5 +1,7 @@
 //! Times as stamps of 32 bits in µs, which repeat after 71 min 35 s.
 
+use crate::time::Duration;
+
 /// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
 pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
 
@@ -16,4 +18,11 @@ pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
 pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
     let age = now.wrapping_sub(stamp);
     if age.cast_signed() < 0 { 0 } else { age }
+}
+
+/// Whole milliseconds, at most 65 s.
+pub(super) const fn whole_ms(time: Duration) -> u16 {
+    let millis = time.as_micros() / 1_000;
+    #[expect(clippy::cast_possible_truncation, reason = "limited before")]
+    if millis < 65_000 { millis as u16 } else { 65_000 }
 }
