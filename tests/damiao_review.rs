@@ -329,16 +329,17 @@ fn a_range_that_a_sag_brought_back_is_noticed() {
         bench.own.motor_mut().write(Register::TorqueRange, 10.0).unwrap();
         bench.steps(150, |_| {});
         bench.own.arm(bench.now()).unwrap();
-        for tick in 0..200 {
+        let mut most = 0.0_f32;
+        for tick in 0..400 {
             _ = bench.own.set_torque(1.0);
             if tick == at {
                 bench.drive.lose_supply();
             }
             bench.step();
-            if bench.drive.torque_nm() > 1.5 {
-                bad.push((at, bench.drive.torque_nm()));
-                break;
-            }
+            most = most.max(bench.drive.torque_nm());
+        }
+        if most > 1.5 {
+            bad.push((at, most));
         }
     }
     assert!(bad.is_empty(), "1 Nm was asked for, after a sag at tick: {bad:?}");
@@ -466,6 +467,8 @@ fn a_spring_with_feedback_9_ms_late_keeps_near_its_limit() {
             most = most.max(bench.drive.torque_nm().abs());
         }
     }
+    println!("{most} Nm, enabled {}, at {}", bench.drive.is_enabled(), bench.drive.angle_rad());
+    assert!(bench.drive.is_enabled(), "{:?}", bench.own.health());
     assert!(most < 4.0, "{most} Nm, limit 2");
 }
 
@@ -609,7 +612,9 @@ impl Random {
 /// Random calls, lost, delayed, duplicated and refused frames, bad clocks and power cycles. After a disarm or an emergency stop every
 /// frame is rest as a foreign decoder reads it; a drive is never enabled without TIMEOUT by a frame while disarmed; what MIT commands ask for
 /// at the reported place keeps within the limit and half a count.
-fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), seeds: u64) {
+fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), sags: bool, writes: bool) {
+    let (seeds, must_confirm) = (60, !sags || writes);
+    let mut confirmations = 0;
     let is_mit = number == 1.0;
     for seed in 0..seeds {
         let mut random = Random(seed * 7_919 + 13);
@@ -633,9 +638,9 @@ fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), s
                 0 => { bench.own.disarm(); resting = true; }
                 1 => { bench.own.emergency_stop(); resting = true; stopped = true; }
                 2 if stopped => { bench.own.clear_emergency_stop(); stopped = false; }
-                3 => bench.drive.lose_supply(),
+                3 if sags => bench.drive.lose_supply(),
                 4 => bench.drive.fail(8 + random.below(7) as u8),
-                5 => _ = bench.own.motor_mut().write(Register::Timeout, 0.0),
+                5 if writes => _ = bench.own.motor_mut().write(Register::Timeout, 0.0),
                 _ => {}
             }
             if random.below(40) == 0 && bench.own.arm(now).is_ok() {
@@ -651,7 +656,9 @@ fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), s
             if random.below(20) > 0 {
                 bench.own.update(Tick::new(now, dt));
             }
-            let must_rest = resting || !bench.own.guard().has_target();
+            let must_rest = resting
+                || !bench.own.guard().has_target()
+                || bench.own.guard().link() != drivetrain::motor::Link::Online;
             while let Some(frame) = bench.own.next_frame(0) {
                 if random.below(40) == 0 {
                     bench.own.requeue(&frame);
@@ -674,7 +681,8 @@ fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), s
                 }
                 let was_enabled = bench.drive.is_enabled();
                 let answer = bench.drive.hear(&frame);
-                if !was_enabled && bench.drive.is_enabled() {
+                confirmations += u32::from(!was_enabled && bench.drive.is_enabled());
+                if must_confirm && !was_enabled && bench.drive.is_enabled() {
                     assert_eq!(timeout_of(&bench.drive), 2_000, "seed {seed} tick {tick}: enabled without TIMEOUT");
                 }
                 if let Some(answer) = answer.filter(|_| random.below(30) > 0) {
@@ -687,24 +695,236 @@ fn storm<M: Mode>(mode: M, number: f32, set: impl Fn(&mut Own<Motor<M>>, f32), s
             bench.drive.step(0.001);
         }
     }
+    println!("enabled {confirmations} times");
+    assert!(confirmations > 20);
 }
 
 #[test]
 fn rest_in_a_storm_mit() {
-    storm(mit(), 1.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), 60);
+    storm(mit(), 1.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), true, false);
 }
 
 #[test]
 fn rest_in_a_storm_velocity() {
-    storm(Velocity::new(quick()), 3.0, |own, x| _ = own.set_velocity((), rad_s(10.0 * x)), 60);
+    storm(Velocity::new(quick()), 3.0, |own, x| _ = own.set_velocity((), rad_s(10.0 * x)), true, false);
 }
 
 #[test]
 fn rest_in_a_storm_position() {
-    storm(PositionVelocity::new(quick()), 2.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), 60);
+    storm(PositionVelocity::new(quick()), 2.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), true, false);
 }
 
 #[test]
 fn rest_in_a_storm_force() {
-    storm(ForcePosition::new(quick(), 2.0), 4.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), 60);
+    storm(ForcePosition::new(quick(), 2.0), 4.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), true, false);
+}
+
+/// As above without sags of the supply: the time-out is confirmed whatever is lost, late or refused.
+#[test]
+fn time_out_in_a_storm() {
+    storm(mit(), 1.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), false, false);
+    storm(Velocity::new(quick()), 3.0, |own, x| _ = own.set_velocity((), rad_s(10.0 * x)), false, false);
+    storm(PositionVelocity::new(quick()), 2.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), false, false);
+    storm(ForcePosition::new(quick(), 2.0), 4.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), false, false);
+}
+
+/// As above, and the program writes TIMEOUT 0 while disarmed: "the drive is enabled only after it has confirmed that".
+#[test]
+fn time_out_in_a_storm_with_writes() {
+    storm(mit(), 1.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), false, true);
+}
+
+/// A question that waits when the motor is driven should not go out any more: it is sent after the time-out was written, and here
+/// sets it to 0. The drive is then enabled without one.
+#[test]
+fn a_write_that_waits_does_not_undo_the_time_out() {
+    let mut bench = Bench::new(mit(), 1.0);
+    bench.steps(100, |_| {});
+    bench.own.motor_mut().write(Register::Timeout, 0.0).unwrap();
+    let mut kept = Vec::new();
+    for tick in 0..200 {
+        bench.now_us += 1_000;
+        let now = bench.now();
+        if tick == 25 {
+            bench.own.arm(now).unwrap();
+        }
+        _ = bench.own.set_velocity((), rad_s(1.0));
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            // The driver has no room for it and its queue is long: it leaves 40 ms later.
+            let is_write = frame.header() == 0x7FF && frame.data()[2] == 0x55 && frame.data()[4] == 0;
+            if is_write && tick < 25 {
+                kept = vec![frame];
+                continue;
+            }
+            if let Some(answer) = bench.drive.hear(&frame) {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+        if tick == 26 {
+            for frame in kept.drain(..) {
+                let answer = bench.drive.hear(&frame).unwrap();
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+        assert!(!bench.drive.is_enabled() || timeout_of(&bench.drive) == 2_000, "tick {tick}");
+    }
+    assert!(bench.drive.is_enabled());
+}
+
+/// The same, waiting in our own slot while the driver takes nothing.
+#[test]
+fn a_write_that_waits_in_the_slot_does_not_undo_the_time_out() {
+    for from in 0..40 {
+        let mut bench = Bench::new(mit(), 1.0);
+        bench.steps(100, |_| {});
+        bench.own.motor_mut().write(Register::Timeout, 0.0).unwrap();
+        for tick in 0..200 {
+            bench.now_us += 1_000;
+            let now = bench.now();
+            if tick == from + 2 {
+                bench.own.arm(now).unwrap();
+            }
+            _ = bench.own.set_velocity((), rad_s(1.0));
+            bench.own.update(Tick::new(now, 0.001));
+            if tick >= from && tick < from + 3 {
+                let refresh = CanFrame::standard(0x7FF, [1, 0, 0xCC, 0, 0, 0, 0, 0]).unwrap();
+                let answer = bench.drive.hear(&refresh).unwrap();
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+                continue;
+            }
+            while let Some(frame) = bench.own.next_frame(0) {
+                if let Some(answer) = bench.drive.hear(&frame) {
+                    _ = Devices::ingest(&mut bench.own, &answer, now);
+                }
+            }
+            assert!(!bench.drive.is_enabled() || timeout_of(&bench.drive) == 2_000, "busy from {from}, tick {tick}");
+        }
+    }
+}
+
+/// `Target::Impedance` beside a warm motor: at every share the drive should get at most `share * limit`, as it reads the frame.
+#[test]
+fn an_impedance_keeps_the_limit_of_each_share() {
+    let ranges = [12.5, 30.0, 10.0];
+    let mut random = Random(5);
+    let mut worst = (0.0, 0.0, Impedance::FREE);
+    for _ in 0..300_000 {
+        let mut unit = || (random.below(20_001) as f64 - 10_000.0) / 10_000.0;
+        let share = unit().abs() as f32;
+        let (p, v) = (12.4 * unit(), 29.0 * unit());
+        let target = Impedance {
+            angle: Angle::from_radians(14.0 * unit() as f32),
+            velocity: rad_s(35.0 * unit() as f32),
+            stiffness: (50.0 * unit().powi(4)) as f32,
+            damping: 5.0 * unit().abs() as f32,
+            torque_nm: 5.0 * unit() as f32,
+        };
+        let mut motor = Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0).unwrap()).unwrap();
+        _ = motor.decode(&feedback_of(ranges, 1, 1, p, v));
+        let frame = motor.control(Order { target: Target::Impedance(target), share, step: TimeStep::of(0.001) });
+        if frame.data()[..7] == [0xFF; 7] {
+            continue;
+        }
+        let [ps, vs, kp, kd, t] = mit_fields(&frame, ranges);
+        let over = (kp * (ps - p) + kd * (vs - v) + t).abs() - 3.0 * f64::from(share);
+        if over > worst.0 {
+            worst = (over, share.into(), target);
+        }
+    }
+    assert!(worst.0 < 0.2, "{:.2} Nm above the limit of 3 Nm times {}: {:?}", worst.0, worst.1, worst.2);
+}
+
+/// A wheel turns at its target of 20 rad/s when its feedback is late once, by 15 ms. It should go on smoothly. It is disabled, enabled with
+/// "stay at 20 rad/s", and then told 0 rad/s, as the output opens from zero: a full brake.
+#[test]
+fn velocity_mode_does_not_brake_hard_after_late_feedback() {
+    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
+    let (mut torque, mut slowest) = (0.0_f32, f32::MAX);
+    for tick in 0..400 {
+        _ = bench.own.set_velocity((), quick());
+        bench.is_cut = tick < 15;
+        bench.step();
+        torque = torque.min(bench.drive.torque_nm());
+        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+    }
+    assert!(torque > -1.0 && slowest > 15.0, "target 20 all the time: {torque} Nm, down to {slowest} rad/s");
+}
+
+/// The same when a coasting wheel is armed, its target the speed that it has.
+#[test]
+fn velocity_mode_does_not_brake_a_coasting_wheel_when_armed() {
+    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
+    bench.own.disarm();
+    bench.steps(10, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let (mut torque, mut slowest) = (0.0_f32, f32::MAX);
+    for _ in 0..400 {
+        _ = bench.own.set_velocity((), quick());
+        bench.step();
+        torque = torque.min(bench.drive.torque_nm());
+        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+    }
+    assert!(torque > -1.0 && slowest > 15.0, "target 20 all the time: {torque} Nm, down to {slowest} rad/s");
+}
+
+/// After a short loss of feedback (30 ms) a spring should not come back at full stiffness at once: the shaft may be elsewhere by then.
+#[test]
+fn a_spring_does_not_come_back_at_once_after_late_feedback() {
+    let mut bench = Bench::armed(ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap(), 1.0);
+    bench.steps(1_000, |b| b.own.set_angle((), Angle::ZERO).unwrap());
+    for tick in 0..60 {
+        _ = bench.own.set_angle((), Angle::ZERO);
+        bench.is_cut = tick < 30;
+        if tick == 25 {
+            bench.drive.set_angle(-1.0);
+        }
+        bench.step();
+        if tick > 31 {
+            println!("{tick} {:.2}", bench.drive.torque_nm());
+        }
+        assert!(tick < 30 || tick > 40 || bench.drive.torque_nm() < 1.0, "{} Nm, tick {tick}", bench.drive.torque_nm());
+    }
+}
+
+/// A drive that is in another mode and enabled (by another tool, or by this program before it was restarted) should be disabled by an
+/// emergency stop. The frames go to the id of our mode alone, which such a drive discards.
+#[test]
+fn an_emergency_stop_disables_a_drive_in_another_mode() {
+    let mut bench = Bench::new(Velocity::new(quick()), 1.0);
+    bench.steps(100, |_| {});
+    _ = bench.drive.hear(&CanFrame::standard(1, [255, 255, 255, 255, 255, 255, 255, 252]).unwrap());
+    assert!(bench.drive.is_enabled());
+    bench.own.emergency_stop();
+    bench.steps(300, |_| {});
+    assert!(!bench.drive.is_enabled());
+}
+
+/// A refused frame is its sender's: `requeue` should return true for each frame that came from `next_frame`.
+#[test]
+fn each_frame_of_a_motor_can_be_given_back() {
+    let mut bench = Bench::new(Velocity::new(quick()), 3.0);
+    let mut foreign = Vec::new();
+    for tick in 0..300 {
+        if tick == 150 {
+            bench.own.arm(bench.now()).unwrap();
+        }
+        _ = bench.own.set_velocity((), rad_s(1.0));
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            if frame.header() == 0x7FF && frame.data()[2] == 0xCC && !bench.own.requeue(&frame) {
+                foreign.push(frame);
+            }
+            if let Some(answer) = bench.drive.hear(&frame) {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+    }
+    assert!(foreign.is_empty(), "{foreign:?}");
 }
