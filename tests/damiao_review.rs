@@ -928,3 +928,117 @@ fn each_frame_of_a_motor_can_be_given_back() {
     }
     assert!(foreign.is_empty(), "{foreign:?}");
 }
+
+/// A late frame with an error arrives while the drive is enabled, and nothing more is heard then. The drive should be disabled. It gets nothing but
+/// "clear error", 1000 times a second, which also feeds its watchdog: it goes on with its last velocity for ever.
+#[test]
+fn a_drive_is_disabled_after_an_error_that_is_over() {
+    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
+    let now = bench.now();
+    _ = Devices::ingest(&mut bench.own, &feedback_of([12.5, 30.0, 10.0], 1, 8, 0.0, 20.0), now);
+    bench.own.emergency_stop();
+    for _ in 0..2_000 {
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            _ = bench.drive.hear(&frame); // nothing comes back
+        }
+        bench.drive.step(0.001);
+    }
+    let speed = bench.drive.velocity_rad_per_s();
+    assert!(!bench.drive.is_enabled(), "2 s after the emergency stop: {speed} rad/s");
+}
+
+/// Feedback that is 20 ms old when it arrives, each ms: nobody sees that. What the torque then is, beside the limit.
+#[test]
+fn a_spring_with_feedback_20_ms_old_keeps_within_twice_its_limit() {
+    let mut worst = Vec::new();
+    for (stiffness, damping) in [(20.0, 0.6), (60.0, 1.0), (150.0, 3.0), (400.0, 5.0)] {
+        let mode = ImpedanceControl::new(2.0).unwrap().with_gains(stiffness, damping).unwrap();
+        let mut bench = Bench::new(mode, 1.0);
+        let mut waiting: Vec<(u64, CanFrame)> = Vec::new();
+        let mut most = 0.0_f32;
+        for tick in 0..3_000_u32 {
+            bench.now_us += 1_000;
+            let now = bench.now();
+            let due: Vec<_> = waiting.iter().filter(|w| w.0 <= bench.now_us).map(|w| w.1).collect();
+            waiting.retain(|w| w.0 > bench.now_us);
+            for frame in due {
+                _ = Devices::ingest(&mut bench.own, &frame, now);
+            }
+            if tick == 400 {
+                bench.own.arm(now).unwrap();
+            }
+            _ = bench.own.set_angle((), Angle::from_radians(if tick / 400 % 2 == 0 { 1.0 } else { -1.0 }));
+            bench.own.update(Tick::new(now, 0.001));
+            while let Some(frame) = bench.own.next_frame(0) {
+                if let Some(answer) = bench.drive.hear(&frame) {
+                    waiting.push((bench.now_us + 20_000, answer));
+                }
+            }
+            for _ in 0..10 {
+                bench.drive.step(1e-4);
+                most = most.max(bench.drive.torque_nm().abs());
+            }
+        }
+        worst.push((stiffness, damping, most, bench.drive.is_enabled()));
+    }
+    println!("{worst:?}");
+    assert!(worst.iter().all(|it| it.2 < 4.0 && it.3), "limit 2 Nm: (stiffness, damping, torque): {worst:?}");
+}
+
+/// A joint on its way in position-velocity mode, whose feedback is late once by 15 ms: how hard it is braked.
+#[test]
+fn position_mode_does_not_brake_hard_after_late_feedback() {
+    let mut bench = Bench::new(PositionVelocity::new(rad_s(10.0)), 2.0);
+    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.steps(100, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    bench.steps(300, |b| b.own.set_angle((), Angle::from_radians(3.0)).unwrap());
+    let before = bench.drive.velocity_rad_per_s();
+    let (mut slowest, mut torque) = (f32::MAX, 0.0_f32);
+    for tick in 0..40 {
+        _ = bench.own.set_angle((), Angle::from_radians(3.0));
+        bench.is_cut = tick < 15;
+        bench.step();
+        torque = torque.min(bench.drive.torque_nm());
+        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+    }
+    assert!(torque > -1.0, "{before} rad/s before, then {torque} Nm, down to {slowest} rad/s");
+}
+
+/// A motor of one's own whose commands have an id that others share. Its command was refused: it is its own, as at 374294f.
+#[test]
+fn a_shared_command_of_an_own_motor_can_be_given_back() {
+    use drivetrain::motor::{Claim, Ingest, MotorName, Role};
+    use embedded_can::StandardId;
+    struct Shared;
+    impl OwnMotor for Shared {
+        fn name(&self) -> MotorName {
+            MotorName::new("shared", 1)
+        }
+        fn claims(&self) -> impl IntoIterator<Item = Claim> {
+            let claim = |raw, role| Claim::new(StandardId::new(raw).unwrap(), role, self.name()).shared();
+            [claim(0x123, Role::Command), claim(0x124, Role::Feedback)]
+        }
+        fn decode(&mut self, _: &CanFrame) -> Ingest {
+            Ingest::Taken
+        }
+        fn velocity(&self) -> AngularVelocity {
+            AngularVelocity::ZERO
+        }
+        fn rest(&mut self) -> CanFrame {
+            CanFrame::standard(0x123, [1, 0, 0, 0, 0, 0, 0, 0]).unwrap()
+        }
+        fn control(&mut self, _: Order) -> CanFrame {
+            CanFrame::standard(0x123, [1, 0, 0, 0, 0, 0, 0, 9]).unwrap()
+        }
+        fn reset(&mut self) {}
+    }
+    let mut own = Own::new(Shared);
+    own.update(Tick::new(drivetrain::time::Instant::from_micros(1_000), 0.001));
+    let frame = own.next_frame(0).unwrap();
+    assert!(own.requeue(&frame), "{frame:?}");
+}
