@@ -2,7 +2,7 @@
 
 use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
 use super::config::{Mode, sealed};
-use super::feedback::answer;
+use super::feedback::{is_answer, value};
 use super::{ConfigError, Feedback, Model, Register, Status};
 use crate::frame::CanFrame;
 use crate::motor::{
@@ -59,10 +59,10 @@ pub struct Motor<M> {
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     settings: Settings<Register, { CHECKED.len() }>,
-    /// The next enabling or disabling frame goes to the bare id.
-    is_bare: bool,
-    /// The drive has confirmed its time-out since it was disabled.
-    is_timeout_set: bool,
+    /// Counts the frames that enable or disable.
+    specials: u8,
+    /// How far the drive has confirmed its time-out since it was to be enabled.
+    timeout: Confirmation,
 }
 
 impl<M: Mode> Motor<M> {
@@ -83,8 +83,8 @@ impl<M: Mode> Motor<M> {
             mode,
             drive: None,
             settings: Settings::new(CHECKED),
-            is_bare: false,
-            is_timeout_set: false,
+            specials: 0,
+            timeout: Confirmation::None,
         })
     }
 
@@ -116,12 +116,6 @@ impl<M: Mode> Motor<M> {
     #[must_use]
     pub const fn feedback(&self) -> Option<&Feedback> {
         self.drive.as_ref()
-    }
-
-    /// Returns the control mode, to change its gains.
-    #[must_use]
-    pub const fn mode_mut(&mut self) -> &mut M {
-        &mut self.mode
     }
 
     /// Asks the drive for a register. While the motor is disarmed the frame goes out within some 10 ms, and again until
@@ -239,26 +233,33 @@ impl<M: Mode> OwnMotor for Motor<M> {
         self.mode.reset();
     }
 
-    /// First a target where the shaft is, then the time-out until the drive has confirmed it, then the frame that enables it.
-    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
-        let stay = self.drive.and_then(|drive| self.mode.stay(&drive));
-        if let (Some(stay), 0) = (stay, sent) {
-            return Some(self.frame_of(stay));
+    /// First what is not known of the settings, then the time-out, written and read back, then the frame that enables: each of
+    /// them needs all of that anew, for the drive may have lost its supply since.
+    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
+        if let Some(unknown) = self.settings.complete() {
+            return Some(inquiry(self.id, unknown));
         }
-        if !self.is_timeout_set {
-            let timeout = Inquiry::Write(Register::Timeout, self.expected(Register::Timeout));
-            return Some(inquiry(self.id, self.settings.ask(timeout)));
-        }
-        Some(self.special(mit::ENABLE))
+        let timeout = self.expected(Register::Timeout);
+        let asked = match self.timeout {
+            Confirmation::None => Inquiry::Write(Register::Timeout, timeout),
+            Confirmation::Written => Inquiry::Read(Register::Timeout),
+            Confirmation::Read => {
+                self.timeout = Confirmation::None;
+                self.settings.forget();
+                return Some(self.special(mit::ENABLE));
+            }
+        };
+        Some(inquiry(self.id, self.settings.ask(asked)))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
-        self.is_timeout_set = false;
+        self.timeout = Confirmation::None;
         <M as sealed::Mode>::REST.is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        Some(refresh(self.id))
+        let stay = self.drive.and_then(|drive| self.mode.stay(&drive));
+        Some(stay.map_or_else(|| refresh(self.id), |stay| self.frame_of(stay)))
     }
 
     fn is_enabled(&self) -> Option<bool> {
@@ -266,19 +267,31 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.is_timeout_set = false;
+        self.timeout = Confirmation::None;
         self.settings.inquire().map(|asked| inquiry(self.id, asked))
     }
 
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
-        let Some(asked) = self.settings.asked().filter(|_| frame.length() == 8) else {
+        let data = frame.bytes();
+        if frame.length() != 8 || !is_answer(data, self.id) {
             return false;
-        };
-        let Some(value) = answer(frame.bytes(), self.id, asked) else { return false };
-        if matches!(asked, Inquiry::Write(Register::Timeout, _)) {
-            self.is_timeout_set = value.to_bits() == self.expected(Register::Timeout).to_bits();
         }
-        self.settings.take(asked, value)
+        let asked = self.settings.asked();
+        if let Some((asked, value)) =
+            asked.and_then(|asked| Some((asked, value(data, self.id, asked)?)))
+        {
+            let is_right = value.to_bits() == self.expected(Register::Timeout).to_bits();
+            match asked {
+                Inquiry::Write(Register::Timeout, _) if is_right => {
+                    self.timeout = Confirmation::Written
+                }
+                Inquiry::Read(Register::Timeout) if is_right => self.timeout = Confirmation::Read,
+                Inquiry::Read(Register::Timeout) => self.timeout = Confirmation::None,
+                _ => {}
+            }
+            self.settings.take(asked, value);
+        }
+        true
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
@@ -293,7 +306,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn forget_settings(&mut self) {
         self.settings.forget();
-        self.is_timeout_set = false;
+        self.timeout = Confirmation::None;
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -319,19 +332,29 @@ impl<M: Mode> OwnMotor for Motor<M> {
 }
 
 impl<M: Mode> Motor<M> {
-    /// Disables the drive; where it reports an error, clears that, which leaves it disabled.
+    /// Disables the drive; where it reports an error, clears that in turn, which leaves it disabled.
     fn off(&mut self) -> CanFrame {
         let has_error = self.drive.is_some_and(|drive| drive.status.is_error());
-        self.special(if has_error { CLEAR_ERROR } else { mit::DISABLE })
+        let clears = has_error && self.specials & 2 != 0;
+        self.special(if clears { CLEAR_ERROR } else { mit::DISABLE })
     }
 
     /// Sends a frame that enables or disables to the id of the mode and to the bare id in turn: programs of the vendor use the one,
     /// three public packages the other.
     fn special(&mut self, data: [u8; 8]) -> CanFrame {
-        self.is_bare = !self.is_bare;
-        let id = if self.is_bare { self.command_id() } else { self.id.into() };
+        self.specials = self.specials.wrapping_add(1);
+        let is_bare = self.specials & 1 == 0;
+        let id = if is_bare { self.id.into() } else { self.command_id() };
         CanFrame::of(standard(id), data)
     }
+}
+
+/// How far the drive has confirmed its time-out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Confirmation {
+    None,
+    Written,
+    Read,
 }
 
 const fn name_of(register: Register) -> &'static str {

@@ -13,7 +13,7 @@ pub(super) const REGISTERS: u16 = 0x7FF;
 pub(super) const CLEAR_ERROR: [u8; 8] = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFB];
 
 /// The largest velocity of a force-position command, in rad/s.
-const MOST_VELOCITY: f32 = 100.0;
+pub(super) const MOST_VELOCITY: f32 = 100.0;
 
 /// A command of one of the four control modes, in units of the output shaft.
 ///

@@ -1,6 +1,6 @@
 //! The control modes, with what a user chooses for each.
 
-use super::command::Command;
+use super::command::{Command, MOST_VELOCITY};
 use super::{ConfigError, Feedback, Model};
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
@@ -61,7 +61,7 @@ impl sealed::Mode for ImpedanceControl {
     fn command(&mut self, order: Order, drive: &Feedback, model: &Model) -> Option<Command> {
         let velocity = AngularVelocity::from_rad_per_s(drive.measured.velocity_rad_per_s);
         let Impedance { angle, velocity, stiffness, damping, torque_nm } =
-            self.step(order, drive.angle(), velocity, &model.most())?;
+            self.step(order, drive.angle(), velocity, &model.most(), &model.count())?;
         Some(Command::Mit(mit::Command {
             position_rad: angle.as_radians(),
             velocity_rad_per_s: velocity.as_rad_per_s(),
@@ -145,6 +145,10 @@ impl sealed::Mode for ForcePosition {
 
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
         velocity_limit(self.velocity_limit, model)?;
+        if self.velocity_limit.as_rad_per_s() > MOST_VELOCITY {
+            let limit = self.velocity_limit.as_rad_per_s();
+            return Err(ConfigError::VelocityLimit(limit, MOST_VELOCITY));
+        }
         torque_limit(self.torque_limit_nm, model)
     }
 
@@ -172,7 +176,9 @@ fn position_of(order: &Order, drive: &Feedback, model: &Model) -> Option<f32> {
     }
     let position = drive.measured.position_rad;
     let way = wrap_pi(angle.as_radians() - position);
-    Some((position + way).min(model.pmax_rad()).max(-model.pmax_rad()))
+    // At the very end a position is none any more.
+    let end = model.pmax_rad() * 0.9995;
+    Some((position + way).min(end).max(-end))
 }
 
 /// Velocity mode: the drive's own loop follows a velocity.
@@ -204,7 +210,7 @@ impl sealed::Mode for Velocity {
 
     fn command(&mut self, order: Order, _: &Feedback, _: &Model) -> Option<Command> {
         let Target::Velocity(velocity) = order.target else { return None };
-        let limit = self.velocity_limit.as_rad_per_s() * order.share;
+        let limit = self.velocity_limit.as_rad_per_s();
         Some(Command::Velocity(velocity.as_rad_per_s().min(limit).max(-limit)))
     }
 

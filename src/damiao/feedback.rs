@@ -114,13 +114,13 @@ impl Status {
 
 /// Reads the value in the answer to an inquiry; `None` for any other frame. The answer has the id of the feedback.
 ///
-/// A feedback frame may read like one: so only the register that was asked for, of this drive, counts.
+/// Only the register that was asked for, of this drive, counts.
 ///
 /// ```text
 /// byte 0 .. 1    2                       3                4 ..  7
 /// id, low first  0x33 read, 0x55 written register number  value, low first
 /// ```
-pub(super) fn answer(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Option<f32> {
+pub(super) fn value(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Option<f32> {
     let (asked, register) = match inquiry {
         Inquiry::Read(register) => (0x33, register),
         Inquiry::Write(register, _) => (0x55, register),
@@ -130,3 +130,15 @@ pub(super) fn answer(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Opti
     let is_answer = (low, high, verb, number) == (id, 0, asked, register.number());
     is_answer.then(|| register.value_of(value))
 }
+
+/// Tells whether a frame reads like an answer about a register of a drive, awaited or not: of a tool, or come twice.
+///
+/// A drive that is disabled and turns backward with nearly the largest velocity, at the lower end of its range, reports the same
+/// bytes: it counts as silent then.
+pub(super) const fn is_answer(data: &[u8; 8], id: u8) -> bool {
+    let [low, high, verb, number, ..] = *data;
+    low == id && high == 0 && matches!(verb, 0x33 | 0x55 | 0xAA) && number <= LAST_REGISTER
+}
+
+/// The largest number of a register.
+const LAST_REGISTER: u8 = 81;

@@ -19,15 +19,15 @@
 //! |---|---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): MIT | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode | no gains, no torque |
 //! | [`ForcePosition`] | angle | the torque limit of the mode | disabled |
-//! | [`PositionVelocity`] | angle | the register `OC_Value` | disabled |
-//! | [`Velocity`] | velocity | the register `OC_Value` | disabled |
+//! | [`PositionVelocity`] | angle | the drive alone | disabled |
+//! | [`Velocity`] | velocity | the drive alone | disabled |
 //!
 //! **Before a motor is armed, its registers are read.** `CTRL_MODE`, `PMAX`, `VMAX` and `TMAX` have to be what the configuration
 //! says, else [`arm`](crate::motor::Devices::arm) names the register and both values: a drive in another mode discards the
 //! commands, and one with other ranges gives another torque. The first answer takes some 50 ms.
 //!
-//! **When the program stops, the drive does**: `TIMEOUT` is written each time before the drive is enabled, 100 ms unless
-//! configured otherwise, and the drive is enabled only after it has confirmed that.
+//! **When the program stops, the drive does**: `TIMEOUT` is written and read back each time before the drive is enabled, 100 ms
+//! unless configured otherwise.
 //!
 //! ```
 //! use drivetrain::damiao::{Model, Motor};
@@ -44,7 +44,8 @@
 //! Sources: the register table and frames as python-damiao-driver (damiao-motor 1.0.6) documents them, which agree with librm and
 //! reBot; the master id, the time-out and the states also from the manual of the DM-J4310-2EC. Frames of public tests are in
 //! `tests/data/wire`. Not known: how a drive behaves that is enabled without a target in the modes other than MIT; so a target
-//! where the shaft stands goes first. Programs of the vendor send enabling and disabling frames to
+//! where the shaft is goes out in each cycle until it is. A position mode brakes a shaft that turns when it is enabled with what the
+//! drive has. `ForcePosition` takes TMAX for the torque at full current, as damiao-motor says. Programs of the vendor send enabling and disabling frames to
 //! the id of the mode, public packages to the bare id: here they go to both in turn.
 
 mod bus;

@@ -120,6 +120,19 @@ impl Model {
         }
     }
 
+    /// Returns the value of a count of each MIT field.
+    #[must_use]
+    pub const fn count(&self) -> Impedance {
+        let (stiffness, damping) = self.ranges.gains();
+        Impedance {
+            angle: Angle::from_radians(2.0 * self.pmax_rad() / 65_535.0),
+            velocity: AngularVelocity::from_rad_per_s(2.0 * self.vmax_rad_per_s() / 4_095.0),
+            stiffness: stiffness / 4_095.0,
+            damping: damping / 4_095.0,
+            torque_nm: 2.0 * self.tmax_nm() / 4_095.0,
+        }
+    }
+
     /// Returns the largest position of the fields, in rad.
     #[must_use]
     pub const fn pmax_rad(&self) -> f32 {

@@ -70,6 +70,11 @@ impl<M: Mode> Subject for Joint<M> {
         let is_enabling = command.bytes() == &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
         !is_enabling && (!drive.is_enabled() || turned.torque_nm().abs() <= 10.0 / 4095.0)
     }
+    /// What others send about registers may be for another drive.
+    fn rival(&self, command: &Claim) -> Option<CanFrame> {
+        (command.id() != embedded_can::Id::from(id(0x7FF)))
+            .then(|| CanFrame::of(command.id(), [0; 8]))
+    }
     fn settle_ms(&self) -> u64 {
         100
     }

@@ -4,6 +4,13 @@
 #![cfg(test)]
 
 mod bench;
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "fields of a frame, drawn values, and the number of a mode"
+)]
+mod review;
 
 use bench::{Bench, J4310, mit};
 use drivetrain::control::PidConfig;

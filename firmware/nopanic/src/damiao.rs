@@ -12,6 +12,7 @@ pub fn call_all() {
     Model::name.call();
     Model::ranges.call();
     Model::most.call();
+    Model::count.call();
     Model::pmax_rad.call();
     Model::vmax_rad_per_s.call();
     Model::tmax_nm.call();
@@ -47,6 +48,7 @@ fn settings() {
     Settings::<Register, 4>::forget.call();
     Settings::<Register, 4>::request.call();
     Settings::<Register, 4>::answer.call();
+    Settings::<Register, 4>::complete.call();
     Settings::<Register, 4>::inquire.call();
     Settings::<Register, 4>::ask.call();
     Settings::<Register, 4>::asked.call();
@@ -59,7 +61,6 @@ fn motor<M: Mode + 'static>() {
     Motor::<M>::with_master_id.call();
     Motor::<M>::with_timeout.call();
     Motor::<M>::feedback.call();
-    Motor::<M>::mode_mut.call();
     Motor::<M>::read.call();
     Motor::<M>::write.call();
     Motor::<M>::store.call();

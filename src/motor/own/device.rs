@@ -27,6 +27,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
             match claim.role() {
                 Role::Feedback => is_feedback = true,
+                // What others send on a shared id may be for another drive.
+                Role::Command if claim.is_shared() => {}
                 Role::Command => command = Some(claim),
             }
         }
@@ -63,7 +65,12 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 
     fn next_frame(&mut self) -> Option<CanFrame> {
-        self.switching.take().or_else(|| self.command.take())
+        if let Some(frame) = self.switching.take() {
+            return Some(frame);
+        }
+        let command = self.command.take();
+        self.last = command.or(self.last);
+        command
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if it is still wanted.
@@ -73,7 +80,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             self.enabling = self.enabling.saturating_sub(1);
         }
         // Of an id that several motors send, only the frames that this one sent.
-        let is_known = [self.switched, self.asked].contains(&Some(*frame));
+        let is_known = [self.switched, self.last].contains(&Some(*frame));
         let mut commands = self
             .motor
             .claims()
@@ -100,8 +107,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.watch.is_faulty(&self.guard).then(|| self.motor.name()).into_iter()
     }
 
+    /// A motor that is armed has asked before, and asks again before its drive is enabled.
     fn wrong_setting(&self) -> Option<WrongSetting> {
-        self.motor.wrong_setting()
+        if self.guard.is_armed() { None } else { self.motor.wrong_setting() }
     }
 
     fn second_master(&self) -> Option<Claim> {
@@ -177,7 +185,10 @@ impl<M: OwnMotor> Own<M> {
     /// Returns a question for a setting, in the place of a frame of rest that was sent before: so no update has more frames, and
     /// none that is not disabled is asked.
     fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
-        if self.guard.link() == Link::Offline {
+        // A drive that lost its supply is silent until it runs again.
+        let was_online =
+            core::mem::replace(&mut self.was_online, self.guard.link() == Link::Online);
+        if was_online && !self.was_online {
             self.motor.forget_settings();
         }
         let is_idle = !self.power.is_on() && !self.has_posted && self.has_rested;
@@ -186,8 +197,7 @@ impl<M: OwnMotor> Own<M> {
             return None;
         }
         self.inquired = now;
-        self.asked = self.motor.inquire();
-        self.asked
+        self.motor.inquire()
     }
 
     /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
@@ -221,7 +231,7 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn enable(&mut self) {
-        if self.motor.wrong_setting().is_some() {
+        if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
             self.guard.relax_until_armed();
             return;
         }
@@ -250,6 +260,7 @@ impl<M: OwnMotor> Own<M> {
     fn reopen(&mut self) {
         self.guard.reopen();
         self.start = None;
+        self.start_velocity = None;
     }
 
     /// Returns the command that this step asks for, or rest; what asks for feedback if either would disable a drive that is being
@@ -286,6 +297,14 @@ impl<M: OwnMotor> Own<M> {
                 let way = wrap_pi((target - start).as_radians());
                 Target::Angle(start + Angle::from_radians(way * opened))
             }
+            (Target::Velocity(target), _) if opened < 1.0 => {
+                let start = *self.start_velocity.get_or_insert_with(|| self.motor.velocity());
+                if start.is_finite() {
+                    Target::Velocity(start + (target - start) * opened)
+                } else {
+                    self.target
+                }
+            }
             (Target::Impedance(target), Some(measured)) if opened < 1.0 => {
                 let start = *self.start.get_or_insert(measured);
                 let way = (target.angle - start).as_radians();
@@ -298,6 +317,7 @@ impl<M: OwnMotor> Own<M> {
 
     fn relax(&mut self) {
         self.start = None;
+        self.start_velocity = None;
         if !self.is_resting {
             self.motor.reset();
             self.is_resting = true;

@@ -62,8 +62,10 @@ impl Impedance {
 /// within a limit.
 ///
 /// The limit holds at the angle and velocity that the drive reported last: the torque beside is limited first, then the spring,
-/// then the damper. Angle and velocity are sent so near that gains times what is left to go do not ask for more, so a drive that
-/// hears no further command goes no further. Stiffness and damping are scaled by the [share](Order::share) of the order.
+/// then the damper. Angle and velocity are sent so near that gains times what is left to go do not ask for more. Until the next
+/// command the drive follows what it measures itself: a shaft that is blocked while it turns at `v` feels up to `damping * v` more.
+/// Stiffness and damping are scaled by the [share](Order::share) of the order, and lowered where a count of the angle or of the
+/// velocity, times the gain, is more than an eighth of the limit.
 ///
 /// # Examples
 /// ```
@@ -73,10 +75,11 @@ impl Impedance {
 ///
 /// let mut joint = ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?; // Nm, Nm/rad, Nm s/rad
 /// let most = Impedance { angle: Angle::from_radians(12.5), stiffness: 500.0, damping: 5.0, ..Impedance::FREE };
+/// let count = Impedance { stiffness: 500.0 / 4095.0, damping: 5.0 / 4095.0, ..Impedance::FREE };
 /// let order = Order { target: Target::Angle(Angle::from_radians(1.0)), share: 1.0, step: TimeStep::of(0.001) };
-/// let sent = joint.step(order, Some(Angle::ZERO), AngularVelocity::ZERO, &most).ok_or("at rest")?;
-/// assert_eq!((sent.angle.as_radians(), sent.stiffness), (0.15, 20.0)); // 3 Nm, not 20
-/// assert_eq!(joint.effort(), 1.0);
+/// let sent = joint.step(order, Some(Angle::ZERO), AngularVelocity::ZERO, &most, &count).ok_or("at rest")?;
+/// assert!((sent.angle.as_radians() * sent.stiffness - 3.0).abs() < 0.01); // 3 Nm, not 20
+/// assert!((joint.effort() - 1.0).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -146,21 +149,31 @@ impl ImpedanceControl {
         always.with(Capability::Velocity).with(Capability::Angle)
     }
 
-    /// Returns what the drive is told, at most `most` in each field but the torque; `None` to rest: an angle is needed and not
-    /// known, or the target is none that is [taken](Self::capabilities).
+    /// Returns what the drive is told; `None` to rest: an angle is needed and not known, or the target is none that is
+    /// [taken](Self::capabilities). `most` is the largest value of each field, and `count` the value of a count of it, 0 if it is
+    /// exact. Gains are whole counts and a quarter, for a drive that truncates.
     pub fn step(
         &mut self,
         Order { target, share, step }: Order,
         angle: Option<Angle>,
         velocity: AngularVelocity,
         most: &Impedance,
+        count: &Impedance,
     ) -> Option<Impedance> {
         self.effort = 0.0;
         let limit = self.torque_limit_nm * share;
         let wanted = self.wanted(target, angle, velocity, limit, &step)?;
-        let stiffness = share * wanted.stiffness.min(most.stiffness);
-        let damping = share * wanted.damping.min(most.damping);
+        let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
+        let end = most.velocity.as_rad_per_s();
+        // A velocity at the end of its range is there or beyond.
+        let is_known = velocity.as_rad_per_s().abs() < end - 0.5 * per_count_s;
+        let damping = if is_known { wanted.damping.min(most.damping) } else { 0.0 };
+        let stiffness =
+            whole(share * wanted.stiffness.min(most.stiffness), per_count, limit, count.stiffness);
+        let damping = whole(share * damping, per_count_s, limit, count.damping);
         let torque_nm = wanted.torque_nm.min(limit).max(-limit);
+        // Angle and velocity are truncated, by the drive that reports them and in the command.
+        let limit = limit - 2.0 * (stiffness * per_count + damping * per_count_s);
         let at = match angle {
             Some(angle) => angle.as_radians(),
             None if stiffness > 0.0 => return None,
@@ -170,15 +183,14 @@ impl ImpedanceControl {
         let way = wanted.angle.as_radians().min(end).max(-end) - at;
         let way = within(way, torque_nm, stiffness, limit);
         let spring_nm = torque_nm + stiffness * way;
-        let end = most.velocity.as_rad_per_s();
         let change = wanted.velocity.as_rad_per_s().min(end).max(-end) - velocity.as_rad_per_s();
         let change = within(change, spring_nm, damping, limit);
         self.effort = (spring_nm + damping * change) / self.torque_limit_nm;
         Some(Impedance {
             angle: Angle::from_radians(at + way),
             velocity: velocity + AngularVelocity::from_rad_per_s(change),
-            stiffness,
-            damping,
+            stiffness: stiffness + 0.25 * count.stiffness,
+            damping: damping + 0.25 * count.damping,
             torque_nm,
         })
     }
@@ -234,6 +246,13 @@ impl ImpedanceControl {
 fn followed(loops: &mut Cascade, torque_nm: f32, limit: f32) -> Impedance {
     loops.speed_mut().keep_integral_between(-limit, limit);
     Impedance { torque_nm, ..Impedance::FREE }
+}
+
+/// Returns a gain in whole counts, of which a count of what it multiplies makes no more than an eighth of the limit.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn whole(gain: f32, per_count: f32, limit: f32, count: f32) -> f32 {
+    let gain = if per_count > 0.0 { gain.min(limit / (8.0 * per_count)) } else { gain };
+    if count > 0.0 { (gain / count) as u32 as f32 * count } else { gain }
 }
 
 /// Returns the part of a difference whose torque, beside so much, keeps within the limit.

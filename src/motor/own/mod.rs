@@ -89,6 +89,8 @@ pub struct Own<M> {
     target: Target,
     /// The angle of the shaft when an angle target was followed first.
     start: Option<Angle>,
+    /// The velocity of the shaft when a velocity target was followed first.
+    start_velocity: Option<AngularVelocity>,
     is_resting: bool,
     /// The last command, which an update without a step may send once more.
     held: Option<CanFrame>,
@@ -99,10 +101,11 @@ pub struct Own<M> {
     has_posted: bool,
     /// The last update offered a frame of rest.
     has_rested: bool,
+    was_online: bool,
     /// The time of the last question.
     inquired: Instant,
-    /// The last question, sent or not.
-    asked: Option<CanFrame>,
+    /// The last frame that was taken, but for the drive's power.
+    last: Option<CanFrame>,
     /// The last frame for the drive's power, sent or not.
     switched: Option<CanFrame>,
     /// How many frames were sent to enable the drive since it was to be disabled.
@@ -125,13 +128,15 @@ impl<M: OwnMotor> Own<M> {
             power: Power::NEW,
             target: Target::Torque(0.0),
             start: None,
+            start_velocity: None,
             is_resting: true,
             held: None,
             switching: None,
             command: None,
             has_posted: false,
             has_rested: false,
-            asked: None,
+            was_online: false,
+            last: None,
             inquired: Instant::START,
             switched: None,
             enabling: 0,

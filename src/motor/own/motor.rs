@@ -102,7 +102,8 @@ pub trait OwnMotor {
         None
     }
 
-    /// Forgets the settings of the drive: it was offline or has reset, and may be another one.
+    /// Forgets the settings of the drive: its feedback is late or lost, or it has reset, so it may have lost its supply or be another
+    /// one.
     fn forget_settings(&mut self) {}
 
     /// Returns what the motor offers: velocities and feedback, unless said otherwise.

@@ -61,6 +61,13 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         self.answer
     }
 
+    /// Returns a question for a value that is not known, and awaits the answer; `None` when all are.
+    pub fn complete(&mut self) -> Option<Inquiry<R>> {
+        let index = self.found.iter().position(Option::is_none)?;
+        let setting = *self.checked.get(index)?;
+        Some(self.ask(Inquiry::Read(setting)))
+    }
+
     /// Returns the next question: for what is not known, then for each value in turn.
     pub fn inquire(&mut self) -> Option<Inquiry<R>> {
         let turn = usize::from(self.turn);
@@ -71,8 +78,10 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
             }
             return Some(self.ask(request));
         }
-        let unknown = self.found.iter().position(Option::is_none);
-        let index = unknown.or_else(|| (turn / 2).checked_rem(N))?;
+        if let Some(unknown) = self.complete() {
+            return Some(unknown);
+        }
+        let index = (turn / 2).checked_rem(N)?;
         let setting = *self.checked.get(index)?;
         Some(self.ask(Inquiry::Read(setting)))
     }

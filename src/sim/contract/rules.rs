@@ -323,7 +323,9 @@ fn from_zero<S: Subject>(mut run: Run<S>) -> Outcome {
     run.step()?;
     run.subject.device().disarm();
     let mut driving = run.drain()?.driving;
-    driving += run.step()?.driving;
+    for _ in 0..=run.subject.settle_ms() {
+        driving += run.step()?.driving;
+    }
     let now = run.now();
     let armed = run.subject.device().arm(now).is_ok();
     for _ in 0..20 {
