@@ -30,9 +30,8 @@ use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    WrongSetting,
     ArmError, CanDevice, Claim, Condition, Devices, Edge, Ingest, Link, MotorName, TargetError,
-    Timeouts, Visitor,
+    Timeouts, Visitor, WrongSetting,
 };
 use drivetrain::time::{Instant, Tick};
 use std::collections::VecDeque;
