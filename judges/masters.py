@@ -106,7 +106,6 @@ class DamiaoMotor(Master):
         "DM-H3510": "H3510",
         "DM-H6215": "G6215",
     }
-    other_ranges = {"DM-J4340": (12.5, 10.0, 28.0)}
 
     def __init__(self):
         super().__init__()
@@ -279,7 +278,6 @@ class Motorbridge(SocketCan):
     name = "motorbridge"
     is_single = True
     models = DamiaoMotor.models
-    other_ranges = {"DM-J4340": (12.5, 10.0, 28.0)}
     # Full negative torque.
     of_nan = bytes(8)
     # It looks at the number within a frame as well as at its id: the frames have those of fifteen motors in turn.
@@ -475,7 +473,7 @@ class CanMotorControl(SocketCan):
         "DM-H3510": "DMH3510",
         "DM-H6215": "DMH6215",
     }
-    other_ranges = {"DM-J3507": (12.5, 50.0, 5.0), "DM-J4340": (12.5, 10.0, 28.0)}
+    other_ranges = {"DM-J3507": (12.5, 50.0, 5.0)}
     # Whatever the model.
     feedback_model = "DM-J4340P"
     refuses_outside = True

@@ -4,7 +4,7 @@ use crate::functions::{device, family};
 use crate::opaque::{Function, any};
 use drivetrain::damiao::*;
 use drivetrain::motor::{
-    AngleDrive, Impedance, ImpedanceControl, Own, OwnMotor, Settings, VelocityDrive,
+    AngleDrive, Impedance, ImpedanceControl, Order, Own, OwnMotor, Settings, VelocityDrive,
 };
 
 pub fn call_all() {
@@ -30,7 +30,14 @@ pub fn call_all() {
     ImpedanceControl::torque_limit_nm.call();
     ImpedanceControl::effort.call();
     ImpedanceControl::capabilities.call();
-    ImpedanceControl::step.call();
+    (|control: &mut ImpedanceControl,
+      order: Order,
+      angle,
+      velocity,
+      ends: (Impedance, Impedance)| {
+        ImpedanceControl::step(control, order, angle, velocity, &ends.0, &ends.1)
+    })
+    .call();
     ImpedanceControl::reset.call();
     Impedance::is_finite.call();
     settings();
