@@ -62,10 +62,14 @@ fn cut(model: &PowerModel, loads: [WheelLoad; 4], limit_w: f32) {
         .map(|load| power(load, load.torque).abs() + power(load, -load.torque).abs())
         .sum();
     if cut.within && cut_w.is_finite() && size.is_finite() && size < 1e30 {
+        // A torque that is cut has no smaller step than this.
+        let smallest = f32::from_bits(1);
+        let grain: f64 =
+            loads.iter().map(|load| (power(load, smallest) - power(load, 0.0)).abs()).sum();
         let limit = f64::from(if limit_w > 0.0 { limit_w } else { 0.0 });
         assert!(
-            cut_w <= limit + 1e-4 * (size + idle) + 1e-30,
-            "{cut_w} of {limit_w}: {cut:?} {loads:?}"
+            cut_w <= limit + 1e-4 * (size + idle) + grain + 1e-30,
+            "{cut_w} of {limit_w}: {cut:?} {loads:?} {model:?}"
         );
     }
 }
