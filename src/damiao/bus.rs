@@ -137,6 +137,7 @@ impl<M: Mode> Motor<M> {
     }
 
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
+    /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
     pub const fn store(&mut self) {
         self.settings.request(Inquiry::Store);
     }
