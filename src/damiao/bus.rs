@@ -1,4 +1,4 @@
-//! Which frame belongs to a motor, and what is sent when.
+//! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
 use super::config::{Mode, sealed};
@@ -277,20 +277,17 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if frame.length() != 8 || !is_answer(data, self.id) {
             return false;
         }
-        let asked = self.settings.asked();
-        if let Some((asked, value)) =
-            asked.and_then(|asked| Some((asked, value(data, self.id, asked)?)))
-        {
-            let is_right = value.to_bits() == self.expected(Register::Timeout).to_bits();
-            match asked {
-                Inquiry::Write(Register::Timeout, _) if is_right => {
-                    self.timeout = Confirmation::Written
-                }
-                Inquiry::Read(Register::Timeout) if is_right => self.timeout = Confirmation::Read,
-                Inquiry::Read(Register::Timeout) => self.timeout = Confirmation::None,
-                _ => {}
+        let Some(asked) = self.settings.asked() else { return true };
+        let Some(value) = value(data, self.id, asked) else { return true };
+        self.settings.take(asked, value);
+        let is_right = value.to_bits() == self.expected(Register::Timeout).to_bits();
+        match asked {
+            Inquiry::Write(Register::Timeout, _) if is_right => {
+                self.timeout = Confirmation::Written;
             }
-            self.settings.take(asked, value);
+            Inquiry::Read(Register::Timeout) if is_right => self.timeout = Confirmation::Read,
+            Inquiry::Read(Register::Timeout) => self.timeout = Confirmation::None,
+            _ => {}
         }
         true
     }

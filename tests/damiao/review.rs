@@ -452,12 +452,9 @@ fn a_spring_with_feedback_9_ms_late_keeps_near_its_limit() {
 
 // ---------------------------------------------------------------- end of PMAX
 
-/// A target whose nearest turn lies beyond PMAX: the motor should stop short of the end and hold there. It goes to the end, its feedback
-/// is no position there, so it is disabled and trips: a loaded arm falls.
-#[test]
-fn a_joint_that_is_led_to_the_end_of_its_range_is_held() {
+fn is_held_at_the_ends<M: Mode>(mode: M, number: f32) {
     for angle in [12.7_f32, -12.7] {
-        let mut bench = Bench::new(PositionVelocity::new(quick()), 2.0);
+        let mut bench = Bench::new(mode, number);
         bench.drive.set_angle(angle.signum() * 12.3);
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();
@@ -469,19 +466,16 @@ fn a_joint_that_is_led_to_the_end_of_its_range_is_held() {
     }
 }
 
+/// A target whose nearest turn lies beyond PMAX: the motor should stop short of the end and hold there. It goes to the end, its feedback
+/// is no position there, so it is disabled and trips: a loaded arm falls.
+#[test]
+fn a_joint_that_is_led_to_the_end_of_its_range_is_held() {
+    is_held_at_the_ends(PositionVelocity::new(quick()), 2.0);
+}
+
 #[test]
 fn a_spring_that_is_led_to_the_end_of_its_range_is_held() {
-    for angle in [12.7_f32, -12.7] {
-        let mut bench = Bench::new(mit(), 1.0);
-        bench.drive.set_angle(angle.signum() * 12.3);
-        bench.steps(100, |_| {});
-        bench.own.arm(bench.now()).unwrap();
-        for tick in 0..3_000 {
-            let set = bench.own.set_angle((), Angle::from_radians(angle));
-            assert_eq!(set, Ok(()), "tick {tick}, at {} rad", bench.drive.angle_rad());
-            bench.step();
-        }
-    }
+    is_held_at_the_ends(mit(), 1.0);
 }
 
 // ---------------------------------------------------------------- configuration, settings, bus
