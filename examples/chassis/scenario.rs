@@ -1,4 +1,4 @@
-//! The robot, what it is asked to do, and what came of it.
+//! The robot, its tasks, and the result of a run.
 
 use super::silence::{CommandWatch, Silence};
 use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};

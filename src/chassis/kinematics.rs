@@ -2,7 +2,7 @@ use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 use core::fmt::Debug;
 
-/// A layout of wheels: what each must do for a motion of the body, and what motion they make.
+/// A layout of wheels: converts a motion of the body to wheel speeds, and wheel speeds to a motion.
 ///
 /// Every layout has `inverse` and `forward` as its own functions; the trait is what
 /// [`Chassis`](super::Chassis) needs to work with all of them.

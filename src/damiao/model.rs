@@ -7,8 +7,8 @@ use crate::wire::mit::Ranges;
 
 /// A model of motor: its name and the ranges of its fields, which are registers of the drive.
 ///
-/// The torques and speeds of the ranges are those of the protocol, not of the motor: what a motor bears is the
-/// limit that a program states with its mode.
+/// The torques and speeds of the ranges are those of the protocol, not of the motor: a program states the
+/// limit of the motor with its mode.
 ///
 /// | model | PMAX rad | VMAX rad/s | TMAX Nm | seen in |
 /// |---|--:|--:|--:|---|

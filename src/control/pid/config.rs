@@ -194,8 +194,8 @@ impl PidConfig {
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
     ///
     /// For speed loops: the effort that overcomes dry friction (in units of the output), and the effort a unit of speed takes.
-    /// The setpoint is taken as `measurement + e`: on a circle it is the one next to the measurement, whatever its turn, and
-    /// one that is lost in the rounding of the error counts as zero. With an error formed elsewhere there is none.
+    /// The setpoint is taken as `measurement + e`. On a circle, that is the setpoint next to the measurement, whatever its turn. A
+    /// setpoint that rounding removes from the error counts as zero. A step with a given error has no feed-forward.
     #[must_use]
     pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
         self.parameters.static_gain = static_gain;

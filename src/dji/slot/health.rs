@@ -1,4 +1,4 @@
-//! What is looked at in one motor a tick, and what is known of it.
+//! Checks of one motor a tick, and its health.
 
 use super::{Slot, coarse};
 use crate::dji::command::to_raw;

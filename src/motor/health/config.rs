@@ -14,7 +14,7 @@ pub enum Reaction {
     Relax,
 }
 
-/// What is looked for in a motor, and what follows from it.
+/// Configures the checks of a motor and the reaction to each condition.
 ///
 /// A motor keeps a reference to it, so it stands in a `static` or a `const`, one for all motors that are alike.
 ///

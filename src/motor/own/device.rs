@@ -182,8 +182,8 @@ impl<M: OwnMotor> Own<M> {
         self.motor.forget_settings();
     }
 
-    /// Returns a question for a setting, in the place of a frame of rest that was sent before: so no update has more frames, and
-    /// none that is not disabled is asked.
+    /// Returns a question for a setting. The question takes the place of a frame of rest after another one, so an update with a
+    /// question has no more frames. A drive that reports that it is enabled gets rest instead.
     fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
         // A drive that lost its supply is silent until it runs again.
         let was_online =
@@ -263,8 +263,8 @@ impl<M: OwnMotor> Own<M> {
         self.start_velocity = None;
     }
 
-    /// Returns the command that this step asks for, or rest; what asks for feedback if either would disable a drive that is being
-    /// enabled.
+    /// Returns the command of this step, or rest. If rest would disable a drive that is being enabled, returns the frame that asks
+    /// for feedback.
     fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
             // A late motor keeps its integral, one without a target starts afresh.

@@ -12,9 +12,10 @@ pub enum Inquiry<R> {
     Store,
 }
 
-/// What is known of the settings of a drive, and what it is asked next. `N` of them have to be as configured.
+/// The known settings of a drive, and the order of questions about them. `N` settings have to be as configured.
 ///
-/// Each second question is the application's, while there is one. It is repeated until the drive answers; one to store is not.
+/// While the application has a question, each second question is that one. A read or a write is repeated until the drive answers; a
+/// store is sent once.
 ///
 /// # Examples
 /// ```
