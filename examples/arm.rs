@@ -12,7 +12,7 @@ mod console;
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own, OwnMotor};
 use drivetrain::runner::{Nb, Runner};
-use drivetrain::sim::{DamiaoDrive, Line, Simulation};
+use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
 use plotters::prelude::*;
@@ -99,9 +99,9 @@ struct Sample {
 fn drive(part: Part, angle_deg: f32) -> DamiaoDrive {
     let model = part.model;
     let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-    let mut drive =
-        DamiaoDrive::new(part.id, 0x10 + u16::from(part.id), ranges).with_shaft(part.inertia, 0.02);
-    drive.set_angle(angle_deg.to_radians());
+    let mut drive = DamiaoDrive::new(part.id, 0x10 + u16::from(part.id), ranges)
+        .with_shaft(DriveShaft::new(part.inertia, 0.02));
+    drive.shaft_mut().set_angle(angle_deg.to_radians());
     drive
 }
 
@@ -120,10 +120,10 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
         for answer in answers {
             world.inject(Line::Can1, answer).map_err(|_| "the bus is full")?;
         }
-        let angles = drives.map(|drive| drive.angle_rad());
+        let angles = drives.map(|drive| drive.shaft().angle_rad());
         for (drive, weight_nm) in drives.iter_mut().zip(weight_nm(angles)) {
             // Held by hand until the motors do.
-            drive.set_load(if ms > ARMED + 200 { -weight_nm } else { 0.0 });
+            drive.shaft_mut().set_load(if ms > ARMED + 200 { -weight_nm } else { 0.0 });
             (0..4).for_each(|_| drive.step(0.00025));
         }
         runner.poll(16);
@@ -150,7 +150,7 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
         samples.push(Sample {
             time_s: ms as f32 * 1e-3,
             angles_deg: angles.map(f32::to_degrees),
-            torques_nm: drives.map(|drive| drive.torque_nm()),
+            torques_nm: drives.map(|drive| drive.shaft().torque_nm()),
         });
     }
     if drives.iter().any(DamiaoDrive::is_enabled) {

@@ -96,8 +96,9 @@ pub fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Ou
                     ("fail", [error]) => drive.fail(error.parse()?),
                     ("supply", []) => drive.lose_supply(),
                     ("shaft", []) => {
-                        let (angle, velocity) = (drive.angle_rad(), drive.velocity_rad_per_s());
-                        let (torque, error) = (drive.torque_nm(), drive.error());
+                        let (angle, velocity) =
+                            (drive.shaft().angle_rad(), drive.shaft().velocity_rad_per_s());
+                        let (torque, error) = (drive.shaft().torque_nm(), drive.error());
                         let enabled = u8::from(drive.is_enabled());
                         write!(answer, "{angle} {velocity} {torque} {enabled} {error}")?;
                     }

@@ -68,7 +68,7 @@ impl<M: Mode> Subject for Joint<M> {
         let mut turned = *drive;
         turned.step(1e-6);
         let is_enabling = command.bytes() == &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
-        !is_enabling && (!drive.is_enabled() || turned.torque_nm().abs() <= 10.0 / 4095.0)
+        !is_enabling && (!drive.is_enabled() || turned.shaft().torque_nm().abs() <= 10.0 / 4095.0)
     }
     /// What others send about registers may be for another drive.
     fn rival(&self, command: &Claim) -> Option<CanFrame> {

@@ -20,7 +20,7 @@ use drivetrain::damiao::{
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, DriveShaft};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -56,12 +56,12 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     let wheel = AngularVelocity::from_rad_per_s(6.0);
     let mut velocity = Bench::armed(Velocity::new(AngularVelocity::from_rad_per_s(20.0)), 3.0);
     velocity.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
-    assert!((velocity.drive.velocity_rad_per_s() - 6.0).abs() < 0.2);
+    assert!((velocity.drive.shaft().velocity_rad_per_s() - 6.0).abs() < 0.2);
     rests(velocity);
 
     let mut damped = Bench::armed(mit(), 1.0);
     damped.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
-    assert!((damped.drive.velocity_rad_per_s() - 6.0).abs() < 0.2);
+    assert!((damped.drive.shaft().velocity_rad_per_s() - 6.0).abs() < 0.2);
     rests(damped);
 
     let loops = ImpedanceControl::new(3.0).unwrap().with_loops(
@@ -70,24 +70,26 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     );
     let mut looped = Bench::armed(loops.unwrap(), 1.0);
     looped.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
-    assert!((looped.drive.velocity_rad_per_s() - 6.0).abs() < 0.1);
+    assert!((looped.drive.shaft().velocity_rad_per_s() - 6.0).abs() < 0.1);
     looped.steps(1_500, |bench| bench.own.set_angle((), Angle::from_radians(1.0)).unwrap());
-    assert!((looped.drive.angle_rad() - 1.0).abs().rem_euclid(core::f32::consts::TAU) < 0.02);
+    assert!(
+        (looped.drive.shaft().angle_rad() - 1.0).abs().rem_euclid(core::f32::consts::TAU) < 0.02
+    );
     rests(looped);
 
     let quick = AngularVelocity::from_rad_per_s(10.0);
     let joint = Angle::from_radians(1.0);
     let mut position = Bench::armed(PositionVelocity::new(quick), 2.0);
     position.steps(2_000, |bench| bench.own.set_angle((), joint).unwrap());
-    assert!((position.drive.angle_rad() - 1.0).abs() < 0.02);
+    assert!((position.drive.shaft().angle_rad() - 1.0).abs() < 0.02);
     rests(position);
 
     let mut force = Bench::armed(ForcePosition::new(quick, 2.0), 4.0);
     force.steps(2_000, |bench| {
         bench.own.set_angle((), joint).unwrap();
-        assert!(bench.drive.torque_nm().abs() <= 2.001);
+        assert!(bench.drive.shaft().torque_nm().abs() <= 2.001);
     });
-    assert!((force.drive.angle_rad() - 1.0).abs() < 0.02);
+    assert!((force.drive.shaft().angle_rad() - 1.0).abs() < 0.02);
     rests(force);
 }
 
@@ -95,15 +97,17 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 fn rests<M: Mode>(mut bench: Bench<M>) {
     bench.own.disarm();
     bench.step();
-    bench.steps(50, |bench| assert!(bench.drive.torque_nm().abs() < 0.003, "{:?}", bench.frames));
+    bench.steps(50, |bench| {
+        assert!(bench.drive.shaft().torque_nm().abs() < 0.003, "{:?}", bench.frames)
+    });
     assert!(!bench.drive.is_enabled());
 }
 
 #[test]
 fn an_impedance_holds_a_weight_at_its_angle_and_never_asks_for_more_than_the_limit() {
     let mut bench = Bench::armed(ImpedanceControl::new(3.0).unwrap(), 1.0);
-    bench.drive = bench.drive.with_shaft(0.05, 0.05);
-    bench.drive.set_load(-1.0);
+    bench.drive = bench.drive.with_shaft(DriveShaft::new(0.05, 0.05));
+    bench.drive.shaft_mut().set_load(-1.0);
     let far = Impedance {
         angle: Angle::from_radians(2.0),
         stiffness: 30.0,
@@ -114,11 +118,15 @@ fn an_impedance_holds_a_weight_at_its_angle_and_never_asks_for_more_than_the_lim
     bench.steps(3_000, |bench| {
         bench.own.set_impedance(far).unwrap();
         assert!(
-            bench.drive.torque_nm().abs() < 3.3,
+            bench.drive.shaft().torque_nm().abs() < 3.3,
             "a count of torque, and what one cycle changes"
         );
     });
-    assert!((bench.drive.angle_rad() - 2.0).abs() < 0.01, "{}", bench.drive.angle_rad());
+    assert!(
+        (bench.drive.shaft().angle_rad() - 2.0).abs() < 0.01,
+        "{}",
+        bench.drive.shaft().angle_rad()
+    );
     for wrong in [
         Impedance { stiffness: -1.0, ..far },
         Impedance { damping: f32::NAN, ..far },
@@ -133,19 +141,19 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     let quick = AngularVelocity::from_rad_per_s(10.0);
     let there = Angle::from_radians(-1.5);
     let mut position = Bench::new(PositionVelocity::new(quick), 2.0);
-    position.drive.set_angle(1.5);
+    position.drive.shaft_mut().set_angle(1.5);
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
     position.steps(60, |bench| bench.own.set_angle((), there).unwrap());
-    let near = position.drive.angle_rad();
+    let near = position.drive.shaft().angle_rad();
     assert!((near - 1.5).abs() < 0.05, "60 ms after arming at {near}");
     let mut spring = Bench::new(mit(), 1.0);
-    spring.drive.set_angle(1.5);
+    spring.drive.shaft_mut().set_angle(1.5);
     spring.steps(100, |_| {});
     spring.own.arm(spring.now()).unwrap();
     spring.steps(30, |bench| {
         bench.own.set_angle((), there).unwrap();
-        assert!(bench.drive.torque_nm().abs() < 0.3, "{}", bench.drive.torque_nm());
+        assert!(bench.drive.shaft().torque_nm().abs() < 0.3, "{}", bench.drive.shaft().torque_nm());
     });
 }
 
@@ -196,7 +204,7 @@ fn two_motors_with_one_master_id_are_told_apart() {
         }
     }
     assert!(robot.is_armed() && now > Instant::START + Duration::from_millis(1_000));
-    let speeds = drives.map(|drive| drive.velocity_rad_per_s());
+    let speeds = drives.map(|drive| drive.shaft().velocity_rad_per_s());
     assert!((speeds[0] - 3.0).abs() < 0.2 && (speeds[1] + 5.0).abs() < 0.2, "{speeds:?}");
 }
 

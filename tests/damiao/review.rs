@@ -8,7 +8,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Order, Own, OwnMotor, Target, VelocityDrive,
 };
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::sim::{DamiaoDrive, DriveShaft};
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
@@ -123,8 +123,8 @@ fn velocity_mode_does_not_jump_after_a_duplicated_answer() {
     for _ in 0..60 {
         bench.own.set_velocity((), AngularVelocity::ZERO).unwrap();
         bench.step();
-        torque = torque.max(bench.drive.torque_nm().abs());
-        speed = speed.max(bench.drive.velocity_rad_per_s().abs());
+        torque = torque.max(bench.drive.shaft().torque_nm().abs());
+        speed = speed.max(bench.drive.shaft().velocity_rad_per_s().abs());
     }
     assert!(torque < 0.5 && speed < 0.5, "target 0, shaft at rest: {torque} Nm, {speed} rad/s");
 }
@@ -181,7 +181,7 @@ fn velocity_mode_does_not_resume_its_old_speed_when_one_frame_is_lost() {
     bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
     bench.steps(5_000, |_| {});
-    assert!(bench.drive.velocity_rad_per_s().abs() < 0.5);
+    assert!(bench.drive.shaft().velocity_rad_per_s().abs() < 0.5);
     bench.own.arm(bench.now()).unwrap();
     let (mut lost, mut torque, mut speed) = (false, 0.0_f32, 0.0_f32);
     for _ in 0..60 {
@@ -201,9 +201,9 @@ fn velocity_mode_does_not_resume_its_old_speed_when_one_frame_is_lost() {
         }
         for _ in 0..10 {
             bench.drive.step(1e-4);
-            torque = torque.max(bench.drive.torque_nm().abs());
+            torque = torque.max(bench.drive.shaft().torque_nm().abs());
         }
-        speed = speed.max(bench.drive.velocity_rad_per_s().abs());
+        speed = speed.max(bench.drive.shaft().velocity_rad_per_s().abs());
     }
     assert!(lost && torque < 1.0, "target 0, shaft at rest: {torque} Nm, {speed} rad/s");
 }
@@ -237,7 +237,7 @@ fn velocity_mode_does_not_resume_its_old_speed_when_the_bus_was_busy() {
         }
         for _ in 0..10 {
             bench.drive.step(1e-4);
-            torque = torque.max(bench.drive.torque_nm().abs());
+            torque = torque.max(bench.drive.shaft().torque_nm().abs());
         }
     }
     assert!(torque < 1.0, "target 0, shaft at rest: {torque} Nm; {:?}", &seen[..6.min(seen.len())]);
@@ -265,15 +265,12 @@ fn velocity_mode_does_not_jump_to_a_velocity_measured_long_before() {
             }
         }
         // Somebody stops the wheel.
-        bench.drive.set_load(if tick < 300 {
-            -2.0 * bench.drive.velocity_rad_per_s() * 0.1
-        } else {
-            0.0
-        });
+        let drag = if tick < 300 { -0.2 * bench.drive.shaft().velocity_rad_per_s() } else { 0.0 };
+        bench.drive.shaft_mut().set_load(drag);
         for _ in 0..10 {
             bench.drive.step(1e-4);
             if tick > 290 {
-                torque = torque.max(bench.drive.torque_nm().abs());
+                torque = torque.max(bench.drive.shaft().torque_nm().abs());
             }
         }
     }
@@ -335,7 +332,7 @@ fn a_range_that_a_sag_brought_back_is_noticed() {
             }
             bench.is_cut = (at..at + 12).contains(&tick); // it starts
             bench.step();
-            most = most.max(bench.drive.torque_nm());
+            most = most.max(bench.drive.shaft().torque_nm());
         }
         if most > 1.5 {
             bad.push((at, most));
@@ -442,10 +439,14 @@ fn a_spring_with_feedback_9_ms_late_keeps_near_its_limit() {
         }
         for _ in 0..10 {
             bench.drive.step(1e-4);
-            most = most.max(bench.drive.torque_nm().abs());
+            most = most.max(bench.drive.shaft().torque_nm().abs());
         }
     }
-    println!("{most} Nm, enabled {}, at {}", bench.drive.is_enabled(), bench.drive.angle_rad());
+    println!(
+        "{most} Nm, enabled {}, at {}",
+        bench.drive.is_enabled(),
+        bench.drive.shaft().angle_rad()
+    );
     assert!(bench.drive.is_enabled(), "{:?}", bench.own.health());
     assert!(most < 4.0, "{most} Nm, limit 2");
 }
@@ -455,12 +456,12 @@ fn a_spring_with_feedback_9_ms_late_keeps_near_its_limit() {
 fn is_held_at_the_ends<M: Mode>(mode: M, number: f32) {
     for angle in [12.7_f32, -12.7] {
         let mut bench = Bench::new(mode, number);
-        bench.drive.set_angle(angle.signum() * 12.3);
+        bench.drive.shaft_mut().set_angle(angle.signum() * 12.3);
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();
         for tick in 0..3_000 {
             let set = bench.own.set_angle((), Angle::from_radians(angle));
-            assert_eq!(set, Ok(()), "tick {tick}, at {} rad", bench.drive.angle_rad());
+            assert_eq!(set, Ok(()), "tick {tick}, at {} rad", bench.drive.shaft().angle_rad());
             bench.step();
         }
     }
@@ -843,15 +844,15 @@ fn an_impedance_keeps_the_limit_of_each_share() {
 #[test]
 fn velocity_mode_does_not_brake_hard_after_late_feedback() {
     let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
-    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
     let (mut torque, mut slowest) = (0.0_f32, f32::MAX);
     for tick in 0..400 {
         _ = bench.own.set_velocity((), quick());
         bench.is_cut = tick < 15;
         bench.step();
-        torque = torque.min(bench.drive.torque_nm());
-        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+        torque = torque.min(bench.drive.shaft().torque_nm());
+        slowest = slowest.min(bench.drive.shaft().velocity_rad_per_s());
     }
     assert!(
         torque > -1.0 && slowest > 15.0,
@@ -863,7 +864,7 @@ fn velocity_mode_does_not_brake_hard_after_late_feedback() {
 #[test]
 fn velocity_mode_does_not_brake_a_coasting_wheel_when_armed() {
     let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
-    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
     bench.steps(80, |_| {});
@@ -872,8 +873,8 @@ fn velocity_mode_does_not_brake_a_coasting_wheel_when_armed() {
     for _ in 0..400 {
         _ = bench.own.set_velocity((), quick());
         bench.step();
-        torque = torque.min(bench.drive.torque_nm());
-        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+        torque = torque.min(bench.drive.shaft().torque_nm());
+        slowest = slowest.min(bench.drive.shaft().velocity_rad_per_s());
     }
     assert!(
         torque > -1.0 && slowest > 15.0,
@@ -891,16 +892,16 @@ fn a_spring_does_not_come_back_at_once_after_late_feedback() {
         _ = bench.own.set_angle((), Angle::ZERO);
         bench.is_cut = tick < 30;
         if tick == 25 {
-            bench.drive.set_angle(-1.0);
+            bench.drive.shaft_mut().set_angle(-1.0);
         }
         bench.step();
         if tick > 31 {
-            println!("{tick} {:.2}", bench.drive.torque_nm());
+            println!("{tick} {:.2}", bench.drive.shaft().torque_nm());
         }
         assert!(
-            !(30..=40).contains(&tick) || bench.drive.torque_nm() < 1.0,
+            !(30..=40).contains(&tick) || bench.drive.shaft().torque_nm() < 1.0,
             "{} Nm, tick {tick}",
-            bench.drive.torque_nm()
+            bench.drive.shaft().torque_nm()
         );
     }
 }
@@ -961,7 +962,7 @@ fn a_drive_is_disabled_after_an_error_that_is_over() {
         }
         bench.drive.step(0.001);
     }
-    let speed = bench.drive.velocity_rad_per_s();
+    let speed = bench.drive.shaft().velocity_rad_per_s();
     assert!(!bench.drive.is_enabled(), "2 s after the emergency stop: {speed} rad/s");
 }
 
@@ -996,7 +997,7 @@ fn a_spring_with_feedback_20_ms_old_keeps_within_twice_its_limit() {
             }
             for _ in 0..10 {
                 bench.drive.step(1e-4);
-                most = most.max(bench.drive.torque_nm().abs());
+                most = most.max(bench.drive.shaft().torque_nm().abs());
             }
         }
         worst.push((stiffness, damping, most, bench.drive.is_enabled()));
@@ -1012,18 +1013,18 @@ fn a_spring_with_feedback_20_ms_old_keeps_within_twice_its_limit() {
 #[test]
 fn position_mode_does_not_brake_hard_after_late_feedback() {
     let mut bench = Bench::new(PositionVelocity::new(rad_s(10.0)), 2.0);
-    bench.drive = bench.drive.with_shaft(0.01, 0.001);
+    bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
     bench.steps(300, |b| b.own.set_angle((), Angle::from_radians(3.0)).unwrap());
-    let before = bench.drive.velocity_rad_per_s();
+    let before = bench.drive.shaft().velocity_rad_per_s();
     let (mut slowest, mut torque) = (f32::MAX, 0.0_f32);
     for tick in 0..40 {
         _ = bench.own.set_angle((), Angle::from_radians(3.0));
         bench.is_cut = tick < 15;
         bench.step();
-        torque = torque.min(bench.drive.torque_nm());
-        slowest = slowest.min(bench.drive.velocity_rad_per_s());
+        torque = torque.min(bench.drive.shaft().torque_nm());
+        slowest = slowest.min(bench.drive.shaft().velocity_rad_per_s());
     }
     assert!(torque > -1.0, "{before} rad/s before, then {torque} Nm, down to {slowest} rad/s");
 }

@@ -238,7 +238,7 @@ impl<M: Mode> Subject<1> for Damiao<M> {
             turned.step(1e-6);
             is_driven |= frame.header() != 0x7FF
                 && turned.is_enabled()
-                && turned.torque_nm().abs() > 10.0 / 4095.0;
+                && turned.shaft().torque_nm().abs() > 10.0 / 4095.0;
         }
         [is_driven]
     }

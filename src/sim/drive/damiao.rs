@@ -6,6 +6,7 @@
     reason = "fields of a frame and of its registers, which saturate"
 )]
 
+use super::DriveShaft;
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -27,7 +28,7 @@ const TMAX: usize = 6;
 
 /// A drive of Damiao and the shaft that it turns, for tests: it takes frames, answers them, and moves.
 ///
-/// It stands beside the [`Simulation`](super::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
+/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
 /// Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is
 /// discarded without an answer. The shaft is an inertia with viscous friction.
 ///
@@ -52,12 +53,7 @@ pub struct DamiaoDrive {
     /// Since the last frame of the drive's own.
     silence_s: f64,
     command: Command,
-    angle_rad: f64,
-    velocity_rad_per_s: f64,
-    torque_nm: f64,
-    load_nm: f64,
-    inertia_kg_m2: f64,
-    friction_nm_s: f64,
+    shaft: DriveShaft,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -89,12 +85,7 @@ impl DamiaoDrive {
             error: 0,
             silence_s: 0.0,
             command: Command::None,
-            angle_rad: 0.0,
-            velocity_rad_per_s: 0.0,
-            torque_nm: 0.0,
-            load_nm: 0.0,
-            inertia_kg_m2: 0.01,
-            friction_nm_s: 0.01,
+            shaft: DriveShaft::new(0.01, 0.01),
         }
     }
 
@@ -106,21 +97,21 @@ impl DamiaoDrive {
         self
     }
 
-    /// Sets the inertia at the output shaft in kg m² and the viscous friction in Nm s/rad, both above zero.
+    /// Gives the drive another shaft.
     #[must_use]
-    pub fn with_shaft(self, inertia_kg_m2: f32, friction_nm_s: f32) -> Self {
-        let (inertia_kg_m2, friction_nm_s) = (inertia_kg_m2.into(), friction_nm_s.into());
-        Self { inertia_kg_m2, friction_nm_s, ..self }
+    pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
+        Self { shaft, ..self }
     }
 
-    /// Sets a torque from outside, in Nm: the weight of an arm, say.
-    pub fn set_load(&mut self, torque_nm: f32) {
-        self.load_nm = torque_nm.into();
+    /// Returns the shaft.
+    #[must_use]
+    pub const fn shaft(&self) -> &DriveShaft {
+        &self.shaft
     }
 
-    /// Sets the angle of the output shaft in rad.
-    pub fn set_angle(&mut self, angle_rad: f32) {
-        self.angle_rad = angle_rad.into();
+    /// Returns the shaft, to load or to turn it.
+    pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
+        &mut self.shaft
     }
 
     /// Has the drive report an error, 8 to 14, and switch itself off.
@@ -133,24 +124,6 @@ impl DamiaoDrive {
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
         (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
-    }
-
-    /// Returns the angle of the output shaft in rad.
-    #[must_use]
-    pub fn angle_rad(&self) -> f32 {
-        single(self.angle_rad)
-    }
-
-    /// Returns the velocity of the output shaft in rad/s.
-    #[must_use]
-    pub fn velocity_rad_per_s(&self) -> f32 {
-        single(self.velocity_rad_per_s)
-    }
-
-    /// Returns the torque of the drive in the last step, in Nm.
-    #[must_use]
-    pub fn torque_nm(&self) -> f32 {
-        single(self.torque_nm)
     }
 
     /// Tells whether the drive follows commands.
@@ -196,27 +169,23 @@ impl DamiaoDrive {
         }
         let most = self.value(TMAX);
         let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
-        self.torque_nm = wanted.clamp(-most, most);
-        let sum = self.torque_nm + self.load_nm - self.friction_nm_s * self.velocity_rad_per_s;
-        self.velocity_rad_per_s += sum / self.inertia_kg_m2 * dt_s;
-        self.angle_rad += self.velocity_rad_per_s * dt_s;
+        self.shaft.step(wanted.clamp(-most, most), dt_s);
     }
 
     fn wanted_nm(&self) -> f64 {
-        let speed_loop =
-            |velocity: f64| 100.0 * self.inertia_kg_m2 * (velocity - self.velocity_rad_per_s);
+        let shaft = &self.shaft;
         match self.command {
             Command::None => 0.0,
             Command::Mit { position, velocity, kp, kd, torque } => {
-                kp * (position - self.angle_rad)
-                    + kd * (velocity - self.velocity_rad_per_s)
+                kp * (position - shaft.angle_rad)
+                    + kd * (velocity - shaft.velocity_rad_per_s)
                     + torque
             }
             Command::Position(position, most, limit) => {
-                let velocity = (5.0 * (position - self.angle_rad)).clamp(-most, most);
-                speed_loop(velocity).clamp(-limit, limit)
+                let velocity = (5.0 * (position - shaft.angle_rad)).clamp(-most, most);
+                shaft.following_nm(velocity).clamp(-limit, limit)
             }
-            Command::Velocity(velocity) => speed_loop(velocity),
+            Command::Velocity(velocity) => shaft.following_nm(velocity),
         }
     }
 
@@ -225,7 +194,7 @@ impl DamiaoDrive {
             ENABLE => self.is_enabled = self.error == 0,
             DISABLE => self.is_enabled = false,
             CLEAR_ERROR => self.error = 0,
-            _ => self.angle_rad = 0.0,
+            _ => self.shaft.angle_rad = 0.0,
         }
     }
 
@@ -266,9 +235,9 @@ impl DamiaoDrive {
         };
         let status = if self.error > 0 { self.error } else { u8::from(self.is_enabled) };
         let bits = u64::from(status << 4 | self.id & 0xF) << 56
-            | field(self.angle_rad, self.value(PMAX), 16) << 40
-            | field(self.velocity_rad_per_s, self.value(VMAX), 12) << 28
-            | field(self.torque_nm, self.value(TMAX), 12) << 16
+            | field(self.shaft.angle_rad, self.value(PMAX), 16) << 40
+            | field(self.shaft.velocity_rad_per_s, self.value(VMAX), 12) << 28
+            | field(self.shaft.torque_nm, self.value(TMAX), 12) << 16
             | 35 << 8
             | 30;
         self.answer(bits.to_be_bytes())

@@ -1,0 +1,7 @@
+//! Drives with command frames of their own, each written from its manual and without the codec of its family.
+
+mod damiao;
+mod shaft;
+
+pub use damiao::DamiaoDrive;
+pub use shaft::DriveShaft;

@@ -1,0 +1,86 @@
+//! The shaft that a simulated drive turns.
+
+/// An output shaft with inertia and viscous friction, turned by a drive and by a load.
+///
+/// # Examples
+/// ```
+/// use drivetrain::sim::DriveShaft;
+///
+/// let mut shaft = DriveShaft::new(0.01, 0.0); // kg m², Nm s/rad
+/// shaft.set_load(0.5);
+/// for _ in 0..1_000 {
+///     shaft.step(0.0, 0.001);
+/// }
+/// assert!((shaft.velocity_rad_per_s() - 50.0).abs() < 0.01);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct DriveShaft {
+    pub(super) angle_rad: f64,
+    pub(super) velocity_rad_per_s: f64,
+    pub(super) torque_nm: f64,
+    load_nm: f64,
+    pub(super) inertia_kg_m2: f64,
+    friction_nm_s: f64,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounds to single precision")]
+impl DriveShaft {
+    /// Makes a shaft at rest with an inertia in kg m², above zero, and a viscous friction in Nm s/rad.
+    #[must_use]
+    pub fn new(inertia_kg_m2: f32, friction_nm_s: f32) -> Self {
+        Self {
+            angle_rad: 0.0,
+            velocity_rad_per_s: 0.0,
+            torque_nm: 0.0,
+            load_nm: 0.0,
+            inertia_kg_m2: inertia_kg_m2.into(),
+            friction_nm_s: friction_nm_s.into(),
+        }
+    }
+
+    /// Sets a torque from outside, in Nm: the weight of an arm, say.
+    pub fn set_load(&mut self, torque_nm: f32) {
+        self.load_nm = torque_nm.into();
+    }
+
+    /// Sets the angle in rad.
+    pub fn set_angle(&mut self, angle_rad: f32) {
+        self.angle_rad = angle_rad.into();
+    }
+
+    /// Sets the velocity in rad/s.
+    pub fn set_velocity(&mut self, velocity_rad_per_s: f32) {
+        self.velocity_rad_per_s = velocity_rad_per_s.into();
+    }
+
+    /// Returns the angle in rad; turns count.
+    #[must_use]
+    pub const fn angle_rad(&self) -> f32 {
+        self.angle_rad as f32
+    }
+
+    /// Returns the velocity in rad/s.
+    #[must_use]
+    pub const fn velocity_rad_per_s(&self) -> f32 {
+        self.velocity_rad_per_s as f32
+    }
+
+    /// Returns the torque of the drive in the last step, in Nm.
+    #[must_use]
+    pub const fn torque_nm(&self) -> f32 {
+        self.torque_nm as f32
+    }
+
+    /// Moves on by a time in s under a torque of the drive in Nm.
+    pub fn step(&mut self, torque_nm: f64, dt_s: f64) {
+        self.torque_nm = torque_nm;
+        let sum = torque_nm + self.load_nm - self.friction_nm_s * self.velocity_rad_per_s;
+        self.velocity_rad_per_s += sum / self.inertia_kg_m2 * dt_s;
+        self.angle_rad += self.velocity_rad_per_s * dt_s;
+    }
+
+    /// Returns the torque in Nm by which a drive's own speed loop follows a velocity in rad/s.
+    pub(super) fn following_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        100.0 * self.inertia_kg_m2 * (velocity_rad_per_s - self.velocity_rad_per_s)
+    }
+}
