@@ -165,7 +165,7 @@ def decode(image, function):
         same = [output(end, index) == field for index, field in enumerate(fields)]
         valid = claripy.ULT(high[31:16], 8192)
         rule = claripy.If(
-            valid, claripy.And(end.regs.r0 == 1, *same), claripy.And(end.regs.r0 == 0, same[0])
+            valid, claripy.And(end.regs.r0 == 1, *same), end.regs.r0 == 0
         )
         paths.append((end, rule))
     yield paths, {"high": high, "low": low}, ()

@@ -7,8 +7,7 @@
 #![cfg(test)]
 
 use drivetrain::dji::{
-    AttachError, Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006,
-    M3508, Model,
+    AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
 };
 use drivetrain::encoder::{Position, shortest};
 use drivetrain::frame::CanFrame;
@@ -156,7 +155,7 @@ fn every_value<M: Model, const N: usize>(
     });
 }
 
-fn set_amperes<M: CurrentControlled>(
+fn set_amperes<M: Model<Command = Current>>(
     bus: &mut Bus,
     motor: Handle<M>,
     value: f32,
@@ -386,7 +385,7 @@ fn every_pair_of_motors_is_refused_exactly_when_it_collides() {
                 let done = attach(&mut bus, other, other_id);
                 match done {
                     Ok(()) => assert!(there.is_some() && !collides),
-                    Err(AttachError::Collision(_)) => assert!(collides),
+                    Err(AttachError::Collision { .. }) => assert!(collides),
                     Err(AttachError::Id { .. }) => assert!(there.is_none()),
                     Err(error) => panic!("{error}"),
                 }

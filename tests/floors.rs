@@ -100,7 +100,7 @@ fn named(line: &str) -> Vec<String> {
 }
 
 /// What the simulator may know of the driver: its table of facts, not its code.
-const FACTS: [&str; 12] = [
+const FACTS: [&str; 11] = [
     "CommandFrame",
     "Facts",
     "Gm6020Current",
@@ -108,7 +108,6 @@ const FACTS: [&str; 12] = [
     "M2006",
     "M3508",
     "Model",
-    "Unit",
     "self",
     "model",
     "as",

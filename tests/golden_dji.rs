@@ -115,16 +115,12 @@ fn every_pair_of_motors_collides_exactly_where_the_table_says() {
             let outcome = attach(&mut bus, other.0, other.1);
             match listed(&names[0], &names[1]) {
                 Some(pair) => {
-                    let Err(AttachError::Collision(collision)) = outcome else {
+                    let Err(AttachError::Collision { motor, with, slot, .. }) = outcome else {
                         panic!("{names:?} were accepted")
                     };
-                    assert_eq!(
-                        collision.slot.is_some(),
-                        pair["tx_slot"].as_bool().unwrap(),
-                        "{names:?}"
-                    );
-                    assert_eq!(collision.with, MotorName::new(facts(one.0).name, one.1));
-                    assert_eq!(collision.motor, MotorName::new(facts(other.0).name, other.1));
+                    assert_eq!(slot.is_some(), pair["tx_slot"].as_bool().unwrap(), "{names:?}");
+                    assert_eq!(with, MotorName::new(facts(one.0).name, one.1));
+                    assert_eq!(motor, MotorName::new(facts(other.0).name, other.1));
                 }
                 None => assert_eq!(outcome.is_err(), one == other, "{names:?}"),
             }
@@ -185,7 +181,7 @@ fn drive(first: u8, raw: &[i64]) -> CanFrame {
 
 #[test]
 fn amperes_become_the_golden_bytes() {
-    fn drive<M: CurrentControlled>(vector: &Value) {
+    fn drive<M: Model<Command = Current>>(vector: &Value) {
         let mut bus = Bus::new();
         let motors = bus.attach_all([1, 2, 3, 4].map(at_once::<M>)).unwrap();
         for id in 1..=4 {

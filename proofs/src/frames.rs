@@ -64,7 +64,7 @@ pub extern "C" fn frame(wire: &Wire, place: &mut CanFrame) -> u32 {
 const fn attached<M: Model>(bus: &mut Bus, id: u8) -> AnyHandle {
     match bus.attach(Config::<M>::new(id)) {
         Ok(motor) => Handle::erase(motor),
-        Err(AttachError::Collision(_)) => panic!("two motors on one id"),
+        Err(AttachError::Collision { .. }) => panic!("two motors on one id"),
         Err(_) => panic!("not attached"),
     }
 }

@@ -65,11 +65,11 @@ const fn bytes(high: u32, low: u32) -> [u8; 8] {
     [a, b, c, d, e, f, g, h]
 }
 
-/// Decodes feedback: 1 and angle, rpm, current, temperature, error; or 0 and the angle that was refused.
+/// Decodes feedback: 1 and angle, rpm, current, temperature, error; or 0 for a frame that is refused.
 #[unsafe(no_mangle)]
 extern "C" fn decode(high: u32, low: u32, fields: &mut [i32; 5]) -> u32 {
     match Feedback::decode(&bytes(high, low)) {
-        Ok(feedback) => {
+        Some(feedback) => {
             *fields = [
                 i32::from(feedback.angle()),
                 i32::from(feedback.rpm()),
@@ -79,10 +79,7 @@ extern "C" fn decode(high: u32, low: u32, fields: &mut [i32; 5]) -> u32 {
             ];
             1
         }
-        Err(error) => {
-            *fields = [i32::from(error.angle), 0, 0, 0, 0];
-            0
-        }
+        None => 0,
     }
 }
 

@@ -1,9 +1,7 @@
 //! From a physical command to the word on the wire, for each model.
 
 use crate::Shared;
-use drivetrain::dji::{
-    Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model,
-};
+use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::TargetError;
 use drivetrain::time::{Duration, Instant, Tick};
@@ -48,7 +46,7 @@ impl<M: Model> Motor<M> {
     }
 }
 
-fn amperes<M: CurrentControlled>(
+fn amperes<M: Model<Command = Current>>(
     bus: &mut Bus,
     motor: Handle<M>,
     value: f32,

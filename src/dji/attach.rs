@@ -5,7 +5,7 @@ use super::command::Place;
 use super::config::PlainConfig;
 use super::handle::Key;
 use super::slot::Slot;
-use super::{AnyHandle, AttachError, Bus, Collision, Config, Facts, Handle, Model};
+use super::{AnyHandle, AttachError, Bus, Config, Facts, Handle, Model};
 use crate::motor::MotorName;
 
 impl<B> Bus<B> {
@@ -42,7 +42,7 @@ impl<B> Bus<B> {
         let place = Place::new(frame, slot);
         if let Some(with) = here.name() {
             let slot = if here.place.same_as(place) { Some((frame, slot)) } else { None };
-            return Err(AttachError::Collision(Collision { motor, with, feedback_id, slot }));
+            return Err(AttachError::Collision { motor, with, feedback_id, slot });
         }
         let Some(generation) = here.next_generation() else {
             return Err(AttachError::WornOut { motor });

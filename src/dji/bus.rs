@@ -202,7 +202,7 @@ impl<B> Bus<B> {
             self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
             return Ingest::Malformed(Malformed::Length(frame.length()));
         }
-        let Ok(feedback) = Feedback::decode(frame.bytes()) else {
+        let Some(feedback) = Feedback::decode(frame.bytes()) else {
             self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
             return Ingest::Malformed(Malformed::Field);
         };

@@ -1,4 +1,4 @@
-use super::{CurrentControlled, Facts, Gm6020Voltage, Model, VoltageControlled};
+use super::{Facts, Gm6020Voltage, Model};
 use crate::control::PidConfig;
 use crate::encoder::GearRatio;
 use crate::motor::{HealthConfig, OPENING, Recovery};
@@ -175,7 +175,7 @@ impl<M: Model> Config<M> {
     }
 }
 
-impl<M: CurrentControlled> Config<M> {
+impl<M: Model<Command = Current>> Config<M> {
     /// Lowers the largest current, for loops and direct commands alike. More than the ESC's full scale is refused
     /// by `attach`.
     #[must_use]
@@ -185,7 +185,7 @@ impl<M: CurrentControlled> Config<M> {
     }
 }
 
-impl<M: VoltageControlled> Config<M> {
+impl<M: Model<Command = Voltage>> Config<M> {
     /// Lowers the largest voltage, for loops and direct commands alike. More than full scale is refused by `attach`.
     #[must_use]
     pub const fn with_voltage_limit(mut self, limit: Voltage) -> Self {

@@ -12,8 +12,17 @@ pub enum AttachError {
         /// The highest id of its model.
         highest: u8,
     },
-    /// Another motor is in the way.
-    Collision(Collision),
+    /// Two motors cannot share a bus.
+    Collision {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The motor that is there.
+        with: MotorName,
+        /// The feedback id that both would use.
+        feedback_id: u16,
+        /// The command frame and slot that both would use, if they share one.
+        slot: Option<(CommandFrame, u8)>,
+    },
     /// A parameter of the configuration is not usable.
     Parameter {
         /// The motor that was to be attached.
@@ -21,12 +30,18 @@ pub enum AttachError {
         /// The name of the parameter.
         parameter: &'static str,
     },
-    /// A proportional gain is impossible for the model.
+    /// A proportional gain is impossible for the model: the finest error that feedback tells asks for more than there is.
+    ///
+    /// The gains are whole numbers in the unit of the loop: A, or V in voltage mode, per rad/s of the output shaft, or rad/s per rad.
     Gain {
         /// The motor that was to be attached.
         motor: MotorName,
-        /// The gain.
-        gain: SteepGain,
+        /// The name of the gain and of its loop.
+        parameter: &'static str,
+        /// The gain that was given.
+        value: u32,
+        /// The highest gain that the model takes.
+        highest: u32,
     },
     /// The bus would be loaded beyond its ceiling: lower the rate of the feedback, or use a second bus.
     Load {
@@ -46,37 +61,12 @@ pub enum AttachError {
     },
 }
 
-/// Two motors that cannot share a bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Collision {
-    /// The motor that was to be attached.
-    pub motor: MotorName,
-    /// The motor that is there.
-    pub with: MotorName,
-    /// The feedback id that both would use.
-    pub feedback_id: u16,
-    /// The command frame and slot that both would use, if they share one.
-    pub slot: Option<(CommandFrame, u8)>,
-}
-
-/// A proportional gain with which the finest error that feedback tells asks for more than there is, in whole numbers.
-///
-/// The unit is that of the loop: A, or V in voltage mode, per rad/s of the output shaft, or rad/s per rad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct SteepGain {
-    /// The name of the gain and of its loop.
-    pub parameter: &'static str,
-    /// The gain that was given.
-    pub value: u32,
-    /// The highest gain that the model takes.
-    pub highest: u32,
-}
-
-impl core::fmt::Display for SteepGain {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(Message::new().gain(*self).as_str())
-    }
+/// A proportional gain that is impossible for a model, and its bound.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SteepGain {
+    pub(super) parameter: &'static str,
+    pub(super) value: u32,
+    pub(super) highest: u32,
 }
 
 impl AttachError {
@@ -88,7 +78,7 @@ impl AttachError {
             Self::Id { motor, highest } => {
                 message.name(*motor).text(": the id is not within 1..=").number(*highest as u32)
             }
-            Self::Collision(Collision { motor, with, feedback_id, slot }) => {
+            Self::Collision { motor, with, feedback_id, slot } => {
                 let message = message
                     .name(*motor)
                     .text(" collides with ")
@@ -107,7 +97,9 @@ impl AttachError {
             Self::Parameter { motor, parameter } => {
                 message.name(*motor).text(": ").text(parameter).text(" is not usable")
             }
-            Self::Gain { motor, gain } => message.name(*motor).text(": ").gain(*gain),
+            Self::Gain { motor, parameter, value, highest } => {
+                message.name(*motor).text(": ").gain(parameter, *value, *highest)
+            }
             Self::Load { motor, load, ceiling_percent, feedback_hz } => {
                 let message = message
                     .name(*motor)
@@ -216,7 +208,7 @@ impl Message {
         message
     }
 
-    const fn gain(self, SteepGain { parameter, value, highest }: SteepGain) -> Self {
+    const fn gain(self, parameter: &str, value: u32, highest: u32) -> Self {
         self.text(parameter)
             .text(" is ")
             .number(value)
@@ -253,8 +245,15 @@ pub enum LoopError {
     NoLoop,
     /// A parameter is not usable.
     Parameter(&'static str),
-    /// A proportional gain is impossible for the model.
-    Gain(SteepGain),
+    /// A proportional gain is impossible for the model, as in [`AttachError::Gain`].
+    Gain {
+        /// The name of the gain and of its loop.
+        parameter: &'static str,
+        /// The gain that was given.
+        value: u32,
+        /// The highest gain that the model takes.
+        highest: u32,
+    },
 }
 
 impl core::fmt::Display for LoopError {
@@ -263,7 +262,9 @@ impl core::fmt::Display for LoopError {
             Self::Detached => f.write_str("the motor was detached"),
             Self::NoLoop => f.write_str("the motor was attached without this loop"),
             Self::Parameter(parameter) => write!(f, "{parameter} is not usable"),
-            Self::Gain(gain) => write!(f, "{gain}"),
+            Self::Gain { parameter, value, highest } => {
+                f.write_str(Message::new().gain(parameter, *value, *highest).as_str())
+            }
         }
     }
 }
@@ -280,11 +281,11 @@ mod tests {
 
     #[test]
     fn a_collision_names_both_motors_the_id_and_the_slot() {
-        let feedback = Collision { motor: GM6020, with: M3508, feedback_id: 0x205, slot: None };
-        let message = AttachError::Collision(feedback).to_string();
+        let collision =
+            |slot| AttachError::Collision { motor: GM6020, with: M3508, feedback_id: 0x205, slot };
+        let message = collision(None).to_string();
         assert_eq!(message, "GM6020 (current) #1 collides with M3508 #5 on 0x205");
-        let slot = Collision { slot: Some((CommandFrame::X1FF, 0)), ..feedback };
-        let message = AttachError::Collision(slot).to_string();
+        let message = collision(Some((CommandFrame::X1FF, 0))).to_string();
         assert_eq!(
             message,
             "GM6020 (current) #1 collides with M3508 #5 on 0x205 and on slot 0 of 0x1FF"
@@ -313,11 +314,10 @@ mod tests {
 
     #[test]
     fn a_steep_gain_tells_value_bound_and_remedy_and_is_not_cut() {
-        let gain =
-            SteepGain { parameter: "kp of the position loop", value: u32::MAX, highest: 1_263_787 };
         let motor = MotorName::new("GM6020 (voltage)", 7);
+        let (parameter, value, highest) = ("kp of the position loop", u32::MAX, 1_263_787);
         assert_eq!(
-            AttachError::Gain { motor, gain }.to_string(),
+            AttachError::Gain { motor, parameter, value, highest }.to_string(),
             "GM6020 (voltage) #7: kp of the position loop is 4294967295, at most 1263787 \
              in SI units of the output shaft: WordGains converts words per rpm"
         );

@@ -8,10 +8,10 @@ use crate::motor::Severity;
 /// ```
 /// use drivetrain::dji::Feedback;
 ///
-/// let feedback = Feedback::decode(&[0x0E, 0x16, 0x00, 0x00, 0xFF, 0xFD, 0x21, 0x00])?;
+/// let feedback = Feedback::decode(&[0x0E, 0x16, 0x00, 0x00, 0xFF, 0xFD, 0x21, 0x00]).ok_or("angle")?;
 /// assert_eq!((feedback.angle(), feedback.rpm(), feedback.current()), (3606, 0, -3));
 /// assert_eq!((feedback.temperature(), feedback.error()), (33, 0));
-/// # Ok::<(), drivetrain::dji::FeedbackError>(())
+/// # Ok::<(), &str>(())
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -23,41 +23,19 @@ pub struct Feedback {
     condition: u32,
 }
 
-/// A feedback frame with an angle above 8191: not from one of these motors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FeedbackError {
-    /// The angle field.
-    pub angle: u16,
-}
-
-impl core::fmt::Display for FeedbackError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "rotor angle {} is above 8191", self.angle)
-    }
-}
-
-impl core::error::Error for FeedbackError {}
-
 impl Feedback {
     pub(super) const NONE: Self = Self { motion: 0, condition: 0 };
 
-    /// Takes the eight bytes of a feedback frame.
-    ///
-    /// # Errors
-    /// When the angle is above 8191.
+    /// Takes the eight bytes of a feedback frame; `None` if the angle is above 8191, which no motor of this family reports.
+    #[must_use]
     #[inline]
-    pub const fn decode(data: &[u8; 8]) -> Result<Self, FeedbackError> {
+    pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let [a, b, c, d, e, f, g, h] = *data;
         let feedback = Self {
             motion: u32::from_be_bytes([a, b, c, d]),
             condition: u32::from_le_bytes([e, f, g, h]),
         };
-        if feedback.motion < (8192 << 16) {
-            Ok(feedback)
-        } else {
-            Err(FeedbackError { angle: feedback.angle() })
-        }
+        if feedback.motion < (8192 << 16) { Some(feedback) } else { None }
     }
 
     /// Takes a frame of 8 bytes whose angle is possible and whose error code is zero, with one comparison for all;
@@ -230,12 +208,9 @@ mod tests {
 
     #[test]
     fn an_angle_above_8191_refuses_the_whole_frame() {
-        assert_eq!(
-            Feedback::decode(&[0x20, 0, 0, 0, 0, 0, 0, 0]),
-            Err(FeedbackError { angle: 8192 })
-        );
-        assert_eq!(Feedback::decode(&[0xFF; 8]), Err(FeedbackError { angle: 0xFFFF }));
-        assert!(Feedback::decode(&[0x1F, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]).is_ok());
+        assert_eq!(Feedback::decode(&[0x20, 0, 0, 0, 0, 0, 0, 0]), None);
+        assert_eq!(Feedback::decode(&[0xFF; 8]), None);
+        assert!(Feedback::decode(&[0x1F, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]).is_some());
     }
 
     /// A whole frame with a possible angle and no error: each of the three alone refuses it.
@@ -246,7 +221,7 @@ mod tests {
         let usual = [0x1F, 0xFF, 0x80, 0x01, 0x7F, 0xFE, 250, 0];
         let frame = CanFrame::new(id, &usual).unwrap();
         let feedback = Feedback::without_error(&frame).unwrap();
-        assert_eq!(Ok(feedback), Feedback::decode(&usual));
+        assert_eq!(Some(feedback), Feedback::decode(&usual));
         assert_eq!((feedback.angle(), feedback.rpm(), feedback.current()), (8191, -32767, 0x7FFE));
         assert_eq!((feedback.temperature(), feedback.error_and_temperature()), (250, 250));
 
@@ -273,7 +248,6 @@ mod tests {
             format!("{feedback:?}"),
             "Feedback { angle: 1, rpm: 2, current: 3, temperature: 4, error: 5 }"
         );
-        assert_eq!(FeedbackError { angle: 9000 }.to_string(), "rotor angle 9000 is above 8191");
         assert_eq!(ErrorCode::Stalled.to_string(), "stalled");
         assert_eq!(ErrorCode::Unlisted(6).to_string(), "unlisted code 6");
     }

@@ -1,7 +1,7 @@
 //! What comes between the update of the loops and the frames.
 
 use super::slot::Slot;
-use super::{AnyHandle, Bus, CurrentControlled, Handle};
+use super::{AnyHandle, Bus, Handle, Model};
 use crate::units::Current;
 
 impl<B> Bus<B> {
@@ -9,7 +9,10 @@ impl<B> Bus<B> {
     ///
     /// The direction is that of the shaft. What the motor does about it is in [`State::current`](super::State::current).
     #[must_use]
-    pub fn commanded_current<M: CurrentControlled>(&self, motor: Handle<M, B>) -> Option<Current> {
+    pub fn commanded_current<M: Model<Command = Current>>(
+        &self,
+        motor: Handle<M, B>,
+    ) -> Option<Current> {
         let slot = self.slot(motor.into())?;
         Some(Current::from_amperes(slot.in_units(self.outbox.get(slot.place))))
     }

@@ -108,12 +108,9 @@ mod word_gains;
 pub use bus::{Bus, Counters};
 pub use command::CommandFrame;
 pub use config::Config;
-pub use error::{AttachError, Collision, LoopError, Message, SteepGain};
-pub use feedback::{ErrorCode, Feedback, FeedbackError};
+pub use error::{AttachError, LoopError, Message};
+pub use feedback::{ErrorCode, Feedback};
 pub use handle::{AnyHandle, Handle};
-pub use model::{
-    CurrentControlled, Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model, Unit,
-    VoltageControlled,
-};
+pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 pub use state::State;
 pub use word_gains::WordGains;

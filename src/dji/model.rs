@@ -1,16 +1,8 @@
 use super::CommandFrame;
 use super::feedback::ErrorTable;
 use crate::encoder::GearRatio;
-
-/// What a command means to the ESC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Unit {
-    /// Torque current in amperes.
-    Ampere,
-    /// Terminal voltage in volts, nominal.
-    Volt,
-}
+use crate::motor::Capability;
+use crate::units::{Current, Voltage};
 
 /// The facts of one motor model: the only home of each number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,10 +17,10 @@ pub struct Facts {
     pub feedback_base: u16,
     /// The largest command, on the wire.
     pub command_raw: i16,
-    /// The largest command, in [`unit`](Self::unit).
+    /// The largest command, in A or V.
     pub command_full_scale: f32,
-    /// The unit of the command.
-    pub unit: Unit,
+    /// Quantity that the command sets: [`Capability::Current`] in A, or [`Capability::Voltage`] in nominal V.
+    pub control: Capability,
     /// The current feedback that stands for [`current_full_scale_a`](Self::current_full_scale_a), on the wire.
     pub current_raw: i16,
     /// Amperes at [`current_raw`](Self::current_raw).
@@ -101,7 +93,7 @@ static M2006_FACTS: Facts = Facts {
     feedback_base: 0x200,
     command_raw: 10_000,
     command_full_scale: 10.0,
-    unit: Unit::Ampere,
+    control: Capability::Current,
     current_raw: 10_000,
     current_full_scale_a: 10.0,
     gear: M2006_GEAR,
@@ -122,7 +114,7 @@ static M3508_FACTS: Facts = Facts {
     feedback_base: 0x200,
     command_raw: 16_384,
     command_full_scale: 20.0,
-    unit: Unit::Ampere,
+    control: Capability::Current,
     current_raw: 16_384,
     current_full_scale_a: 20.0,
     gear: M3508_GEAR,
@@ -143,7 +135,7 @@ static GM6020_VOLTAGE_FACTS: Facts = Facts {
     feedback_base: 0x204,
     command_raw: 25_000,
     command_full_scale: 24.0,
-    unit: Unit::Volt,
+    control: Capability::Voltage,
     current_raw: 16_384,
     current_full_scale_a: 3.0,
     gear: GearRatio::DIRECT,
@@ -161,7 +153,7 @@ static GM6020_CURRENT_FACTS: Facts = Facts {
     command: [CommandFrame::X1FE, CommandFrame::X2FE],
     command_raw: 16_384,
     command_full_scale: 3.0,
-    unit: Unit::Ampere,
+    control: Capability::Current,
     ..GM6020_VOLTAGE_FACTS
 };
 
@@ -170,31 +162,28 @@ mod sealed {
 }
 
 /// A motor model of this family, as a type: handles carry it, so that a target of the wrong kind does not compile.
-pub trait Model: sealed::Sealed + Copy + core::fmt::Debug + 'static {
-    /// The facts of this model.
-    const FACTS: &'static Facts;
-}
-
-/// A model whose command is a torque current.
 ///
 /// # Examples
 /// A current for a motor in voltage mode does not compile:
-/// ```compile_fail,E0277
+/// ```compile_fail,E0271
 /// use drivetrain::dji::{Bus, Config, Gm6020Voltage};
 /// use drivetrain::units::Current;
 ///
 /// let mut bus = Bus::new();
 /// let yaw = bus.attach(Config::<Gm6020Voltage>::new(1))?;
-/// bus.set_current(yaw, Current::from_amperes(1.0))?; // the trait bound `Gm6020Voltage: CurrentControlled` …
+/// bus.set_current(yaw, Current::from_amperes(1.0))?; // expected `Current`, found `Voltage`
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait CurrentControlled: Model {}
+pub trait Model: sealed::Sealed + Copy + core::fmt::Debug + 'static {
+    /// The command of the model: a torque [`Current`], or a terminal [`Voltage`].
+    type Command;
 
-/// A model whose command is a voltage.
-pub trait VoltageControlled: Model {}
+    /// The facts of this model.
+    const FACTS: &'static Facts;
+}
 
 macro_rules! models {
-    ($($(#[$doc:meta])* $model:ident, $facts:ident, $control:ident;)+) => {
+    ($($(#[$doc:meta])* $model:ident, $facts:ident, $command:ident;)+) => {
         $(
             $(#[$doc])*
             #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -202,9 +191,10 @@ macro_rules! models {
 
             impl sealed::Sealed for $model {}
             impl Model for $model {
+                type Command = $command;
+
                 const FACTS: &'static Facts = &$facts;
             }
-            impl $control for $model {}
         )+
 
         /// Those of every model.
@@ -215,13 +205,13 @@ macro_rules! models {
 
 models! {
     /// The M2006 with its C610 ESC: current control, no temperature.
-    M2006, M2006_FACTS, CurrentControlled;
+    M2006, M2006_FACTS, Current;
     /// The M3508 with its C620 ESC: current control.
-    M3508, M3508_FACTS, CurrentControlled;
+    M3508, M3508_FACTS, Current;
     /// The GM6020 as it is delivered: voltage control.
-    Gm6020Voltage, GM6020_VOLTAGE_FACTS, VoltageControlled;
+    Gm6020Voltage, GM6020_VOLTAGE_FACTS, Voltage;
     /// The GM6020 with current control switched on in RoboMaster Assistant.
-    Gm6020Current, GM6020_CURRENT_FACTS, CurrentControlled;
+    Gm6020Current, GM6020_CURRENT_FACTS, Current;
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What the application asks of the motors.
 
 use super::slot::Slot;
-use super::{AnyHandle, Bus, CurrentControlled, Handle, LoopError, Model, VoltageControlled};
+use super::{AnyHandle, Bus, Handle, LoopError, Model};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::motor::{AngleDrive, Capabilities, LONGEST_PAUSE, Measured, TargetError, VelocityDrive};
@@ -21,7 +21,7 @@ impl<B> Bus<B> {
     ///
     /// # Errors
     /// See above.
-    pub fn set_current<M: CurrentControlled>(
+    pub fn set_current<M: Model<Command = Current>>(
         &mut self,
         motor: Handle<M, B>,
         current: Current,
@@ -33,7 +33,7 @@ impl<B> Bus<B> {
     ///
     /// # Errors
     /// See above.
-    pub fn set_voltage<M: VoltageControlled>(
+    pub fn set_voltage<M: Model<Command = Voltage>>(
         &mut self,
         motor: Handle<M, B>,
         voltage: Voltage,

@@ -2,8 +2,9 @@ use super::mailbox::Mailboxes;
 use super::motor::{MotorConfig, MotorState, position, wrapped};
 use super::random::Random;
 use super::rotor::{Drive, Rotor};
-use crate::dji::{Facts, Unit};
+use crate::dji::Facts;
 use crate::frame::CanFrame;
+use crate::motor::Capability;
 use crate::units::{AngularVelocity, Current};
 
 /// The longest time that the ESC's firmware is late with a frame. An estimate.
@@ -130,10 +131,10 @@ impl Esc {
         }
         let share = f32::from(self.command) / f32::from(self.command_raw);
         let value = share * self.facts.command_full_scale;
-        let drive = match (self.loss.is_none(), self.facts.unit) {
+        let drive = match (self.loss.is_none(), self.facts.control) {
             (false, _) => Drive::Open,
-            (true, Unit::Volt) => Drive::Volts(value),
-            (true, Unit::Ampere) => Drive::Amperes(value),
+            (true, Capability::Voltage) => Drive::Volts(value),
+            (true, _) => Drive::Amperes(value),
         };
         self.rotor.step_current(drive, dt_s);
     }

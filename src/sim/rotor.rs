@@ -213,7 +213,7 @@ const AMBIENT_C: f32 = 25.0;
 mod tests {
     use super::super::motor::Model;
     use super::*;
-    use crate::dji::Unit;
+    use crate::motor::Capability;
 
     const STEP: f32 = 1e-4;
     const MODELS: [Model; 4] =
@@ -258,7 +258,7 @@ mod tests {
 
     fn full(model: Model) -> Drive {
         let facts = model.facts();
-        if facts.unit == Unit::Volt {
+        if facts.control == Capability::Voltage {
             Drive::Volts(facts.command_full_scale)
         } else {
             Drive::Amperes(facts.command_full_scale)

@@ -2,7 +2,7 @@ use super::answers::Answers;
 use super::budget::Budget;
 use super::model::IDS;
 use super::slot::{Slot, name};
-use super::{AttachError, Command, Config, Joint, Reply, ReplyError, State};
+use super::{AttachError, Command, Config, Joint, Reply, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
@@ -190,7 +190,7 @@ impl Joints {
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
         let counters = &mut self.counters;
         let reply = Reply::decode(frame.data());
-        if let Ok(reply) = reply {
+        if let Some(reply) = reply {
             self.answers.take(index, reply.register());
         }
         if slot.id.is_none() {
@@ -198,21 +198,23 @@ impl Joints {
             return Ingest::Unrelated;
         }
         match reply {
-            Ok(reply) => {
+            Some(reply) => {
                 count(&mut counters.replies);
                 slot.receive(reply, now);
                 self.let_go(index);
                 return Ingest::Taken;
             }
-            Err(_) if Command::decode(frame.data()).is_some() => {
+            None if Command::decode(frame.data()).is_some() => {
                 if self.echoes {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
                 slot.hear_rival(now);
             }
-            Err(ReplyError::Length(_)) => count(&mut counters.bad_length),
-            Err(ReplyError::Kind(_) | ReplyError::Register(_)) => count(&mut counters.bad_field),
+            None => count(match frame.length() {
+                6 => &mut counters.bad_field,
+                _ => &mut counters.bad_length,
+            }),
         }
         slot.bad_replies = slot.bad_replies.saturating_add(1);
         Ingest::Malformed(match frame.length() {

@@ -10,9 +10,9 @@ const REPLY: u8 = 0x04;
 /// ```
 /// use drivetrain::snake::{Register, Reply};
 ///
-/// let reply = Reply::decode(&[0x04, 0x07, 0xFF, 0xFF, 0xFF, 0xFF])?;
+/// let reply = Reply::decode(&[0x04, 0x07, 0xFF, 0xFF, 0xFF, 0xFF]).ok_or("no reply")?;
 /// assert_eq!((reply.register(), reply.value()), (Register::ActualPosition, -1));
-/// # Ok::<(), drivetrain::snake::ReplyError>(())
+/// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -22,18 +22,6 @@ pub struct Reply {
     value: i32,
 }
 
-/// Why a frame is no reply.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum ReplyError {
-    /// It has not 6 bytes.
-    Length(usize),
-    /// Its first byte is not 4.
-    Kind(u8),
-    /// There is no such register.
-    Register(u8),
-}
-
 impl Reply {
     /// Takes a register and its value.
     #[must_use]
@@ -41,19 +29,15 @@ impl Reply {
         Self { register, value }
     }
 
-    /// Takes the data of a reply.
-    ///
-    /// # Errors
-    /// Says what is wrong with it.
-    pub fn decode(data: &[u8]) -> Result<Self, ReplyError> {
-        let [kind, register, a, b, c, d] = *data else {
-            return Err(ReplyError::Length(data.len()));
-        };
-        if kind != REPLY {
-            return Err(ReplyError::Kind(kind));
+    /// Takes the data of a reply; `None` if it has not 6 bytes, does not begin with 4, or names no register.
+    #[must_use]
+    pub fn decode(data: &[u8]) -> Option<Self> {
+        match *data {
+            [REPLY, register, a, b, c, d] => {
+                Some(Self::new(Register::from_raw(register)?, i32::from_be_bytes([a, b, c, d])))
+            }
+            _ => None,
         }
-        let known = Register::from_raw(register).ok_or(ReplyError::Register(register))?;
-        Ok(Self::new(known, i32::from_be_bytes([a, b, c, d])))
     }
 
     /// Returns the data of the reply.
@@ -75,15 +59,3 @@ impl Reply {
         self.value
     }
 }
-
-impl core::fmt::Display for ReplyError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length(length) => write!(f, "{length} bytes are no reply of 6"),
-            Self::Kind(kind) => write!(f, "a reply begins with 4, not with {kind}"),
-            Self::Register(register) => write!(f, "there is no register {register:#04x}"),
-        }
-    }
-}
-
-impl core::error::Error for ReplyError {}

@@ -104,7 +104,7 @@ pub use bus::{Counters, Joints};
 pub use command::Command;
 pub use config::{Config, Settings};
 pub use error::AttachError;
-pub use feedback::{Reply, ReplyError};
+pub use feedback::Reply;
 pub use handle::Joint;
 pub use model::{IDS, PULSES_PER_TURN, Register};
 pub use offset::Offset;

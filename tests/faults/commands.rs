@@ -3,7 +3,7 @@
 use crate::case::{Case, cases, safe_after, saw};
 use crate::rig::{Rig, SPEED, armed, at_ms, at_once, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, CurrentControlled, Gm6020Current, Gm6020Voltage, M2006, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::motor::{ArmError, TargetError};
 use drivetrain::runner::EmergencyStop;
@@ -132,10 +132,10 @@ fn f36_conversions_saturate_symmetrically_and_monotonically() {
     saw("3.4e38 A is 16384 and -3.4e38 A is -16384; -32768 is -16384");
 }
 
-/// That the wrong unit does not compile is shown by the `compile_fail` examples of `CurrentControlled` and `branded`.
+/// That the wrong unit does not compile is shown by the `compile_fail` examples of `Model` and `branded`.
 #[cfg_attr(test, test)]
 fn f37_each_model_has_its_own_scale() {
-    fn raw_of<M: CurrentControlled>(base: u16) -> i16 {
+    fn raw_of<M: Model<Command = Current>>(base: u16) -> i16 {
         let mut bus = Bus::new();
         let motor = bus.attach(at_once::<M>(1)).unwrap();
         _ = bus.ingest(&feedback(base + 1, 0, 0), at_ms(1));

@@ -4,10 +4,11 @@ use super::{NO_GAINS, Slot, is_loop};
 use crate::control::{Pid, PidConfig};
 use crate::dji::command::{Place, to_raw};
 use crate::dji::config::PlainConfig;
+use crate::dji::error::SteepGain;
 use crate::dji::feedback::ErrorTable;
 use crate::dji::handle::Key;
 use crate::dji::range::Range;
-use crate::dji::{AttachError, Facts, LoopError, SteepGain, Unit};
+use crate::dji::{AttachError, Facts, LoopError};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};
 use crate::motor::{Capabilities, Capability, HealthConfig, MotorGuard, MotorName, Recovery};
 use core::f32::consts::TAU;
@@ -56,10 +57,12 @@ impl Slot {
             (Err(error), _) | (_, Err(error)) => return Err(parameter!(error.parameter())),
         };
         if let Some(gain) = steep_position(&position, facts) {
-            return Err(AttachError::Gain { motor, gain });
+            let SteepGain { parameter, value, highest } = gain;
+            return Err(AttachError::Gain { motor, parameter, value, highest });
         }
         if let Some(gain) = steep_speed(&speed, facts, rad_per_s_per_rpm) {
-            return Err(AttachError::Gain { motor, gain });
+            let SteepGain { parameter, value, highest } = gain;
+            return Err(AttachError::Gain { motor, parameter, value, highest });
         }
         if let Err(name) = config.health.validate() {
             return Err(parameter!(name));
@@ -125,11 +128,7 @@ impl Slot {
     /// Returns what the motor offers with the loops that it has.
     pub(in crate::dji) fn capabilities(&self) -> Capabilities {
         let Some(facts) = self.facts else { return Capabilities::NONE };
-        let direct = match facts.unit {
-            Unit::Ampere => Capability::Current,
-            Unit::Volt => Capability::Voltage,
-        };
-        let set = Capabilities::of(&[Capability::Raw, direct, Capability::Feedback]);
+        let set = Capabilities::of(&[Capability::Raw, facts.control, Capability::Feedback]);
         [
             (Capability::Velocity, is_loop(&self.speed)),
             (Capability::Angle, is_loop(&self.position)),
@@ -189,8 +188,8 @@ fn replace(
     if !is_loop(pid) {
         return Err(LoopError::NoLoop);
     }
-    if let Some(gain) = steep {
-        return Err(LoopError::Gain(gain));
+    if let Some(SteepGain { parameter, value, highest }) = steep {
+        return Err(LoopError::Gain { parameter, value, highest });
     }
     pid.set_config(within(Some(config), limit))
         .map_err(|error| LoopError::Parameter(error.parameter()))

@@ -2,7 +2,7 @@ use super::*;
 
 #[test]
 fn one_ampere_is_the_raw_value_of_each_model() {
-    fn raw_of<M: CurrentControlled>(amperes: f32) -> i16 {
+    fn raw_of<M: Model<Command = Current>>(amperes: f32) -> i16 {
         let (mut bus, [motor]) = armed([Config::<M>::at_once(1)]);
         bus.set_current(motor, Current::from_amperes(amperes)).unwrap();
         step(&mut bus, 2);

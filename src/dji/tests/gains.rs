@@ -9,15 +9,13 @@ const fn p(kp: f32) -> PidConfig {
 fn assert_steepest<M: Model>(config: Config<M>, steepest: f32) {
     let mut bus: Bus = Bus::new();
     let error = bus.attach(config.speed_loop(p(1.001 * steepest))).unwrap_err();
-    let AttachError::Gain { gain, .. } = error else { panic!("{error}") };
-    assert_eq!(gain.parameter, "kp of the speed loop");
-    let (down, up) = (
-        f64::from(steepest) - f64::from(gain.highest),
-        f64::from(gain.value) - f64::from(1.001 * steepest),
-    );
-    assert!((0.0..1.0).contains(&down) && (0.0..1.0).contains(&up), "{gain:?}");
+    let AttachError::Gain { parameter, value, highest, .. } = error else { panic!("{error}") };
+    assert_eq!(parameter, "kp of the speed loop");
+    let (down, up) =
+        (f64::from(steepest) - f64::from(highest), f64::from(value) - f64::from(1.001 * steepest));
+    assert!((0.0..1.0).contains(&down) && (0.0..1.0).contains(&up), "{error:?}");
     let motor = bus.attach(config.speed_loop(p(0.999 * steepest))).unwrap();
-    let refused = Err(LoopError::Gain(gain));
+    let refused = Err(LoopError::Gain { parameter, value, highest });
     assert_eq!(bus.set_speed_loop(motor, p(1.001 * steepest)), refused);
     assert_eq!(bus.set_speed_loop(motor, p(0.999 * steepest)), Ok(()));
 }
@@ -42,10 +40,10 @@ fn a_gain_with_which_one_count_of_the_encoder_asks_for_the_no_load_speed_is_refu
     let with = |kp| Config::<M3508>::new(1).position_loop(p(kp), SPEED);
     let mut bus: Bus = Bus::new();
     let error = bus.attach(with(1.265e6)).unwrap_err();
-    let AttachError::Gain { gain, .. } = error else { panic!("{error}") };
-    assert_eq!((gain.parameter, gain.value), ("kp of the position loop", 1_265_000));
+    let AttachError::Gain { parameter, value, highest, .. } = error else { panic!("{error}") };
+    assert_eq!((parameter, value), ("kp of the position loop", 1_265_000));
     let arm = bus.attach(with(1.263e6)).unwrap();
-    let refused = Err(LoopError::Gain(gain));
+    let refused = Err(LoopError::Gain { parameter, value, highest });
     assert_eq!(bus.set_position_loop(arm, p(1.265e6)), refused);
     assert_eq!(bus.set_position_loop(arm, p(1.263e6)), Ok(()));
     let yaw = |kp| Config::<Gm6020Voltage>::new(5).position_loop(p(kp), SPEED);
