@@ -10,8 +10,8 @@ use drivetrain::chassis::{
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
-    Body, Heading, Point2, Point3, Pose2, RollPitchYaw, Rotation2, Rotation3, Transform2,
-    Transform3, Twist, Vec2, Vec3, World,
+    Body, Heading, Point2, Point3, Pose2, Rotation2, Rotation3, Transform2, Transform3, Twist,
+    Vec2, Vec3, World,
 };
 use drivetrain::units::{Angle, AngularVelocity};
 use proptest::prelude::*;
@@ -29,7 +29,7 @@ fn round<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: T) {
 
 fn turned(roll: f32, pitch: f32, yaw: f32) -> Rotation3 {
     let [roll, pitch, yaw] = [roll, pitch, yaw].map(Angle::from_radians);
-    Rotation3::from(RollPitchYaw { roll, pitch, yaw })
+    Rotation3::from_roll_pitch_yaw(roll, pitch, yaw)
 }
 
 proptest! {

@@ -4,7 +4,7 @@
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Link};
-use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply, Settings};
+use drivetrain::snake::{Command, Config, Joint, Joints, Register, Reply};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain_fuzz::Gesture;
@@ -334,7 +334,7 @@ impl Story {
                 let pulses = bits.cast_signed();
                 let offset = joints.offset(joint);
                 if joints.set_pulses(joint, pulses).is_ok() {
-                    known.follow(offset.map(|offset| offset.target(pulses)));
+                    known.follow(offset.map(|offset| pulses.wrapping_add(offset)));
                 }
                 match joints.set_speed(joint, AngularVelocity::from_rad_per_s(value)) {
                     // Nearly: the last bit is the crate's own affair.
@@ -376,8 +376,8 @@ impl Story {
                     }
                 }
                 1 => {
-                    let settings = Settings::new().with_current(bits.cast_signed());
-                    if joints.set_settings(joint, settings).is_ok() {
+                    let settings = Config::new(1).with_current(bits.cast_signed());
+                    if joints.set_settings(joint, &settings).is_ok() {
                         known.current = Some(bits.cast_signed());
                     }
                 }

@@ -19,7 +19,7 @@
 //! | [`Vec2`], [`Vec3`] | plain numbers along the axes, without a frame |
 //! | [`Point2`], [`Point3`] | a place in a frame |
 //! | [`Rotation2`], [`Heading`] | a turn in the plane; a heading keeps the angle too |
-//! | [`Rotation3`], [`RollPitchYaw`] | a turn in space: unit quaternion; three angles |
+//! | [`Rotation3`] | a turn in space: unit quaternion, from and to roll, pitch and yaw |
 //! | [`Transform2`], [`Transform3`] | where one frame stands in another |
 //! | [`Pose2`] | position and direction in a frame of the plane; in space, a [`Transform3`] |
 //! | [`Twist`] | a velocity in the plane; [`Transform2::exp`] is the way it makes in a time |
@@ -55,7 +55,7 @@ pub use frame::{Body, Gimbal, World};
 pub use point::{Point2, Point3};
 pub use pose::Pose2;
 pub use rotation2::{Heading, Rotation2};
-pub use rotation3::{RollPitchYaw, Rotation3};
+pub use rotation3::Rotation3;
 pub use transform2::Transform2;
 pub use transform3::Transform3;
 pub use twist::Twist;

@@ -9,9 +9,9 @@ use crate::units::Angle;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{geometry::{RollPitchYaw, Rotation3, Vec3}, units::Angle};
+/// use drivetrain::{geometry::{Rotation3, Vec3}, units::Angle};
 ///
-/// let left = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
+/// let left = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::ZERO, Angle::from_degrees(90.0));
 /// let turned = left.apply(Vec3::new(1.0, 0.0, 0.0));
 /// assert!(turned.x.abs() < 1e-6 && (turned.y - 1.0).abs() < 1e-6);
 /// assert!((left.compose(left).roll_pitch_yaw().yaw.as_degrees().abs() - 180.0).abs() < 1e-4);
@@ -25,38 +25,29 @@ pub struct Rotation3 {
     vector: Vec3,
 }
 
-/// A turn in space as three angles: yaw about z, then pitch about the new y, then roll about the new x (Rz Ry Rx).
-///
-/// Positive roll lowers the right side, positive pitch lowers the nose, positive yaw turns left.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{geometry::{RollPitchYaw, Rotation3, Vec3}, units::Angle};
-///
-/// let nose_down = RollPitchYaw { pitch: Angle::from_degrees(30.0), ..Default::default() };
-/// let ahead = Rotation3::from(nose_down).apply(Vec3::new(1.0, 0.0, 0.0));
-/// assert!((ahead.z + 0.5).abs() < 1e-6); // -sin(30 degrees)
-/// ```
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct RollPitchYaw {
-    /// About x.
-    pub roll: Angle,
-    /// About y. Read back, it is in -90..=90 degrees.
-    pub pitch: Angle,
-    /// About z.
-    pub yaw: Angle,
-}
-
 /// The cosine of pitch below which it counts as 90 degrees: what rounding leaves there is up to 5e-7.
 const LOCKED: f32 = 2e-6;
 
-impl From<RollPitchYaw> for Rotation3 {
-    fn from(angles: RollPitchYaw) -> Self {
+impl Rotation3 {
+    /// No turn.
+    pub const IDENTITY: Self = Self { w: 1.0, vector: Vec3::ZERO };
+
+    /// Takes three angles: yaw about z, then pitch about the new y, then roll about the new x (Rz Ry Rx).
+    ///
+    /// Positive roll lowers the right side, positive pitch lowers the nose, positive yaw turns left.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::{geometry::{Rotation3, Vec3}, units::Angle};
+    ///
+    /// let nose_down = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::from_degrees(30.0), Angle::ZERO);
+    /// let ahead = nose_down.apply(Vec3::new(1.0, 0.0, 0.0));
+    /// assert!((ahead.z + 0.5).abs() < 1e-6); // -sin(30 degrees)
+    /// ```
+    #[must_use]
+    pub fn from_roll_pitch_yaw(roll: Angle, pitch: Angle, yaw: Angle) -> Self {
         let half = |angle: Angle| sin_cos(0.5 * angle.as_radians());
-        let ((sr, cr), (sp, cp), (sy, cy)) =
-            (half(angles.roll), half(angles.pitch), half(angles.yaw));
+        let ((sr, cr), (sp, cp), (sy, cy)) = (half(roll), half(pitch), half(yaw));
         Self {
             w: cy * cp * cr + sy * sp * sr,
             vector: Vec3::new(
@@ -67,11 +58,6 @@ impl From<RollPitchYaw> for Rotation3 {
         }
         .normalized()
     }
-}
-
-impl Rotation3 {
-    /// No turn.
-    pub const IDENTITY: Self = Self { w: 1.0, vector: Vec3::ZERO };
 
     /// Takes a quaternion of any length but zero; `w` is the real part.
     ///
@@ -150,16 +136,16 @@ impl Rotation3 {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::{geometry::{RollPitchYaw, Rotation3}, units::Angle};
+    /// use drivetrain::{geometry::Rotation3, units::Angle};
     ///
     /// let degrees = Angle::from_degrees;
-    /// let nose_down = RollPitchYaw { roll: degrees(20.0), pitch: degrees(90.0), yaw: degrees(50.0) };
-    /// let read = Rotation3::from(nose_down).roll_pitch_yaw();
-    /// assert_eq!(read.roll, Angle::ZERO);
-    /// assert!((read.yaw.as_degrees() - 30.0).abs() < 1e-3); // 50 - 20
+    /// let nose_down = Rotation3::from_roll_pitch_yaw(degrees(20.0), degrees(90.0), degrees(50.0));
+    /// let [roll, _, yaw] = nose_down.roll_pitch_yaw();
+    /// assert_eq!(roll, Angle::ZERO);
+    /// assert!((yaw.as_degrees() - 30.0).abs() < 1e-3); // 50 - 20
     /// ```
     #[must_use]
-    pub fn roll_pitch_yaw(self) -> RollPitchYaw {
+    pub fn roll_pitch_yaw(self) -> [Angle; 3] {
         let [[r00, r01, r02], [r10, r11, r12], [r20, _, _]] = self.to_matrix();
         let level = sqrt(r00 * r00 + r10 * r10);
         let pitch = angle_of(-r20, level);
@@ -171,8 +157,7 @@ impl Rotation3 {
             // Roll is what is left after yaw, so that errors of yaw near the lock cancel in the whole.
             (angle_of(sin * r02 - cos * r12, cos * r11 - sin * r01), yaw)
         };
-        let angle = Angle::from_radians;
-        RollPitchYaw { roll: angle(roll), pitch: angle(pitch), yaw: angle(yaw) }
+        [roll, pitch, yaw].map(Angle::from_radians)
     }
 
     /// Returns the rotation matrix, rows first.
@@ -254,8 +239,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn turn(roll: f32, pitch: f32, yaw: f32) -> Rotation3 {
-        let angle = Angle::from_degrees;
-        Rotation3::from(RollPitchYaw { roll: angle(roll), pitch: angle(pitch), yaw: angle(yaw) })
+        let [roll, pitch, yaw] = [roll, pitch, yaw].map(Angle::from_degrees);
+        Rotation3::from_roll_pitch_yaw(roll, pitch, yaw)
     }
 
     fn close(a: Vec3, b: Vec3) {
@@ -286,10 +271,9 @@ mod tests {
     type Quaternion = [f64; 4];
 
     /// The quaternion of three angles as they are in `f32`, without rounding.
-    fn exact(angles: RollPitchYaw) -> Quaternion {
+    fn exact(angles: [Angle; 3]) -> Quaternion {
         let half = |angle: Angle| (0.5 * f64::from(angle.as_radians())).sin_cos();
-        let ((sr, cr), (sp, cp), (sy, cy)) =
-            (half(angles.roll), half(angles.pitch), half(angles.yaw));
+        let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(half);
         [
             cy * cp * cr + sy * sp * sr,
             cy * cp * sr - sy * sp * cr,
@@ -321,27 +305,27 @@ mod tests {
 
     #[test]
     fn at_gimbal_lock_roll_is_zero_yaw_takes_all_and_near_it_the_turn_is_the_same() {
-        let radians = Angle::from_radians;
         for away in [0.0, 1e-7, 1e-6, 2e-6, 3e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
             for (side, roll, yaw) in grid() {
                 let (roll, yaw) = (0.2617 * roll, 0.2619 * yaw);
                 let pitch = side * (core::f32::consts::FRAC_PI_2 - away);
-                let wanted =
-                    RollPitchYaw { roll: radians(roll), pitch: radians(pitch), yaw: radians(yaw) };
-                let made = Rotation3::from(wanted);
+                let wanted = [roll, pitch, yaw].map(Angle::from_radians);
+                let [x, y, z] = wanted;
+                let made = Rotation3::from_roll_pitch_yaw(x, y, z);
                 assert!(between(exact(wanted), in_f64(made)) < ROUNDING, "{wanted:?}");
                 let read = made.roll_pitch_yaw();
+                let [read_roll, read_pitch, read_yaw] = read;
                 // What is left of roll at the lock is taken for none: twice the 2e-6 rad that count as lock.
-                let bound = if read.roll == Angle::ZERO { 4e-6 } else { 0.0 } + ROUNDING;
+                let bound = if read_roll == Angle::ZERO { 4e-6 } else { 0.0 } + ROUNDING;
                 assert!(between(exact(read), in_f64(made)) < bound, "{wanted:?} {read:?}");
-                assert!((read.pitch.as_radians() - pitch).abs() < 1e-6, "{wanted:?} {read:?}");
+                assert!((read_pitch.as_radians() - pitch).abs() < 1e-6, "{wanted:?} {read:?}");
                 if away <= 1e-6 {
-                    assert_eq!(read.roll, Angle::ZERO, "{wanted:?}");
-                    let off = crate::math::wrap_pi(read.yaw.as_radians() - (yaw - side * roll));
+                    assert_eq!(read_roll, Angle::ZERO, "{wanted:?}");
+                    let off = crate::math::wrap_pi(read_yaw.as_radians() - (yaw - side * roll));
                     assert!(off.abs() < 2e-6, "{wanted:?} {read:?}");
                 }
                 if away >= 3e-6 && roll.abs() > 0.1 {
-                    let off = crate::math::wrap_pi(read.roll.as_radians() - roll);
+                    let off = crate::math::wrap_pi(read_roll.as_radians() - roll);
                     // Roll and yaw alone are only as exact as the axis is far from the lock.
                     assert!(off.abs() < 1e-6 / away, "{wanted:?} {read:?}");
                 }
@@ -386,7 +370,7 @@ mod tests {
         // What the step really turns, in f64: its rounding would otherwise be counted a million times.
         let each = 2.0 * f64::from(step.vector.z).atan2(f64::from(step.w));
         let expected = (each * 1e6).rem_euclid(core::f64::consts::TAU);
-        let is = f64::from(whole.roll_pitch_yaw().yaw.as_radians());
+        let is = f64::from(whole.roll_pitch_yaw()[2].as_radians());
         let error = (is - expected).rem_euclid(core::f64::consts::TAU);
         let error = error.min(core::f64::consts::TAU - error);
         assert!(error < 1e-4, "{error}");
@@ -406,7 +390,8 @@ mod tests {
     proptest! {
         #[test]
         fn angles_and_back_is_the_same_turn(turn in rotations(), vector in vectors()) {
-            let again = Rotation3::from(turn.roll_pitch_yaw());
+            let [roll, pitch, yaw] = turn.roll_pitch_yaw();
+            let again = Rotation3::from_roll_pitch_yaw(roll, pitch, yaw);
             prop_assert!((again.apply(vector) - turn.apply(vector)).norm() < 5e-6);
         }
 

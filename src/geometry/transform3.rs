@@ -15,10 +15,10 @@ use core::marker::PhantomData;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{geometry::{Body, Gimbal, Point3, RollPitchYaw, Transform3, Vec3}, units::Angle};
+/// use drivetrain::{geometry::{Body, Gimbal, Point3, Rotation3, Transform3, Vec3}, units::Angle};
 ///
-/// let up = RollPitchYaw { pitch: Angle::from_degrees(-90.0), ..Default::default() };
-/// let gimbal = Transform3::<Gimbal, Body>::new(up.into(), Vec3::new(0.0, 0.0, 0.4));
+/// let up = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::from_degrees(-90.0), Angle::ZERO);
+/// let gimbal = Transform3::<Gimbal, Body>::new(up, Vec3::new(0.0, 0.0, 0.4));
 /// let target: Point3<Body> = gimbal.apply(Point3::new(2.0, 0.0, 0.0)); // 2 m along the barrel
 /// assert!(target.x_m.abs() < 1e-6 && (target.z_m - 2.4).abs() < 1e-6);
 /// let back: Point3<Gimbal> = gimbal.inverse().apply(target);
@@ -27,9 +27,9 @@ use core::marker::PhantomData;
 ///
 /// The first seed's camera, at (1, 2, 0.5), turned 90 degrees to the left:
 /// ```
-/// use drivetrain::{geometry::{Body, Point3, Rotation3, RollPitchYaw, Transform3, Vec3, World}, units::Angle};
+/// use drivetrain::{geometry::{Body, Point3, Rotation3, Transform3, Vec3, World}, units::Angle};
 ///
-/// let yaw = Rotation3::from(RollPitchYaw { yaw: Angle::from_degrees(90.0), ..Default::default() });
+/// let yaw = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::ZERO, Angle::from_degrees(90.0));
 /// let camera = Transform3::<Body, World>::new(yaw, Vec3::new(1.0, 2.0, 0.5));
 /// let seen = camera.apply(Point3::new(0.0, 1.0, 0.0));
 /// assert!(seen.x_m.abs() < 1e-6 && (seen.y_m - 2.0).abs() < 1e-6 && (seen.z_m - 0.5).abs() < 1e-6);

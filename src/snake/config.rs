@@ -7,21 +7,23 @@ use crate::units::AngularVelocity;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::snake::{Config, Settings};
+/// use drivetrain::snake::Config;
 /// use drivetrain::units::AngularVelocity;
 ///
 /// const HEAD: Config = Config::new(1)
 ///     .reversed()
 ///     .with_speed(AngularVelocity::from_rpm(20.0))
-///     .with_settings(Settings::new().with_current(1_000));
-/// assert_eq!((HEAD.id(), HEAD.settings().current()), (1, 1_000));
+///     .with_current(1_000)
+///     .with_acceleration(500_000);
+/// assert_eq!((HEAD.id(), HEAD.current()), (1, 1_000));
+/// assert_eq!((HEAD.acceleration(), HEAD.deceleration(), HEAD.mode()), (500_000, 0x0010_AAAA, 1));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     id: u8,
     pub(super) reversed: bool,
     pub(super) speed: AngularVelocity,
-    settings: Settings,
+    pub(super) settings: Settings,
     pub(super) stall: Stall,
 }
 
@@ -42,7 +44,7 @@ impl Config {
     #[must_use]
     pub const fn new(id: u8) -> Self {
         let speed = AngularVelocity::from_rpm(10.0);
-        Self { id, reversed: false, speed, settings: Settings::new(), stall: Stall::USUAL }
+        Self { id, reversed: false, speed, settings: Settings::USUAL, stall: Stall::USUAL }
     }
 
     /// Turns the positive direction around, for position and speed alike.
@@ -78,10 +80,28 @@ impl Config {
         Self { stall: Stall { window, reaction }, ..self }
     }
 
-    /// Sets what is written before the joint is enabled.
+    /// Sets the current that is written before the joint is enabled, in the drive's own unit: 2000 at first.
     #[must_use]
-    pub const fn with_settings(self, settings: Settings) -> Self {
-        Self { settings, ..self }
+    pub const fn with_current(self, current: i32) -> Self {
+        Self { settings: Settings { current, ..self.settings }, ..self }
+    }
+
+    /// Sets the acceleration that is written before the joint is enabled, in pulses a second².
+    #[must_use]
+    pub const fn with_acceleration(self, acceleration: i32) -> Self {
+        Self { settings: Settings { acceleration, ..self.settings }, ..self }
+    }
+
+    /// Sets the deceleration that is written before the joint is enabled, in pulses a second².
+    #[must_use]
+    pub const fn with_deceleration(self, deceleration: i32) -> Self {
+        Self { settings: Settings { deceleration, ..self.settings }, ..self }
+    }
+
+    /// Sets the work mode that is written before the joint is enabled; only 1, position, is documented.
+    #[must_use]
+    pub const fn with_mode(self, mode: i32) -> Self {
+        Self { settings: Settings { mode, ..self.settings }, ..self }
     }
 
     /// Returns the id.
@@ -90,92 +110,48 @@ impl Config {
         self.id
     }
 
-    /// Returns what is written before the joint is enabled.
-    #[must_use]
-    pub const fn settings(&self) -> &Settings {
-        &self.settings
-    }
-}
-
-/// The registers that a drive is set up with, as on the wire: their units are not documented.
-///
-/// # Examples
-/// ```
-/// use drivetrain::snake::Settings;
-///
-/// let settings = Settings::new().with_acceleration(500_000);
-/// assert_eq!((settings.acceleration(), settings.deceleration()), (500_000, 0x0010_AAAA));
-/// assert_eq!((settings.current(), settings.mode()), (2_000, 1));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Settings {
-    current: i32,
-    acceleration: i32,
-    deceleration: i32,
-    mode: i32,
-}
-
-impl Settings {
-    /// Takes what the robot's firmware writes.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            current: CURRENT,
-            acceleration: ACCELERATION,
-            deceleration: ACCELERATION,
-            mode: POSITION_MODE,
-        }
-    }
-
-    /// Sets the current, in the drive's own unit.
-    #[must_use]
-    pub const fn with_current(self, current: i32) -> Self {
-        Self { current, ..self }
-    }
-
-    /// Sets the acceleration in pulses a second².
-    #[must_use]
-    pub const fn with_acceleration(self, acceleration: i32) -> Self {
-        Self { acceleration, ..self }
-    }
-
-    /// Sets the deceleration in pulses a second².
-    #[must_use]
-    pub const fn with_deceleration(self, deceleration: i32) -> Self {
-        Self { deceleration, ..self }
-    }
-
-    /// Sets the work mode; only 1, position, is documented.
-    #[must_use]
-    pub const fn with_mode(self, mode: i32) -> Self {
-        Self { mode, ..self }
-    }
-
-    /// Returns the current.
+    /// Returns the current, in the drive's own unit.
     #[must_use]
     pub const fn current(&self) -> i32 {
-        self.current
+        self.settings.current
     }
 
     /// Returns the acceleration in pulses a second².
     #[must_use]
     pub const fn acceleration(&self) -> i32 {
-        self.acceleration
+        self.settings.acceleration
     }
 
     /// Returns the deceleration in pulses a second².
     #[must_use]
     pub const fn deceleration(&self) -> i32 {
-        self.deceleration
+        self.settings.deceleration
     }
 
     /// Returns the work mode.
     #[must_use]
     pub const fn mode(&self) -> i32 {
-        self.mode
+        self.settings.mode
     }
+}
+
+/// The registers that a drive is set up with, as on the wire: their units are not documented.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Settings {
+    pub(super) current: i32,
+    pub(super) acceleration: i32,
+    pub(super) deceleration: i32,
+    pub(super) mode: i32,
+}
+
+impl Settings {
+    /// What the robot's firmware writes.
+    pub(super) const USUAL: Self = Self {
+        current: CURRENT,
+        acceleration: ACCELERATION,
+        deceleration: ACCELERATION,
+        mode: POSITION_MODE,
+    };
 
     /// Names the first that makes no sense.
     pub(super) const fn refused(&self) -> Option<&'static str> {
@@ -188,11 +164,5 @@ impl Settings {
         } else {
             None
         }
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -102,10 +102,9 @@ mod tests;
 
 pub use bus::{Counters, Joints};
 pub use command::Command;
-pub use config::{Config, Settings};
+pub use config::Config;
 pub use error::AttachError;
 pub use feedback::Reply;
 pub use handle::Joint;
 pub use model::{IDS, PULSES_PER_TURN, Register};
-pub use offset::Offset;
 pub use state::State;

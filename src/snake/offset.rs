@@ -4,47 +4,30 @@
 /// position shown = raw - offset        target sent = wanted + offset
 /// ```
 /// [`Reset::Rezero`](crate::wire::host_link::Reset::Rezero) makes the present position zero. The robot's document does it as
-/// `offset = shown + offset` and doubts that; as `shown + offset` is the raw position, it is right, and it is what
-/// [`rezero`](Self::rezero) does. All arithmetic wraps as the motor's own 32-bit counter does.
-///
-/// # Examples
-/// ```
-/// use drivetrain::snake::Offset;
-///
-/// let mut offset = Offset::default();
-/// offset.rezero(70_000); // the motor stands at raw 70 000
-/// assert_eq!(offset.shown(70_000), 0);
-/// assert_eq!(offset.target(-1_000), 69_000);
-/// offset.rezero(69_000);
-/// assert_eq!(offset.shown(70_000), 1_000);
-/// ```
+/// `offset = shown + offset` and doubts that. `shown + offset` is the raw position, so the raw position is the new offset. All
+/// arithmetic wraps as the motor's own 32-bit counter does.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Offset(i32);
+pub(super) struct Offset(i32);
 
 impl Offset {
     /// Takes the raw position of the zero in pulses.
-    #[must_use]
-    pub const fn new(raw_pulses: i32) -> Self {
+    pub(super) const fn new(raw_pulses: i32) -> Self {
         Self(raw_pulses)
     }
 
     /// Returns the position from the zero, in pulses.
-    #[must_use]
-    pub const fn shown(self, raw_pulses: i32) -> i32 {
+    pub(super) const fn shown(self, raw_pulses: i32) -> i32 {
         raw_pulses.wrapping_sub(self.0)
     }
 
     /// Returns the raw target for a wanted position from the zero, in pulses.
-    #[must_use]
-    pub const fn target(self, wanted_pulses: i32) -> i32 {
+    pub(super) const fn target(self, wanted_pulses: i32) -> i32 {
         wanted_pulses.wrapping_add(self.0)
     }
 
-    /// Makes the present raw position the zero.
-    pub const fn rezero(&mut self, raw_pulses: i32) {
-        self.0 = raw_pulses;
+    /// Returns the raw position of the zero in pulses.
+    pub(super) const fn raw(self) -> i32 {
+        self.0
     }
 }
 
@@ -53,12 +36,18 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn a_zero_is_shown_as_zero_and_moves_the_targets() {
+        let offset = Offset::new(70_000);
+        assert_eq!((offset.shown(70_000), offset.target(-1_000)), (0, 69_000));
+        assert_eq!(Offset::new(69_000).shown(70_000), 1_000);
+    }
+
     proptest! {
         #[test]
         fn the_documents_sum_is_the_raw_position(first: i32, raw: i32) {
-            let mut offset = Offset::new(first);
-            let sum = offset.shown(raw).wrapping_add(first);
-            offset.rezero(raw);
+            let sum = Offset::new(first).shown(raw).wrapping_add(first);
+            let offset = Offset::new(raw);
             prop_assert_eq!(offset, Offset::new(sum));
             prop_assert_eq!(offset.shown(raw), 0);
         }

@@ -3,9 +3,11 @@
 mod health;
 mod writing;
 
+use super::config::Settings;
 use super::config::Stall;
 use super::model::{FASTEST, PULSES_PER_TURN};
-use super::{AttachError, Config, Joint, Offset, Register, Reply, Settings, State};
+use super::offset::Offset;
+use super::{AttachError, Config, Joint, Register, Reply, State};
 use crate::encoder::{Homing, Position};
 use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
@@ -67,7 +69,7 @@ impl Slot {
         id: None,
         generation: 0,
         reversed: false,
-        settings: Settings::new(),
+        settings: Settings::USUAL,
         guard: Guard::new(),
         offset: Offset::new(0),
         homing: Homing::Relative,
@@ -107,7 +109,7 @@ impl Slot {
         } else if config.stall.window == Duration::ZERO {
             Some("stall window")
         } else {
-            config.settings().refused()
+            config.settings.refused()
         };
         if let Some(parameter) = refused {
             return Err(AttachError::Parameter { joint, parameter });
@@ -116,7 +118,7 @@ impl Slot {
             id: Some(config.id()),
             generation,
             reversed: config.reversed,
-            settings: *config.settings(),
+            settings: config.settings,
             guard: Guard::new().with_timeouts(timeouts),
             stall: config.stall,
             speed: to_pulses(speed),

@@ -1,7 +1,8 @@
 //! What the application asks of the joints.
 
+use super::offset::Offset;
 use super::slot::{Slot, to_pulses};
-use super::{AttachError, Joint, Joints, Offset, PULSES_PER_TURN, Register, Reply, Settings};
+use super::{AttachError, Config, Joint, Joints, PULSES_PER_TURN, Register, Reply};
 use crate::encoder::Position;
 use crate::motor::TargetError;
 use crate::units::AngularVelocity;
@@ -48,12 +49,15 @@ impl Joints {
         Ok(())
     }
 
-    /// Changes what a joint is set up with, while it moves too. In the middle of its being brought up, a change may be
-    /// written after the enable: within seven of its turns.
+    /// Changes the registers that a joint is set up with to those of `config`: current, acceleration, deceleration and mode.
+    ///
+    /// Nothing else of `config` is looked at. The joint may move meanwhile. If it is being brought up, a change may be written
+    /// after the enable, within seven of its turns.
     ///
     /// # Errors
     /// When a parameter is not usable. A detached joint changes nothing.
-    pub fn set_settings(&mut self, joint: Joint, settings: Settings) -> Result<(), AttachError> {
+    pub fn set_settings(&mut self, joint: Joint, config: &Config) -> Result<(), AttachError> {
+        let settings = config.settings;
         let Some(slot) = self.slot_mut(joint) else { return Ok(()) };
         if let (Some(parameter), Some(joint)) = (settings.refused(), slot.name()) {
             return Err(AttachError::Parameter { joint, parameter });
@@ -85,22 +89,26 @@ impl Joints {
         Ok(())
     }
 
-    /// Sets where the zero of a joint lies in the counts of its drive: one that was stored, say. A joint that has a target
-    /// is relaxed.
+    /// Sets where the zero of a joint lies in the counts of its drive, in pulses: one that was stored, say. A joint that has a
+    /// target is relaxed.
+    ///
+    /// ```text
+    /// position shown = raw - offset        target sent = wanted + offset
+    /// ```
     ///
     /// # Errors
     /// When the joint is detached.
-    pub fn set_offset(&mut self, joint: Joint, offset: Offset) -> Result<(), TargetError> {
+    pub fn set_offset(&mut self, joint: Joint, raw_pulses: i32) -> Result<(), TargetError> {
         let now = self.now;
-        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(offset, now);
+        self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(Offset::new(raw_pulses), now);
         self.relax(joint);
         Ok(())
     }
 
-    /// Returns where the zero of a joint lies in the counts of its drive: to be stored.
+    /// Returns where the zero of a joint lies in the counts of its drive, in pulses: to be stored. `None` for a detached joint.
     #[must_use]
-    pub fn offset(&self, joint: Joint) -> Option<Offset> {
-        Some(self.slot(joint)?.offset)
+    pub fn offset(&self, joint: Joint) -> Option<i32> {
+        Some(self.slot(joint)?.offset.raw())
     }
 
     /// Asks a joint for a register once, in its turn; [`answer`](Self::answer) has it then.

@@ -246,7 +246,7 @@ fn observe(time_s: f32, host: &Host, robot: &mut Robot<'_>, plant: &Plant<'_>) -
     let offsets = robot.joints.map(|joint| joints.offset(joint).unwrap_or_default());
     let mut true_deg = [0.0; JOINTS];
     for ((angle, state), offset) in true_deg.iter_mut().zip(states).zip(offsets) {
-        *angle = state.map_or(0.0, |state| degrees(offset.shown(state.drive_counts)));
+        *angle = state.map_or(0.0, |state| degrees(state.drive_counts.wrapping_sub(offset)));
     }
     let asked = robot.accepted.last().copied().unwrap_or_default();
     let (_, bus) = robot.runner.device();

@@ -114,7 +114,7 @@ pub(crate) fn robot(
         let states = plant.states();
         let angles = robot.joints.iter().zip(states).filter_map(|(joint, state)| {
             let offset = robot.runner.device().0.offset(*joint)?;
-            Some(super::degrees(offset.shown(state?.drive_counts)).abs())
+            Some(super::degrees(state?.drive_counts.wrapping_sub(offset)).abs())
         });
         report.furthest_deg = angles.fold(report.furthest_deg, f32::max);
     }

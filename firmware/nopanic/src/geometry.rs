@@ -46,6 +46,7 @@ pub fn call_all() {
     Rotation3::inverse.call();
     Rotation3::angle.call();
     Rotation3::interpolate.call();
+    Rotation3::from_roll_pitch_yaw.call();
     Rotation3::roll_pitch_yaw.call();
     Rotation3::to_matrix.call();
     Rotation3::from_matrix.call();

@@ -89,7 +89,7 @@ impl Slot {
     /// Tells whether the joint would move visibly within the window, from rest.
     fn is_fast_enough(&self) -> bool {
         let time_s = self.stall.window.as_secs_f32();
-        let sped_up = 0.5 * self.settings.acceleration() as f32 * time_s * time_s;
+        let sped_up = 0.5 * self.settings.acceleration as f32 * time_s * time_s;
         sped_up.min(self.speed as f32 * time_s) > 4.0 * STANDS as f32
     }
 

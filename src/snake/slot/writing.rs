@@ -30,10 +30,10 @@ impl Slot {
 
     const fn value(&self, register: Register) -> i32 {
         match register {
-            Register::Mode => self.settings.mode(),
-            Register::Current => self.settings.current(),
-            Register::Acceleration => self.settings.acceleration(),
-            Register::Deceleration => self.settings.deceleration(),
+            Register::Mode => self.settings.mode,
+            Register::Current => self.settings.current,
+            Register::Acceleration => self.settings.acceleration,
+            Register::Deceleration => self.settings.deceleration,
             Register::Speed => self.speed,
             Register::Enable => 1,
             Register::Position | Register::ActualPosition | Register::ActualSpeed => self.target,

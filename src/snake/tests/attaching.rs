@@ -18,11 +18,7 @@ fn ids_and_parameters_that_make_no_sense_are_named() {
     }
     let no_window = Config::new(1).with_stall(Duration::ZERO, Reaction::Report);
     assert_eq!(refused(no_window), "snake joint #1: stall window is not usable");
-    let settings = Settings::new().with_current(0);
-    assert_eq!(
-        refused(Config::new(1).with_settings(settings)),
-        "snake joint #1: current is not usable"
-    );
+    assert_eq!(refused(Config::new(1).with_current(0)), "snake joint #1: current is not usable");
     joints.attach(Config::new(1)).unwrap();
     assert_eq!(joints.attach(Config::new(1)), Err(AttachError::Taken(slot::name(1))));
     assert_eq!(joints.joints().count(), 1);

@@ -16,7 +16,7 @@ fn zeroing_makes_the_present_position_zero_and_relaxes() {
     assert_eq!(sent[0], (2, Command::DISABLE));
     let state = bench.state(0);
     assert_eq!((state.pulses, state.raw_pulses, state.homing), (0, 70_000, Homing::Homed));
-    assert_eq!(bench.joints.offset(bench.handles[0]).map(|offset| offset.target(0)), Some(70_000));
+    assert_eq!(bench.joints.offset(bench.handles[0]), Some(70_000));
     bench.joints.set_pulses(bench.handles[0], -1_000).unwrap();
     let sent = bench.run(20);
     assert!(sent.contains(&(2, Command::Write(Register::Position, 69_000))));

@@ -175,7 +175,7 @@ fn a_joint_that_got_settings_while_it_is_brought_up_is_disabled_all_the_same() {
     let joint = bench.handles[0];
     bench.joints.set_pulses(joint, 1_000).unwrap();
     assert_eq!(writes(&bench.run(1)), [Command::Write(Register::Mode, 1)]);
-    bench.joints.set_settings(joint, Settings::new()).unwrap();
+    bench.joints.set_settings(joint, &Config::new(1)).unwrap();
     bench.joints.relax(joint);
     assert_eq!(writes(&bench.run(1)), [Command::DISABLE]);
 }
