@@ -7,7 +7,7 @@
 
 mod console;
 
-use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
@@ -18,8 +18,8 @@ use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
 use std::error::Error;
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+const WHEEL_RADIUS_M: f32 = 0.076;
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.20, 0.18);
 /// A per rad/s and A per rad of the output shaft. Twice what `WheelTuning` reckons for 20 kg, and more of the integral, for a plan
 /// that has to be kept: a step overshoots by some 9 %.
 const SPEED: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
@@ -68,7 +68,7 @@ impl<'w> Robot<'w> {
             rear_left: OneOf::Second(rear_left),
             rear_right: OneOf::Second(rear_right),
         };
-        let mut chassis = Chassis::new(Mecanum::new(GEOMETRY)?);
+        let mut chassis = Chassis::new(Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M)?);
         chassis.set_limits(ChassisLimits::new().with_acceleration(ACCELERATION, 10.0))?;
         Ok(Self { front, rear, wheels, chassis })
     }
@@ -149,8 +149,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         rear_left: wheel(1, Line::Can2)?,
         rear_right: wheel(2, Line::Can2)?,
     };
-    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
-    let mounted = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    let (x, y) = (FRONT_LEFT_M.x, FRONT_LEFT_M.y);
+    let mounted = |motor, x, y| Wheel::mecanum(motor, WHEEL_RADIUS_M, Vec2::new(x, y));
     world.attach_chassis(ChassisConfig::new(&[
         mounted(wheels.front_left, x, y),
         mounted(wheels.front_right, x, -y).reversed(),

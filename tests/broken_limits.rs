@@ -7,8 +7,8 @@
 mod own;
 
 use drivetrain::chassis::{
-    Chassis, ChassisError, ChassisLimits, Differential, DifferentialGeometry, DifferentialWheels,
-    Kinematics, ModeConfig, Modes, Omni, PowerBuffer, PowerFit, PowerModel, Swerve, WheelLoad,
+    Chassis, ChassisError, ChassisLimits, Differential, Kinematics, ModeConfig, Modes, Omni,
+    PowerBuffer, PowerFit, PowerModel, Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, LoopError, M3508};
@@ -128,8 +128,7 @@ fn a_forgetting_factor_that_is_none_is_one() {
 
 #[test]
 fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
-    let geometry = DifferentialGeometry { wheel_radius_m: 0.05, half_track_m: 0.2 };
-    let two = Differential::new(geometry).unwrap();
+    let two = Differential::new(0.05, 0.2).unwrap();
     let three = Omni::three(0.05, 0.2).unwrap();
     let swerve = Swerve::new(0.05, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)]).unwrap();
     let twist = Twist::new(1.0, 0.0, -1.0);
@@ -137,8 +136,7 @@ fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
     for bad in BROKEN.into_iter().chain([0.0]) {
         let still = AngularVelocity::ZERO;
         let wheels = two.inverse(twist);
-        assert_eq!(two.desaturate(wheels, limit(bad)), DifferentialWheels::splat(still), "{bad}");
-        assert_eq!(wheels.desaturate(limit(bad)), DifferentialWheels::splat(still), "{bad}");
+        assert_eq!(two.desaturate(wheels, limit(bad)), [still; 2], "{bad}");
         let wheels = three.inverse(twist);
         assert_eq!(three.desaturate(wheels, limit(bad)), [still; 3], "{bad}");
         let modules = swerve.inverse(twist);
@@ -152,8 +150,7 @@ fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
 
 #[test]
 fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
-    let geometry = DifferentialGeometry { wheel_radius_m: 0.05, half_track_m: 0.2 };
-    let mut chassis = Chassis::new(Differential::new(geometry).unwrap());
+    let mut chassis = Chassis::new(Differential::new(0.05, 0.2).unwrap());
     let speed = AngularVelocity::from_rad_per_s;
     let limits = ChassisLimits::new().with_acceleration(3.0, 9.0).with_wheel_speed(speed(5.0));
     chassis.set_limits(limits).unwrap();
@@ -181,9 +178,9 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
         chassis.set_body(Twist::new(1.0, 0.0, 0.0));
         let now = Instant::from_micros(1_000 * u64::from(step));
         let before = chassis.reference();
-        let wheels = chassis.update(DifferentialWheels::splat(None), Tick::new(now, 0.001));
+        let [left, _] = chassis.update([None; 2], Tick::new(now, 0.001));
         assert!((chassis.reference() - before).linear().norm() <= 3.001e-3);
-        fastest = fastest.max(wheels.left.as_rad_per_s());
+        fastest = fastest.max(left.as_rad_per_s());
     }
     assert!((fastest - 5.0).abs() < 1e-3, "{fastest}");
 }

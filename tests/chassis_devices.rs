@@ -4,12 +4,12 @@
 #![cfg(feature = "sim")]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumGeometry, MecanumWheels, WheelDrive,
+    Chassis, ChassisLimits, ChassisStatus, Mecanum, MecanumWheels, WheelDrive,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::geometry::{Heading, Twist};
+use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::motor::{
     AngleDrive, Capabilities, Capability, Claim, Condition, Devices, HealthConfig, Ingest,
     MotorName, OneOf, Order, Own, OwnMotor, Reaction, Role, Target, TargetError, VelocityDrive,
@@ -21,8 +21,8 @@ use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id, StandardId};
 use proptest::prelude::*;
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
+const WHEEL_RADIUS_M: f32 = 0.1;
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.2, 0.2);
 const SPEED: PidConfig = PidConfig::new(0.5, 1.0, 0.0);
 /// The wheels are turned by hand, against their current too.
 const BY_HAND: HealthConfig =
@@ -34,7 +34,7 @@ struct Rear;
 type Axles = OneOf<Handle<M3508, Front>, Handle<M3508, Rear>>;
 
 fn mecanum() -> Chassis<Mecanum> {
-    let mut chassis = Chassis::new(Mecanum::new(GEOMETRY).unwrap());
+    let mut chassis = Chassis::new(Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M).unwrap());
     chassis.set_limits(ChassisLimits::new().with_acceleration(2.0, 10.0)).unwrap();
     chassis
 }
@@ -530,7 +530,10 @@ fn one_call_drives_the_devices_of_two_runners_and_goes_on_when_one_is_lost() {
     assert!((vx_m_s - 0.5).abs() < 0.02, "{vx_m_s}");
     let status = chassis.status();
     assert_eq!((status.refused, status.lost_wheels), (2, 2), "{status:?}");
-    let five = Mecanum::new(GEOMETRY).unwrap().inverse(Twist::new(0.5, 0.0, 0.0)).front_left;
+    let five = Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M)
+        .unwrap()
+        .inverse(Twist::new(0.5, 0.0, 0.0))
+        .front_left;
     let measured = front.device().velocity(front_left).unwrap();
     assert!((measured - five).as_rad_per_s().abs() < 0.2, "{measured:?}");
 }

@@ -4,7 +4,7 @@
 #![cfg(feature = "sim")]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels, Mode, ModeConfig, Modes,
+    Chassis, ChassisLimits, Mecanum, MecanumWheels, Mode, ModeConfig, Modes,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -16,8 +16,8 @@ use drivetrain::sim::{
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::Angle;
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
+const WHEEL_RADIUS_M: f32 = 0.076;
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.2, 0.18);
 const SPEED: PidConfig = PidConfig::new(4.0, 20.0, 0.0).with_output_limit(5.0);
 
 struct Robot<'w> {
@@ -33,8 +33,8 @@ impl<'w> Robot<'w> {
         let ids = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 };
         let motor = |id| world.attach(MotorConfig::m3508(id));
         let motors = ids.try_map(motor).unwrap();
-        let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
-        let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+        let (x, y) = (FRONT_LEFT_M.x, FRONT_LEFT_M.y);
+        let wheel = |motor, x, y| Wheel::mecanum(motor, WHEEL_RADIUS_M, Vec2::new(x, y));
         world
             .attach_chassis(ChassisConfig::new(&[
                 wheel(motors.front_left, x, y),
@@ -56,7 +56,7 @@ impl<'w> Robot<'w> {
             rear_left: bus.attach(config(3)).unwrap(),
             rear_right: bus.attach(config(4).reversed()).unwrap(),
         };
-        let mut chassis = Chassis::new(Mecanum::new(GEOMETRY).unwrap());
+        let mut chassis = Chassis::new(Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M).unwrap());
         chassis.set_limits(ChassisLimits::new().with_acceleration(2.0, 10.0)).unwrap();
         let runner = Runner::new(Nb(world.controller()), world.clock(), bus);
         Self { world, runner, wheels, chassis }

@@ -2,10 +2,7 @@
 
 #![cfg(test)]
 
-use drivetrain::chassis::{
-    Differential, DifferentialGeometry, DifferentialWheels, Mecanum, MecanumGeometry,
-    MecanumWheels, ModuleState, Omni, Swerve,
-};
+use drivetrain::chassis::{Differential, Mecanum, MecanumWheels, ModuleState, Omni, Swerve};
 use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -65,16 +62,13 @@ fn compare<const N: usize>(
 
 #[test]
 fn mecanum_with_both_roller_mountings() {
-    let geometry =
-        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
-    let usual = Mecanum::new(geometry).unwrap();
+    let usual = Mecanum::new(0.076, Vec2::new(0.20, 0.18)).unwrap();
     compare(
         "mecanum_o",
         |twist| usual.inverse(twist).into_array(),
         |wheels| usual.forward(MecanumWheels::from_array(wheels)),
     );
-    let wide = MecanumGeometry { half_wheelbase_m: 0.1, half_track_m: 0.3, ..geometry };
-    let other = Mecanum::<'X'>::with_rollers(wide).unwrap();
+    let other = Mecanum::<'X'>::with_rollers(0.076, Vec2::new(0.1, 0.3)).unwrap();
     compare(
         "mecanum_x",
         |twist| other.inverse(twist).into_array(),
@@ -105,13 +99,8 @@ fn omni_with_three_four_and_scattered_wheels() {
 
 #[test]
 fn differential() {
-    let geometry = DifferentialGeometry { wheel_radius_m: 0.076, half_track_m: 0.18 };
-    let chassis = Differential::new(geometry).unwrap();
-    compare(
-        "differential",
-        |twist| chassis.inverse(twist).into_array(),
-        |wheels| chassis.forward(DifferentialWheels::from_array(wheels)),
-    );
+    let chassis = Differential::new(0.076, 0.18).unwrap();
+    compare("differential", |twist| chassis.inverse(twist), |wheels| chassis.forward(wheels));
 }
 
 #[test]

@@ -4,8 +4,7 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    Differential, DifferentialGeometry, Kinematics, Mecanum, MecanumGeometry, ModuleState, Omni,
-    Swerve, WheelSpeed,
+    Differential, Kinematics, Mecanum, ModuleState, Omni, Swerve, WheelSpeed,
 };
 use drivetrain::geometry::{Body, Pose2, Twist, Vec2};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -162,13 +161,12 @@ fn jitters<const N: usize>() -> impl Strategy<Value = [(f32, f32, f32); N]> {
 proptest! {
     #[test]
     fn mecanum(case in cases(), wheel_radius_m in radius(), half_wheelbase_m in length(), half_track_m in length()) {
-        let geometry = MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m };
         let reach_m = half_wheelbase_m + half_track_m;
-        laws(&Mecanum::new(geometry).unwrap(), &case, reach_m, EXACT)?;
+        laws(&Mecanum::new(wheel_radius_m, Vec2::new(half_wheelbase_m, half_track_m)).unwrap(), &case, reach_m, EXACT)?;
         // With the other rollers the lever arm is the difference.
         let reach_m = (half_track_m - half_wheelbase_m).abs();
         if reach_m > 0.05 && reach_m > 0.04 * half_track_m.hypot(half_wheelbase_m) {
-            laws(&Mecanum::<'X'>::with_rollers(geometry).unwrap(), &case, reach_m, EXACT)?;
+            laws(&Mecanum::<'X'>::with_rollers(wheel_radius_m, Vec2::new(half_wheelbase_m, half_track_m)).unwrap(), &case, reach_m, EXACT)?;
         }
     }
 
@@ -186,7 +184,7 @@ proptest! {
 
     #[test]
     fn differential(case in cases(), wheel_radius_m in radius(), half_track_m in length()) {
-        let layout = Differential::new(DifferentialGeometry { wheel_radius_m, half_track_m }).unwrap();
+        let layout = Differential::new(wheel_radius_m, half_track_m).unwrap();
         // It cannot move sideways.
         let motion = Twist::new(case.motion.vx_m_s, 0.0, case.motion.wz_rad_s);
         laws(&layout, &Case { motion, ..case }, half_track_m, EXACT)?;

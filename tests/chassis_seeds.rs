@@ -4,8 +4,8 @@
 #![cfg(test)]
 
 use core::f32::consts::FRAC_1_SQRT_2;
-use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels, Omni, PowerModel, WheelLoad};
-use drivetrain::geometry::{Heading, Twist, World};
+use drivetrain::chassis::{Mecanum, MecanumWheels, Omni, PowerModel, WheelLoad};
+use drivetrain::geometry::{Heading, Twist, Vec2, World};
 use drivetrain::math::{wrap, wrap_positive};
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -14,12 +14,7 @@ const CALL: (f32, f32, f32) = (0.076, 0.2, 0.25);
 
 fn mecanum() -> Mecanum {
     let (wheel_radius_m, wheelbase_m, track_m) = CALL;
-    Mecanum::new(MecanumGeometry {
-        wheel_radius_m,
-        half_wheelbase_m: 0.5 * wheelbase_m,
-        half_track_m: 0.5 * track_m,
-    })
-    .unwrap()
+    Mecanum::new(wheel_radius_m, Vec2::new(0.5 * wheelbase_m, 0.5 * track_m)).unwrap()
 }
 
 // The first seed declares half spacings and is called with full ones: its robot turned twice as fast as told.

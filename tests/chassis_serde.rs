@@ -5,8 +5,7 @@
 
 use core::fmt::Debug;
 use drivetrain::chassis::{
-    ChassisLimits, DifferentialGeometry, DifferentialWheels, MecanumGeometry, MecanumWheels, Mode,
-    ModeConfig, Modes, ModuleState, PowerModel, WheelLoad,
+    ChassisLimits, MecanumWheels, Mode, ModeConfig, Modes, ModuleState, PowerModel, WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -73,12 +72,9 @@ proptest! {
 #[test]
 fn values_of_the_chassis_survive_a_file() {
     let speed = AngularVelocity::from_rad_per_s(-3.5);
-    round(MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 });
-    round(DifferentialGeometry { wheel_radius_m: 0.076, half_track_m: 0.18 });
     round(Pose2::<Body>::tangential(Angle::from_degrees(60.0), 0.2));
     round(MecanumWheels { front_left: 1_u8, front_right: 2, rear_left: 3, rear_right: 4 });
     round(MecanumWheels::splat(speed));
-    round(DifferentialWheels { left: Some(speed), right: None });
     round(ModuleState::new(speed, Angle::from_degrees(700.0)));
     round(WheelLoad { torque: -2.0, speed_rad_s: 30.0 });
     round(PowerModel::new(1.0, 0.475, 0.065, 0.001).unwrap());

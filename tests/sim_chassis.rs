@@ -3,7 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
@@ -14,8 +14,8 @@ use drivetrain::sim::{
 use drivetrain::time::Duration;
 use drivetrain::units::AngularVelocity;
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
+const WHEEL_RADIUS_M: f32 = 0.076;
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.2, 0.18);
 /// The ground holds 2 Nm a wheel, so 5 A: more only makes it spin.
 const SPEED: PidConfig = PidConfig::new(4.0, 20.0, 0.0).with_output_limit(5.0);
 const IDS: MecanumWheels<u8> =
@@ -45,8 +45,8 @@ impl<'a> Car<'a> {
         let motors = IDS
             .zip(lines)
             .map(|(id, line)| world.attach(MotorConfig::m3508(id).with_line(line)).unwrap());
-        let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
-        let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+        let (x, y) = (FRONT_LEFT_M.x, FRONT_LEFT_M.y);
+        let wheel = |motor, x, y| Wheel::mecanum(motor, WHEEL_RADIUS_M, Vec2::new(x, y));
         world
             .attach_chassis(ChassisConfig::new(&[
                 wheel(motors.front_left, x, y),
@@ -64,7 +64,7 @@ impl<'a> Car<'a> {
         let [first, second] = buses;
         let robots = [(Line::Can1, first), (Line::Can2, second)]
             .map(|(line, bus)| Runner::new(Nb(world.controller_on(line)), world.clock(), bus));
-        Self { world, robots, wheels, mecanum: Mecanum::new(GEOMETRY).unwrap() }
+        Self { world, robots, wheels, mecanum: Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M).unwrap() }
     }
 
     fn robot(&mut self, line: Line) -> &mut Robot<'a> {

@@ -3,10 +3,7 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::chassis::{
-    Chassis, Differential, DifferentialGeometry, DifferentialWheels, Kinematics, ModuleMotors,
-    Omni, Swerve,
-};
+use drivetrain::chassis::{Chassis, Differential, Kinematics, ModuleMotors, Omni, Swerve};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
 use drivetrain::geometry::{Body, Twist, Vec2};
@@ -102,10 +99,9 @@ fn a_differential_drive_goes_where_it_is_told_but_not_sideways() {
         let side = |id, y| Wheel::plain(m3508(&world, id), RADIUS_M, Vec2::new(0.0, y));
         let floor = [side(1, 0.18), side(2, -0.18)];
         world.attach_chassis(ChassisConfig::new(&floor)).unwrap();
-        let geometry = DifferentialGeometry { wheel_radius_m: RADIUS_M, half_track_m: 0.18 };
-        let layout = Differential::new(geometry).unwrap();
+        let layout = Differential::new(RADIUS_M, 0.18).unwrap();
         let wanted = Twist::new(vx, vy, wz);
-        let state = drive(&world, layout, DifferentialWheels::from_array, [1, 2], wanted);
+        let state = drive(&world, layout, core::convert::identity, [1, 2], wanted);
         assert_moves(state, Twist::new(vx, 0.0, wz));
     }
 }

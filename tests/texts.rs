@@ -3,11 +3,11 @@
 #![cfg(test)]
 
 use drivetrain::chassis::{
-    ChassisError, ChassisLimits, DifferentialGeometry, Mecanum, MecanumGeometry, ModeConfig, Modes,
-    PowerBuffer, PowerModel,
+    ChassisError, ChassisLimits, Mecanum, ModeConfig, Modes, PowerBuffer, PowerModel,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, LoopError, M3508};
+use drivetrain::geometry::Vec2;
 use drivetrain::motor::{Claim, MotorName, Role};
 use drivetrain::runner::FrameQueue;
 use drivetrain::time::ExtendedCounter;
@@ -22,11 +22,8 @@ fn says(text: &impl std::fmt::Display, words: &[&str]) {
 
 #[test]
 fn chassis_errors_name_the_value() {
-    let geometry =
-        MecanumGeometry { wheel_radius_m: 0.0, half_wheelbase_m: 0.2, half_track_m: 0.2 };
-    says(&Mecanum::new(geometry).unwrap_err(), &["wheel_radius_m"]);
-    let geometry = DifferentialGeometry { wheel_radius_m: f32::NAN, half_track_m: 0.2 };
-    says(&drivetrain::chassis::Differential::new(geometry).unwrap_err(), &["wheel_radius_m"]);
+    says(&Mecanum::new(0.0, Vec2::new(0.2, 0.2)).unwrap_err(), &["wheel_radius_m"]);
+    says(&drivetrain::chassis::Differential::new(f32::NAN, 0.2).unwrap_err(), &["wheel_radius_m"]);
     says(&PowerModel::new(1.0, 1.0, -1.0, 0.0).unwrap_err(), &["k2", "zero or more"]);
     let limits = ChassisLimits::new().with_command_timeout(0.0);
     says(&limits.validate().unwrap_err(), &["command timeout", "above zero"]);

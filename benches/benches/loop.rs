@@ -4,11 +4,11 @@
 //! `firmware/qemu`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use drivetrain::chassis::{Mecanum, MecanumGeometry};
+use drivetrain::chassis::Mecanum;
 use drivetrain::control::{Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::geometry::{Body, Twist};
+use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use std::hint::black_box;
@@ -132,9 +132,7 @@ fn benches(criterion: &mut Criterion) {
         eight.tick();
     });
 
-    let geometry =
-        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
-    let mecanum = Mecanum::new(geometry).expect("a real chassis");
+    let mecanum = Mecanum::new(0.076, Vec2::new(0.2, 0.18)).expect("a real chassis");
     let twist = Twist::<Body>::new(1.0, -0.5, 0.7);
     let wheels = mecanum.inverse(twist);
     measure(criterion, "mecanum inverse", || {

@@ -1,6 +1,8 @@
 //! The same robot under a gimbal and a pilot: what each mode makes of the same stick, and what a power limit leaves.
 
-use super::scenario::{GEOMETRY, Robot, Wheels, at, attach_motors, narrow, robot, seconds_of};
+use super::scenario::{
+    FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, narrow, robot, seconds_of,
+};
 use drivetrain::chassis::{
     Chassis, ChassisLimits, Mecanum, MecanumWheels, Mode, ModeConfig, Modes, PowerBuffer, PowerCut,
     PowerFit, PowerModel, WheelLoad,
@@ -63,7 +65,7 @@ impl Drive {
         let world = Simulation::new(self.seed);
         let motors = attach_motors(&world)?;
         let (mut robot, wheels) = robot(&world)?;
-        let mut chassis = Chassis::new(Mecanum::new(GEOMETRY)?);
+        let mut chassis = Chassis::new(Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M)?);
         let fastest = AngularVelocity::from_rpm(450.0);
         chassis.set_limits(
             ChassisLimits::new().with_acceleration(4.0, 20.0).with_wheel_speed(fastest),

@@ -1,7 +1,7 @@
 //! The robot, its tasks, and the result of a run.
 
 use super::silence::{CommandWatch, Silence};
-use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::geometry::{Heading, Twist, Vec2, World as WorldFrame};
@@ -15,8 +15,8 @@ use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
 
-pub(crate) const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+pub(crate) const WHEEL_RADIUS_M: f32 = 0.076;
+pub(crate) const FRONT_LEFT_M: Vec2 = Vec2::new(0.20, 0.18);
 /// A per rad/s and A per rad of the output shaft. Twice what `WheelTuning` reckons for 20 kg, and more of the integral, for a plan
 /// that has to be kept: a step overshoots by some 9 %.
 const SPEED: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
@@ -123,7 +123,7 @@ impl Scenario {
         };
         let mut commands = trouble.map(|(_, from_s, until_s)| CommandWatch::new(from_s, until_s));
         let (mut robot, wheels) = robot(&world)?;
-        let mecanum = Mecanum::new(GEOMETRY)?;
+        let mecanum = Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M)?;
         let plan = Plan::new(self.seconds);
         let end = at(self.seconds);
         let mut run = Run {
@@ -174,8 +174,8 @@ pub(crate) fn attach_motors(world: &Simulation) -> Result<MecanumWheels<MotorKey
     let motor = |id| world.attach(MotorConfig::m3508(id));
     let keys = MecanumWheels { front_left: 2, front_right: 1, rear_left: 3, rear_right: 4 }
         .try_map(motor)?;
-    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
-    let wheel = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    let (x, y) = (FRONT_LEFT_M.x, FRONT_LEFT_M.y);
+    let wheel = |motor, x, y| Wheel::mecanum(motor, WHEEL_RADIUS_M, Vec2::new(x, y));
     world.attach_chassis(ChassisConfig::new(&[
         wheel(keys.front_left, x, y),
         wheel(keys.front_right, x, -y).reversed(),

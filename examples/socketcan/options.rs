@@ -1,6 +1,6 @@
 //! What the command line asks for.
 
-use drivetrain::chassis::MecanumGeometry;
+use drivetrain::geometry::Vec2;
 
 pub(crate) const HELP: &str = "\
 usage: socketcan [--interface NAME] [--motors LIST] [--rpm N | --mecanum X,Y,W [--geometry R,L,B]] [--seconds S] [--arm]
@@ -24,15 +24,16 @@ told from here.
   --arm             send commands; without it nothing is sent
   --log FILE        every frame in the form of candump -L";
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+const WHEEL_RADIUS_M: f32 = 0.076;
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.20, 0.18);
 
 pub(crate) struct Options {
     pub(crate) interface: String,
     pub(crate) motors: Vec<(String, u8)>,
     pub(crate) rpm: f32,
     pub(crate) twist: Option<[f32; 3]>,
-    pub(crate) geometry: MecanumGeometry,
+    /// Wheel radius and place of the front left wheel, in m.
+    pub(crate) geometry: (f32, Vec2),
     pub(crate) seconds: u64,
     pub(crate) arm: bool,
     /// By `--rpm` or `--mecanum`.
@@ -66,7 +67,7 @@ pub(crate) fn parse(
         motors: motors("m3508:1-4")?,
         rpm: 0.0,
         twist: None,
-        geometry: GEOMETRY,
+        geometry: (WHEEL_RADIUS_M, FRONT_LEFT_M),
         seconds: 5,
         arm: false,
         asks_for_motion: false,
@@ -89,7 +90,7 @@ pub(crate) fn parse(
             "--geometry" => {
                 let [wheel_radius_m, half_wheelbase_m, half_track_m] =
                     three("--geometry", &value()?)?;
-                geometry = Some(MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m });
+                geometry = Some((wheel_radius_m, Vec2::new(half_wheelbase_m, half_track_m)));
             }
             _ => return Err(format!("no option {option}; --help lists them")),
         }

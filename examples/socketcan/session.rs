@@ -80,7 +80,8 @@ fn speeds(options: &Options, motors: &[AnyHandle]) -> Result<Vec<AngularVelocity
     if !wheels.eq(options.motors.iter().cloned()) {
         return Err("--mecanum needs --motors m3508:1-4".into());
     }
-    let speeds = Mecanum::new(options.geometry)?.inverse(Twist::new(x, y, w));
+    let (wheel_radius_m, front_left_m) = options.geometry;
+    let speeds = Mecanum::new(wheel_radius_m, front_left_m)?.inverse(Twist::new(x, y, w));
     let MecanumWheels { front_left, front_right, rear_left, rear_right } = speeds;
     // Ids 1 to 4, as DJI counts them: from the front right, counter-clockwise.
     Ok(vec![front_right, front_left, rear_left, rear_right])

@@ -3,9 +3,8 @@
 #![no_main]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Differential, DifferentialGeometry, Kinematics, Mecanum,
-    MecanumGeometry, Mode, ModeConfig, Modes, ModuleState, Omni, Swerve, SwerveSteering,
-    WheelSpeed,
+    Chassis, ChassisLimits, Differential, Kinematics, Mecanum, Mode, ModeConfig, Modes,
+    ModuleState, Omni, Swerve, SwerveSteering, WheelSpeed,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2};
@@ -21,18 +20,12 @@ fuzz_target!(|data: &[u8]| {
     let speed = |input: &mut Input| AngularVelocity::from_rad_per_s(input.float());
     match input.byte() % 6 {
         0 | 1 => {
-            let geometry = MecanumGeometry {
-                wheel_radius_m: radius,
-                half_wheelbase_m: input.positive(),
-                half_track_m: input.positive(),
-            };
-            let Ok(layout) = Mecanum::new(geometry) else { return };
+            let front_left = Vec2::new(input.positive(), input.positive());
+            let Ok(layout) = Mecanum::new(radius, front_left) else { return };
             drive(layout, input, speed);
         }
         2 => {
-            let geometry =
-                DifferentialGeometry { wheel_radius_m: radius, half_track_m: input.positive() };
-            let Ok(layout) = Differential::new(geometry) else { return };
+            let Ok(layout) = Differential::new(radius, input.positive()) else { return };
             drive(layout, input, speed);
         }
         3 => {

@@ -26,11 +26,10 @@ use crate::units::Angle;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Chassis, Mecanum, MecanumGeometry, MecanumWheels};
-/// use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
+/// use drivetrain::chassis::{Chassis, Mecanum, MecanumWheels};
+/// use drivetrain::{geometry::{Twist, Vec2}, time::{Instant, Tick}, units::AngularVelocity};
 ///
-/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
-/// let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+/// let mut chassis = Chassis::new(Mecanum::new(0.1, Vec2::new(0.2, 0.2))?);
 /// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
 /// let measured = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(10.0)));
 /// let targets = chassis.update(measured, Tick::new(Instant::from_micros(1_000), 0.001));
@@ -310,11 +309,11 @@ impl<K: Kinematics> Chassis<K> {
     /// # Examples
     /// Front wheels on one bus, rear wheels on another:
     /// ```
-    /// use drivetrain::chassis::{Chassis, Mecanum, MecanumGeometry, MecanumWheels};
+    /// use drivetrain::chassis::{Chassis, Mecanum, MecanumWheels};
     /// use drivetrain::control::PidConfig;
     /// use drivetrain::dji::{Bus, Config, M3508};
     /// use drivetrain::motor::{OneOf, TargetError};
-    /// use drivetrain::{geometry::Twist, time::{Instant, Tick}};
+    /// use drivetrain::{geometry::{Twist, Vec2}, time::{Instant, Tick}};
     ///
     /// let (mut front, mut rear) = (Bus::new(), Bus::new());
     /// let wheel = |id| Config::<M3508>::new(id).speed_loop(PidConfig::new(1.9, 2.4, 0.0));
@@ -324,8 +323,7 @@ impl<K: Kinematics> Chassis<K> {
     ///     rear_left: OneOf::Second(rear.attach(wheel(1))?),
     ///     rear_right: OneOf::Second(rear.attach(wheel(2).reversed())?),
     /// };
-    /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
-    /// let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+    /// let mut chassis = Chassis::new(Mecanum::new(0.1, Vec2::new(0.2, 0.2))?);
     ///
     /// // Each millisecond; with runners, `&mut (front.device_mut(), rear.device_mut())`:
     /// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
@@ -368,9 +366,7 @@ fn can_be_meant<F>(twist: Twist<F>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{
-        Mecanum, MecanumGeometry, MecanumWheels, ModuleMotors, ModuleState, Swerve,
-    };
+    use crate::chassis::{Mecanum, MecanumWheels, ModuleMotors, ModuleState, Swerve};
     use crate::geometry::Vec2;
     use crate::math::wrap_pi;
     use crate::motor::{AngleDrive, TargetError, VelocityDrive};
@@ -383,9 +379,7 @@ mod tests {
         MecanumWheels { front_left: None, front_right: None, rear_left: None, rear_right: None };
 
     fn mecanum() -> Mecanum {
-        let geometry =
-            MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.2 };
-        Mecanum::new(geometry).unwrap()
+        Mecanum::new(0.1, Vec2::new(0.2, 0.2)).unwrap()
     }
 
     fn limited(limits: ChassisLimits) -> Chassis<Mecanum> {

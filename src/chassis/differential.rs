@@ -1,30 +1,7 @@
 use super::error::positive;
-use super::{ChassisError, DifferentialWheels, Kinematics};
+use super::{ChassisError, Kinematics};
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
-
-/// The dimensions of a chassis with a driven left and a driven right side: all in m, above zero.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{Differential, DifferentialGeometry}, geometry::Twist};
-///
-/// // Sides 0.5 m apart: half of it.
-/// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
-/// let turning = Differential::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
-/// assert!((turning.right.as_rad_per_s() - 0.25 * 2.0 / 0.1).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct DifferentialGeometry {
-    /// Radius of the wheels.
-    pub wheel_radius_m: f32,
-    /// Half the distance from the left side to the right one. Tracks and skid steering act like wider ones: measure
-    /// it by turning in place.
-    pub half_track_m: f32,
-}
 
 /// The kinematics of two driven sides that cannot move sideways.
 ///
@@ -32,15 +9,17 @@ pub struct DifferentialGeometry {
 /// r * left = vx - half track * wz        r * right = vx + half track * wz        vy = 0
 /// ```
 ///
+/// The wheels are an array: all of the left side (+y), then all of the right side.
+///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Differential, DifferentialGeometry};
+/// use drivetrain::chassis::Differential;
 /// use drivetrain::geometry::Twist;
 ///
-/// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
-/// let wheels = Differential::new(geometry)?.inverse(Twist::new(1.0, 0.0, 2.0)); // ahead and to the left
-/// assert!((wheels.left.as_rad_per_s() - 5.0).abs() < 1e-5);
-/// assert!((wheels.right.as_rad_per_s() - 15.0).abs() < 1e-5);
+/// // Sides 0.5 m apart: half of it.
+/// let [left, right] = Differential::new(0.1, 0.25)?.inverse(Twist::new(1.0, 0.0, 2.0)); // ahead and to the left
+/// assert!((left.as_rad_per_s() - 5.0).abs() < 1e-5);
+/// assert!((right.as_rad_per_s() - 15.0).abs() < 1e-5);
 /// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,12 +32,13 @@ pub struct Differential {
 }
 
 impl Differential {
-    /// Takes the dimensions.
+    /// Takes the radius of the wheels, and half the distance from the left side to the right one, both in m.
+    ///
+    /// Tracks and skid steering act like sides that are further apart: measure it by turning in place.
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(geometry: DifferentialGeometry) -> Result<Self, ChassisError> {
-        let DifferentialGeometry { wheel_radius_m, half_track_m } = geometry;
+    pub const fn new(wheel_radius_m: f32, half_track_m: f32) -> Result<Self, ChassisError> {
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
         }
@@ -75,61 +55,52 @@ impl Differential {
 
     /// Returns the wheel velocities for the motion `twist` of the body; its sideways part is left out.
     #[must_use]
-    pub const fn inverse(&self, twist: Twist<Body>) -> DifferentialWheels<AngularVelocity> {
+    pub const fn inverse(&self, twist: Twist<Body>) -> [AngularVelocity; 2] {
         let yaw = twist.wz_rad_s * self.half_track_m;
-        DifferentialWheels {
-            left: AngularVelocity::from_rad_per_s((twist.vx_m_s - yaw) * self.per_radius),
-            right: AngularVelocity::from_rad_per_s((twist.vx_m_s + yaw) * self.per_radius),
-        }
+        [
+            AngularVelocity::from_rad_per_s((twist.vx_m_s - yaw) * self.per_radius),
+            AngularVelocity::from_rad_per_s((twist.vx_m_s + yaw) * self.per_radius),
+        ]
     }
 
     /// Returns the motion of the body; its sideways part is zero.
     #[must_use]
-    pub const fn forward(&self, wheels: DifferentialWheels<AngularVelocity>) -> Twist<Body> {
-        let (left, right) = (wheels.left.as_rad_per_s(), wheels.right.as_rad_per_s());
+    pub const fn forward(&self, [left, right]: [AngularVelocity; 2]) -> Twist<Body> {
+        let (left, right) = (left.as_rad_per_s(), right.as_rad_per_s());
         Twist::new(0.5 * self.wheel_radius_m * (left + right), 0.0, self.yaw_per * (right - left))
     }
 }
 
 impl Kinematics for Differential {
-    type Wheels<T: Copy> = DifferentialWheels<T>;
+    type Wheels<T: Copy> = [T; 2];
     type Speed = AngularVelocity;
     type Steering = ();
 
     const UNSTEERED: () = ();
 
-    fn inverse(&self, twist: Twist<Body>) -> DifferentialWheels<AngularVelocity> {
+    fn inverse(&self, twist: Twist<Body>) -> [AngularVelocity; 2] {
         self.inverse(twist)
     }
 
-    fn forward(&self, wheels: DifferentialWheels<AngularVelocity>) -> Twist<Body> {
+    fn forward(&self, wheels: [AngularVelocity; 2]) -> Twist<Body> {
         self.forward(wheels)
     }
 
     /// Both sides are needed.
-    fn forward_partial(
-        &self,
-        wheels: DifferentialWheels<Option<AngularVelocity>>,
-    ) -> Option<Twist<Body>> {
-        wheels.all().map(|all| self.forward(all))
+    fn forward_partial(&self, [left, right]: [Option<AngularVelocity>; 2]) -> Option<Twist<Body>> {
+        Some(self.forward([left?, right?]))
     }
 
     fn wheel_radius_m(&self) -> f32 {
         self.wheel_radius_m
     }
 
-    fn map<T: Copy, U: Copy>(
-        wheels: DifferentialWheels<T>,
-        f: impl FnMut(T) -> U,
-    ) -> DifferentialWheels<U> {
+    fn map<T: Copy, U: Copy>(wheels: [T; 2], f: impl FnMut(T) -> U) -> [U; 2] {
         wheels.map(f)
     }
 
-    fn zip<T: Copy, U: Copy>(
-        a: DifferentialWheels<T>,
-        b: DifferentialWheels<U>,
-    ) -> DifferentialWheels<(T, U)> {
-        a.zip(b)
+    fn zip<T: Copy, U: Copy>([a, b]: [T; 2], [c, d]: [U; 2]) -> [(T, U); 2] {
+        [(a, c), (b, d)]
     }
 }
 
@@ -137,12 +108,13 @@ impl Kinematics for Differential {
 mod tests {
     use super::*;
 
-    const GEOMETRY: DifferentialGeometry =
-        DifferentialGeometry { wheel_radius_m: 0.5, half_track_m: 0.25 };
+    fn chassis() -> Differential {
+        Differential::new(0.5, 0.25).unwrap()
+    }
 
     fn sides(vx: f32, vy: f32, wz: f32) -> (f32, f32) {
-        let wheels = Differential::new(GEOMETRY).unwrap().inverse(Twist::new(vx, vy, wz));
-        (wheels.left.as_rad_per_s(), wheels.right.as_rad_per_s())
+        let [left, right] = chassis().inverse(Twist::new(vx, vy, wz));
+        (left.as_rad_per_s(), right.as_rad_per_s())
     }
 
     #[test]
@@ -164,14 +136,12 @@ mod tests {
 
     #[test]
     fn a_lost_side_leaves_the_motion_unknown() {
-        let chassis = Differential::new(GEOMETRY).unwrap();
-        let lost = DifferentialWheels { left: Some(AngularVelocity::ZERO), right: None };
-        assert_eq!(chassis.forward_partial(lost), None);
+        assert_eq!(chassis().forward_partial([Some(AngularVelocity::ZERO), None]), None);
     }
 
     #[test]
     fn a_length_of_zero_is_named() {
-        let flat = DifferentialGeometry { half_track_m: 0.0, ..GEOMETRY };
-        assert_eq!(Differential::new(flat), Err(ChassisError::NotPositive("half_track_m")));
+        let flat = Differential::new(0.5, 0.0);
+        assert_eq!(flat, Err(ChassisError::NotPositive("half_track_m")));
     }
 }

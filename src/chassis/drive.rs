@@ -9,7 +9,7 @@ use crate::units::{Angle, AngularVelocity};
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Chassis, Differential, DifferentialGeometry, DifferentialWheels};
+/// use drivetrain::chassis::{Chassis, Differential};
 /// use drivetrain::motor::{TargetError, VelocityDrive};
 /// use drivetrain::{geometry::Twist, time::{Instant, Tick}, units::AngularVelocity};
 ///
@@ -26,12 +26,11 @@ use crate::units::{Angle, AngularVelocity};
 ///     }
 /// }
 ///
-/// let geometry = DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.25 };
-/// let mut chassis = Chassis::new(Differential::new(geometry)?);
+/// let mut chassis = Chassis::new(Differential::new(0.1, 0.25)?);
 /// let mut motors = Motors([AngularVelocity::ZERO; 2]);
 /// chassis.set_body(Twist::new(1.0, 0.0, 0.0));
 /// let tick = Tick::new(Instant::from_micros(1_000), 0.001);
-/// chassis.drive(&mut motors, DifferentialWheels { left: 0, right: 1 }, tick);
+/// chassis.drive(&mut motors, [0, 1], tick);
 /// assert!((motors.0[1].as_rad_per_s() - 10.0).abs() < 1e-5);
 /// # Ok::<(), drivetrain::chassis::ChassisError>(())
 /// ```

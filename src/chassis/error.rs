@@ -4,9 +4,9 @@ use crate::control::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{ChassisError, ChassisLimits, Differential, DifferentialGeometry};
+/// use drivetrain::chassis::{ChassisError, ChassisLimits, Differential};
 ///
-/// let flat = Differential::new(DifferentialGeometry { wheel_radius_m: 0.1, half_track_m: 0.0 });
+/// let flat = Differential::new(0.1, 0.0);
 /// assert_eq!(flat, Err(ChassisError::NotPositive("half_track_m")));
 /// let slow = ChassisLimits::new().with_command_timeout(60.0).validate();
 /// assert_eq!(slow.map_err(|error| error.to_string()), Err("command timeout must be at most 1 s".into()));

@@ -1,33 +1,9 @@
 use super::error::positive;
 use super::least_squares::MAX_CONDITION;
 use super::{ChassisError, Kinematics, MecanumWheels};
-use crate::geometry::{Body, Twist};
+use crate::geometry::{Body, Twist, Vec2};
 use crate::units::AngularVelocity;
 use core::f32::consts::SQRT_2;
-
-/// The dimensions of a mecanum chassis: all in m, above zero.
-///
-/// # Examples
-/// ```
-/// use drivetrain::{chassis::{Mecanum, MecanumGeometry}, geometry::Twist};
-///
-/// // Axles 0.4 m apart, wheels 0.3 m apart: half of each.
-/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.2, half_track_m: 0.15 };
-/// let turning = Mecanum::new(geometry)?.inverse(Twist::new(0.0, 0.0, 2.0));
-/// assert!((turning.front_right.as_rad_per_s() - (0.2 + 0.15) * 2.0 / 0.1).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MecanumGeometry {
-    /// Radius of the wheels, over the rollers.
-    pub wheel_radius_m: f32,
-    /// Half the distance from the front axle to the rear one.
-    pub half_wheelbase_m: f32,
-    /// Half the distance from the left wheels to the right ones, centre to centre.
-    pub half_track_m: f32,
-}
 
 /// The kinematics of four mecanum wheels.
 ///
@@ -45,19 +21,18 @@ pub struct MecanumGeometry {
 /// cannot turn. Another letter does not compile:
 ///
 /// ```compile_fail
-/// use drivetrain::chassis::{Mecanum, MecanumGeometry};
+/// use drivetrain::{chassis::Mecanum, geometry::Vec2};
 ///
-/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.3, half_track_m: 0.2 };
-/// let mecanum = Mecanum::<'Y'>::with_rollers(geometry);
+/// let mecanum = Mecanum::<'Y'>::with_rollers(0.1, Vec2::new(0.3, 0.2));
 /// ```
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{Mecanum, MecanumGeometry};
-/// use drivetrain::geometry::Twist;
+/// use drivetrain::chassis::Mecanum;
+/// use drivetrain::geometry::{Twist, Vec2};
 ///
-/// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.3, half_track_m: 0.2 };
-/// let mecanum = Mecanum::new(geometry)?;
+/// // Axles 0.6 m apart, wheels 0.4 m apart: the front left wheel is half of each from the centre.
+/// let mecanum = Mecanum::new(0.1, Vec2::new(0.3, 0.2))?;
 /// let wheels = mecanum.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((wheels.front_left.as_rad_per_s() - (1.0 - 0.5 - 0.5 * 2.0) / 0.1).abs() < 1e-4);
 /// assert!((wheels.front_right.as_rad_per_s() - (1.0 + 0.5 + 0.5 * 2.0) / 0.1).abs() < 1e-4);
@@ -76,12 +51,16 @@ pub struct Mecanum<const FLOOR: char = 'O'> {
 }
 
 impl Mecanum {
-    /// Takes the dimensions, with the rollers in the usual mounting.
+    /// Takes the radius of the wheels over the rollers, and the place of the front left one from the centre, in m, with the
+    /// rollers in the usual mounting.
+    ///
+    /// `front_left_m.x` is half the distance of the axles, `front_left_m.y` half the distance from the left wheels to the
+    /// right ones, centre to centre. The other three wheels mirror it.
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
-        Self::with_rollers(geometry)
+    pub const fn new(wheel_radius_m: f32, front_left_m: Vec2) -> Result<Self, ChassisError> {
+        Self::with_rollers(wheel_radius_m, front_left_m)
     }
 }
 
@@ -92,7 +71,7 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
         if FLOOR == 'O' { 1.0 } else { -1.0 }
     };
 
-    /// Takes the dimensions, with the rollers in the mounting named by the type.
+    /// Takes the dimensions as [`new`](Mecanum::new) does, with the rollers in the mounting named by the type.
     ///
     /// # Errors
     /// Names the length that is not above zero and finite. [`ChassisError::Singular`] for `'X'` when half track and
@@ -100,23 +79,25 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::chassis::{Mecanum, MecanumGeometry};
-    /// use drivetrain::geometry::Twist;
+    /// use drivetrain::chassis::Mecanum;
+    /// use drivetrain::geometry::{Twist, Vec2};
     ///
-    /// let geometry = MecanumGeometry { wheel_radius_m: 0.1, half_wheelbase_m: 0.1, half_track_m: 0.3 };
-    /// let wheels = Mecanum::<'X'>::with_rollers(geometry)?.inverse(Twist::new(0.0, 1.0, 0.0));
+    /// let wheels = Mecanum::<'X'>::with_rollers(0.1, Vec2::new(0.1, 0.3))?.inverse(Twist::new(0.0, 1.0, 0.0));
     /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-5); // to the left, the other way round
     /// # Ok::<(), drivetrain::chassis::ChassisError>(())
     /// ```
-    pub const fn with_rollers(geometry: MecanumGeometry) -> Result<Self, ChassisError> {
-        let MecanumGeometry { wheel_radius_m, half_wheelbase_m, half_track_m } = geometry;
+    pub const fn with_rollers(
+        wheel_radius_m: f32,
+        front_left_m: Vec2,
+    ) -> Result<Self, ChassisError> {
+        let Vec2 { x: half_wheelbase_m, y: half_track_m } = front_left_m;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
         }
-        if let Err(error) = positive(half_wheelbase_m, "half_wheelbase_m") {
+        if let Err(error) = positive(half_wheelbase_m, "front_left_m.x") {
             return Err(error);
         }
-        if let Err(error) = positive(half_track_m, "half_track_m") {
+        if let Err(error) = positive(half_track_m, "front_left_m.y") {
             return Err(error);
         }
         let arm_m = half_track_m + Self::SIDE * half_wheelbase_m;
@@ -218,17 +199,16 @@ impl<const FLOOR: char> Kinematics for Mecanum<FLOOR> {
 mod tests {
     use super::*;
 
-    const SQUARE: MecanumGeometry =
-        MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.25 };
-    const OBLONG: MecanumGeometry =
-        MecanumGeometry { wheel_radius_m: 0.5, half_wheelbase_m: 0.25, half_track_m: 0.5 };
+    const RADIUS_M: f32 = 0.5;
+    const SQUARE: Vec2 = Vec2::new(0.25, 0.25);
+    const OBLONG: Vec2 = Vec2::new(0.25, 0.5);
 
     fn wheels<const FLOOR: char>(mecanum: &Mecanum<FLOOR>, vx: f32, vy: f32, wz: f32) -> [f32; 4] {
         mecanum.inverse(Twist::new(vx, vy, wz)).map(AngularVelocity::as_rad_per_s).into_array()
     }
 
     fn usual() -> Mecanum {
-        Mecanum::new(SQUARE).unwrap()
+        Mecanum::new(RADIUS_M, SQUARE).unwrap()
     }
 
     #[test]
@@ -274,24 +254,24 @@ mod tests {
 
     #[test]
     fn with_the_other_rollers_strafe_left_turns_front_left_forward() {
-        let other = Mecanum::<'X'>::with_rollers(OBLONG).unwrap();
+        let other = Mecanum::<'X'>::with_rollers(RADIUS_M, OBLONG).unwrap();
         assert_eq!(wheels(&other, 0.0, 1.0, 0.0), [2.0, -2.0, -2.0, 2.0]);
         assert_eq!(wheels(&other, 0.0, 0.0, 4.0), [-2.0, 2.0, -2.0, 2.0]);
     }
 
     #[test]
     fn with_the_other_rollers_a_square_chassis_is_refused() {
-        let error = Mecanum::<'X'>::with_rollers(SQUARE);
+        let error = Mecanum::<'X'>::with_rollers(RADIUS_M, SQUARE);
         assert!(matches!(error, Err(ChassisError::Singular(_))));
     }
 
     #[test]
     fn a_length_of_zero_nan_or_infinity_is_named() {
         for bad in [0.0, -0.1, f32::NAN, f32::INFINITY] {
-            let radius = Mecanum::new(MecanumGeometry { wheel_radius_m: bad, ..SQUARE });
+            let radius = Mecanum::new(bad, SQUARE);
             assert_eq!(radius, Err(ChassisError::NotPositive("wheel_radius_m")));
-            let track = Mecanum::new(MecanumGeometry { half_track_m: bad, ..SQUARE });
-            assert_eq!(track, Err(ChassisError::NotPositive("half_track_m")));
+            let track = Mecanum::new(RADIUS_M, Vec2 { y: bad, ..SQUARE });
+            assert_eq!(track, Err(ChassisError::NotPositive("front_left_m.y")));
         }
     }
 

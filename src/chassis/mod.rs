@@ -8,7 +8,7 @@
 //! | [`Mecanum`] | [`MecanumWheels`] | both roller mountings |
 //! | [`Omni`] | an array, as given | three and more wheels at any place, in any direction |
 //! | [`Omni::three`], [`Omni::four`] | an array, front left first | positive rolls counter-clockwise |
-//! | [`Differential`] | [`DifferentialWheels`] | cannot move sideways |
+//! | [`Differential`] | an array: left, right | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
 //! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ChassisError`].
@@ -30,11 +30,10 @@
 //! References: K. Lynch, F. Park, *Modern Robotics* (2017), chapters 3 and 13.
 //!
 //! ```
-//! use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
-//! use drivetrain::{geometry::{Heading, Twist}, time::{Instant, Tick}, units::{Angle, AngularVelocity}};
+//! use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
+//! use drivetrain::{geometry::{Heading, Twist, Vec2}, time::{Instant, Tick}, units::{Angle, AngularVelocity}};
 //!
-//! let geometry = MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
-//! let mut chassis = Chassis::new(Mecanum::new(geometry)?);
+//! let mut chassis = Chassis::new(Mecanum::new(0.076, Vec2::new(0.20, 0.18))?);
 //! chassis.set_limits(ChassisLimits::new().with_wheel_speed(AngularVelocity::from_rpm(450.0)))?;
 //!
 //! // Each millisecond:
@@ -67,12 +66,12 @@ mod swerve;
 mod wheels;
 
 pub use base::Chassis;
-pub use differential::{Differential, DifferentialGeometry};
+pub use differential::Differential;
 pub use drive::{ModuleMotors, WheelDrive};
 pub use error::ChassisError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::ChassisLimits;
-pub use mecanum::{Mecanum, MecanumGeometry};
+pub use mecanum::Mecanum;
 pub use mode::{Mode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::Omni;
@@ -82,4 +81,4 @@ pub use power_fit::PowerFit;
 pub use status::ChassisStatus;
 pub use steering::SwerveSteering;
 pub use swerve::{ModuleState, Swerve};
-pub use wheels::{DifferentialWheels, MecanumWheels};
+pub use wheels::MecanumWheels;

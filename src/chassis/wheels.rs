@@ -124,22 +124,3 @@ named_wheels! {
         rear_right
     }
 }
-
-named_wheels! {
-    /// One value for each side of a [`Differential`](super::Differential) chassis.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::chassis::DifferentialWheels;
-    ///
-    /// let (left, right) = (DifferentialWheels { left: Some(1.0), right: None }, DifferentialWheels::splat(2.0));
-    /// assert_eq!(left.all(), None); // one side is missing
-    /// assert_eq!(right.zip(right).map(|(a, b)| a * b).left, 4.0);
-    /// ```
-    DifferentialWheels, 2 {
-        /// All wheels of the left side, +y.
-        left,
-        /// All wheels of the right side, -y.
-        right
-    }
-}

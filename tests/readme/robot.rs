@@ -1,8 +1,8 @@
-use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{self, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::geometry::{Heading, Twist, World};
+use drivetrain::geometry::{Heading, Twist, World, Vec2};
 use drivetrain::motor::{ArmError, Edge, VelocityDrive};
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::Clock;
@@ -39,11 +39,7 @@ fn robot(
         rear_right: bus.attach(wheel(4).reversed())?,
     };
     let yaw = bus.attach(dji::Config::<Gm6020Voltage>::new(5).position_loop(ANGLE, RATE))?;
-    let mecanum = Mecanum::new(MecanumGeometry {
-        wheel_radius_m: 0.076,
-        half_wheelbase_m: 0.20,
-        half_track_m: 0.18,
-    })?;
+    let mecanum = Mecanum::new(0.076, Vec2::new(0.20, 0.18))?; // in m: wheel radius, front left wheel from the centre
     let fastest = AngularVelocity::from_rpm(450.0);
     let mut runner = Runner::new(Nb(can), clock, bus).with_emergency_stop(&STOP);
     let mut was_on = true; // a switch that is on at power-on, or after a watchdog's reset, arms nothing

@@ -108,7 +108,7 @@ pub fn call_all() {
     PowerFit::rejected.call();
     (|fit: &mut PowerFit, wheels: [WheelLoad; 4], watts: f32| PowerFit::learn(fit, wheels, watts))
         .call();
-    wheels!(DifferentialWheels MecanumWheels);
+    wheels!(MecanumWheels);
 }
 
 /// What a macro gives to every set of wheels, which it calls `name`.

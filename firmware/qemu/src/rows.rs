@@ -5,7 +5,7 @@ use crate::row;
 use crate::wiring::{Drive, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use drivetrain::chassis::{Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::{Pid, PidConfig, TimeStep};
 use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
 use drivetrain::encoder::{Position, Shaft};
@@ -106,9 +106,7 @@ rows! {
 
 /// Kinematics and transforms.
 pub fn space() {
-    let geometry =
-        MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.2, half_track_m: 0.18 };
-    let mecanum = black_box(Mecanum::new(geometry).unwrap());
+    let mecanum = black_box(Mecanum::new(0.076, Vec2::new(0.2, 0.18)).unwrap());
     let twist = black_box(Twist::<Body>::new(1.0, 0.5, 0.25));
     let wheels = black_box(mecanum.inverse(twist));
     let angle = black_box(Angle::from_degrees(30.0));

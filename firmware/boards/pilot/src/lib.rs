@@ -6,10 +6,10 @@
 //! falls silent while one is held, the robot stops until both are let go.
 #![cfg_attr(not(test), no_std)]
 
-use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
-use drivetrain::geometry::{Heading, Twist};
+use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
@@ -80,12 +80,10 @@ impl Pilot {
             rear_left: attach(wheel(3))?,
             rear_right: attach(wheel(4).reversed())?,
         };
-        let geometry = MecanumGeometry {
-            wheel_radius_m: WHEEL.wheel_radius_m,
-            half_wheelbase_m: 0.20,
-            half_track_m: 0.18,
-        };
-        let mut chassis = Chassis::new(Mecanum::new(geometry).map_err(|_| "no such chassis")?);
+        let mut chassis = Chassis::new(
+            Mecanum::new(WHEEL.wheel_radius_m, Vec2::new(0.20, 0.18))
+                .map_err(|_| "no such chassis")?,
+        );
         let limits =
             ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
