@@ -2,15 +2,23 @@
 
 #![cfg(test)]
 
-use drivetrain::time::{Duration, Instant};
+use drivetrain::time::{ConditionEdge, Duration, Instant};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::host_link::{COMMAND_LENGTH, HostCommand, Reset};
-use drivetrain::wire::{Receiver, SignalEdge};
+use drivetrain::wire::{Receiver, Silence};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Instant {
     Instant::START + Duration::from_millis(ms)
+}
+
+const fn heard(at: Instant) -> ConditionEdge<Silence> {
+    ConditionEdge { condition: Silence, began: false, at }
+}
+
+const fn lost(at: Instant) -> ConditionEdge<Silence> {
+    ConditionEdge { condition: Silence, began: true, at }
 }
 
 #[test]
@@ -24,7 +32,7 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     for at in [10, 60, 110] {
         assert_eq!(host.read(&mut &bytes[..], ms(at)), Some(command));
     }
-    assert_eq!(host.edge(ms(110)), Some(SignalEdge::Heard { at: ms(10) }));
+    assert_eq!(host.edge(ms(110)), Some(heard(ms(10))));
     assert_eq!(host.latest(ms(210)), Some(command));
     assert_eq!(host.latest(ms(211)), None);
 
@@ -32,11 +40,11 @@ fn f61_a_silent_host_relaxes_the_robot_after_its_deadline() {
     damaged[40] ^= 0x10;
     assert_eq!(host.read(&mut &damaged[..], ms(215)), None);
     assert_eq!(host.latest(ms(215)), None, "a damaged command is no sign of life");
-    assert_eq!(host.edge(ms(215)), Some(SignalEdge::Lost { at: ms(210) }));
+    assert_eq!(host.edge(ms(215)), Some(lost(ms(210))));
     assert_eq!(host.edge(ms(215)), None, "told once");
 
     assert_eq!(host.read(&mut &bytes[..], ms(500)), Some(command));
-    assert_eq!(host.edge(ms(500)), Some(SignalEdge::Heard { at: ms(500) }));
+    assert_eq!(host.edge(ms(500)), Some(heard(ms(500))));
     assert_eq!(host.losses(), 1);
 }
 
@@ -66,10 +74,10 @@ fn f62_loss_of_the_remote_is_neutral_with_an_edge() {
     assert_eq!(dbus.remote(ms(100)).right_switch, Switch::Up);
     assert_eq!(dbus.remote(ms(101)), Remote::default());
     assert_eq!(dbus.remote(ms(101)).right_switch, Switch::Absent);
-    assert_eq!(dbus.edge(ms(101)), Some(SignalEdge::Heard { at: ms(0) }));
-    assert_eq!(dbus.edge(ms(101)), Some(SignalEdge::Lost { at: ms(100) }));
+    assert_eq!(dbus.edge(ms(101)), Some(heard(ms(0))));
+    assert_eq!(dbus.edge(ms(101)), Some(lost(ms(100))));
     assert!(dbus.read(&mut &SHOWN[..], ms(200)).is_some());
-    assert_eq!(dbus.edge(ms(200)), Some(SignalEdge::Heard { at: ms(200) }));
+    assert_eq!(dbus.edge(ms(200)), Some(heard(ms(200))));
 }
 
 #[test]
@@ -82,7 +90,7 @@ fn f62_an_implausible_frame_is_neutral_at_once() {
         assert!(dbus.edge(ms(0)).is_some());
         assert_eq!(dbus.read(&mut &bad[..], ms(14)), None, "byte {byte}");
         assert_eq!(dbus.remote(ms(14)), Remote::default());
-        assert_eq!(dbus.edge(ms(14)), Some(SignalEdge::Lost { at: ms(14) }));
+        assert_eq!(dbus.edge(ms(14)), Some(lost(ms(14))));
         assert!(dbus.read(&mut &SHOWN[..], ms(28)).is_some());
         assert!((dbus.remote(ms(28)).right_x - 1.0).abs() < 1e-6);
     }
@@ -203,17 +211,17 @@ fn f63_an_imu_with_a_frozen_clock_goes_stale_with_an_edge() {
         let frame = imu_frame(10 * step, 1.0, 0.0);
         assert!(imu.read(&mut &frame[..], ms(10 * u64::from(step))).is_some());
     }
-    assert_eq!(imu.edge(ms(40)), Some(SignalEdge::Heard { at: ms(0) }));
+    assert_eq!(imu.edge(ms(40)), Some(heard(ms(0))));
     let frozen = imu_frame(40, 1.0, 0.0);
     for step in 5..20 {
         assert!(imu.read(&mut &frozen[..], ms(10 * step)).is_some());
         assert_eq!(imu.latest(ms(10 * step)).is_some(), step <= 9, "{step}");
     }
     assert_eq!(imu.frozen_frames(), 15);
-    assert_eq!(imu.edge(ms(190)), Some(SignalEdge::Lost { at: ms(90) }));
+    assert_eq!(imu.edge(ms(190)), Some(lost(ms(90))));
     assert_eq!(imu.edge(ms(190)), None);
     assert!(imu.read(&mut &imu_frame(200, 1.0, 0.0)[..], ms(200)).is_some());
-    assert_eq!(imu.edge(ms(200)), Some(SignalEdge::Heard { at: ms(200) }));
+    assert_eq!(imu.edge(ms(200)), Some(heard(ms(200))));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What can be wrong with a bus as a whole, and the latch that keeps it until it is read.
 
-use crate::time::{Duration, Instant};
+use crate::time::{ConditionEdge, Duration, Instant};
 
 /// Something that is wrong with the bus as a whole, for a moment or for hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -52,39 +52,8 @@ impl core::fmt::Display for BusCondition {
     }
 }
 
-/// A [`BusCondition`] that began or ended.
-///
-/// Latched until it is read with [`Runner::next_edge`](super::Runner::next_edge), so none is lost; and as long as it waits,
-/// the same change is not noted again, so that none floods: [`Statistics`](super::Statistics) has the numbers. The edge
-/// read last always tells the present state; two beginnings in a row say that it ended in between.
-///
-/// # Examples
-/// ```
-/// use drivetrain::runner::{BusCondition, BusEdge};
-/// use drivetrain::time::Instant;
-///
-/// let at = Instant::from_micros(2_310_000);
-/// let edge = BusEdge { condition: BusCondition::Silent, began: true, at };
-/// assert_eq!(edge.to_string(), "bus silent began at 2310000 us");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct BusEdge {
-    /// What changed.
-    pub condition: BusCondition,
-    /// Whether it began; otherwise it ended.
-    pub began: bool,
-    /// When it began, the first time since the last reading; or when it ended, the last time.
-    pub at: Instant,
-}
-
-impl core::fmt::Display for BusEdge {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let phase = if self.began { "began" } else { "ended" };
-        write!(f, "{} {phase} at {} us", self.condition, self.at.as_micros())
-    }
-}
+/// A [`BusCondition`] that began or ended, for [`Runner::next_edge`](super::Runner::next_edge).
+pub(super) type BusEdge = ConditionEdge<BusCondition>;
 
 /// How long a repeated condition must not have come again before it is over.
 const CALM: Duration = Duration::from_secs(1);
@@ -197,9 +166,9 @@ impl Latch {
     const fn waiting(&self, condition: BusCondition) -> Option<BusEdge> {
         // An end that waits while the condition is there belongs to the time before.
         if self.end_waits && (self.active || !self.begin_waits) {
-            Some(BusEdge { condition, began: false, at: self.ended })
+            Some(ConditionEdge { condition, began: false, at: self.ended })
         } else if self.begin_waits {
-            Some(BusEdge { condition, began: true, at: self.began })
+            Some(ConditionEdge { condition, began: true, at: self.began })
         } else {
             None
         }

@@ -13,7 +13,7 @@
 //! them is reached with [`Runner::port_mut`].
 //!
 //! # What it watches
-//! A bus that is down or silent, overruns and a clock that does not go on are latched as [`BusEdge`]s beside those of
+//! A bus that is down or silent, overruns and a clock that does not go on are latched as [`ConditionEdge`]s beside those of
 //! the motors; [`Runner::next_edge`] hands them out. [`Runner::heartbeat`] is for the hardware watchdog, which alone
 //! can help when the loop itself stops.
 //!
@@ -29,8 +29,8 @@ mod stop;
 mod tests;
 mod watch;
 
-pub use edge::{BusCondition, BusEdge};
-pub use port::{BlockingTx, Nb, Port, Received, Sent};
+pub use edge::BusCondition;
+pub use port::{BlockingTx, Nb, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
 pub use statistics::{ErrorCounts, MeasuredLoad, Statistics};
@@ -38,7 +38,7 @@ pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};
-use crate::time::{Clock, Duration, Tick, Ticker};
+use crate::time::{Clock, ConditionEdge, Duration, Tick, Ticker};
 use statistics::{Meter, increment};
 use watch::Watch;
 
@@ -258,7 +258,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
     /// Returns the oldest change of a [`BusCondition`] that was not read yet, and takes it off the list.
     ///
-    /// What concerns one motor only is an edge of that motor.
+    /// As long as a change waits, the same change is not noted again, so that none floods: [`Statistics`] has the numbers. Two
+    /// beginnings in a row say that the condition ended in between. What concerns one motor only is an edge of that motor.
     ///
     /// # Examples
     /// A second without a tick, and a second in time:
@@ -283,12 +284,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// let log: Vec<String> = core::iter::from_fn(|| runner.next_edge()).map(|edge| edge.to_string()).collect();
     /// assert_eq!(log, ["tick overrun began at 1000000 us", "tick overrun ended at 2000000 us"]);
     /// ```
-    pub fn next_edge(&mut self) -> Option<BusEdge> {
+    pub fn next_edge(&mut self) -> Option<ConditionEdge<BusCondition>> {
         self.watch.next_edge()
     }
 
     /// Takes all changes that were not read yet, the oldest first; see [`next_edge`](Self::next_edge).
-    pub fn edges(&mut self) -> impl Iterator<Item = BusEdge> + '_ {
+    pub fn edges(&mut self) -> impl Iterator<Item = ConditionEdge<BusCondition>> + '_ {
         core::iter::from_fn(|| self.next_edge())
     }
 

@@ -9,15 +9,15 @@ use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Instant};
 use embedded_can::{Error, ErrorKind};
 
-mod sealed {
-    pub trait Sealed {}
-}
-
 /// What the runner needs of a CAN driver: implemented by [`Nb`] and [`BlockingTx`].
 ///
 /// Several drivers implement both traits of `embedded-can`, whose methods have the same names, so the choice is a
 /// newtype. A driver with neither trait gets `embedded_can::nb::Can` by a newtype of its own.
-pub trait Port: sealed::Sealed {
+pub trait Port: Driver {}
+
+/// How frames go to a driver and come from it. Sealed: a [`Port`] outside of this module is made from the traits of
+/// `embedded-can`.
+pub trait Driver {
     /// Offers a frame to the driver.
     fn try_send(&mut self, frame: &CanFrame) -> Sent;
 
@@ -59,9 +59,9 @@ pub enum Received {
 #[derive(Debug, Clone, Copy)]
 pub struct Nb<C>(pub C);
 
-impl<C> sealed::Sealed for Nb<C> {}
+impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
-impl<C: embedded_can::nb::Can> Port for Nb<C> {
+impl<C: embedded_can::nb::Can> Driver for Nb<C> {
     fn try_send(&mut self, frame: &CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
         match self.0.transmit(&frame) {
@@ -91,9 +91,9 @@ impl<C: embedded_can::nb::Can> Port for Nb<C> {
 #[derive(Debug, Clone, Copy)]
 pub struct BlockingTx<C>(pub C);
 
-impl<C> sealed::Sealed for BlockingTx<C> {}
+impl<C: embedded_can::blocking::Can> Port for BlockingTx<C> {}
 
-impl<C: embedded_can::blocking::Can> Port for BlockingTx<C> {
+impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
     fn try_send(&mut self, frame: &CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
         match self.0.transmit(&frame) {

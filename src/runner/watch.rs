@@ -1,8 +1,9 @@
 //! Whether the loop runs: on time, with a clock that goes on, heard and sent.
 
+use super::edge::BusEdge;
 use super::edge::Edges;
 use super::statistics::increment;
-use super::{BusCondition, BusEdge, Port, Runner};
+use super::{BusCondition, Port, Runner};
 use crate::motor::Devices;
 use crate::time::{Clock, Duration, Instant, Tick};
 

@@ -75,40 +75,21 @@ impl Clock for &ManualClock {
     }
 }
 
-/// The time since its creation, from the operating system's monotonic clock.
+/// The time since it was read from the operating system's monotonic clock: `std::time::Instant::now()` is a clock that starts
+/// at zero.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::time::{Clock, Instant, StdClock};
+/// use drivetrain::time::{Clock, Instant};
 ///
-/// let mut clock = StdClock::new();
-/// let first = clock.now();
-/// assert!(clock.now() >= first);
+/// let mut clock = std::time::Instant::now();
+/// let first = Clock::now(&mut clock);
+/// assert!(Clock::now(&mut clock) >= first);
 /// ```
 #[cfg(feature = "std")]
-#[derive(Debug, Clone, Copy)]
-pub struct StdClock(std::time::Instant);
-
-#[cfg(feature = "std")]
-impl StdClock {
-    /// Starts at zero, now.
-    #[must_use]
-    pub fn new() -> Self {
-        Self(std::time::Instant::now())
-    }
-}
-
-#[cfg(feature = "std")]
-impl Default for StdClock {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-#[cfg(feature = "std")]
-impl Clock for StdClock {
+impl Clock for std::time::Instant {
     fn now(&mut self) -> Instant {
-        Instant::START + Duration::from(self.0.elapsed())
+        Instant::START + Duration::from(self.elapsed())
     }
 }
 
@@ -127,9 +108,9 @@ mod tests {
     #[cfg(feature = "std")]
     #[test]
     fn the_clock_of_the_operating_system_counts_from_its_creation() {
-        let mut clock = StdClock::new();
+        let mut clock = std::time::Instant::now();
         let start = std::time::Instant::now();
         while start.elapsed().as_millis() < 1 {}
-        assert!(clock.now() >= Instant::from_micros(1_000));
+        assert!(Clock::now(&mut clock) >= Instant::from_micros(1_000));
     }
 }

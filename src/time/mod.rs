@@ -7,6 +7,7 @@
 //! | [`ManualClock`] | a clock that a test moves by hand |
 //! | [`ExtendedCounter`] | a 16- or 32-bit hardware counter, extended to an [`Instant`] |
 //! | [`Ticker`], [`Tick`] | the cadence of the control loop, without drift, overruns counted |
+//! | [`ConditionEdge`] | a condition of a bus or of a source of data began or ended |
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant, Ticker};
@@ -21,13 +22,13 @@
 mod clock;
 mod counter;
 mod duration;
+mod edge;
 mod instant;
 mod ticker;
 
-#[cfg(feature = "std")]
-pub use clock::StdClock;
 pub use clock::{Clock, ManualClock};
 pub use counter::{CounterError, ExtendedCounter};
 pub use duration::Duration;
+pub use edge::ConditionEdge;
 pub use instant::Instant;
 pub use ticker::{Tick, Ticker};

@@ -1,71 +1,60 @@
-use crate::time::{Duration, Instant};
+use crate::time::{ConditionEdge, Duration, Instant};
 
-/// A source of data went silent or was heard again.
+/// The condition of a source of data: nothing came until the deadline, or what came could not be trusted.
+///
+/// A source is silent before it is heard for the first time.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{ConditionEdge, Instant};
+/// use drivetrain::wire::Silence;
+///
+/// let edge = ConditionEdge { condition: Silence, began: true, at: Instant::from_micros(101_000) };
+/// assert_eq!(edge.to_string(), "silence began at 101000 us");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum SignalEdge {
-    /// Data came, for the first time or again.
-    Heard {
-        /// When it came.
-        at: Instant,
-    },
-    /// Nothing came until the deadline, or what came could not be trusted.
-    Lost {
-        /// When the deadline passed, or the bad data came.
-        at: Instant,
-    },
+pub struct Silence;
+
+impl core::fmt::Display for Silence {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("silence")
+    }
 }
 
 /// Watches that something happens again within a time limit, and latches each change.
 ///
-/// It begins as not live. An [`SignalEdge`] is kept until it is fetched. When the source came and went more than once
+/// It begins as not live. An edge is kept until it is fetched. When the source came and went more than once
 /// between two calls of [`edge`](Self::edge), the changes that cancel each other are left out; [`losses`](Self::losses)
 /// still counts them all.
-///
-/// # Examples
-/// ```
-/// use drivetrain::time::{Duration, Instant};
-/// use drivetrain::wire::{Deadline, SignalEdge};
-///
-/// let ms = |ms| Instant::START + Duration::from_millis(ms);
-/// let mut host = Deadline::new(Duration::from_millis(100));
-/// assert!(!host.is_live(ms(0)));
-/// host.meet(ms(5));
-/// assert!(host.is_live(ms(105)));
-/// assert!(!host.is_live(ms(106)));
-/// assert_eq!(host.edge(ms(300)), Some(SignalEdge::Heard { at: ms(5) }));
-/// assert_eq!(host.edge(ms(300)), Some(SignalEdge::Lost { at: ms(105) }));
-/// assert_eq!(host.edge(ms(300)), None);
-/// ```
 #[derive(Debug, Clone)]
-pub struct Deadline {
+pub(super) struct Deadline {
     limit: Duration,
     met: Instant,
     live: bool,
     losses: u32,
-    pending: [Option<SignalEdge>; 2],
+    pending: [Option<ConditionEdge<Silence>>; 2],
 }
 
 impl Deadline {
     /// Takes the longest silence that is no loss.
-    #[must_use]
-    pub const fn new(limit: Duration) -> Self {
+    pub(super) const fn new(limit: Duration) -> Self {
         Self { limit, met: Instant::START, live: false, losses: 0, pending: [None; 2] }
     }
 
     /// Notes that data came.
-    pub fn meet(&mut self, now: Instant) {
+    pub(super) fn meet(&mut self, now: Instant) {
         self.expire(now);
         self.met = now;
         if !self.live {
             self.live = true;
-            self.latch(SignalEdge::Heard { at: now });
+            self.latch(edge(false, now));
         }
     }
 
     /// Notes that what came cannot be trusted: lost at once.
-    pub fn revoke(&mut self, now: Instant) {
+    pub(super) fn revoke(&mut self, now: Instant) {
         self.expire(now);
         if self.live {
             self.lose(now);
@@ -73,14 +62,12 @@ impl Deadline {
     }
 
     /// Returns whether data came within the limit.
-    #[must_use]
-    pub fn is_live(&self, now: Instant) -> bool {
+    pub(super) fn is_live(&self, now: Instant) -> bool {
         self.live && now.since(self.met) <= self.limit
     }
 
     /// Returns the oldest change that was not fetched yet.
-    #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
+    pub(super) fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.expire(now);
         let [first, second] = self.pending;
         self.pending = [second, None];
@@ -88,8 +75,7 @@ impl Deadline {
     }
 
     /// Returns how often the source was lost. Saturates.
-    #[must_use]
-    pub const fn losses(&self) -> u32 {
+    pub(super) const fn losses(&self) -> u32 {
         self.losses
     }
 
@@ -102,16 +88,21 @@ impl Deadline {
     fn lose(&mut self, at: Instant) {
         self.live = false;
         self.losses = self.losses.saturating_add(1);
-        self.latch(SignalEdge::Lost { at });
+        self.latch(edge(true, at));
     }
 
-    fn latch(&mut self, edge: SignalEdge) {
+    fn latch(&mut self, edge: ConditionEdge<Silence>) {
         self.pending = match self.pending {
             [None, _] => [Some(edge), None],
             [first, None] => [first, Some(edge)],
             [first, Some(_)] => [first, None],
         };
     }
+}
+
+/// Silence that began or ended.
+const fn edge(began: bool, at: Instant) -> ConditionEdge<Silence> {
+    ConditionEdge { condition: Silence, began, at }
 }
 
 #[cfg(test)]
@@ -123,13 +114,24 @@ mod tests {
     }
 
     #[test]
+    fn data_counts_until_the_limit_and_both_edges_wait() {
+        let mut host = Deadline::new(Duration::from_millis(100));
+        assert!(!host.is_live(ms(0)));
+        host.meet(ms(5));
+        assert!(host.is_live(ms(105)) && !host.is_live(ms(106)));
+        assert_eq!(host.edge(ms(300)), Some(edge(false, ms(5))));
+        assert_eq!(host.edge(ms(300)), Some(edge(true, ms(105))));
+        assert_eq!(host.edge(ms(300)), None);
+    }
+
+    #[test]
     fn a_loss_between_two_frames_is_seen_though_nobody_asked_meanwhile() {
         let mut deadline = Deadline::new(Duration::from_millis(10));
         deadline.meet(ms(0));
-        assert_eq!(deadline.edge(ms(0)), Some(SignalEdge::Heard { at: ms(0) }));
+        assert_eq!(deadline.edge(ms(0)), Some(edge(false, ms(0))));
         deadline.meet(ms(50));
-        assert_eq!(deadline.edge(ms(50)), Some(SignalEdge::Lost { at: ms(10) }));
-        assert_eq!(deadline.edge(ms(50)), Some(SignalEdge::Heard { at: ms(50) }));
+        assert_eq!(deadline.edge(ms(50)), Some(edge(true, ms(10))));
+        assert_eq!(deadline.edge(ms(50)), Some(edge(false, ms(50))));
         assert_eq!(deadline.edge(ms(50)), None);
     }
 
@@ -158,7 +160,7 @@ mod tests {
         assert_eq!(deadline.losses(), 98 + 1);
     }
 
-    fn is_heard(edge: SignalEdge) -> bool {
-        matches!(edge, SignalEdge::Heard { .. })
+    fn is_heard(edge: ConditionEdge<Silence>) -> bool {
+        !edge.began
     }
 }

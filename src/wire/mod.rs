@@ -53,7 +53,7 @@ mod error;
 mod field;
 mod receiver;
 
-pub use deadline::{Deadline, SignalEdge};
+pub use deadline::Silence;
 pub use deframer::{Counts, Decode, Deframer, Reject};
 pub use error::EncodeError;
 pub use receiver::Receiver;

@@ -1,5 +1,6 @@
-use super::{Counts, Deadline, Decode, Deframer, SignalEdge};
-use crate::time::{Duration, Instant};
+use super::deadline::Deadline;
+use super::{Counts, Decode, Deframer, Silence};
+use crate::time::{ConditionEdge, Duration, Instant};
 
 /// A [`Deframer`] that keeps its latest frame, and takes it away when no new one came in time.
 ///
@@ -7,7 +8,7 @@ use crate::time::{Duration, Instant};
 /// ```
 /// use drivetrain::time::{Duration, Instant};
 /// use drivetrain::wire::host_link::{HostCommand, COMMAND_LENGTH};
-/// use drivetrain::wire::{SignalEdge, Receiver};
+/// use drivetrain::wire::Receiver;
 ///
 /// let ms = |ms| Instant::START + Duration::from_millis(ms);
 /// let mut host = Receiver::<HostCommand, COMMAND_LENGTH>::new(Duration::from_millis(100));
@@ -17,8 +18,8 @@ use crate::time::{Duration, Instant};
 ///
 /// assert!(host.latest(ms(101)).is_some());
 /// assert!(host.latest(ms(102)).is_none()); // relax the robot
-/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Heard { at: ms(1) }));
-/// assert_eq!(host.edge(ms(102)), Some(SignalEdge::Lost { at: ms(101) }));
+/// assert!(host.edge(ms(102)).is_some_and(|heard| !heard.began && heard.at == ms(1)));
+/// assert!(host.edge(ms(102)).is_some_and(|silent| silent.began && silent.at == ms(101)));
 /// # Ok::<(), drivetrain::wire::EncodeError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -76,9 +77,9 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
         self.latest.filter(|_| self.deadline.is_live(now))
     }
 
-    /// Returns the oldest change between heard and lost that was not fetched yet.
+    /// Returns the oldest beginning or end of silence that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
+    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.deadline.edge(now)
     }
 

@@ -16,7 +16,7 @@ use drivetrain::wire::hipnuc::{self, Imu};
 use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
-use drivetrain::wire::{Counts, Deframer, Receiver, SignalEdge};
+use drivetrain::wire::{Counts, Deframer, Receiver};
 use std::error::Error;
 
 /// Three commands may be damaged in a row.
@@ -159,11 +159,8 @@ impl<'w> Robot<'w> {
     pub(crate) fn tick(&mut self, tick: Tick, output: &mut Output) {
         let now = tick.now();
         while let Some(edge) = self.host.edge(now) {
-            let (at, event) = match edge {
-                SignalEdge::Heard { at } => (at, Event::HostHeard),
-                SignalEdge::Lost { at } => (at, Event::HostLost),
-            };
-            self.events.push((seconds(at), event));
+            let event = if edge.began { Event::HostLost } else { Event::HostHeard };
+            self.events.push((seconds(edge.at), event));
         }
         match self.host.latest(now) {
             Some(command) => {

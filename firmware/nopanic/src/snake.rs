@@ -30,7 +30,6 @@ pub fn call_all() {
     Config::deceleration.call();
     Config::mode.call();
     Config::id.call();
-    Config::settings.call();
     Joints::new.call();
     Joints::with_timeouts.call();
     Joints::with_reply_timeout.call();

@@ -8,7 +8,7 @@ use drivetrain::wire::hipnuc::*;
 use drivetrain::wire::host_link::*;
 use drivetrain::wire::mit;
 use drivetrain::wire::vofa::*;
-use drivetrain::wire::{Deadline, Deframer, Receiver};
+use drivetrain::wire::{Deframer, Receiver};
 
 pub fn call_all() {
     Record::parse.call();
@@ -24,12 +24,6 @@ pub fn call_all() {
     Dbus::counts.call();
     (|dbus: &mut Dbus, input: &mut &'static [u8], now| Dbus::read(dbus, input, now)).call();
     Keys::contains.call();
-    Deadline::new.call();
-    Deadline::meet.call();
-    Deadline::revoke.call();
-    Deadline::is_live.call();
-    Deadline::edge.call();
-    Deadline::losses.call();
     Deframer::<Status, 64>::new.call();
     Deframer::<Telemetry, 128>::with_options.call();
     Deframer::<Status, 64>::abandon.call();

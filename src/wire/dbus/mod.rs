@@ -39,9 +39,10 @@ mod remote;
 
 pub use remote::{Keys, Remote, Switch};
 
+use super::deadline::Deadline;
 use super::deframer::count;
-use super::{Counts, Deadline, SignalEdge};
-use crate::time::{Duration, Instant};
+use super::{Counts, Silence};
+use crate::time::{ConditionEdge, Duration, Instant};
 
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 18;
@@ -160,9 +161,9 @@ impl Dbus {
         self.deadline.is_live(now)
     }
 
-    /// Returns the oldest change between heard and lost that was not fetched yet.
+    /// Returns the oldest beginning or end of silence that was not fetched yet.
     #[must_use]
-    pub fn edge(&mut self, now: Instant) -> Option<SignalEdge> {
+    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.deadline.edge(now)
     }
 

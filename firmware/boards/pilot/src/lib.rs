@@ -10,11 +10,11 @@ use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist, Vec2};
-use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::time::{ConditionEdge, Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
-use drivetrain::wire::{Receiver, SignalEdge};
+use drivetrain::wire::{Receiver, Silence};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
 const WHEEL: WheelTuning = WheelTuning {
@@ -103,7 +103,11 @@ impl Pilot {
     }
 
     /// Hands over who was heard and lost since, for the log.
-    pub fn edges(&mut self, now: Instant, mut log: impl FnMut(&'static str, SignalEdge)) {
+    pub fn edges(
+        &mut self,
+        now: Instant,
+        mut log: impl FnMut(&'static str, ConditionEdge<Silence>),
+    ) {
         while let Some(edge) = self.dbus.edge(now) {
             log("remote control", edge);
         }
