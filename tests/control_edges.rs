@@ -76,8 +76,7 @@ subjects! {
     SpeedActuator, 2, it, [a, b, _], dt_s => it.step(a, b, &TimeStep::of(dt_s)), it.rejected();
     PositionActuator, 3, it, [a, b, c], dt_s => it.step(a, b, c, &TimeStep::of(dt_s)), it.rejected();
     ByError, 2, it, [a, b, _], dt_s => it.0.step_error(a, b, &TimeStep::of(dt_s)), it.0.rejected();
-    LinearDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
-    OptimalDifferentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    Differentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     LowPass, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     SlewLimiter, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     Biquad, 1, it, [a, ..], _ => it.update(a), it.rejected();
@@ -132,8 +131,8 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (Freezes, Box::new(Pid::new(gains.with_derivative_on_error()).unwrap())),
         (Freezes, Box::new(Pid::new(options).unwrap())),
         (Freezes, Box::new(Pid::new(incremental).unwrap())),
-        (CountsAs(0.01), Box::new(LinearDifferentiator::new(100.0, 0.01).unwrap())),
-        (CountsAs(0.01), Box::new(OptimalDifferentiator::new(1e4, 0.0125, 0.01).unwrap())),
+        (CountsAs(0.01), Box::new(Differentiator::linear(100.0, 0.01).unwrap())),
+        (CountsAs(0.01), Box::new(Differentiator::optimal(1e4, 0.0125, 0.01).unwrap())),
         (CountsAs(0.1), Box::new(SlewLimiter::new(30.0, 60.0).unwrap())),
         (Freezes, Box::new(Cascade::new(gains, gains).unwrap())),
         (Freezes, Box::new(SpeedActuator::new(SpeedActuatorConfig::new(gains)).unwrap())),
@@ -447,8 +446,8 @@ fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
         Cascade::new(GAINS, GAINS).is_ok(),
         SpeedActuator::new(SPEED).is_ok(),
         PositionActuator::new(PositionActuatorConfig::new(GAINS, SPEED)).is_ok(),
-        LinearDifferentiator::new(100.0, DT_S).is_ok(),
-        OptimalDifferentiator::new(1e4, 0.002, DT_S).is_ok(),
+        Differentiator::linear(100.0, DT_S).is_ok(),
+        Differentiator::optimal(1e4, 0.002, DT_S).is_ok(),
         LowPass::new(10.0).is_ok(),
         Biquad::low_pass(30.0, Biquad::BUTTERWORTH, 1000.0).is_ok(),
         Biquad::notch(60.0, 2.0, 1000.0).is_ok(),
@@ -562,11 +561,11 @@ const MORE_THAN_ZERO: Parameters = &[
     ("derivative_filter", |x| Pid::new(GAINS.with_derivative_filter(x)).err()),
     ("output_limit", |x| incremental(|config| config.with_output_limit(x))),
     ("r", |x| incremental(|config| config.with_tracking(x))),
-    ("r", |x| LinearDifferentiator::new(x, DT_S).err()),
-    ("max_step", |x| LinearDifferentiator::new(1.0, x).err()),
-    ("r", |x| OptimalDifferentiator::new(x, 0.002, DT_S).err()),
-    ("h0", |x| OptimalDifferentiator::new(1.0, x, DT_S).err()),
-    ("max_step", |x| OptimalDifferentiator::new(1.0, 0.002, x).err()),
+    ("r", |x| Differentiator::linear(x, DT_S).err()),
+    ("max_step", |x| Differentiator::linear(1.0, x).err()),
+    ("r", |x| Differentiator::optimal(x, 0.002, DT_S).err()),
+    ("h0", |x| Differentiator::optimal(1.0, x, DT_S).err()),
+    ("max_step", |x| Differentiator::optimal(1.0, 0.002, x).err()),
     ("cutoff", |x| LowPass::new(x).err()),
     ("cutoff", |x| Biquad::low_pass(x, 1.0, 1000.0).err()),
     ("q", |x| Biquad::low_pass(10.0, x, 1000.0).err()),
@@ -615,8 +614,8 @@ const CONTRADICTIONS: Parameters = &[
     ("output_range", |_| incremental(|config| config.with_output_range(1.0, -2.0))),
     ("variable_integral", |_| Pid::new(GAINS.with_variable_integral(3.0, 2.0)).err()),
     ("r", |_| Pid::new(GAINS.with_period(360.0).with_tracking(80.0)).err()),
-    ("r", |_| LinearDifferentiator::new(1001.0, DT_S).err()),
-    ("h0", |_| OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).err()),
+    ("r", |_| Differentiator::linear(1001.0, DT_S).err()),
+    ("h0", |_| Differentiator::optimal(1.0, 1.2 * DT_S, DT_S).err()),
     ("cutoff", |_| Biquad::low_pass(500.0, 1.0, 1000.0).err()),
     ("center", |_| Biquad::notch(500.0, 1.0, 1000.0).err()),
     ("cutoff", |_| Biquad::low_pass(0.9, 1.0, 1000.0).err()),

@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 use drivetrain::control::{
-    Biquad, LinearDifferentiator, LowPass, MotionLimits, OptimalDifferentiator, Oscillation, Pid,
-    PidConfig, Profile, TimeStep, TuningRule, fhan,
+    Biquad, Differentiator, LowPass, MotionLimits, Oscillation, Pid, PidConfig, Profile, TimeStep,
+    TuningRule, fhan,
 };
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
@@ -91,8 +91,8 @@ fn fhan_in_the_form_of_the_paper() {
 
 #[test]
 fn tracking_differentiators() {
-    let mut optimal = OptimalDifferentiator::new(50.0, 0.006, 0.002).unwrap();
-    let mut linear = LinearDifferentiator::new(80.0, 0.002).unwrap();
+    let mut optimal = Differentiator::optimal(50.0, 0.006, 0.002).unwrap();
+    let mut linear = Differentiator::linear(80.0, 0.002).unwrap();
     for (_, row) in rows(include_str!("data/control/differentiator.csv")) {
         assert_close(optimal.update(row[0], 0.002), row[1], 1e-4, "optimal");
         assert_close(optimal.rate(), row[2], 2e-3, "optimal rate");

@@ -672,7 +672,7 @@ impl Healthy {
     /// One millisecond.
     fn turn(&mut self) {
         let drive = f64::from(self.word) / self.limit * self.fastest_rpm;
-        // 50 ms to no-load speed, as `Gap` takes it.
+        // 50 ms to no-load speed, as `resolve_gap` takes it.
         self.rpm += (drive - self.rpm) * (1.0 / 50.0);
         self.counts += self.rpm * (8192.0 / 60_000.0);
     }

@@ -2,9 +2,9 @@
 #![no_main]
 
 use drivetrain::control::{
-    Biquad, LinearDifferentiator, LowPass, MotionLimits, OptimalDifferentiator, Pid, PidConfig,
-    PositionActuator, PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter,
-    SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep, Window,
+    Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator,
+    PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
+    SpeedActuatorConfig, StepResponse, TimeStep, Window,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -269,18 +269,16 @@ fn filters(mut input: Input) {
 
 fn differentiators(mut input: Input) {
     let (r, h0_s, max_step_s) = (input.positive(), input.positive(), input.positive());
-    let mut linear = LinearDifferentiator::new(r, max_step_s).ok().map(Observed::new);
-    let mut optimal = OptimalDifferentiator::new(r, h0_s, max_step_s).ok().map(Observed::new);
+    let mut linear = Differentiator::linear(r, max_step_s).ok().map(Observed::new);
+    let mut optimal = Differentiator::optimal(r, h0_s, max_step_s).ok().map(Observed::new);
     while !input.is_empty() {
         let (sample, dt_s) = (input.float(), input.step_s());
         if let Some(differentiator) = &mut linear {
-            differentiator
-                .step(ANY, LinearDifferentiator::rejected, |one| one.update(sample, dt_s));
+            differentiator.step(ANY, Differentiator::rejected, |one| one.update(sample, dt_s));
             assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
         }
         if let Some(differentiator) = &mut optimal {
-            differentiator
-                .step(ANY, OptimalDifferentiator::rejected, |one| one.update(sample, dt_s));
+            differentiator.step(ANY, Differentiator::rejected, |one| one.update(sample, dt_s));
             assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
         }
     }

@@ -3,13 +3,21 @@ use super::number::{Sum, finite};
 use super::step::TimeStep;
 use crate::math;
 
-/// The linear tracking differentiator: follows a signal as a critically damped system would and gives its rate of change.
+/// A tracking differentiator: follows a signal and gives its rate of change, by a linear or a time-optimal law.
 ///
 /// ```text
-/// value' = rate,   rate' = -r^2 (value - input) - 2 r rate
+/// linear    value' = rate,   rate' = -r^2 (value - input) - 2 r rate
+/// optimal   value' = rate,   rate' = fhan(value - input, rate, r, h0)
 /// ```
-/// Stepped by Euler's rule, which does not overshoot a constant input as long as `r dt <= 1`: a configuration beyond is refused.
-/// A step of the input is followed to 4 % after `5 / r` seconds.
+/// [`linear`](Self::linear) follows as a critically damped system would. A step of the input is followed to 4 % after `5 / r`
+/// seconds, and without overshoot as long as `r dt <= 1`.
+///
+/// [`optimal`](Self::optimal) is Han's: it follows with a bounded acceleration `r`, in the shortest time. `h0`, at least 1.25 time
+/// steps, is the width over which the switching is smoothed: larger filters more noise. From rest, it comes to rest at a constant
+/// input without overshoot. Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions on Industrial
+/// Electronics 56 (2009), section IV.A.
+///
+/// Both are stepped by Euler's rule.
 ///
 /// # Edge behaviour
 /// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
@@ -19,88 +27,16 @@ use crate::math;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::LinearDifferentiator;
+/// use drivetrain::control::Differentiator;
 ///
-/// let mut follow = LinearDifferentiator::new(100.0, 0.001)?;
+/// let mut follow = Differentiator::linear(100.0, 0.001)?;
 /// for _ in 0..50 {
 ///     follow.update(1.0, 0.001);
 /// }
 /// assert!((follow.value() - 0.96).abs() < 0.01 && follow.rate() > 0.0);
-/// assert!(LinearDifferentiator::new(100.0, 0.02).is_err()); // r dt = 2: would oscillate
-/// # Ok::<(), drivetrain::control::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct LinearDifferentiator {
-    r: f32,
-    follower: Follower,
-}
-
-impl LinearDifferentiator {
-    /// Takes `r`, the speed of following in 1/s, and the longest step in seconds.
-    ///
-    /// # Errors
-    /// Names `r` or `max_step` when NaN, infinite, zero or negative; `r` when `r * max_step_s` is above 1.
-    pub const fn new(r: f32, max_step_s: f32) -> Result<Self, ConfigError> {
-        check!(positive("r", r));
-        check!(positive("max_step", max_step_s));
-        if r * max_step_s > 1.0 {
-            return Err(ConfigError::Unstable("r"));
-        }
-        Ok(Self { r, follower: Follower::new(max_step_s) })
-    }
-
-    /// Steps by `dt_s` seconds towards `input` and returns the new value.
-    pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
-        let (r, step) = (self.r, TimeStep::new(dt_s, self.follower.max_step_s));
-        self.follower.step(input, &step, |error, rate| -r * finite(r * error + 2.0 * rate))
-    }
-
-    /// Puts the value at `value`, at rest. NaN and infinity count as zero.
-    pub const fn reset_to(&mut self, value: f32) {
-        self.follower.reset_to(value);
-    }
-
-    /// Returns the value that follows the input.
-    #[must_use]
-    pub const fn value(&self) -> f32 {
-        self.follower.value.value()
-    }
-
-    /// Returns its rate of change a second.
-    #[must_use]
-    pub const fn rate(&self) -> f32 {
-        self.follower.rate.value()
-    }
-
-    /// Returns the number of steps that were refused; stays at 65535.
-    #[must_use]
-    pub const fn rejected(&self) -> u16 {
-        self.follower.rejected
-    }
-}
-
-/// Han's time-optimal tracking differentiator: follows a signal with a bounded acceleration `r`, in the shortest time.
-///
-/// ```text
-/// value' = rate,   rate' = fhan(value - input, rate, r, h0)
-/// ```
-/// `h0`, at least 1.25 time steps, is the width over which the switching is smoothed: larger filters more noise.
-/// From rest, it comes to rest at a constant input without overshoot.
-/// Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions on Industrial Electronics 56 (2009), section IV.A.
-///
-/// # Edge behaviour
-/// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
-/// [`rejected`](Self::rejected) grows. `dt_s` above the maximum, on the first call too: counts as the maximum. Starts from zero
-/// at rest; see [`reset_to`](Self::reset_to). Steps smaller than the spacing of `f32` at the value add up: it arrives, however far
-/// from zero. What overflows `f32` stays at its largest number.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::OptimalDifferentiator;
 ///
 /// // 1 m at no more than 4 m/s²: half a second up, half a second down.
-/// let mut follow = OptimalDifferentiator::new(4.0, 0.002, 0.001)?;
+/// let mut follow = Differentiator::optimal(4.0, 0.002, 0.001)?;
 /// for _ in 0..500 {
 ///     follow.update(1.0, 0.001);
 /// }
@@ -109,21 +45,37 @@ impl LinearDifferentiator {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct OptimalDifferentiator {
+pub struct Differentiator {
     r: f32,
+    /// Zero of the linear law.
     h0_s: f32,
     follower: Follower,
 }
 
-impl OptimalDifferentiator {
+impl Differentiator {
     const LEAST_STEPS: f32 = 1.25;
 
-    /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds.
+    /// Takes `r`, the speed of following in 1/s, and the longest step in seconds, of the linear law.
+    ///
+    /// # Errors
+    /// Names `r` or `max_step` when NaN, infinite, zero or negative; `r` when `r * max_step_s` is above 1: beyond, it would
+    /// oscillate.
+    pub const fn linear(r: f32, max_step_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("r", r));
+        check!(positive("max_step", max_step_s));
+        if r * max_step_s > 1.0 {
+            return Err(ConfigError::Unstable("r"));
+        }
+        Ok(Self { r, h0_s: 0.0, follower: Follower::new(max_step_s) })
+    }
+
+    /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds,
+    /// of the time-optimal law.
     ///
     /// # Errors
     /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below 1.25 `max_step_s`: at
     /// 1.0 a step of `3 r h0²` overshoots by 4 %, from 1.15 on none does.
-    pub const fn new(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
+    pub const fn optimal(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
         check!(positive("r", r));
         check!(positive("h0", h0_s));
         check!(positive("max_step", max_step_s));
@@ -137,7 +89,11 @@ impl OptimalDifferentiator {
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
         let (r, h0_s) = (self.r, self.h0_s);
         let step = TimeStep::new(dt_s, self.follower.max_step_s);
-        self.follower.step(input, &step, |error, rate| fhan(error, rate, r, h0_s))
+        if h0_s > 0.0 {
+            self.follower.step(input, &step, |error, rate| fhan(error, rate, r, h0_s))
+        } else {
+            self.follower.step(input, &step, |error, rate| -r * finite(r * error + 2.0 * rate))
+        }
     }
 
     /// Puts the value at `value`, at rest. NaN and infinity count as zero.
@@ -241,7 +197,7 @@ mod tests {
     fn r_dt_from_a_tenth_to_three_never_overshoots_or_is_an_error() {
         for tenths in 1..=30_u8 {
             let r = f32::from(tenths) * 100.0;
-            match LinearDifferentiator::new(r, DT_S) {
+            match Differentiator::linear(r, DT_S) {
                 Err(error) => {
                     assert!(tenths > 10);
                     assert_eq!(error, ConfigError::Unstable("r"));
@@ -260,23 +216,23 @@ mod tests {
     #[test]
     fn a_parameter_that_cannot_be_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(LinearDifferentiator::new(bad, DT_S).unwrap_err().parameter(), "r");
-            assert_eq!(LinearDifferentiator::new(1.0, bad).unwrap_err().parameter(), "max_step");
-            assert_eq!(OptimalDifferentiator::new(bad, DT_S, DT_S).unwrap_err().parameter(), "r");
-            assert_eq!(OptimalDifferentiator::new(1.0, bad, DT_S).unwrap_err().parameter(), "h0");
+            assert_eq!(Differentiator::linear(bad, DT_S).unwrap_err().parameter(), "r");
+            assert_eq!(Differentiator::linear(1.0, bad).unwrap_err().parameter(), "max_step");
+            assert_eq!(Differentiator::optimal(bad, DT_S, DT_S).unwrap_err().parameter(), "r");
+            assert_eq!(Differentiator::optimal(1.0, bad, DT_S).unwrap_err().parameter(), "h0");
             assert_eq!(
-                OptimalDifferentiator::new(1.0, DT_S, bad).unwrap_err().parameter(),
+                Differentiator::optimal(1.0, DT_S, bad).unwrap_err().parameter(),
                 "max_step"
             );
         }
-        let narrow = OptimalDifferentiator::new(1.0, 1.2 * DT_S, DT_S).unwrap_err();
+        let narrow = Differentiator::optimal(1.0, 1.2 * DT_S, DT_S).unwrap_err();
         assert_eq!(narrow, ConfigError::Unstable("h0"));
     }
 
     #[test]
     fn bad_inputs_and_bad_times_change_nothing() {
-        let mut linear = LinearDifferentiator::new(100.0, DT_S).unwrap();
-        let mut optimal = OptimalDifferentiator::new(10.0, WIDTH_S, DT_S).unwrap();
+        let mut linear = Differentiator::linear(100.0, DT_S).unwrap();
+        let mut optimal = Differentiator::optimal(10.0, WIDTH_S, DT_S).unwrap();
         linear.update(1.0, DT_S);
         optimal.update(1.0, DT_S);
         let before = (linear, optimal);
@@ -298,8 +254,8 @@ mod tests {
     #[test]
     fn a_long_pause_counts_as_the_longest_step() {
         let (mut paused, mut steady) = (
-            LinearDifferentiator::new(900.0, DT_S).unwrap(),
-            LinearDifferentiator::new(900.0, DT_S).unwrap(),
+            Differentiator::linear(900.0, DT_S).unwrap(),
+            Differentiator::linear(900.0, DT_S).unwrap(),
         );
         for _ in 0..20 {
             assert_eq!(paused.update(1.0, 10.0), steady.update(1.0, DT_S));
@@ -308,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_long_pause_counts_as_the_longest_step_for_the_optimal_one_too() {
-        let new = || OptimalDifferentiator::new(10.0, WIDTH_S, DT_S).unwrap();
+        let new = || Differentiator::optimal(10.0, WIDTH_S, DT_S).unwrap();
         let (mut paused, mut steady) = (new(), new());
         for _ in 0..20 {
             assert_eq!(paused.update(1.0, 10.0), steady.update(1.0, DT_S));
@@ -325,8 +281,8 @@ mod tests {
 
     #[test]
     fn the_rate_of_a_ramp_is_its_slope() {
-        let mut linear = LinearDifferentiator::new(200.0, DT_S).unwrap();
-        let mut optimal = OptimalDifferentiator::new(1000.0, 0.005, DT_S).unwrap();
+        let mut linear = Differentiator::linear(200.0, DT_S).unwrap();
+        let mut optimal = Differentiator::optimal(1000.0, 0.005, DT_S).unwrap();
         for sample in 0..1000_u16 {
             let input = 3.0 * f32::from(sample) * DT_S;
             linear.update(input, DT_S);
@@ -337,11 +293,11 @@ mod tests {
 
     #[test]
     fn reset_to_is_at_rest() {
-        let mut linear = LinearDifferentiator::new(200.0, DT_S).unwrap();
+        let mut linear = Differentiator::linear(200.0, DT_S).unwrap();
         linear.update(1.0, DT_S);
         linear.reset_to(5.0);
         assert_eq!((linear.update(5.0, DT_S), linear.rate()), (5.0, 0.0));
-        let mut optimal = OptimalDifferentiator::new(1000.0, 0.005, DT_S).unwrap();
+        let mut optimal = Differentiator::optimal(1000.0, 0.005, DT_S).unwrap();
         optimal.reset_to(f32::NAN);
         assert_eq!((optimal.value(), optimal.rate()), (0.0, 0.0));
     }
@@ -354,7 +310,7 @@ mod tests {
         times: impl Iterator<Item = f32>,
     ) -> Result<(), String> {
         let mut follow =
-            OptimalDifferentiator::new(r, h0_s, DT_S).map_err(|error| error.to_string())?;
+            Differentiator::optimal(r, h0_s, DT_S).map_err(|error| error.to_string())?;
         follow.reset_to(start);
         let (mut rate, mut value) = (0.0, start);
         for dt_s in times {
@@ -390,7 +346,7 @@ mod tests {
                 let times = core::iter::repeat_n(DT_S, steps);
                 assert_eq!(arrives((r, width * DT_S), 0.0, target, times), Ok(()), "{width}");
             }
-            let refused = OptimalDifferentiator::new(r, DT_S, DT_S).unwrap_err();
+            let refused = Differentiator::optimal(r, DT_S, DT_S).unwrap_err();
             assert_eq!(refused, ConfigError::Unstable("h0"));
         }
     }
@@ -401,7 +357,7 @@ mod tests {
         for (start, way) in [(1e6, 90.0), (-1e6, 90.0), (1e5, -1.0)] {
             let times = core::iter::repeat_n(DT_S, 20_000);
             assert_eq!(arrives((10.0, WIDTH_S), start, start + way, times), Ok(()), "{start}");
-            let mut linear = LinearDifferentiator::new(2.0, DT_S).unwrap();
+            let mut linear = Differentiator::linear(2.0, DT_S).unwrap();
             linear.reset_to(start);
             for _ in 0..20_000 {
                 linear.update(start + way, DT_S);
@@ -415,7 +371,7 @@ mod tests {
         fn linear_is_bounded_by_its_inputs_when_they_are_constant(
             r in 1.0_f32..1000.0, target in -1e6_f32..1e6, steps in prop::collection::vec(1_u16..=1000, 1..200),
         ) {
-            let mut follow = LinearDifferentiator::new(r, DT_S).unwrap();
+            let mut follow = Differentiator::linear(r, DT_S).unwrap();
             for micros in steps {
                 let value = follow.update(target, f32::from(micros) * 1e-6);
                 prop_assert!(value * target >= 0.0 && value.abs() <= target.abs() * 1.000_01);
@@ -438,7 +394,7 @@ mod tests {
 
         #[test]
         fn a_narrow_width_overshoots_or_is_an_error(width in 0.1_f32..1.5, sizes in 1.0_f32..100.0) {
-            if let Ok(mut follow) = OptimalDifferentiator::new(1.0, width * DT_S, DT_S) {
+            if let Ok(mut follow) = Differentiator::optimal(1.0, width * DT_S, DT_S) {
                 let target = sizes * (width * DT_S) * (width * DT_S);
                 for _ in 0..200 {
                     prop_assert!(follow.update(target, DT_S) <= target * 1.000_01);
@@ -457,8 +413,8 @@ mod tests {
 
         #[test]
         fn huge_values_stay_finite(samples in prop::collection::vec(-f32::MAX..f32::MAX, 1..20)) {
-            let mut linear = LinearDifferentiator::new(1000.0, DT_S).unwrap();
-            let mut optimal = OptimalDifferentiator::new(1e30, WIDTH_S, DT_S).unwrap();
+            let mut linear = Differentiator::linear(1000.0, DT_S).unwrap();
+            let mut optimal = Differentiator::optimal(1e30, WIDTH_S, DT_S).unwrap();
             for input in samples {
                 prop_assert!(linear.update(input, DT_S).is_finite() && linear.rate().is_finite());
                 prop_assert!(optimal.update(input, DT_S).is_finite() && optimal.rate().is_finite());

@@ -9,13 +9,13 @@
 //! | gimbal or swerve angle | [`PositionActuator`] | `with_period(360.0)`: the shortest way round |
 //! | the same, with an error from integers | [`Cascade`] | as the motors of a bus do |
 //! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
-//! | a target from a stick or another computer | [`SlewLimiter`], [`OptimalDifferentiator`] | the acceleration the mechanism can take |
+//! | a target from a stick or another computer | [`SlewLimiter`], [`Differentiator::optimal`] | the acceleration the mechanism can take |
 //! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
 //! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
 //! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
 //! | single wrong samples | the median of a [`Window`] of 3 | |
 //! | a disturbance of a known period | the mean of a [`Window`] of that many samples | |
-//! | the rate of a noisy signal | [`LinearDifferentiator`], [`OptimalDifferentiator`] | |
+//! | the rate of a noisy signal | [`Differentiator`] | |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
 //! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
@@ -52,7 +52,7 @@ mod tuning;
 pub use actuator::{
     Cascade, PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig,
 };
-pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
+pub use differentiator::{Differentiator, fhan};
 pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};
 pub(crate) use pid::Input;

@@ -1,6 +1,10 @@
 use super::{COUNTS_PER_TURN, shortest};
 
-/// The rotor's way across lost frames, and whether it is sure.
+/// Returns the way of the rotor across lost frames in counts, counter-clockwise positive; as an error the nearest way, if another
+/// number of turns would fit as well.
+///
+/// Takes angle (counts) and speed (rpm) of the rotor before and after, the time between in µs, and the no-load speed of the
+/// motor (rotor rpm).
 ///
 /// Between two frames that are `T` apart the rotor moved about the mean of both reported speeds times `T`.
 /// The angle fixes the rest, as long as the estimate is off by less than half a rotor turn. Its error is at most
@@ -15,61 +19,50 @@ use super::{COUNTS_PER_TURN, shortest};
 /// the one before. So a way with a turn less in the same direction must not fit either: at speed `v` a gap of up to
 /// about one rotor turn is sure, a longer one is not.
 ///
+/// # Errors
+/// The nearest way, when the number of turns is in doubt.
+///
 /// # Examples
 /// ```
-/// use drivetrain::encoder::Gap;
+/// use drivetrain::encoder::resolve_gap;
 ///
 /// // Five frames of an M3508 at 9000 rpm are lost: 1228.8 counts a millisecond, 7373 in 6 ms.
-/// let gap = Gap::resolve((1000, 9000), (181, 9000), 6_000, 9256);
-/// assert_eq!((gap.counts, gap.ambiguous), (7373, false));
+/// assert_eq!(resolve_gap((1000, 9000), (181, 9000), 6_000, 9256), Ok(7373));
 /// // After 40 ms it could be several turns: the nearest is taken, and flagged.
-/// assert!(Gap::resolve((1000, 9000), (181, 9000), 40_000, 9256).ambiguous);
+/// assert_eq!(resolve_gap((1000, 9000), (181, 9000), 40_000, 9256), Err(-819));
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Gap {
-    /// Rotor counts moved, counter-clockwise positive.
-    pub counts: i32,
-    /// Whether another number of turns would fit as well.
-    pub ambiguous: bool,
-}
+pub fn resolve_gap(
+    before: (u16, i16),
+    after: (u16, i16),
+    elapsed_us: u32,
+    no_load_rpm: u16,
+) -> Result<i32, i32> {
+    const COUNTS_PER_RPM_MS: f32 = COUNTS_PER_TURN as f32 / 60_000.0;
+    const HALF_TURN: f32 = COUNTS_PER_TURN as f32 / 2.0;
+    let (angle, speed) = (before.0, f32::from(before.1) * COUNTS_PER_RPM_MS);
+    let (next_angle, next_speed) = (after.0, f32::from(after.1) * COUNTS_PER_RPM_MS);
+    let no_load = f32::from(no_load_rpm) * COUNTS_PER_RPM_MS;
+    let elapsed_ms = elapsed_us as f32 * 1e-3;
 
-impl Gap {
-    /// Takes angle (counts) and speed (rpm) of the rotor before and after, the time between in µs, and the
-    /// motor's no-load speed (rotor rpm).
-    #[must_use]
-    pub fn resolve(
-        before: (u16, i16),
-        after: (u16, i16),
-        elapsed_us: u32,
-        no_load_rpm: u16,
-    ) -> Self {
-        const COUNTS_PER_RPM_MS: f32 = COUNTS_PER_TURN as f32 / 60_000.0;
-        const HALF_TURN: f32 = COUNTS_PER_TURN as f32 / 2.0;
-        let (angle, speed) = (before.0, f32::from(before.1) * COUNTS_PER_RPM_MS);
-        let (next_angle, next_speed) = (after.0, f32::from(after.1) * COUNTS_PER_RPM_MS);
-        let no_load = f32::from(no_load_rpm) * COUNTS_PER_RPM_MS;
-        let elapsed_ms = elapsed_us as f32 * 1e-3;
-
-        let estimate = (speed + next_speed) * 0.5 * elapsed_ms;
-        let fastest = if speed.abs() > next_speed.abs() { speed.abs() } else { next_speed.abs() };
-        let error = (next_speed - speed).abs() * 0.5 * elapsed_ms
-            + no_load * (elapsed_ms * elapsed_ms * (0.25 / 50.0))
-            + fastest;
-        if error >= HALF_TURN {
-            return Self { counts: shortest(angle, next_angle), ambiguous: true };
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "error bounds it: below 50 turns")]
-        let estimate = estimate as i32;
-        #[expect(
-            clippy::cast_sign_loss,
-            clippy::cast_possible_truncation,
-            reason = "modulo one turn"
-        )]
-        let expected_angle = (i32::from(angle) + estimate) as u16;
-        let rest = shortest(expected_angle, next_angle);
-        let counts = estimate + rest;
-        let implausible = rest.unsigned_abs() as f32 > error + 1.0;
-        Self { counts, ambiguous: implausible || fits_an_earlier_frame(counts, error - fastest) }
+    let estimate = (speed + next_speed) * 0.5 * elapsed_ms;
+    let fastest = if speed.abs() > next_speed.abs() { speed.abs() } else { next_speed.abs() };
+    let error = (next_speed - speed).abs() * 0.5 * elapsed_ms
+        + no_load * (elapsed_ms * elapsed_ms * (0.25 / 50.0))
+        + fastest;
+    if error >= HALF_TURN {
+        return Err(shortest(angle, next_angle));
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "error bounds it: below 50 turns")]
+    let estimate = estimate as i32;
+    #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "modulo one turn")]
+    let expected_angle = (i32::from(angle) + estimate) as u16;
+    let rest = shortest(expected_angle, next_angle);
+    let counts = estimate + rest;
+    let implausible = rest.unsigned_abs() as f32 > error + 1.0;
+    if implausible || fits_an_earlier_frame(counts, error - fastest) {
+        Err(counts)
+    } else {
+        Ok(counts)
     }
 }
 
@@ -85,14 +78,13 @@ mod tests {
 
     #[test]
     fn a_gap_at_rest_is_the_shortest_way() {
-        let gap = Gap::resolve((10, 0), (8190, 0), 3_000, 9256);
-        assert_eq!(gap, Gap { counts: -12, ambiguous: false });
+        assert_eq!(resolve_gap((10, 0), (8190, 0), 3_000, 9256), Ok(-12));
     }
 
     #[test]
     fn an_angle_that_contradicts_the_speed_is_flagged() {
         // 2 ms at 6000 rpm is 1638 counts; a quarter turn backward cannot be.
-        assert!(Gap::resolve((0, 6000), (6144, 6000), 2_000, 9256).ambiguous);
+        assert!(resolve_gap((0, 6000), (6144, 6000), 2_000, 9256).is_err());
     }
 
     #[test]
@@ -100,24 +92,24 @@ mod tests {
         // From 0 to 3000 rpm in 4 ms, or back: 819.2 counts on the mean, and as many for an early or a late change;
         // 101.1 for a rise and fall in between; 409.6 for 1 ms at the faster speed: 1329.9.
         for (before, after) in [(0, 3000), (3000, 0)] {
-            let gap = |counts| Gap::resolve((0, before), (counts, after), 4_000, 9256);
-            assert_eq!(gap(819 + 1325), Gap { counts: 819 + 1325, ambiguous: false });
-            assert!(gap(819 + 1335).ambiguous);
+            let gap = |counts| resolve_gap((0, before), (counts, after), 4_000, 9256);
+            assert_eq!(gap(819 + 1325), Ok(819 + 1325));
+            assert!(gap(819 + 1335).is_err());
         }
     }
 
     #[test]
     fn one_count_of_rounding_is_allowed_for() {
-        let gap = |counts| Gap::resolve((0, 0), (counts, 0), 1_000, 0);
-        assert_eq!(gap(1), Gap { counts: 1, ambiguous: false });
-        assert_eq!(gap(2), Gap { counts: 2, ambiguous: true });
+        let gap = |counts| resolve_gap((0, 0), (counts, 0), 1_000, 0);
+        assert_eq!(gap(1), Ok(1));
+        assert_eq!(gap(2), Err(2));
     }
 
     #[test]
     fn a_gap_of_any_length_is_finite() {
         for elapsed in [0, 1, u32::MAX] {
-            let gap = Gap::resolve((0, i16::MIN), (8191, i16::MAX), elapsed, u16::MAX);
-            assert!(gap.ambiguous && gap.counts.abs() <= 4096);
+            let gap = resolve_gap((0, i16::MIN), (8191, i16::MAX), elapsed, u16::MAX);
+            assert!(gap.is_err_and(|counts| counts.abs() <= 4096));
         }
     }
 
@@ -133,8 +125,8 @@ mod tests {
             let moved = (mean * 8192.0 / 60e6 * f64::from(elapsed_us)).round() as i32;
             #[expect(clippy::cast_possible_truncation, reason = "0..8192")]
             let end = (i32::from(start) + moved).rem_euclid(8192) as u16;
-            let gap = Gap::resolve((start, rpm), (end, next_rpm), elapsed_us, 9256);
-            prop_assert!(gap.ambiguous || gap.counts == moved, "{gap:?} moved {moved}");
+            let gap = resolve_gap((start, rpm), (end, next_rpm), elapsed_us, 9256);
+            prop_assert!(gap.is_err() || gap == Ok(moved), "{gap:?} moved {moved}");
         }
     }
     proptest! {
@@ -147,8 +139,8 @@ mod tests {
             let moved = (f64::from(rpm) * 8192.0 / 60e6 * f64::from(moved_us)).round() as i32;
             #[expect(clippy::cast_possible_truncation, reason = "0..8192")]
             let end = (i32::from(start) + moved).rem_euclid(8192) as u16;
-            let gap = Gap::resolve((start, rpm), (end, rpm), moved_us + waited_us, 9256);
-            prop_assert!(gap.ambiguous || gap.counts == moved, "{gap:?} moved {moved}");
+            let gap = resolve_gap((start, rpm), (end, rpm), moved_us + waited_us, 9256);
+            prop_assert!(gap.is_err() || gap == Ok(moved), "{gap:?} moved {moved}");
         }
     }
 }

@@ -7,7 +7,7 @@
 //! | item | what it does |
 //! |---|---|
 //! | [`shortest`] | the way from one angle to the next, when less than half a rotor turn passed |
-//! | [`Gap::resolve`] | the same across lost frames, with the reported speeds; says when it cannot know |
+//! | [`resolve_gap`] | the same across lost frames, with the reported speeds; says when it cannot know |
 //! | [`GearRatio`] | an exact fraction, 3591:187 say |
 //! | [`Shaft`] | turns and phase of the output shaft, in integers, for any number of turns |
 //! | [`Position`] | a multi-turn position as users write it |
@@ -22,7 +22,7 @@ mod gear;
 mod homing;
 mod shaft;
 
-pub use gap::Gap;
+pub use gap::resolve_gap;
 pub use gear::{GearError, GearRatio};
 pub use homing::Homing;
 pub use shaft::{Position, Shaft, shortest};

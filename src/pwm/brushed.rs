@@ -54,7 +54,7 @@ impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedErr
 ///
 /// # Examples
 /// ```
-/// use drivetrain::pwm::{Brushed, BrushedConfig, OnePin};
+/// use drivetrain::pwm::{Brushed, BrushedConfig};
 /// use drivetrain::time::{Instant, Tick};
 /// # use embedded_hal::{digital, pwm::*};
 /// # struct Pin(u16);
@@ -70,13 +70,13 @@ impl<P: core::fmt::Debug, D: core::fmt::Debug> core::error::Error for BrushedErr
 /// # }
 /// # let (channel, pin) = (Pin(0), Pin(0));
 ///
-/// let mut motor = Brushed::new(channel, OnePin(pin), BrushedConfig::new(1).with_limit(0.5))?;
+/// let mut motor = Brushed::new(channel, [pin], BrushedConfig::new(1).with_limit(0.5))?;
 /// motor.arm(Instant::from_micros(1_000))?;
 /// for millis in 1..=201 {
 ///     motor.set_duty(-0.9)?; // saturates at its limit, which opens in 0.2 s
 ///     motor.update(Tick::new(Instant::from_micros(1_000 * millis), 0.001))?;
 /// }
-/// assert_eq!((motor.channel().0, motor.direction().0.0), (500, 1)); // backward with half of 1000
+/// assert_eq!((motor.channel().0, motor.direction()[0].0), (500, 1)); // backward with half of 1000
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

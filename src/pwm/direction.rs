@@ -1,12 +1,12 @@
 use embedded_hal::digital::{ErrorType, OutputPin};
 
-/// The pins that tell a bridge which way to drive: [`OnePin`], or a tuple of two pins.
+/// The pins that tell a bridge which way to drive: an array of one pin, or a tuple of two.
 ///
-/// A tuple is IN1 and IN2 of a bridge like the L298N or TB6612FNG: at most one pin is high, and both low let the motor coast.
+/// One pin, `[pin]`, is low for forward and high for backward; coasting leaves it as it is. A tuple is IN1 and IN2 of a bridge like the L298N or TB6612FNG: at most one pin is high, and both low let the motor coast.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::pwm::{Direction, OnePin};
+/// use drivetrain::pwm::Direction;
 /// # use embedded_hal::digital::*;
 /// # struct Pin(bool);
 /// # impl ErrorType for Pin { type Error = core::convert::Infallible; }
@@ -16,9 +16,9 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 /// # }
 /// # let (pin, in1, in2) = (Pin(false), Pin(false), Pin(false));
 ///
-/// let mut direction = OnePin(pin);
-/// direction.backward()?;
-/// assert!(direction.0.0); // high
+/// let mut one = [pin];
+/// one.backward()?;
+/// assert!(one[0].0); // high
 ///
 /// let mut pins = (in1, in2);
 /// pins.backward()?;
@@ -48,11 +48,8 @@ pub trait Direction {
     fn backward(&mut self) -> Result<(), Self::Error>;
 }
 
-/// One pin: low is forward, high is backward; coasting leaves it as it is.
-#[derive(Debug, Clone, Copy)]
-pub struct OnePin<P>(pub P);
-
-impl<P: OutputPin> Direction for OnePin<P> {
+/// Low is forward, high is backward; coasting leaves the pin as it is.
+impl<P: OutputPin> Direction for [P; 1] {
     type Error = P::Error;
 
     fn coast(&mut self) -> Result<(), Self::Error> {
@@ -60,11 +57,13 @@ impl<P: OutputPin> Direction for OnePin<P> {
     }
 
     fn forward(&mut self) -> Result<(), Self::Error> {
-        self.0.set_low()
+        let [pin] = self;
+        pin.set_low()
     }
 
     fn backward(&mut self) -> Result<(), Self::Error> {
-        self.0.set_high()
+        let [pin] = self;
+        pin.set_high()
     }
 }
 

@@ -14,7 +14,7 @@
 //! |---|---|
 //! | [`RcPwm`], [`RcConfig`] | an ESC or servo that listens to the length of a pulse |
 //! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
-//! | [`Direction`]: [`OnePin`], or a tuple of two pins | how the bridge is told which way |
+//! | [`Direction`]: an array of one pin, or a tuple of two | how the bridge is told which way |
 //! | [`HealthConfig`](crate::motor::HealthConfig) | when a brushed motor with an encoder counts as stalled, or runs away |
 //! | [`PwmError`], [`BrushedError`] | what is wrong with a configuration, or with a pin |
 //!
@@ -39,5 +39,5 @@ mod rc;
 mod tests;
 
 pub use brushed::{Brushed, BrushedConfig, BrushedError};
-pub use direction::{Direction, OnePin};
+pub use direction::Direction;
 pub use rc::{PwmError, RcConfig, RcPwm};

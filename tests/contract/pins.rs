@@ -4,7 +4,7 @@ use super::*;
 use drivetrain::motor::{
     ArmError, CanDevice, Claim, Edge, Ingest, Malformed, MotorName, Role, Visitor, WrongSetting,
 };
-use drivetrain::pwm::{Brushed, BrushedConfig, OnePin, RcConfig, RcPwm};
+use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
 use drivetrain::time::{Duration, Instant, Tick};
 use embedded_hal::{digital, pwm};
 use std::cell::Cell;
@@ -58,7 +58,7 @@ trait OnPins: VelocityDrive<()> {
     fn edge(&mut self) -> Option<Edge>;
 }
 
-impl OnPins for Brushed<Pin, OnePin<Pin>> {
+impl OnPins for Brushed<Pin, [Pin; 1]> {
     fn hear(&mut self, counter: u32, now: Instant) {
         self.ingest_counts(counter, now);
     }
@@ -245,9 +245,9 @@ impl<M: OnPins> Subject for Wired<M> {
     }
 }
 
-fn brushed(config: BrushedConfig) -> Wired<Brushed<Pin, OnePin<Pin>>> {
+fn brushed(config: BrushedConfig) -> Wired<Brushed<Pin, [Pin; 1]>> {
     let (pulse, now) = (Pin::default(), Instant::START);
-    let motor = Brushed::new(pulse.clone(), OnePin(Pin::default()), config).unwrap();
+    let motor = Brushed::new(pulse.clone(), [Pin::default()], config).unwrap();
     Wired { motor, pulse, rest: 0, listens: true, now, waits: false }
 }
 

@@ -292,7 +292,7 @@ impl Subject<1> for Snake {
 #[cfg(feature = "hal")]
 pub(super) mod pins {
     use super::*;
-    use drivetrain::pwm::{Brushed, BrushedConfig, OnePin, RcConfig, RcPwm};
+    use drivetrain::pwm::{Brushed, BrushedConfig, RcConfig, RcPwm};
     use embedded_hal::{digital, pwm};
     use std::convert::Infallible;
 
@@ -370,15 +370,15 @@ pub(super) mod pins {
         }
     }
 
-    pub(crate) fn brushed() -> Brushed<Pin, OnePin<Pin>> {
+    pub(crate) fn brushed() -> Brushed<Pin, [Pin; 1]> {
         let config = BrushedConfig::new(1)
             .with_encoder(2_000.0, 16)
             .with_health(&STANDS)
             .with_opening(Duration::ZERO);
-        Brushed::new(Pin(0), OnePin(Pin(0)), config).unwrap()
+        Brushed::new(Pin(0), [Pin(0)], config).unwrap()
     }
 
-    impl Subject<1> for Brushed<Pin, OnePin<Pin>> {
+    impl Subject<1> for Brushed<Pin, [Pin; 1]> {
         const RULES: [Rules; 1] = [OWN];
 
         stops!();

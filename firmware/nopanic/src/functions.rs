@@ -3,14 +3,13 @@
 use crate::opaque::{Function, any};
 use core::hint::black_box;
 use drivetrain::control::{
-    ConfigError, LinearDifferentiator, OptimalDifferentiator, Pid, PidConfig, TimeStep,
-    WheelTuning, fhan,
+    ConfigError, Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan,
 };
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
-use drivetrain::encoder::{Gap, GearRatio, Homing, Position, Shaft, shortest};
+use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
@@ -180,23 +179,19 @@ fn control() {
     Pid::output.call();
     Pid::config.call();
     Pid::rejected.call();
-    LinearDifferentiator::new.call();
-    LinearDifferentiator::update.call();
-    LinearDifferentiator::reset_to.call();
-    LinearDifferentiator::value.call();
-    LinearDifferentiator::rate.call();
-    OptimalDifferentiator::new.call();
-    OptimalDifferentiator::update.call();
-    OptimalDifferentiator::reset_to.call();
-    OptimalDifferentiator::value.call();
-    OptimalDifferentiator::rate.call();
+    Differentiator::linear.call();
+    Differentiator::update.call();
+    Differentiator::reset_to.call();
+    Differentiator::value.call();
+    Differentiator::rate.call();
+    Differentiator::optimal.call();
     fhan.call();
     WheelTuning::speed_loop.call();
 }
 
 fn encoder() {
     shortest.call();
-    Gap::resolve.call();
+    resolve_gap.call();
     GearRatio::new.call();
     GearRatio::rotor.call();
     GearRatio::output.call();

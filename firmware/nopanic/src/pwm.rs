@@ -40,7 +40,7 @@ impl digital::OutputPin for Pin {
 }
 
 pub fn call_all() {
-    brushed::<OnePin<Pin>>();
+    brushed::<[Pin; 1]>();
     brushed::<(Pin, Pin)>();
     BrushedConfig::new.call();
     BrushedConfig::with_encoder.call();

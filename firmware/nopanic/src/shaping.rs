@@ -39,8 +39,7 @@ pub fn call_all() {
     SpeedActuator::pid.call();
     SpeedActuator::pid_mut.call();
     SpeedActuator::rejected.call();
-    LinearDifferentiator::rejected.call();
-    OptimalDifferentiator::rejected.call();
+    Differentiator::rejected.call();
     Biquad::low_pass.call();
     Biquad::notch.call();
     Biquad::update.call();

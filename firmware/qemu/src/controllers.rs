@@ -5,10 +5,10 @@ use crate::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
-    Biquad, Cascade, ConfigError, FeedForward, LinearDifferentiator, LowPass, MotionLimits,
-    OptimalDifferentiator, Pid, PidConfig, PositionActuator, PositionActuatorConfig, Profile,
-    ProfileState, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
-    StepResponse, TimeStep, Window,
+    Biquad, Cascade, ConfigError, Differentiator, FeedForward, LowPass, MotionLimits, Pid,
+    PidConfig, PositionActuator, PositionActuatorConfig, Profile, ProfileState, RelayTuner,
+    RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep,
+    Window,
 };
 
 const DT_S: f32 = 0.001;
@@ -34,8 +34,8 @@ functions! {
     control_biquad(filter: &mut Biquad, input) -> f32 = filter.update(input);
     control_moving_average(window: &mut Window<8>, sample) -> f32 = window.push(sample).mean();
     control_median(window: &mut Window<5>, sample) -> f32 = window.push(sample).median();
-    control_linear(differentiator: &mut LinearDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
-    control_optimal(differentiator: &mut OptimalDifferentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
+    control_linear(differentiator: &mut Differentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
+    control_optimal(differentiator: &mut Differentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
     control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
     control_profile(profile: &Profile, time_s) -> ProfileState = profile.at(time_s);
     control_plan(limits: &MotionLimits, start, end) -> Result<Profile, ConfigError> = Profile::plan(start, end, limits);
@@ -63,9 +63,9 @@ pub fn rows() {
     sampled("biquad", control_biquad, &mut filter);
     sampled("moving_average_8", control_moving_average, &mut Window::new());
     sampled("median_5", control_median, &mut Window::new());
-    let mut differentiator = LinearDifferentiator::new(black_box(100.0), 0.005).unwrap();
+    let mut differentiator = Differentiator::linear(black_box(100.0), 0.005).unwrap();
     timed("differentiator_linear", control_linear, &mut differentiator);
-    let mut differentiator = OptimalDifferentiator::new(black_box(100.0), 0.006, 0.004).unwrap();
+    let mut differentiator = Differentiator::optimal(black_box(100.0), 0.006, 0.004).unwrap();
     timed("differentiator_optimal", control_optimal, &mut differentiator);
     let mut limiter = SlewLimiter::new(black_box(100.0), 50.0).unwrap();
     timed("slew_limiter", control_slew, &mut limiter);

@@ -242,9 +242,9 @@ impl PidConfig {
     /// Leads the setpoint through a linear tracking differentiator of speed `r` in 1/s, more than zero. Off by default.
     ///
     /// A step of the setpoint is followed to 4 % after `5 / r` seconds, without overshoot, from the first measurement on: see
-    /// [`LinearDifferentiator`](crate::control::LinearDifferentiator). A time step longer than `1 / r` counts as `1 / r`, which is as fast as
+    /// [`Differentiator::linear`](crate::control::Differentiator::linear). A time step longer than `1 / r` counts as `1 / r`, which is as fast as
     /// the setpoint can be followed without overshoot. With an error formed elsewhere there is no setpoint to follow. Not with a
-    /// period: an [`OptimalDifferentiator`](crate::control::OptimalDifferentiator) in front of the controller follows an angle.
+    /// period: a [`Differentiator::optimal`](crate::control::Differentiator::optimal) in front of the controller follows an angle.
     ///
     /// # Examples
     /// ```

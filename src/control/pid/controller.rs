@@ -1164,7 +1164,7 @@ mod tests {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod incremental {
     use super::*;
-    use crate::control::{LinearDifferentiator, TimeStep};
+    use crate::control::{Differentiator, TimeStep};
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -1282,7 +1282,7 @@ mod incremental {
     fn with_tracking_a_long_pause_moves_the_target_on_by_the_longest_step() {
         let config = incremental(1.0, 5.0, 0.5);
         let mut pid = pid(config.with_tracking(50.0));
-        let mut follow = LinearDifferentiator::new(50.0, 0.01).unwrap();
+        let mut follow = Differentiator::linear(50.0, 0.01).unwrap();
         follow.reset_to(10.0);
         for _ in 0..5 {
             follow.update(11.0, DT_S);
@@ -1469,7 +1469,7 @@ mod incremental {
         ) {
             let config = PidConfig { incremental, ..PidConfig::new(gains.0, gains.1, gains.2) };
             let (mut led, mut plain) = (pid(config.with_tracking(r)), pid(config));
-            let mut follow = LinearDifferentiator::new(r, 1.0 / r * 0.999_999).unwrap();
+            let mut follow = Differentiator::linear(r, 1.0 / r * 0.999_999).unwrap();
             follow.reset_to(samples[0].1);
             for (setpoint, measurement, micros) in samples {
                 let dt_s = f32::from(micros) * 1e-6;

@@ -2,7 +2,7 @@
 
 use super::Slot;
 use crate::dji::{Facts, Feedback};
-use crate::encoder::{COUNTS_PER_TURN, Gap, Homing, Position, shortest};
+use crate::encoder::{COUNTS_PER_TURN, Homing, Position, resolve_gap, shortest};
 use crate::motor::{Condition, Link, TargetError, Timeouts, age};
 
 impl Slot {
@@ -58,9 +58,10 @@ impl Slot {
             return self.doubt_position();
         }
         let (before, after) = ((before.angle(), before.rpm()), (after.angle(), after.rpm()));
-        let gap = Gap::resolve(before, after, gap_us, no_load_rpm);
-        self.shaft.advance_far(gap.counts);
-        if gap.ambiguous {
+        let gap = resolve_gap(before, after, gap_us, no_load_rpm);
+        let (Ok(counts) | Err(counts)) = gap;
+        self.shaft.advance_far(counts);
+        if gap.is_err() {
             self.doubt_position();
         }
     }
