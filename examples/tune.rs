@@ -10,9 +10,7 @@
 mod arguments;
 mod console;
 
-use drivetrain::control::{
-    Oscillation, PidConfig, RelayTuner, RelayTunerConfig, StepResponse, TuningRule,
-};
+use drivetrain::control::{PidConfig, RelayTuner, StepResponse, TuningRule};
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
@@ -30,7 +28,8 @@ struct Plan<M: Model> {
     simulated: MotorConfig,
     /// A speed about which the motor swings: away from zero, where dry friction would hold it.
     swing_about: f32,
-    relay: RelayTunerConfig,
+    /// Amplitude, hysteresis and bias.
+    relay: [f32; 3],
     guessed: PidConfig,
     rule: TuningRule,
     step_to: f32,
@@ -43,7 +42,7 @@ const WHEEL: Plan<M3508> = Plan {
     simulated: MotorConfig::m3508(1),
     swing_about: 15.0,
     // The hysteresis slows the swing down to 8 samples of the loop in half a period, and more.
-    relay: RelayTunerConfig::new(3.0, 0.5),
+    relay: [3.0, 0.5, 0.0],
     guessed: PidConfig::new(0.1, 2.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 30.0,
@@ -56,7 +55,7 @@ const YAW: Plan<Gm6020Voltage> = Plan {
     simulated: MotorConfig::gm6020_voltage(1),
     swing_about: 8.0,
     // The back-EMF takes 0.75 V for each rad/s; the relay swings about that.
-    relay: RelayTunerConfig::new(4.0, 3.0).with_bias(6.0),
+    relay: [4.0, 3.0, 6.0],
     guessed: PidConfig::new(0.2, 4.0, 0.0),
     rule: TuningRule::TyreusLuybenPi,
     step_to: 12.0,
@@ -101,13 +100,14 @@ fn run<M: Model>(
     Ok(())
 }
 
-fn identify<M: Model>(plan: &Plan<M>) -> Outcome<Oscillation> {
-    let mut tuner = RelayTuner::new(plan.relay)?;
+fn identify<M: Model>(plan: &Plan<M>) -> Outcome<RelayTuner> {
+    let [amplitude, hysteresis, bias] = plan.relay;
+    let mut tuner = RelayTuner::new(amplitude, hysteresis)?.with_bias(bias)?;
     run(plan, plan.guessed, 3, |bus, motor, speed, dt_s| {
         (plan.effort)(bus, motor, tuner.update(plan.swing_about, speed, dt_s));
     })?;
-    match (tuner.oscillation(), tuner.failure()) {
-        (Some(found), _) => Ok(found),
+    match (tuner.ultimate(), tuner.failure()) {
+        (Some(_), _) => Ok(tuner),
         (None, Some(failure)) => Err(format!("{}: {failure}", plan.name).into()),
         (None, None) => Err(format!("{}: still swinging after 3 s", plan.name).into()),
     }
@@ -128,17 +128,18 @@ fn step<M: Model>(plan: &Plan<M>, speed: PidConfig) -> Outcome<(StepResponse, Cu
 }
 
 fn tune<M: Model>(plan: &Plan<M>) -> Outcome<Tuned> {
-    let found = identify(plan)?;
+    let tuner = identify(plan)?;
+    let (gain, period_s) = tuner.ultimate().ok_or("still swinging")?;
     console::line(format_args!(
         "{}: ultimate gain {:.3} {unit} per rad/s, ultimate period {:.1} ms",
         plan.name,
-        found.ultimate_gain,
-        1e3 * found.ultimate_period_s,
+        gain,
+        1e3 * period_s,
         unit = plan.unit,
     ));
     let (before, before_curve) = step(plan, plan.guessed)?;
     report("guessed", plan.guessed, &before);
-    let gains = found.pid(plan.rule);
+    let gains = tuner.pid(plan.rule).ok_or("still swinging")?;
     let (after, after_curve) = step(plan, gains)?;
     report(&format!("{:?}", plan.rule), gains, &after);
     Ok(Tuned { name: plan.name, target: plan.step_to, before: before_curve, after: after_curve })

@@ -77,6 +77,7 @@ subjects! {
     PositionActuator, 3, it, [a, b, c], dt_s => it.step(a, b, c, &TimeStep::of(dt_s)), it.rejected();
     ByError, 2, it, [a, b, _], dt_s => it.0.step_error(a, b, &TimeStep::of(dt_s)), it.0.rejected();
     Differentiator, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
+    Differentiator<true>, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     LowPass, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     SlewLimiter, 1, it, [a, ..], dt_s => it.update(a, dt_s), it.rejected();
     Biquad, 1, it, [a, ..], _ => it.update(a), it.rejected();
@@ -143,7 +144,7 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (FreezesBehindFilter, Box::new(Pid::new(tracking).unwrap())),
         (InFull, Box::new(LowPass::new(10.0).unwrap())),
         (InFull, Box::new(StepResponse::new(0.0, 1.0, 100.0, 0.02).unwrap())),
-        (StartsAnew, Box::new(RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).unwrap())),
+        (StartsAnew, Box::new(RelayTuner::new(3.0, 0.01).unwrap())),
         (NoTime, Box::new(Biquad::low_pass(30.0, Biquad::BUTTERWORTH, 1000.0).unwrap())),
         (NoTime, Box::new(Biquad::notch(60.0, 2.0, 1000.0).unwrap())),
         (NoTime, Box::new(Mean(Window::new()))),
@@ -454,7 +455,7 @@ fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
         Window::<5>::new().rejected() == 0,
         SlewLimiter::new(1.0, 2.0).is_ok() && MotionLimits::new(1.0, 1.0).validate().is_ok(),
         FeedForward::new(0.3, 0.05, 0.01).is_ok(),
-        RelayTuner::new(RelayTunerConfig::new(3.0, 0.01)).is_ok(),
+        RelayTuner::new(3.0, 0.01).is_ok(),
         StepResponse::new(0.0, 1.0, 1.0, 0.02).is_ok(),
     ];
     assert_eq!(MADE, [true; 15]);
@@ -466,7 +467,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
     let rows: String = source.lines().filter(|line| line.starts_with("//! |")).collect();
     let public = source.split("pub use ").skip(1).filter_map(|rest| rest.split(';').next());
     let names = public.flat_map(|uses| uses.split(|letter: char| !letter.is_alphanumeric()));
-    let parts = ["Terms", "TimeStep", "Oscillation", "MotionLimits", "ProfileState"];
+    let parts = ["Terms", "TimeStep", "MotionLimits", "ProfileState"];
     let mut seen = 0;
     for name in names.filter(|name| name.starts_with(char::is_uppercase)) {
         let is_part = ["Config", "Error", "Fault", "Failure"].iter().any(|end| name.ends_with(end));
@@ -475,7 +476,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 16);
+    assert_eq!(seen, 15);
 }
 
 #[test]
@@ -582,8 +583,8 @@ const MORE_THAN_ZERO: Parameters = &[
     ("feedback_filter", |x| speed(|config| config.with_feedback_filter(x))),
     ("output_filter", |x| speed(|config| config.with_output_filter(x))),
     ("angle_filter", |x| angle(|config| config.with_angle_filter(x))),
-    ("amplitude", |x| RelayTuner::new(RelayTunerConfig::new(x, 0.1)).err()),
-    ("time_limit", |x| RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_time_limit(x)).err()),
+    ("amplitude", |x| RelayTuner::new(x, 0.1).err()),
+    ("time_limit", |x| RelayTuner::new(1.0, 0.1).and_then(|tuner| tuner.with_time_limit(x)).err()),
     ("duration", |x| StepResponse::new(0.0, 1.0, x, 0.02).err()),
     ("tolerance", |x| StepResponse::new(0.0, 1.0, 1.0, x).err()),
 ];
@@ -604,7 +605,7 @@ const ZERO_OR_MORE: Parameters = &[
     ("ks", |x| FeedForward::new(x, 0.0, 0.0).err()),
     ("kv", |x| FeedForward::new(0.0, x, 0.0).err()),
     ("ka", |x| FeedForward::new(0.0, 0.0, x).err()),
-    ("hysteresis", |x| RelayTuner::new(RelayTunerConfig::new(1.0, x)).err()),
+    ("hysteresis", |x| RelayTuner::new(1.0, x).err()),
 ];
 
 /// What no pair of values, or no value of its kind, can mean.
@@ -627,8 +628,8 @@ const CONTRADICTIONS: Parameters = &[
             PositionActuatorConfig::new(GAINS.with_period(360.0), SpeedActuatorConfig::new(GAINS));
         PositionActuator::new(circle.with_angle_filter(10.0)).err()
     }),
-    ("cycles", |_| RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_cycles(0)).err()),
-    ("bias", |_| RelayTuner::new(RelayTunerConfig::new(f32::MAX, 0.1).with_bias(f32::MAX)).err()),
+    ("cycles", |_| RelayTuner::new(1.0, 0.1).and_then(|tuner| tuner.with_cycles(0)).err()),
+    ("bias", |_| RelayTuner::new(f32::MAX, 0.1).and_then(|tuner| tuner.with_bias(f32::MAX)).err()),
     ("target", |_| StepResponse::new(1.0, 1.0, 1.0, 0.02).err()),
     ("start", |_| Profile::plan(f32::NAN, 1.0, &MotionLimits::new(1.0, 1.0)).err()),
     ("distance", |_| Profile::plan(f32::MIN, f32::MAX, &MotionLimits::new(1.0, 1.0)).err()),

@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 use drivetrain::control::{
-    Biquad, Differentiator, LowPass, MotionLimits, Oscillation, Pid, PidConfig, Profile, TimeStep,
-    TuningRule, fhan,
+    Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, Profile, TimeStep, TuningRule,
+    fhan,
 };
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
@@ -167,8 +167,7 @@ fn gains_by_the_rules_of_the_papers() {
             _ => TuningRule::TyreusLuybenPid,
         };
         assert_eq!(format!("{rule:?}"), name);
-        let found = Oscillation { ultimate_gain: row[1], ultimate_period_s: row[2] };
-        let (kp, ki, kd) = found.pid(rule).gains();
+        let (kp, ki, kd) = rule.pid(row[1], row[2]).gains();
         assert_close(kp, row[3], 1e-6, name);
         assert_close(ki, row[4], 1e-6, name);
         assert_close(kd, row[5], 1e-6, name);

@@ -3,8 +3,8 @@
 
 use drivetrain::control::{
     Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator,
-    PositionActuatorConfig, Profile, RelayTuner, RelayTunerConfig, SlewLimiter, SpeedActuator,
-    SpeedActuatorConfig, StepResponse, TimeStep, Window,
+    PositionActuatorConfig, Profile, RelayTuner, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
+    StepResponse, TimeStep, Window,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -274,11 +274,11 @@ fn differentiators(mut input: Input) {
     while !input.is_empty() {
         let (sample, dt_s) = (input.float(), input.step_s());
         if let Some(differentiator) = &mut linear {
-            differentiator.step(ANY, Differentiator::rejected, |one| one.update(sample, dt_s));
+            differentiator.step(ANY, |one| one.rejected(), |one| one.update(sample, dt_s));
             assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
         }
         if let Some(differentiator) = &mut optimal {
-            differentiator.step(ANY, Differentiator::rejected, |one| one.update(sample, dt_s));
+            differentiator.step(ANY, |one| one.rejected(), |one| one.update(sample, dt_s));
             assert!(differentiator.get().rate().is_finite(), "{differentiator:?}");
         }
     }
@@ -351,10 +351,12 @@ fn profile(mut input: Input) {
 
 fn relay(mut input: Input) {
     let (amplitude, hysteresis) = (input.positive(), input.positive());
-    let mut config = RelayTunerConfig::new(amplitude, hysteresis);
     let bias = if input.coin() { input.float() } else { 0.0 };
-    config = config.with_bias(bias).with_cycles(input.byte()).with_time_limit(input.positive());
-    let Ok(tuner) = RelayTuner::new(config) else { return };
+    let (cycles, time_limit_s) = (input.byte(), input.positive());
+    let tuner = RelayTuner::new(amplitude, hysteresis).and_then(|tuner| {
+        tuner.with_bias(bias)?.with_cycles(cycles)?.with_time_limit(time_limit_s)
+    });
+    let Ok(tuner) = tuner else { return };
     let mut tuner = Observed::new(tuner);
     tuner.change(|tuner| tuner.output());
     while !input.is_empty() {
@@ -367,7 +369,7 @@ fn relay(mut input: Input) {
             off <= amplitude * 1.001 + rounding || output == 0.0,
             "{output} of {bias} and {amplitude}"
         );
-        if let Some(found) = tuner.get().oscillation() {
+        if let Some(found) = tuner.get().ultimate() {
             assert!(format!("{found:?}").find("NaN").is_none(), "{found:?}");
         }
     }

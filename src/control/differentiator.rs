@@ -17,7 +17,7 @@ use crate::math;
 /// input without overshoot. Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions on Industrial
 /// Electronics 56 (2009), section IV.A.
 ///
-/// Both are stepped by Euler's rule.
+/// Both are stepped by Euler's rule. `OPTIMAL` is the law; it follows from the constructor.
 ///
 /// # Edge behaviour
 /// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
@@ -45,7 +45,7 @@ use crate::math;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Differentiator {
+pub struct Differentiator<const OPTIMAL: bool = false> {
     r: f32,
     /// Zero of the linear law.
     h0_s: f32,
@@ -53,8 +53,6 @@ pub struct Differentiator {
 }
 
 impl Differentiator {
-    const LEAST_STEPS: f32 = 1.25;
-
     /// Takes `r`, the speed of following in 1/s, and the longest step in seconds, of the linear law.
     ///
     /// # Errors
@@ -68,6 +66,10 @@ impl Differentiator {
         }
         Ok(Self { r, h0_s: 0.0, follower: Follower::new(max_step_s) })
     }
+}
+
+impl Differentiator<true> {
+    const LEAST_STEPS: f32 = 1.25;
 
     /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds,
     /// of the time-optimal law.
@@ -84,12 +86,14 @@ impl Differentiator {
         }
         Ok(Self { r, h0_s, follower: Follower::new(max_step_s) })
     }
+}
 
+impl<const OPTIMAL: bool> Differentiator<OPTIMAL> {
     /// Steps by `dt_s` seconds towards `input` and returns the new value.
     pub fn update(&mut self, input: f32, dt_s: f32) -> f32 {
         let (r, h0_s) = (self.r, self.h0_s);
         let step = TimeStep::new(dt_s, self.follower.max_step_s);
-        if h0_s > 0.0 {
+        if OPTIMAL {
             self.follower.step(input, &step, |error, rate| fhan(error, rate, r, h0_s))
         } else {
             self.follower.step(input, &step, |error, rate| -r * finite(r * error + 2.0 * rate))

@@ -59,6 +59,4 @@ pub(crate) use pid::Input;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;
-pub use tuning::{
-    Oscillation, RelayTuner, RelayTunerConfig, StepResponse, TuningRule, WheelTuning,
-};
+pub use tuning::{RelayTuner, StepResponse, TuningRule, WheelTuning};

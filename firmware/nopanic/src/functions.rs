@@ -180,11 +180,12 @@ fn control() {
     Pid::config.call();
     Pid::rejected.call();
     Differentiator::linear.call();
-    Differentiator::update.call();
-    Differentiator::reset_to.call();
-    Differentiator::value.call();
-    Differentiator::rate.call();
     Differentiator::optimal.call();
+    Differentiator::<false>::update.call();
+    Differentiator::<true>::update.call();
+    Differentiator::<false>::reset_to.call();
+    Differentiator::<false>::value.call();
+    Differentiator::<false>::rate.call();
     fhan.call();
     WheelTuning::speed_loop.call();
 }

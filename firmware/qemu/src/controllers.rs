@@ -7,8 +7,7 @@ use core::hint::black_box;
 use drivetrain::control::{
     Biquad, Cascade, ConfigError, Differentiator, FeedForward, LowPass, MotionLimits, Pid,
     PidConfig, PositionActuator, PositionActuatorConfig, Profile, ProfileState, RelayTuner,
-    RelayTunerConfig, SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep,
-    Window,
+    SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep, Window,
 };
 
 const DT_S: f32 = 0.001;
@@ -35,7 +34,7 @@ functions! {
     control_moving_average(window: &mut Window<8>, sample) -> f32 = window.push(sample).mean();
     control_median(window: &mut Window<5>, sample) -> f32 = window.push(sample).median();
     control_linear(differentiator: &mut Differentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
-    control_optimal(differentiator: &mut Differentiator, input, dt_s) -> f32 = differentiator.update(input, dt_s);
+    control_optimal(differentiator: &mut Differentiator<true>, input, dt_s) -> f32 = differentiator.update(input, dt_s);
     control_slew(limiter: &mut SlewLimiter, target, dt_s) -> f32 = limiter.update(target, dt_s);
     control_profile(profile: &Profile, time_s) -> ProfileState = profile.at(time_s);
     control_plan(limits: &MotionLimits, start, end) -> Result<Profile, ConfigError> = Profile::plan(start, end, limits);
@@ -82,8 +81,8 @@ pub fn rows() {
 
 /// While they work: neither is done within the calls of a row.
 fn tuning() {
-    let config = RelayTunerConfig::new(3.0, 0.1).with_cycles(255);
-    let mut tuner = RelayTuner::new(black_box(config)).unwrap();
+    let tuner = RelayTuner::new(black_box(3.0), 0.1).and_then(|tuner| tuner.with_cycles(255));
+    let mut tuner = tuner.unwrap();
     row(
         "relay_tuner",
         &[instructions(control_relay as Step<_>, |update, call| {

@@ -1,7 +1,7 @@
 //! Finding gains and judging them.
 //!
-//! 1. [`RelayTuner`] swings the plant with two output values and measures how it answers: an [`Oscillation`].
-//! 2. [`Oscillation::pid`] turns that into gains by a [`TuningRule`] with a name and a source.
+//! 1. [`RelayTuner`] swings the plant with two output values and measures how it answers: [`RelayTuner::ultimate`].
+//! 2. [`RelayTuner::pid`] turns that into gains by a [`TuningRule`] with a name and a source.
 //! 3. [`StepResponse`] measures what the loop with these gains does.
 //!
 //! Where mass and wheels of a robot are known, [`WheelTuning`] reckons gains to begin with.
@@ -11,7 +11,7 @@ mod rules;
 mod step_response;
 mod wheel;
 
-pub use relay::{RelayTuner, RelayTunerConfig};
-pub use rules::{Oscillation, TuningRule};
+pub use relay::RelayTuner;
+pub use rules::TuningRule;
 pub use step_response::StepResponse;
 pub use wheel::WheelTuning;

@@ -1,72 +1,10 @@
-use super::Oscillation;
+use super::TuningRule;
 use crate::control::error::{ConfigError, check, finite, not_negative, positive};
 use crate::control::number::{self, Sum};
+use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
 use crate::math;
 use core::f32::consts::PI;
-
-/// What a [`RelayTuner`] is made from.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{RelayTuner, RelayTunerConfig};
-///
-/// let config = RelayTunerConfig::new(3.0, 0.5).with_cycles(6).with_bias(0.4);
-/// assert!(RelayTuner::new(config).is_ok());
-/// assert_eq!(RelayTuner::new(RelayTunerConfig::new(0.0, 0.5)).unwrap_err().parameter(), "amplitude");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct RelayTunerConfig {
-    amplitude: f32,
-    hysteresis: f32,
-    bias: f32,
-    cycles: u8,
-    time_limit_s: f32,
-}
-
-impl RelayTunerConfig {
-    /// Takes the output to either side, more than zero, and how far the measurement must pass the setpoint before the output
-    /// switches: more than the noise, zero or more.
-    #[must_use]
-    pub const fn new(amplitude: f32, hysteresis: f32) -> Self {
-        Self { amplitude, hysteresis, bias: 0.0, cycles: 4, time_limit_s: 10.0 }
-    }
-
-    /// Adds a constant to the output, such as what holds the weight or the speed; zero by default.
-    #[must_use]
-    pub const fn with_bias(self, bias: f32) -> Self {
-        Self { bias, ..self }
-    }
-
-    /// Sets the number of periods to average over, more than zero; 4 by default.
-    ///
-    /// They must follow one another with swings that differ by 10 % at most.
-    #[must_use]
-    pub const fn with_cycles(self, cycles: u8) -> Self {
-        Self { cycles, ..self }
-    }
-
-    /// Sets the time in seconds after which it gives up, more than zero; 10 by default.
-    #[must_use]
-    pub const fn with_time_limit(self, time_limit_s: f32) -> Self {
-        Self { time_limit_s, ..self }
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    /// Names `amplitude`, `time_limit` or `cycles` when not more than zero, `hysteresis` when negative, `bias`
-    /// when it, or the output with it, is not finite.
-    pub const fn validate(&self) -> Result<(), ConfigError> {
-        check!(positive("amplitude", self.amplitude));
-        check!(not_negative("hysteresis", self.hysteresis));
-        check!(finite("bias", self.bias.abs() + self.amplitude));
-        check!(positive("cycles", self.cycles as f32));
-        positive("time_limit", self.time_limit_s)
-    }
-}
 
 /// Finds the ultimate gain and period of a plant with a relay in place of the controller.
 ///
@@ -85,10 +23,10 @@ impl RelayTunerConfig {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{RelayTuner, RelayTunerConfig, TuningRule};
+/// use drivetrain::control::{RelayTuner, TuningRule};
 ///
 /// // A motor with inertia whose speed is seen 10 ms late.
-/// let mut tuner = RelayTuner::new(RelayTunerConfig::new(2.0, 0.05))?;
+/// let mut tuner = RelayTuner::new(2.0, 0.05)?;
 /// let (mut speed, mut seen) = (0.0_f32, [0.0_f32; 10]);
 /// while !tuner.is_complete() {
 ///     let effort = tuner.update(0.0, seen[9], 0.001);
@@ -96,16 +34,20 @@ impl RelayTunerConfig {
 ///     seen[0] = speed;
 ///     speed += 50.0 * effort * 0.001;
 /// }
-/// let found = tuner.oscillation().ok_or("did not swing")?;
-/// assert!((found.ultimate_period_s - 0.044).abs() < 0.002); // four times the delay
-/// let (kp, ..) = found.pid(TuningRule::TyreusLuybenPi).gains();
+/// let (_, period_s) = tuner.ultimate().ok_or("did not swing")?;
+/// assert!((period_s - 0.044).abs() < 0.002); // four times the delay
+/// let (kp, ..) = tuner.pid(TuningRule::TyreusLuybenPi).ok_or("did not swing")?.gains();
 /// assert!(kp > 0.5 && kp < 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayTuner {
-    config: RelayTunerConfig,
+    amplitude: f32,
+    hysteresis: f32,
+    bias: f32,
+    time_limit_s: f32,
+    cycles: u8,
     passed: Sum,
     period: Sum,
     lowest: f32,
@@ -142,14 +84,20 @@ impl RelayTuner {
     /// and the peak of a sine to 2 %.
     pub const LEAST_SAMPLES: u8 = 8;
 
-    /// Takes and checks the configuration.
+    /// Takes the output to either side, more than zero, and how far the measurement must pass the setpoint before the output
+    /// switches: more than the noise, zero or more.
     ///
     /// # Errors
-    /// Names the parameter as [`RelayTunerConfig::validate`] does.
-    pub const fn new(config: RelayTunerConfig) -> Result<Self, ConfigError> {
-        check!(config.validate());
+    /// Names `amplitude` when not more than zero, `hysteresis` when negative.
+    pub const fn new(amplitude: f32, hysteresis: f32) -> Result<Self, ConfigError> {
+        check!(positive("amplitude", amplitude));
+        check!(not_negative("hysteresis", hysteresis));
         Ok(Self {
-            config,
+            amplitude,
+            hysteresis,
+            bias: 0.0,
+            time_limit_s: 10.0,
+            cycles: 4,
             passed: Sum::ZERO,
             period: Sum::ZERO,
             lowest: f32::MAX,
@@ -167,6 +115,35 @@ impl RelayTuner {
         })
     }
 
+    /// Adds a constant to the output, such as what holds the weight or the speed; zero by default.
+    ///
+    /// # Errors
+    /// Names `bias` when it, or the output with it, is not finite.
+    pub const fn with_bias(self, bias: f32) -> Result<Self, ConfigError> {
+        check!(finite("bias", bias.abs() + self.amplitude));
+        Ok(Self { bias, ..self })
+    }
+
+    /// Sets the number of periods to average over, more than zero; 4 by default.
+    ///
+    /// They must follow one another with swings that differ by 10 % at most.
+    ///
+    /// # Errors
+    /// Names `cycles` when zero.
+    pub const fn with_cycles(self, cycles: u8) -> Result<Self, ConfigError> {
+        check!(positive("cycles", cycles as f32));
+        Ok(Self { cycles, ..self })
+    }
+
+    /// Sets the time in seconds after which it gives up, more than zero; 10 by default.
+    ///
+    /// # Errors
+    /// Names `time_limit` when not more than zero.
+    pub const fn with_time_limit(self, time_limit_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("time_limit", time_limit_s));
+        Ok(Self { time_limit_s, ..self })
+    }
+
     /// Steps by `dt_s` seconds and returns the output for the plant.
     pub fn update(&mut self, setpoint: f32, measurement: f32, dt_s: f32) -> f32 {
         let step = TimeStep::of(dt_s);
@@ -176,7 +153,7 @@ impl RelayTuner {
             return self.output();
         }
         self.passed.add(step.dt_s());
-        if self.passed.value() >= self.config.time_limit_s {
+        if self.passed.value() >= self.time_limit_s {
             self.state = State::OutOfTime;
             return self.output();
         }
@@ -188,10 +165,10 @@ impl RelayTuner {
         self.samples = self.samples.saturating_add(1);
         self.lowest = if error < self.lowest { error } else { self.lowest };
         self.highest = if error > self.highest { error } else { self.highest };
-        if self.up && error < -self.config.hysteresis {
+        if self.up && error < -self.hysteresis {
             self.up = false;
             self.end_half();
-        } else if !self.up && error > self.config.hysteresis {
+        } else if !self.up && error > self.hysteresis {
             self.up = true;
             self.end_half();
             self.end_period();
@@ -230,7 +207,7 @@ impl RelayTuner {
             self.start_sums();
         }
         self.last_swing = swing;
-        if self.periods >= self.config.cycles {
+        if self.periods >= self.cycles {
             self.state = if self.coarse { State::TooFast } else { State::Done };
         }
         self.next_period();
@@ -245,9 +222,9 @@ impl RelayTuner {
     #[must_use]
     pub fn output(&self) -> f32 {
         match self.state {
-            State::Swinging if self.up => self.config.bias + self.config.amplitude,
-            State::Swinging => self.config.bias - self.config.amplitude,
-            State::Idle | State::Done | State::TooFast | State::OutOfTime => self.config.bias,
+            State::Swinging if self.up => self.bias + self.amplitude,
+            State::Swinging => self.bias - self.amplitude,
+            State::Idle | State::Done | State::TooFast | State::OutOfTime => self.bias,
         }
     }
 
@@ -263,16 +240,16 @@ impl RelayTuner {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{ConfigError, RelayTuner, RelayTunerConfig};
+    /// use drivetrain::control::{ConfigError, RelayTuner};
     ///
     /// // A speed that follows at once: it swings from one sample to the next.
-    /// let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.0))?;
+    /// let mut tuner = RelayTuner::new(1.0, 0.0)?;
     /// let mut speed = 0.0;
     /// while !tuner.is_complete() {
     ///     speed = tuner.update(0.0, speed, 0.001);
     /// }
     /// let failure = tuner.failure().ok_or("it swung")?;
-    /// assert_eq!((tuner.oscillation(), failure), (None, ConfigError::TooFewSamples("hysteresis")));
+    /// assert_eq!((tuner.ultimate(), failure), (None, ConfigError::TooFewSamples("hysteresis")));
     /// assert_eq!(failure.to_string(), "hysteresis: fewer than 8 samples in half a period of the swing");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -280,7 +257,7 @@ impl RelayTuner {
     pub fn failure(&self) -> Option<ConfigError> {
         match self.state {
             State::Idle | State::Swinging => None,
-            State::Done if self.oscillation().is_some() => None,
+            State::Done if self.ultimate().is_some() => None,
             State::Done => Some(ConfigError::NoGain("hysteresis")),
             State::TooFast => Some(ConfigError::TooFewSamples("hysteresis")),
             State::OutOfTime => Some(ConfigError::OutOfTime("time_limit")),
@@ -293,22 +270,32 @@ impl RelayTuner {
         self.rejected
     }
 
-    /// Returns the result: `None` while it runs, and when there is a [`failure`](Self::failure).
+    /// Returns the ultimate gain and period of the plant: `None` while it runs, and when there is a [`failure`](Self::failure).
+    ///
+    /// The gain `Ku` is the proportional one at which the loop would just keep oscillating, in units of the output over the
+    /// measurement; the period `Tu` is that of the oscillation in seconds.
     #[must_use]
-    pub fn oscillation(&self) -> Option<Oscillation> {
+    pub fn ultimate(&self) -> Option<(f32, f32)> {
         if self.state != State::Done {
             return None;
         }
-        let cycles = f32::from(self.config.cycles);
+        let cycles = f32::from(self.cycles);
         let swing = self.sum_of_swings / cycles;
-        let hysteresis = self.config.hysteresis;
+        let hysteresis = self.hysteresis;
         let effective = math::sqrt((swing - hysteresis) * (swing + hysteresis));
-        let ultimate_gain = 4.0 * self.config.amplitude / (PI * effective);
+        let ultimate_gain = 4.0 * self.amplitude / (PI * effective);
         if ultimate_gain.is_finite() && ultimate_gain > 0.0 {
-            Some(Oscillation { ultimate_gain, ultimate_period_s: self.sum_of_periods_s / cycles })
+            Some((ultimate_gain, self.sum_of_periods_s / cycles))
         } else {
             None
         }
+    }
+
+    /// Returns a configuration with the gains by `rule`, and no option; `None` as [`ultimate`](Self::ultimate).
+    #[must_use]
+    pub fn pid(&self, rule: TuningRule) -> Option<PidConfig> {
+        let (gain, period_s) = self.ultimate()?;
+        Some(rule.pid(gain, period_s))
     }
 }
 
@@ -339,8 +326,11 @@ mod tests {
         }
     }
 
-    fn swing(config: RelayTunerConfig, plant: &mut ThreeLags) -> RelayTuner {
-        let mut tuner = RelayTuner::new(config).unwrap();
+    fn relay(amplitude: f32, hysteresis: f32) -> RelayTuner {
+        RelayTuner::new(amplitude, hysteresis).unwrap()
+    }
+
+    fn swing(mut tuner: RelayTuner, plant: &mut ThreeLags) -> RelayTuner {
         let mut measurement = 0.0;
         while !tuner.is_complete() {
             measurement = plant.step(tuner.update(0.0, measurement, DT_S));
@@ -351,23 +341,23 @@ mod tests {
     #[test]
     fn it_finds_the_ultimate_gain_and_period_of_three_lags() {
         let mut plant = ThreeLags { states: [0.0; 3], gain: 2.0, lag_s: 0.1 };
-        let found = swing(RelayTunerConfig::new(1.0, 0.0), &mut plant).oscillation().unwrap();
+        let (gain, period_s) = swing(relay(1.0, 0.0), &mut plant).ultimate().unwrap();
         // The describing function is good to some percent.
-        assert!((found.ultimate_gain - 4.0).abs() < 0.4, "{found:?}");
-        assert!((found.ultimate_period_s - 0.3628).abs() < 0.02, "{found:?}");
+        assert!((gain - 4.0).abs() < 0.4, "{gain}");
+        assert!((period_s - 0.3628).abs() < 0.02, "{period_s}");
     }
 
     #[test]
     fn its_gains_close_the_loop_without_steady_error() {
         let lags = || ThreeLags { states: [0.0; 3], gain: 2.0, lag_s: 0.1 };
-        let found = swing(RelayTunerConfig::new(1.0, 0.01), &mut lags()).oscillation().unwrap();
+        let found = swing(relay(1.0, 0.01), &mut lags());
         for (rule, most) in [
             (TuningRule::ZieglerNicholsPi, 0.6),
             (TuningRule::ZieglerNicholsPid, 0.7),
             (TuningRule::TyreusLuybenPi, 0.15),
             (TuningRule::TyreusLuybenPid, 0.35),
         ] {
-            let mut pid = Pid::new(found.pid(rule)).unwrap();
+            let mut pid = Pid::new(found.pid(rule).unwrap()).unwrap();
             let mut plant = lags();
             let mut response = StepResponse::new(0.0, 1.0, 10.0, 0.05).unwrap();
             let mut measurement = 0.0;
@@ -386,7 +376,7 @@ mod tests {
 
     #[test]
     fn hysteresis_keeps_noise_from_switching() {
-        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.1)).unwrap();
+        let mut tuner = RelayTuner::new(1.0, 0.1).unwrap();
         for sample in 0..100_u8 {
             let noise: f32 = if sample % 2 == 0 { 0.09 } else { -0.09 };
             assert_eq!(tuner.update(0.0, -noise.max(0.0), DT_S), 1.0);
@@ -396,20 +386,19 @@ mod tests {
     #[test]
     fn a_plant_that_does_not_swing_runs_out_of_time() {
         let mut tuner =
-            RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_time_limit(0.5)).unwrap();
+            RelayTuner::new(1.0, 0.1).and_then(|tuner| tuner.with_time_limit(0.5)).unwrap();
         let mut steps = 0;
         while !tuner.is_complete() {
             tuner.update(1.0, 0.0, DT_S);
             steps += 1;
         }
         assert!((499..=501).contains(&steps));
-        assert_eq!((tuner.oscillation(), tuner.output()), (None, 0.0));
+        assert_eq!((tuner.ultimate(), tuner.output()), (None, 0.0));
         assert_eq!(tuner.failure(), Some(ConfigError::OutOfTime("time_limit")));
     }
 
     /// An integrator seen `delay` samples late, swung to the end.
-    fn integrator(delay: usize, config: RelayTunerConfig) -> RelayTuner {
-        let mut tuner = RelayTuner::new(config).unwrap();
+    fn integrator(delay: usize, mut tuner: RelayTuner) -> RelayTuner {
         let (mut speed, mut seen) =
             (0.0, VecDeque::from_iter(core::iter::repeat_n(0.0_f32, delay)));
         while !tuner.is_complete() {
@@ -424,10 +413,10 @@ mod tests {
     fn a_swing_of_a_few_samples_is_a_failure_and_one_of_eight_a_half_period_is_a_result() {
         let mut results = 0;
         for delay in 0..10 {
-            let tuner = integrator(delay, RelayTunerConfig::new(1.0, 0.01));
-            match tuner.oscillation() {
-                Some(found) => {
-                    assert!(found.ultimate_period_s >= 0.016, "{delay}: {found:?}");
+            let tuner = integrator(delay, relay(1.0, 0.01));
+            match tuner.ultimate() {
+                Some((_, period_s)) => {
+                    assert!(period_s >= 0.016, "{delay}: {period_s}");
                     assert_eq!(tuner.failure(), None);
                     results += 1;
                 }
@@ -446,13 +435,13 @@ mod tests {
 
     #[test]
     fn more_hysteresis_makes_a_swing_of_a_few_samples_one_that_counts() {
-        let found = integrator(1, RelayTunerConfig::new(1.0, 0.4)).oscillation().unwrap();
-        assert!(found.ultimate_period_s >= 0.016, "{found:?}");
+        let (_, period_s) = integrator(1, relay(1.0, 0.4)).ultimate().unwrap();
+        assert!(period_s >= 0.016, "{period_s}");
     }
 
     #[test]
     fn one_switch_of_noise_does_not_end_a_slow_swing() {
-        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.05)).unwrap();
+        let mut tuner = RelayTuner::new(1.0, 0.05).unwrap();
         let (mut speed, mut seen, mut step) = (0.0, VecDeque::from([0.0_f32; 12]), 0);
         while !tuner.is_complete() {
             step += 1;
@@ -461,23 +450,22 @@ mod tests {
             let noise = if step == 90 || step == 91 { -late.signum() } else { 0.0 };
             speed += 50.0 * tuner.update(0.0, late + noise, DT_S) * DT_S;
         }
-        assert!(tuner.oscillation().is_some() && tuner.failure().is_none(), "{tuner:?}");
+        assert!(tuner.ultimate().is_some() && tuner.failure().is_none(), "{tuner:?}");
     }
 
     #[test]
     fn a_swing_within_the_hysteresis_has_no_gain() {
-        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, f32::MAX)).unwrap();
+        let mut tuner = RelayTuner::new(1.0, f32::MAX).unwrap();
         tuner.state = State::Done;
         assert_eq!(
-            (tuner.oscillation(), tuner.failure()),
+            (tuner.ultimate(), tuner.failure()),
             (None, Some(ConfigError::NoGain("hysteresis")))
         );
     }
 
     #[test]
     fn a_time_limit_of_hours_ends_at_short_steps_too() {
-        let config = RelayTunerConfig::new(1.0, 0.1).with_time_limit(20_000.0);
-        let mut tuner = RelayTuner::new(config).unwrap();
+        let mut tuner = relay(1.0, 0.1).with_time_limit(20_000.0).unwrap();
         tuner.passed = Sum::from(19_999.0);
         let mut steps = 0_u32;
         while !tuner.is_complete() && steps < 3_000 {
@@ -489,7 +477,7 @@ mod tests {
 
     #[test]
     fn bad_samples_and_bad_times_change_nothing() {
-        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.1).with_bias(0.5)).unwrap();
+        let mut tuner = RelayTuner::new(1.0, 0.1).and_then(|tuner| tuner.with_bias(0.5)).unwrap();
         assert_eq!(tuner.output(), 0.5);
         tuner.update(1.0, 0.0, DT_S);
         let before = tuner;
@@ -504,7 +492,7 @@ mod tests {
 
     #[test]
     fn a_long_pause_starts_the_measurement_anew() {
-        let mut tuner = RelayTuner::new(RelayTunerConfig::new(1.0, 0.02)).unwrap();
+        let mut tuner = RelayTuner::new(1.0, 0.02).unwrap();
         let mut seen: VecDeque<f32> = [0.0; 10].into();
         let mut speed = 0.0;
         for step in 0..100_000_u32 {
@@ -516,21 +504,21 @@ mod tests {
                 break;
             }
         }
-        assert!((tuner.oscillation().unwrap().ultimate_period_s - 0.044).abs() < 0.002);
+        assert!((tuner.ultimate().unwrap().1 - 0.044).abs() < 0.002);
     }
 
     #[test]
     fn a_parameter_that_cannot_be_is_named() {
-        let new = RelayTunerConfig::new(1.0, 0.1);
-        for (config, name) in [
-            (RelayTunerConfig::new(-1.0, 0.1), "amplitude"),
-            (RelayTunerConfig::new(1.0, f32::NAN), "hysteresis"),
+        let new = relay(1.0, 0.1);
+        for (made, name) in [
+            (RelayTuner::new(-1.0, 0.1), "amplitude"),
+            (RelayTuner::new(1.0, f32::NAN), "hysteresis"),
             (new.with_bias(f32::INFINITY), "bias"),
-            (RelayTunerConfig::new(f32::MAX, 0.1).with_bias(f32::MIN), "bias"),
+            (relay(f32::MAX, 0.1).with_bias(f32::MIN), "bias"),
             (new.with_cycles(0), "cycles"),
             (new.with_time_limit(0.0), "time_limit"),
         ] {
-            assert_eq!(RelayTuner::new(config).unwrap_err().parameter(), name);
+            assert_eq!(made.unwrap_err().parameter(), name);
         }
     }
 }

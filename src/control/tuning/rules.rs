@@ -30,37 +30,27 @@ pub enum TuningRule {
     TyreusLuybenPid,
 }
 
-/// What a [`RelayTuner`](super::RelayTuner) found out about the plant.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{Oscillation, TuningRule};
-///
-/// let found = Oscillation { ultimate_gain: 10.0, ultimate_period_s: 0.2 };
-/// let speed = found.pid(TuningRule::ZieglerNicholsPid).with_output_limit(20.0);
-/// assert_eq!(speed.gains(), (6.0, 60.0, 0.15)); // kp, ki, kd
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Oscillation {
-    /// `Ku`, the proportional gain at which the loop would just keep oscillating, in units of the output over the measurement.
-    pub ultimate_gain: f32,
-    /// `Tu`, the period of that oscillation in seconds.
-    pub ultimate_period_s: f32,
-}
-
-impl Oscillation {
-    /// Returns a configuration with the gains by `rule`, and no option.
+impl TuningRule {
+    /// Returns a configuration with the gains for an ultimate gain `Ku` and a period `Tu` in seconds, and no option.
+    ///
+    /// [`RelayTuner::pid`](super::RelayTuner::pid) measures both.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::TuningRule;
+    ///
+    /// let speed = TuningRule::ZieglerNicholsPid.pid(10.0, 0.2).with_output_limit(20.0);
+    /// assert_eq!(speed.gains(), (6.0, 60.0, 0.15)); // kp, ki, kd
+    /// ```
     #[must_use]
-    pub const fn pid(&self, rule: TuningRule) -> PidConfig {
-        let (ku, tu) = (self.ultimate_gain, self.ultimate_period_s);
-        let (kp, ki, kd) = match rule {
-            TuningRule::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
-            TuningRule::ZieglerNicholsPi => (0.45 * ku, 0.54 * ku / tu, 0.0),
-            TuningRule::ZieglerNicholsPid => (0.6 * ku, 1.2 * ku / tu, 0.075 * ku * tu),
-            TuningRule::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
-            TuningRule::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
+    pub const fn pid(self, ultimate_gain: f32, ultimate_period_s: f32) -> PidConfig {
+        let (ku, tu) = (ultimate_gain, ultimate_period_s);
+        let (kp, ki, kd) = match self {
+            Self::ZieglerNicholsP => (0.5 * ku, 0.0, 0.0),
+            Self::ZieglerNicholsPi => (0.45 * ku, 0.54 * ku / tu, 0.0),
+            Self::ZieglerNicholsPid => (0.6 * ku, 1.2 * ku / tu, 0.075 * ku * tu),
+            Self::TyreusLuybenPi => (ku / 3.2, ku / (3.2 * 2.2 * tu), 0.0),
+            Self::TyreusLuybenPid => (ku / 2.2, ku / (2.2 * 2.2 * tu), ku * tu / (2.2 * 6.3)),
         };
         PidConfig::new(kp, ki, kd)
     }
