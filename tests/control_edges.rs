@@ -107,14 +107,13 @@ const fn every_option() -> PidConfig {
 }
 
 fn position(angle: PidConfig, speed: PidConfig) -> PositionActuator {
-    let speed = SpeedActuatorConfig::new(speed).with_output_filter(300.0);
-    let config = PositionActuatorConfig::new(angle, speed).with_outer_divider(3);
-    PositionActuator::new(config.with_angle_filter(200.0)).unwrap()
+    let speed = SpeedActuator::new(speed).unwrap().with_output_filter(300.0).unwrap();
+    let config = PositionActuator::new(angle, speed).unwrap().with_outer_divider(3).unwrap();
+    config.with_angle_filter(200.0).unwrap()
 }
 
 fn bare(angle: PidConfig, speed: PidConfig) -> PositionActuator {
-    PositionActuator::new(PositionActuatorConfig::new(angle, SpeedActuatorConfig::new(speed)))
-        .unwrap()
+    PositionActuator::new(angle, SpeedActuator::new(speed).unwrap()).unwrap()
 }
 
 type Row = (Long, Box<dyn Subject>);
@@ -124,7 +123,7 @@ fn table(gains: PidConfig) -> Vec<Row> {
     let (kp, ki, kd) = gains.gains();
     let incremental = PidConfig::new(kp, ki, kd).with_output_limit(50.0).with_incremental_form();
     let tracking = incremental.with_tracking(80.0);
-    let filtered = SpeedActuatorConfig::new(gains).with_feedback_filter(100.0);
+    let filtered = SpeedActuator::new(gains).unwrap().with_feedback_filter(100.0).unwrap();
     let options = every_option().with_gains(kp, ki, kd);
     use Long::{CountsAs, Freezes, FreezesBehindFilter, InFull, NoTime, StartsAnew};
     vec![
@@ -136,10 +135,10 @@ fn table(gains: PidConfig) -> Vec<Row> {
         (CountsAs(0.01), Box::new(Differentiator::optimal(1e4, 0.0125, 0.01).unwrap())),
         (CountsAs(0.1), Box::new(SlewLimiter::new(30.0, 60.0).unwrap())),
         (Freezes, Box::new(Cascade::new(gains, gains).unwrap())),
-        (Freezes, Box::new(SpeedActuator::new(SpeedActuatorConfig::new(gains)).unwrap())),
+        (Freezes, Box::new(SpeedActuator::new(gains).unwrap())),
         (Freezes, Box::new(bare(gains, gains))),
         (Freezes, Box::new(ByError(bare(gains, gains)))),
-        (FreezesBehindFilter, Box::new(SpeedActuator::new(filtered).unwrap())),
+        (FreezesBehindFilter, Box::new(filtered)),
         (FreezesBehindFilter, Box::new(position(gains, gains))),
         (FreezesBehindFilter, Box::new(Pid::new(tracking).unwrap())),
         (InFull, Box::new(LowPass::new(10.0).unwrap())),
@@ -346,10 +345,10 @@ fn the_count_of_refused_steps_stays_at_its_end() {
 #[test]
 fn after_a_bad_input_the_filters_of_an_actuator_start_anew_and_smooth_again() {
     let proportional = PidConfig::new(2.0, 0.0, 0.0);
-    let smooth = SpeedActuatorConfig::new(proportional).with_feedback_filter(1.0);
-    let mut speed = SpeedActuator::new(smooth).unwrap();
-    let position = PositionActuatorConfig::new(PidConfig::new(3.0, 0.0, 0.0), smooth);
-    let mut position = PositionActuator::new(position.with_angle_filter(1.0)).unwrap();
+    let smooth = SpeedActuator::new(proportional).unwrap().with_feedback_filter(1.0).unwrap();
+    let mut speed = smooth;
+    let position = PositionActuator::new(PidConfig::new(3.0, 0.0, 0.0), smooth).unwrap();
+    let mut position = position.with_angle_filter(1.0).unwrap();
     for bad in NOT_FINITE {
         for _ in 0..5 {
             speed.step(0.0, 1.0, &TimeStep::of(DT_S));
@@ -399,7 +398,7 @@ fn a_positive_kd_damps_in_every_controller_by_every_way_in() {
     let mut four = Pid::new(incremental).unwrap();
     let mut five = four;
     let mut tracking = Pid::new(incremental.with_tracking(80.0)).unwrap();
-    let mut six = SpeedActuator::new(SpeedActuatorConfig::new(damper)).unwrap();
+    let mut six = SpeedActuator::new(damper).unwrap();
     let mut seven = six;
     let (mut eight, mut inner) = (bare(damper, follower), bare(idle, damper));
     let (mut nine, mut ten, mut eleven) = (eight, eight, eight);
@@ -440,13 +439,19 @@ fn a_positive_kd_damps_in_every_controller_by_every_way_in() {
 /// A bad constant of these does not compile.
 #[test]
 fn what_needs_arithmetic_and_comparison_only_is_made_in_a_constant() {
-    const SPEED: SpeedActuatorConfig = SpeedActuatorConfig::new(GAINS).with_feedback_filter(100.0);
+    const SPEED: Option<SpeedActuator> = match SpeedActuator::new(GAINS) {
+        Ok(speed) => match speed.with_feedback_filter(100.0) {
+            Ok(speed) => Some(speed),
+            Err(_) => None,
+        },
+        Err(_) => None,
+    };
     const MADE: [bool; 15] = [
         Pid::new(every_option()).is_ok(),
         Pid::new(GAINS.with_incremental_form().with_tracking(5.0)).is_ok(),
         Cascade::new(GAINS, GAINS).is_ok(),
-        SpeedActuator::new(SPEED).is_ok(),
-        PositionActuator::new(PositionActuatorConfig::new(GAINS, SPEED)).is_ok(),
+        SPEED.is_some(),
+        matches!(SPEED, Some(speed) if PositionActuator::new(GAINS, speed).is_ok()),
         Differentiator::linear(100.0, DT_S).is_ok(),
         Differentiator::optimal(1e4, 0.002, DT_S).is_ok(),
         LowPass::new(10.0).is_ok(),
@@ -482,12 +487,12 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
 #[test]
 fn without_ki_nothing_is_wound_up() {
     let proportional = PidConfig::new(2.0, 0.0, 0.0).with_output_limit(50.0);
-    let actuator = SpeedActuatorConfig::new(proportional);
+    let actuator = SpeedActuator::new(proportional).unwrap();
     let loops: [Box<dyn Subject>; 6] = [
         Box::new(Pid::new(proportional).unwrap()),
         Box::new(Pid::new(every_option().with_gains(2.0, 0.0, 0.0)).unwrap()),
         Box::new(Cascade::new(proportional, proportional).unwrap()),
-        Box::new(SpeedActuator::new(actuator).unwrap()),
+        Box::new(actuator),
         Box::new(bare(proportional, proportional)),
         Box::new(ByError(bare(proportional, proportional))),
     ];
@@ -509,9 +514,9 @@ fn without_ki_nothing_is_wound_up() {
 #[test]
 fn the_angle_loop_rests_when_one_of_its_steps_was_too_long() {
     let integral = PidConfig::new(0.0, 1.0, 0.0);
-    let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
-    let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(4);
-    let mut actuator = PositionActuator::new(config).unwrap();
+    let speed = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
+    let mut actuator =
+        PositionActuator::new(integral, speed).unwrap().with_outer_divider(4).unwrap();
     for step in 0..=8 {
         let dt_s = if step == 6 { 10.0 } else { 0.1 };
         actuator.step(1.0, 0.0, 0.0, &TimeStep::of(dt_s));
@@ -524,9 +529,10 @@ fn the_angle_loop_rests_when_one_of_its_steps_was_too_long() {
 fn the_integral_of_the_angle_loop_works_at_every_divider() {
     for divider in [1, 5, 120, 255] {
         let integral = PidConfig::new(0.0, 1.0, 0.0);
-        let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
-        let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(divider);
-        let mut actuator = PositionActuator::new(config).unwrap();
+        let speed = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
+        let config =
+            PositionActuator::new(integral, speed).unwrap().with_outer_divider(divider).unwrap();
+        let mut actuator = config;
         for _ in 0..=10 * u32::from(divider) {
             actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
@@ -625,8 +631,9 @@ const CONTRADICTIONS: Parameters = &[
     ("outer_divider", |_| angle(|config| config.with_outer_divider(0))),
     ("angle_filter", |_| {
         let circle =
-            PositionActuatorConfig::new(GAINS.with_period(360.0), SpeedActuatorConfig::new(GAINS));
-        PositionActuator::new(circle.with_angle_filter(10.0)).err()
+            PositionActuator::new(GAINS.with_period(360.0), SpeedActuator::new(GAINS).unwrap())
+                .unwrap();
+        circle.with_angle_filter(10.0).err()
     }),
     ("cycles", |_| RelayTuner::new(1.0, 0.1).and_then(|tuner| tuner.with_cycles(0)).err()),
     ("bias", |_| RelayTuner::new(f32::MAX, 0.1).and_then(|tuner| tuner.with_bias(f32::MAX)).err()),
@@ -639,13 +646,17 @@ fn incremental(with: impl Fn(PidConfig) -> PidConfig) -> Option<ConfigError> {
     Pid::new(with(PidConfig::new(1.0, 1.0, 1.0).with_incremental_form())).err()
 }
 
-fn speed(with: impl Fn(SpeedActuatorConfig) -> SpeedActuatorConfig) -> Option<ConfigError> {
-    SpeedActuator::new(with(SpeedActuatorConfig::new(GAINS))).err()
+fn speed(
+    with: impl Fn(SpeedActuator) -> Result<SpeedActuator, ConfigError>,
+) -> Option<ConfigError> {
+    SpeedActuator::new(GAINS).and_then(with).err()
 }
 
-fn angle(with: impl Fn(PositionActuatorConfig) -> PositionActuatorConfig) -> Option<ConfigError> {
-    let config = PositionActuatorConfig::new(GAINS, SpeedActuatorConfig::new(GAINS));
-    PositionActuator::new(with(config)).err()
+fn angle(
+    with: impl Fn(PositionActuator) -> Result<PositionActuator, ConfigError>,
+) -> Option<ConfigError> {
+    let speed = SpeedActuator::new(GAINS).unwrap();
+    PositionActuator::new(GAINS, speed).and_then(with).err()
 }
 
 #[test]

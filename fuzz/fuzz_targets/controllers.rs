@@ -2,9 +2,8 @@
 #![no_main]
 
 use drivetrain::control::{
-    Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator,
-    PositionActuatorConfig, Profile, RelayTuner, SlewLimiter, SpeedActuator, SpeedActuatorConfig,
-    StepResponse, TimeStep, Window,
+    Biquad, ConfigError, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator,
+    Profile, RelayTuner, SlewLimiter, SpeedActuator, StepResponse, TimeStep, Window,
 };
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
@@ -125,20 +124,22 @@ fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
     }
 }
 
-fn speed_config(input: &mut Input) -> SpeedActuatorConfig {
-    let mut config = SpeedActuatorConfig::new(pid_config(input));
+fn speed_loop(input: &mut Input) -> Result<SpeedActuator, ConfigError> {
+    let mut actuator = SpeedActuator::new(pid_config(input));
     let options = input.byte();
     if options & 1 != 0 {
-        config = config.with_feedback_filter(input.positive());
+        let cutoff_hz = input.positive();
+        actuator = actuator.and_then(|actuator| actuator.with_feedback_filter(cutoff_hz));
     }
     if options & 2 != 0 {
-        config = config.with_output_filter(input.positive());
+        let cutoff_hz = input.positive();
+        actuator = actuator.and_then(|actuator| actuator.with_output_filter(cutoff_hz));
     }
-    config
+    actuator
 }
 
 fn speed_actuator(mut input: Input) {
-    let Ok(fresh) = SpeedActuator::new(speed_config(&mut input)) else { return };
+    let Ok(fresh) = speed_loop(&mut input) else { return };
     let range = fresh.pid().config().output_range();
     let mut actuator = Observed::new(fresh);
     while !input.is_empty() {
@@ -168,15 +169,17 @@ fn speed_actuator(mut input: Input) {
 
 fn position_actuator(mut input: Input) {
     let angle = pid_config(&mut input);
-    let mut config = PositionActuatorConfig::new(angle, speed_config(&mut input));
+    let mut actuator = speed_loop(&mut input).and_then(|speed| PositionActuator::new(angle, speed));
     let options = input.byte();
     if options & 1 != 0 {
-        config = config.with_angle_filter(input.positive());
+        let cutoff_hz = input.positive();
+        actuator = actuator.and_then(|actuator| actuator.with_angle_filter(cutoff_hz));
     }
     if options & 2 != 0 {
-        config = config.with_outer_divider(input.byte());
+        let divider = input.byte();
+        actuator = actuator.and_then(|actuator| actuator.with_outer_divider(divider));
     }
-    let Ok(fresh) = PositionActuator::new(config) else { return };
+    let Ok(fresh) = actuator else { return };
     let range = fresh.cascade().speed().config().output_range();
     let (slowest, fastest) = fresh.cascade().position().config().output_range();
     let mut actuator = Observed::new(fresh);

@@ -49,9 +49,7 @@ mod shaping;
 mod step;
 mod tuning;
 
-pub use actuator::{
-    Cascade, PositionActuator, PositionActuatorConfig, SpeedActuator, SpeedActuatorConfig,
-};
+pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};

@@ -13,9 +13,8 @@ pub fn call_all() {
     Cascade::position_mut.call();
     Cascade::speed.call();
     Cascade::speed_mut.call();
-    PositionActuatorConfig::new.call();
-    PositionActuatorConfig::with_angle_filter.call();
-    PositionActuatorConfig::with_outer_divider.call();
+    PositionActuator::with_angle_filter.call();
+    PositionActuator::with_outer_divider.call();
     PositionActuator::new.call();
     PositionActuator::step.call();
     PositionActuator::step_error.call();
@@ -27,9 +26,8 @@ pub fn call_all() {
     PositionActuator::cascade.call();
     PositionActuator::cascade_mut.call();
     PositionActuator::rejected.call();
-    SpeedActuatorConfig::new.call();
-    SpeedActuatorConfig::with_feedback_filter.call();
-    SpeedActuatorConfig::with_output_filter.call();
+    SpeedActuator::with_feedback_filter.call();
+    SpeedActuator::with_output_filter.call();
     SpeedActuator::new.call();
     SpeedActuator::step.call();
     SpeedActuator::reset.call();

@@ -6,8 +6,8 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
     Biquad, Cascade, ConfigError, Differentiator, FeedForward, LowPass, MotionLimits, Pid,
-    PidConfig, PositionActuator, PositionActuatorConfig, Profile, ProfileState, RelayTuner,
-    SlewLimiter, SpeedActuator, SpeedActuatorConfig, StepResponse, TimeStep, Window,
+    PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator,
+    StepResponse, TimeStep, Window,
 };
 
 const DT_S: f32 = 0.001;
@@ -112,10 +112,10 @@ fn loops() {
         );
     }
     let pid = PidConfig::new(0.8, 4.0, 0.001).with_output_limit(20.0).with_integral_limit(10.0);
-    let bare = SpeedActuatorConfig::new(pid);
-    let filtered = bare.with_feedback_filter(100.0).with_output_filter(200.0);
+    let bare = SpeedActuator::new(pid).unwrap();
+    let filtered = bare.with_feedback_filter(100.0).unwrap().with_output_filter(200.0).unwrap();
     for (name, config) in [("speed_actuator", bare), ("speed_actuator_filters", filtered)] {
-        let mut actuator = SpeedActuator::new(black_box(config)).unwrap();
+        let mut actuator = black_box(config);
         row(
             name,
             &[instructions(control_speed as Step<_>, |update, call| {
@@ -134,8 +134,7 @@ fn loops() {
             },
         )],
     );
-    let mut actuator =
-        PositionActuator::new(black_box(PositionActuatorConfig::new(pid, bare))).unwrap();
+    let mut actuator = black_box(PositionActuator::new(pid, bare).unwrap());
     row(
         "position_actuator",
         &[instructions(

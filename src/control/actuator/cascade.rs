@@ -49,6 +49,10 @@ impl Cascade {
         }
     }
 
+    pub(super) const fn of(position: Pid, speed: Pid) -> Self {
+        Self { speed, position }
+    }
+
     /// Steps both loops and returns the output.
     #[inline]
     pub fn step(&mut self, error: f32, velocity: f32, step: &TimeStep) -> f32 {

@@ -14,8 +14,8 @@ mod position;
 mod speed;
 
 pub use cascade::Cascade;
-pub use position::{PositionActuator, PositionActuatorConfig};
-pub use speed::{SpeedActuator, SpeedActuatorConfig};
+pub use position::PositionActuator;
+pub use speed::SpeedActuator;
 
 use super::error::{ConfigError, positive};
 use super::filter::LowPass;
@@ -27,14 +27,11 @@ use super::step::TimeStep;
 struct OptionalFilter(Option<LowPass>);
 
 impl OptionalFilter {
-    /// Makes the filter, if one was asked for, and calls its cut-off by the name it has here.
-    const fn new(name: &'static str, cutoff_hz: Option<f32>) -> Result<Self, ConfigError> {
-        match cutoff_hz {
-            None => Ok(Self(None)),
-            Some(cutoff_hz) => match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
-                (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
-                (Err(error), _) | (_, Err(error)) => Err(error),
-            },
+    /// Makes the filter, and calls its cut-off by the name it has here.
+    const fn new(name: &'static str, cutoff_hz: f32) -> Result<Self, ConfigError> {
+        match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
+            (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
+            (Err(error), _) | (_, Err(error)) => Err(error),
         }
     }
 

@@ -1,53 +1,8 @@
-use super::speed::{SpeedActuatorConfig, SpeedFilters};
-use super::{Cascade, OptionalFilter};
+use super::speed::SpeedFilters;
+use super::{Cascade, OptionalFilter, SpeedActuator};
 use crate::control::error::ConfigError;
-use crate::control::pid::PidConfig;
+use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
-
-/// What a [`PositionActuator`] is made from: an angle loop over a speed loop, and options that are off until named.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig};
-///
-/// // Angle in degrees to speed in rad/s, at most 10 rad/s; speed to volts.
-/// let angle = PidConfig::new(0.2, 0.0, 0.0).with_output_limit(10.0).with_period(360.0);
-/// let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 5.0, 0.0).with_output_limit(24.0));
-/// let yaw = PositionActuatorConfig::new(angle, speed).with_outer_divider(5);
-/// assert!(PositionActuator::new(yaw).is_ok());
-/// assert_eq!(PositionActuator::new(yaw.with_outer_divider(0)).unwrap_err().parameter(), "outer_divider");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct PositionActuatorConfig {
-    angle: PidConfig,
-    speed: SpeedActuatorConfig,
-    angle_cutoff_hz: Option<f32>,
-    outer_divider: u8,
-}
-
-impl PositionActuatorConfig {
-    /// Takes the angle loop, whose output is the setpoint of the speed loop, and the speed loop.
-    #[must_use]
-    pub const fn new(angle: PidConfig, speed: SpeedActuatorConfig) -> Self {
-        Self { angle, speed, angle_cutoff_hz: None, outer_divider: 1 }
-    }
-
-    /// Filters the measured angle with a first-order low-pass of this cut-off, more than zero. Off by default.
-    ///
-    /// Not with a period of the angle loop: the mean of 359° and 1° is not 180°.
-    #[must_use]
-    pub const fn with_angle_filter(self, cutoff_hz: f32) -> Self {
-        Self { angle_cutoff_hz: Some(cutoff_hz), ..self }
-    }
-
-    /// Runs the angle loop on every `divider`-th step only, more than zero. The default is 1.
-    #[must_use]
-    pub const fn with_outer_divider(self, divider: u8) -> Self {
-        Self { outer_divider: divider, ..self }
-    }
-}
 
 /// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
@@ -69,13 +24,14 @@ impl PositionActuatorConfig {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig, TimeStep};
+/// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator, TimeStep};
 ///
 /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
-/// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 0.0, 0.0));
-/// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
+/// let speed = SpeedActuator::new(PidConfig::new(2.0, 0.0, 0.0))?;
+/// let mut arm = PositionActuator::new(angle, speed)?;
 /// assert_eq!(arm.step(1.0, 0.0, 1.0, &TimeStep::of(0.001)), 6.0); // 4 rad/s wanted, 1 rad/s measured
 /// assert_eq!(arm.speed_setpoint(), 4.0);
+/// assert_eq!(arm.with_outer_divider(0).unwrap_err().parameter(), "outer_divider");
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,35 +50,53 @@ pub struct PositionActuator {
 }
 
 impl PositionActuator {
-    /// Takes and checks the configuration.
+    /// Takes the angle loop, whose output is the setpoint of the speed loop, and the speed loop with its filters, which starts
+    /// anew.
     ///
     /// # Errors
-    /// Names the parameter of a loop as [`Pid::new`](crate::control::Pid::new) does, `angle_filter`, `feedback_filter` or `output_filter` when a cut-off
-    /// is NaN, infinite, zero or negative, `angle_filter` when the angle loop has a period, `outer_divider` when zero.
-    pub const fn new(config: PositionActuatorConfig) -> Result<Self, ConfigError> {
-        if config.outer_divider == 0 {
-            return Err(ConfigError::NotPositive("outer_divider"));
-        }
-        if config.angle_cutoff_hz.is_some() && config.angle.period() > 0.0 {
-            return Err(ConfigError::Conflict("angle_filter"));
-        }
-        let filter = match OptionalFilter::new("angle_filter", config.angle_cutoff_hz) {
-            Ok(filter) => filter,
-            Err(error) => return Err(error),
-        };
-        match (Cascade::new(config.angle, config.speed.pid()), config.speed.filters()) {
-            (Ok(cascade), Ok(filters)) => Ok(Self {
-                filter,
-                cascade,
-                filters,
+    /// Names the parameter of the angle loop as [`Pid::new`] does.
+    pub const fn new(angle: PidConfig, mut speed: SpeedActuator) -> Result<Self, ConfigError> {
+        speed.reset();
+        match Pid::new(angle) {
+            Ok(angle) => Ok(Self {
+                filter: OptionalFilter(None),
+                cascade: Cascade::of(angle, speed.pid),
+                filters: speed.filters,
                 passed_s: 0.0,
                 rejected: 0,
-                outer_divider: config.outer_divider,
+                outer_divider: 1,
                 until_outer: 0,
                 froze: false,
             }),
-            (Err(error), _) | (_, Err(error)) => Err(error),
+            Err(error) => Err(error),
         }
+    }
+
+    /// Filters the measured angle with a first-order low-pass of this cut-off, more than zero. Off by default.
+    ///
+    /// # Errors
+    /// Names `angle_filter` when the cut-off is NaN, infinite, zero or negative, and when the angle loop has a period: the mean of
+    /// 359° and 1° is not 180°.
+    pub const fn with_angle_filter(mut self, cutoff_hz: f32) -> Result<Self, ConfigError> {
+        if self.cascade.position().config().period() > 0.0 {
+            return Err(ConfigError::Conflict("angle_filter"));
+        }
+        match OptionalFilter::new("angle_filter", cutoff_hz) {
+            Ok(filter) => self.filter = filter,
+            Err(error) => return Err(error),
+        }
+        Ok(self)
+    }
+
+    /// Runs the angle loop on every `divider`-th step only, more than zero. The default is 1.
+    ///
+    /// # Errors
+    /// Names `outer_divider` when zero.
+    pub const fn with_outer_divider(self, divider: u8) -> Result<Self, ConfigError> {
+        if divider == 0 {
+            return Err(ConfigError::NotPositive("outer_divider"));
+        }
+        Ok(Self { outer_divider: divider, ..self })
     }
 
     /// Steps by a time that was validated before, and returns the output.
@@ -169,11 +143,11 @@ impl PositionActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, PositionActuator, PositionActuatorConfig, SpeedActuatorConfig, TimeStep};
+    /// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator, TimeStep};
     ///
-    /// let speed = SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0));
+    /// let speed = SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0))?;
     /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
-    /// let mut arm = PositionActuator::new(PositionActuatorConfig::new(angle, speed))?;
+    /// let mut arm = PositionActuator::new(angle, speed)?;
     /// arm.reset_to(3.0);
     /// assert_eq!((arm.output(), arm.step(1.0, 0.0, 0.0, &TimeStep::of(0.001))), (3.0, 3.0));
     /// # Ok::<(), drivetrain::control::ConfigError>(())
@@ -267,18 +241,20 @@ mod tests {
     use super::*;
 
     const DT_S: f32 = 0.001;
+    const ANGLE: PidConfig = PidConfig::new(10.0, 1.0, 0.1).with_output_limit(4.0);
 
-    fn config() -> PositionActuatorConfig {
-        PositionActuatorConfig::new(
-            PidConfig::new(10.0, 1.0, 0.1).with_output_limit(4.0),
-            SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)),
+    fn config() -> PositionActuator {
+        PositionActuator::new(
+            ANGLE,
+            SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)).unwrap(),
         )
+        .unwrap()
     }
 
     #[test]
     fn it_brings_an_inertia_to_its_angle_in_both_directions() {
         for target in [1.0, -1.0] {
-            let mut actuator = PositionActuator::new(config().with_outer_divider(2)).unwrap();
+            let mut actuator = config().with_outer_divider(2).unwrap();
             let (mut angle, mut speed) = (0.0_f32, 0.0_f32);
             let mut fastest = 0.0_f32;
             for _ in 0..3000 {
@@ -293,11 +269,12 @@ mod tests {
 
     #[test]
     fn the_angle_loop_runs_on_every_nth_step_with_its_own_time() {
-        let only_integral = PositionActuatorConfig::new(
+        let only_integral = PositionActuator::new(
             PidConfig::new(0.0, 1.0, 0.0),
-            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0)),
-        );
-        let mut actuator = PositionActuator::new(only_integral.with_outer_divider(5)).unwrap();
+            SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap(),
+        )
+        .unwrap();
+        let mut actuator = only_integral.with_outer_divider(5).unwrap();
         let mut changes = 0;
         let mut last = 0.0;
         for _ in 0..=100 {
@@ -311,9 +288,8 @@ mod tests {
 
     #[test]
     fn bad_samples_and_bad_times_leave_no_trace() {
-        let config = config().with_angle_filter(50.0).with_outer_divider(3);
-        let (mut clean, mut hit) =
-            (PositionActuator::new(config).unwrap(), PositionActuator::new(config).unwrap());
+        let config = config().with_angle_filter(50.0).unwrap().with_outer_divider(3).unwrap();
+        let (mut clean, mut hit) = (config, config);
         for sample in 0..20_u8 {
             let angle = f32::from(sample) * 0.1;
             let expected = clean.step(3.0, angle, 1.0, &TimeStep::of(DT_S));
@@ -336,12 +312,18 @@ mod tests {
 
     #[test]
     fn a_burst_of_bad_samples_of_a_moving_shaft_does_not_kick() {
-        let damped = PositionActuatorConfig::new(
+        let damped = PositionActuator::new(
             PidConfig::new(0.0, 0.0, 0.05),
-            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.05)).with_feedback_filter(50.0),
-        );
-        for config in [damped, damped.with_angle_filter(50.0), damped.with_outer_divider(3)] {
-            let mut actuator = PositionActuator::new(config).unwrap();
+            SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.05))
+                .unwrap()
+                .with_feedback_filter(50.0)
+                .unwrap(),
+        )
+        .unwrap();
+        for config in
+            [damped, damped.with_angle_filter(50.0).unwrap(), damped.with_outer_divider(3).unwrap()]
+        {
+            let mut actuator = config;
             let (mut angle, mut speed) = (0.0, 0.0);
             let mut most = 0.0_f32;
             for sample in 0..200_u8 {
@@ -358,11 +340,12 @@ mod tests {
 
     #[test]
     fn a_positive_kd_of_the_angle_loop_damps_by_way_of_the_error_too() {
-        let damper = PositionActuatorConfig::new(
+        let damper = PositionActuator::new(
             PidConfig::new(0.0, 0.0, 1.0),
-            SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0)),
-        );
-        let mut actuator = PositionActuator::new(damper).unwrap();
+            SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap(),
+        )
+        .unwrap();
+        let mut actuator = damper;
         for speed in [2.0, -2.0] {
             actuator.step_error(0.0, speed, &TimeStep::of(DT_S)); // on the first call too
             assert_eq!(actuator.speed_setpoint(), -speed);
@@ -375,11 +358,14 @@ mod tests {
     fn taking_over_gives_the_output_that_was_and_then_moves_from_there() {
         for divider in [1, 3] {
             let speed =
-                SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0));
-            for speed in [speed, speed.with_output_filter(50.0).with_feedback_filter(50.0)] {
-                let config =
-                    PositionActuatorConfig::new(config().angle, speed).with_outer_divider(divider);
-                let mut actuator = PositionActuator::new(config).unwrap();
+                SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)).unwrap();
+            for speed in
+                [speed, speed.with_output_filter(50.0).unwrap().with_feedback_filter(50.0).unwrap()]
+            {
+                let mut actuator = PositionActuator::new(ANGLE, speed)
+                    .unwrap()
+                    .with_outer_divider(divider)
+                    .unwrap();
                 for _ in 0..20 {
                     actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
                 }
@@ -397,12 +383,16 @@ mod tests {
 
     #[test]
     fn an_interruption_keeps_both_integrals_and_kicks_neither_d_nor_a_filter() {
-        let speed =
-            SpeedActuatorConfig::new(PidConfig::new(2.0, 5.0, 0.5)).with_feedback_filter(5.0);
-        let config = PositionActuatorConfig::new(PidConfig::new(1.0, 1.0, 0.1), speed)
+        let speed = SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.5))
+            .unwrap()
+            .with_feedback_filter(5.0)
+            .unwrap();
+        let mut actuator = PositionActuator::new(PidConfig::new(1.0, 1.0, 0.1), speed)
+            .unwrap()
             .with_angle_filter(5.0)
-            .with_outer_divider(4);
-        let mut actuator = PositionActuator::new(config).unwrap();
+            .unwrap()
+            .with_outer_divider(4)
+            .unwrap();
         for _ in 0..10 {
             actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
@@ -427,10 +417,12 @@ mod tests {
     #[test]
     fn a_step_that_was_validated_with_another_maximum_counts_in_full() {
         let integral = PidConfig::new(0.0, 1.0, 0.0);
-        let speed = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
+        let speed = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
         for divider in [1, 2, 5] {
-            let config = PositionActuatorConfig::new(integral, speed).with_outer_divider(divider);
-            let mut actuator = PositionActuator::new(config).unwrap();
+            let mut actuator = PositionActuator::new(integral, speed)
+                .unwrap()
+                .with_outer_divider(divider)
+                .unwrap();
             let step = TimeStep::new(0.5, 1.0);
             for _ in 0..=20 {
                 actuator.step(1.0, 0.0, 0.0, &step);
@@ -441,16 +433,16 @@ mod tests {
 
     #[test]
     fn a_bad_error_or_speed_leaves_the_given_rate_of_the_angle_as_it_is() {
-        let damper = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
-        let config = PositionActuatorConfig::new(PidConfig::new(0.0, 0.0, 1.0), damper);
-        let mut actuator = PositionActuator::new(config).unwrap();
+        let damper = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
+        let config = PositionActuator::new(PidConfig::new(0.0, 0.0, 1.0), damper).unwrap();
+        let mut actuator = config;
         actuator.step_error(0.0, 2.0, &TimeStep::of(DT_S));
         actuator.step_error(f32::NAN, 2.0, &TimeStep::of(DT_S));
         actuator.step_error(0.0, f32::NAN, &TimeStep::of(DT_S));
         actuator.step_error(0.0, 5.0, &TimeStep::of(DT_S));
         assert_eq!(actuator.cascade().position().terms().d, -5.0); // and not that of two steps ago
         // By angles, the travel since the last good one is not that of one step: D keeps its value once.
-        let mut actuator = PositionActuator::new(config).unwrap();
+        let mut actuator = config;
         actuator.step(0.0, 0.0, 0.0, &TimeStep::of(DT_S));
         actuator.step(0.0, 0.002, 0.0, &TimeStep::of(DT_S));
         actuator.step(0.0, f32::NAN, 0.0, &TimeStep::of(DT_S));
@@ -460,11 +452,11 @@ mod tests {
 
     #[test]
     fn reset_forgets() {
-        let mut actuator = PositionActuator::new(config()).unwrap();
+        let mut actuator = config();
         for _ in 0..10 {
             actuator.step(1.0, 0.0, 0.0, &TimeStep::of(DT_S));
         }
         actuator.reset();
-        assert_eq!(actuator, PositionActuator::new(config()).unwrap());
+        assert_eq!(actuator, config());
     }
 }

@@ -3,54 +3,6 @@ use crate::control::error::ConfigError;
 use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
 
-/// What a [`SpeedActuator`] is made from: a speed loop, and filters that are off until named.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig};
-///
-/// let wheel = SpeedActuatorConfig::new(PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0))
-///     .with_feedback_filter(100.0)
-///     .with_output_filter(0.0);
-/// assert_eq!(SpeedActuator::new(wheel).unwrap_err().parameter(), "output_filter");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct SpeedActuatorConfig {
-    pid: PidConfig,
-    feedback_cutoff_hz: Option<f32>,
-    output_cutoff_hz: Option<f32>,
-}
-
-impl SpeedActuatorConfig {
-    /// Takes the speed loop.
-    #[must_use]
-    pub const fn new(pid: PidConfig) -> Self {
-        Self { pid, feedback_cutoff_hz: None, output_cutoff_hz: None }
-    }
-
-    /// Filters the measured speed with a first-order low-pass of this cut-off, more than zero. Off by default.
-    #[must_use]
-    pub const fn with_feedback_filter(self, cutoff_hz: f32) -> Self {
-        Self { feedback_cutoff_hz: Some(cutoff_hz), ..self }
-    }
-
-    /// Filters the output with a first-order low-pass of this cut-off, more than zero. Off by default.
-    #[must_use]
-    pub const fn with_output_filter(self, cutoff_hz: f32) -> Self {
-        Self { output_cutoff_hz: Some(cutoff_hz), ..self }
-    }
-
-    pub(super) const fn pid(&self) -> PidConfig {
-        self.pid
-    }
-
-    pub(super) const fn filters(&self) -> Result<SpeedFilters, ConfigError> {
-        SpeedFilters::new(self)
-    }
-}
-
 /// A speed loop with its filters.
 ///
 /// ```text
@@ -68,17 +20,19 @@ impl SpeedActuatorConfig {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig, TimeStep};
+/// use drivetrain::control::{PidConfig, SpeedActuator, TimeStep};
 ///
-/// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(PidConfig::new(2.0, 2.5, 0.0)))?;
+/// let mut wheel = SpeedActuator::new(PidConfig::new(2.0, 2.5, 0.0))?;
 /// assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0);
+/// let error = wheel.with_feedback_filter(100.0)?.with_output_filter(0.0).unwrap_err();
+/// assert_eq!(error.parameter(), "output_filter");
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedActuator {
-    pid: Pid,
-    filters: SpeedFilters,
+    pub(super) pid: Pid,
+    pub(super) filters: SpeedFilters,
 }
 
 /// The filters about a speed loop, and what comes out of them.
@@ -91,15 +45,8 @@ pub(super) struct SpeedFilters {
 }
 
 impl SpeedFilters {
-    const fn new(config: &SpeedActuatorConfig) -> Result<Self, ConfigError> {
-        match (
-            OptionalFilter::new("feedback_filter", config.feedback_cutoff_hz),
-            OptionalFilter::new("output_filter", config.output_cutoff_hz),
-        ) {
-            (Ok(feedback), Ok(output)) => Ok(Self { feedback, output, value: 0.0 }),
-            (Err(error), _) | (_, Err(error)) => Err(error),
-        }
-    }
+    const NONE: Self =
+        Self { feedback: OptionalFilter(None), output: OptionalFilter(None), value: 0.0 };
 
     /// Runs the loop on the filtered speed, and returns what it gives, filtered and within its limits: a filter may
     /// pass its input by a rounding step, and limits may have been narrowed since its last one.
@@ -147,20 +94,39 @@ impl SpeedFilters {
 }
 
 impl SpeedActuator {
-    /// Takes and checks the configuration.
+    /// Takes and checks the speed loop, without filters.
     ///
     /// # Errors
-    /// Names the parameter of the loop as [`Pid::new`] does, or `feedback_filter` or `output_filter` when the cut-off is NaN,
-    /// infinite, zero or negative.
-    pub const fn new(config: SpeedActuatorConfig) -> Result<Self, ConfigError> {
-        let filters = match config.filters() {
-            Ok(filters) => filters,
-            Err(error) => return Err(error),
-        };
-        match Pid::new(config.pid) {
-            Ok(pid) => Ok(Self { pid, filters }),
+    /// Names the parameter of the loop as [`Pid::new`] does.
+    pub const fn new(pid: PidConfig) -> Result<Self, ConfigError> {
+        match Pid::new(pid) {
+            Ok(pid) => Ok(Self { pid, filters: SpeedFilters::NONE }),
             Err(error) => Err(error),
         }
+    }
+
+    /// Filters the measured speed with a first-order low-pass of this cut-off, more than zero. Off by default.
+    ///
+    /// # Errors
+    /// Names `feedback_filter` when the cut-off is NaN, infinite, zero or negative.
+    pub const fn with_feedback_filter(mut self, cutoff_hz: f32) -> Result<Self, ConfigError> {
+        match OptionalFilter::new("feedback_filter", cutoff_hz) {
+            Ok(filter) => self.filters.feedback = filter,
+            Err(error) => return Err(error),
+        }
+        Ok(self)
+    }
+
+    /// Filters the output with a first-order low-pass of this cut-off, more than zero. Off by default.
+    ///
+    /// # Errors
+    /// Names `output_filter` when the cut-off is NaN, infinite, zero or negative.
+    pub const fn with_output_filter(mut self, cutoff_hz: f32) -> Result<Self, ConfigError> {
+        match OptionalFilter::new("output_filter", cutoff_hz) {
+            Ok(filter) => self.filters.output = filter,
+            Err(error) => return Err(error),
+        }
+        Ok(self)
     }
 
     /// Steps by a time that was validated before, and returns the output.
@@ -189,10 +155,10 @@ impl SpeedActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, SpeedActuator, SpeedActuatorConfig, TimeStep};
+    /// use drivetrain::control::{PidConfig, SpeedActuator, TimeStep};
     ///
     /// let loop_ = PidConfig::new(0.0, 1.0, 0.5);
-    /// let mut wheel = SpeedActuator::new(SpeedActuatorConfig::new(loop_).with_feedback_filter(10.0))?;
+    /// let mut wheel = SpeedActuator::new(loop_)?.with_feedback_filter(10.0)?;
     /// for _ in 0..=1000 {
     ///     wheel.step(1.0, 0.0, &TimeStep::of(0.001));
     /// }
@@ -236,16 +202,19 @@ mod tests {
 
     const DT_S: f32 = 0.001;
 
-    fn filtered() -> SpeedActuatorConfig {
-        SpeedActuatorConfig::new(PidConfig::new(1.0, 2.0, 0.0).with_output_limit(5.0))
+    fn filtered() -> SpeedActuator {
+        SpeedActuator::new(PidConfig::new(1.0, 2.0, 0.0).with_output_limit(5.0))
+            .unwrap()
             .with_feedback_filter(50.0)
+            .unwrap()
             .with_output_filter(50.0)
+            .unwrap()
     }
 
     #[test]
     fn without_filters_it_is_its_pid() {
         let config = PidConfig::new(1.0, 2.0, 0.01).with_output_limit(5.0);
-        let mut actuator = SpeedActuator::new(SpeedActuatorConfig::new(config)).unwrap();
+        let mut actuator = SpeedActuator::new(config).unwrap();
         let mut pid = Pid::new(config).unwrap();
         for sample in 0..50_u8 {
             let speed = f32::from(sample) * 0.1;
@@ -258,7 +227,7 @@ mod tests {
 
     #[test]
     fn both_filters_smooth() {
-        let mut actuator = SpeedActuator::new(filtered()).unwrap();
+        let mut actuator = filtered();
         assert_eq!(actuator.step(0.0, 0.0, &TimeStep::of(DT_S)), 0.0);
         let first = actuator.step(4.0, 0.0, &TimeStep::of(DT_S));
         assert!(first > 0.5 && first < 1.5, "{first}"); // a quarter of the step after dt / (dt + T)
@@ -268,8 +237,7 @@ mod tests {
 
     #[test]
     fn bad_samples_and_bad_times_leave_no_trace() {
-        let (mut clean, mut hit) =
-            (SpeedActuator::new(filtered()).unwrap(), SpeedActuator::new(filtered()).unwrap());
+        let (mut clean, mut hit) = (filtered(), filtered());
         for sample in 0..20_u8 {
             let speed = f32::from(sample) * 0.1;
             let expected = clean.step(3.0, speed, &TimeStep::of(DT_S));
@@ -291,7 +259,7 @@ mod tests {
 
     #[test]
     fn reset_to_takes_over_without_a_jump() {
-        let mut actuator = SpeedActuator::new(filtered()).unwrap();
+        let mut actuator = filtered();
         actuator.step(1.0, 0.0, &TimeStep::of(DT_S));
         actuator.reset_to(2.0);
         assert_eq!(actuator.output(), 2.0);
@@ -306,8 +274,7 @@ mod tests {
         for parts in 1..2_000_u16 {
             let pid =
                 PidConfig::new(1.0, 0.0, 0.0).with_output_range(-0.37 * f32::from(parts), 1.1);
-            let config = SpeedActuatorConfig::new(pid).with_output_filter(1e12);
-            let mut actuator = SpeedActuator::new(config).unwrap();
+            let mut actuator = SpeedActuator::new(pid).unwrap().with_output_filter(1e12).unwrap();
             actuator.step(-1e4, 0.0, &TimeStep::of(DT_S));
             let output = actuator.step(1e4, 0.0, &TimeStep::of(DT_S));
             assert!(output <= 1.1, "{output}");
@@ -316,7 +283,7 @@ mod tests {
 
     #[test]
     fn a_limit_that_was_narrowed_holds_behind_the_filter_at_once() {
-        let mut actuator = SpeedActuator::new(filtered()).unwrap();
+        let mut actuator = filtered();
         for _ in 0..100 {
             actuator.step(100.0, 0.0, &TimeStep::of(DT_S));
         }
@@ -330,8 +297,8 @@ mod tests {
     #[test]
     fn a_cut_off_that_cannot_be_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            let new = SpeedActuatorConfig::new(PidConfig::new(1.0, 0.0, 0.0));
-            let feedback = SpeedActuator::new(new.with_feedback_filter(bad)).unwrap_err();
+            let new = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
+            let feedback = new.with_feedback_filter(bad).unwrap_err();
             assert_eq!(feedback.parameter(), "feedback_filter");
         }
     }
