@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// A parameter of a controller, filter, profile or tuner that cannot work, by its name.
+/// A parameter of a controller, filter, profile, tuner or motor that cannot work, by its name.
 ///
 /// # Examples
 /// ```
@@ -26,6 +26,8 @@ pub enum ConfigError {
     Unstable(&'static str),
     /// It is NaN or infinite.
     NotFinite(&'static str),
+    /// It is outside of the range that its documentation gives.
+    Unusable(&'static str),
     /// It does not go together with another parameter.
     Conflict(&'static str),
     /// It is where the change starts, so that there is none.
@@ -52,6 +54,7 @@ impl ConfigError {
             | Self::Reversed(parameter)
             | Self::Unstable(parameter)
             | Self::NotFinite(parameter)
+            | Self::Unusable(parameter)
             | Self::Conflict(parameter)
             | Self::NoChange(parameter)
             | Self::OutOfRange(parameter)
@@ -71,6 +74,7 @@ impl fmt::Display for ConfigError {
             Self::Reversed(_) => ": the lower end must lie below the upper one",
             Self::Unstable(_) => ": too fast for this time step",
             Self::NotFinite(_) => ": must be finite",
+            Self::Unusable(_) => " is not usable",
             Self::Conflict(_) => ": does not go together with another parameter",
             Self::NoChange(_) => ": must differ from the start",
             Self::OutOfRange(_) => ": outside of the range in which f32 is exact enough",

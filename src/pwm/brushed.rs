@@ -4,7 +4,7 @@ mod health;
 
 use super::Direction;
 use super::rc::duty;
-use crate::control::{Pid, TimeStep};
+use crate::control::{ConfigError, Pid, TimeStep};
 use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
 use crate::time::{Instant, Tick};
 pub use config::BrushedConfig;
@@ -104,12 +104,12 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     ///
     /// # Errors
     /// Names the parameter that is not usable.
-    pub fn new(channel: P, direction: D, config: BrushedConfig) -> Result<Self, super::PwmError> {
+    pub fn new(channel: P, direction: D, config: BrushedConfig) -> Result<Self, ConfigError> {
         config.validate()?;
-        let speed = config.make_loop().map_err(|error| super::PwmError(error.parameter()))?;
+        let speed = config.make_loop()?;
         let guard =
             if config.counts_per_turn.is_some() { Guard::new() } else { Guard::without_feedback() };
-        let watch = Watch::new().with_config(config.health).map_err(super::PwmError)?;
+        let watch = Watch::new().with_config(config.health).map_err(ConfigError::Unusable)?;
         Ok(Self {
             channel,
             direction,

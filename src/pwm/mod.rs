@@ -16,7 +16,8 @@
 //! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
 //! | [`Direction`]: an array of one pin, or a tuple of two | how the bridge is told which way |
 //! | [`HealthConfig`](crate::motor::HealthConfig) | when a brushed motor with an encoder counts as stalled, or runs away |
-//! | [`PwmError`], [`BrushedError`] | what is wrong with a configuration, or with a pin |
+//! | [`BrushedError`] | which pin failed |
+//! | [`ConfigError`](crate::control::ConfigError) | what is wrong with a configuration |
 //!
 //! They follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a target
 //! that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency stop give
@@ -40,4 +41,4 @@ mod tests;
 
 pub use brushed::{Brushed, BrushedConfig, BrushedError};
 pub use direction::Direction;
-pub use rc::{PwmError, RcConfig, RcPwm};
+pub use rc::{RcConfig, RcPwm};

@@ -1,4 +1,4 @@
-use crate::control::TimeStep;
+use crate::control::{ConfigError, TimeStep};
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
     OPENING, TargetError, Timeouts, VelocityDrive,
@@ -114,9 +114,9 @@ impl RcConfig {
     ///
     /// # Errors
     /// Names the first that is not usable.
-    pub fn validate(&self) -> Result<(), PwmError> {
+    pub fn validate(&self) -> Result<(), ConfigError> {
         let speed = self.full_speed.map(AngularVelocity::as_rad_per_s);
-        Err(PwmError(if self.low_us == 0 || self.low_us >= self.high_us {
+        Err(ConfigError::Unusable(if self.low_us == 0 || self.low_us >= self.high_us {
             "low pulse"
         } else if self.neutral_us < self.low_us || self.neutral_us > self.high_us {
             "neutral pulse"
@@ -135,19 +135,6 @@ impl Default for RcConfig {
         Self::new()
     }
 }
-
-/// A parameter that is not usable, by its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PwmError(pub &'static str);
-
-impl core::fmt::Display for PwmError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} is not usable", self.0)
-    }
-}
-
-impl core::error::Error for PwmError {}
 
 /// An RC ESC or servo on a PWM channel whose timer runs at the period of the configuration.
 ///
@@ -205,7 +192,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
     ///
     /// # Errors
     /// Names the parameter that is not usable.
-    pub fn new(channel: P, config: RcConfig) -> Result<Self, PwmError> {
+    pub fn new(channel: P, config: RcConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let guard =
             Guard::without_feedback().with_timeouts(config.timeouts).with_opening(config.opening);

@@ -1,6 +1,5 @@
 use crate::control::{ConfigError, Pid, PidConfig};
 use crate::motor::{HealthConfig, MotorName, OPENING, Timeouts};
-use crate::pwm::PwmError;
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
@@ -113,12 +112,12 @@ impl BrushedConfig {
     ///
     /// # Errors
     /// Names the first that is not usable.
-    pub fn validate(&self) -> Result<(), PwmError> {
+    pub fn validate(&self) -> Result<(), ConfigError> {
         let bad = |number: f32| !(number.is_finite() && number > 0.0);
         if let Err(parameter) = self.health.validate() {
-            return Err(PwmError(parameter));
+            return Err(ConfigError::Unusable(parameter));
         }
-        Err(PwmError(if self.counts_per_turn.is_some_and(bad) {
+        Err(ConfigError::Unusable(if self.counts_per_turn.is_some_and(bad) {
             "counts per turn"
         } else if !(8..=32).contains(&self.counter_bits) {
             "counter width"
@@ -131,7 +130,7 @@ impl BrushedConfig {
         } else if self.speed.is_some() && self.counts_per_turn.is_none() {
             "speed loop without an encoder"
         } else {
-            return self.make_loop().map(|_| ()).map_err(|error| PwmError(error.parameter()));
+            return self.make_loop().map(|_| ());
         }))
     }
 

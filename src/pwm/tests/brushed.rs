@@ -230,7 +230,7 @@ fn parameters_that_make_no_sense_are_named() {
         (config.with_speed_loop(SPEED), "speed loop without an encoder"),
         (WHEEL.with_speed_loop(bad_gain), "kp"),
     ] {
-        assert_eq!(config.validate(), Err(PwmError(name)));
+        assert_eq!(config.validate().map_err(|error| error.parameter()), Err(name));
     }
 }
 

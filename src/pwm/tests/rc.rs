@@ -1,6 +1,7 @@
 //! The RC ESC and servo.
 
 use super::*;
+use crate::control::ConfigError;
 
 fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
     let config = config.with_arming_time(Duration::from_millis(5));
@@ -191,6 +192,6 @@ fn parameters_that_make_no_sense_are_named() {
         (config.with_full_speed(AngularVelocity::from_rpm(f32::NAN)), "full speed"),
     ] {
         let log = Log::default();
-        assert_eq!(RcPwm::new(pin("esc", &log), config).err(), Some(PwmError(name)));
+        assert_eq!(RcPwm::new(pin("esc", &log), config).err(), Some(ConfigError::Unusable(name)));
     }
 }
