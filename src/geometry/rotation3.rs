@@ -14,7 +14,7 @@ use crate::units::Angle;
 /// let left = Rotation3::from_roll_pitch_yaw(Angle::ZERO, Angle::ZERO, Angle::from_degrees(90.0));
 /// let turned = left.apply(Vec3::new(1.0, 0.0, 0.0));
 /// assert!(turned.x.abs() < 1e-6 && (turned.y - 1.0).abs() < 1e-6);
-/// assert!((left.compose(left).roll_pitch_yaw().yaw.as_degrees().abs() - 180.0).abs() < 1e-4);
+/// assert!((left.compose(left).roll_pitch_yaw()[2].as_degrees().abs() - 180.0).abs() < 1e-4);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
