@@ -55,6 +55,8 @@ pub use actuator::{
 pub use differentiator::{LinearDifferentiator, OptimalDifferentiator, fhan};
 pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};
+pub(crate) use number::limited;
+
 pub(crate) use pid::Input;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};

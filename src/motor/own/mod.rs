@@ -5,6 +5,7 @@ mod impedance;
 mod motor;
 mod order;
 mod power;
+mod route;
 mod settings;
 
 pub use impedance::{Impedance, ImpedanceControl};
@@ -20,6 +21,7 @@ use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use power::Power;
+use route::Route;
 
 /// A motor of your own as a device of the runner, beside all others.
 ///
@@ -83,6 +85,7 @@ use power::Power;
 #[derive(Debug, Clone, Copy)]
 pub struct Own<M> {
     motor: M,
+    route: Route,
     guard: Guard,
     watch: Watch,
     power: Power,
@@ -123,6 +126,7 @@ impl<M: OwnMotor> Own<M> {
     pub const fn new(motor: M) -> Self {
         Self {
             motor,
+            route: Route::UNKNOWN,
             guard: Guard::new(),
             watch: Watch::new(),
             power: Power::NEW,
@@ -182,6 +186,7 @@ impl<M: OwnMotor> Own<M> {
     /// Returns the motor, to change its gains or to ask for a setting of its drive. What is sent is unchanged until the next update.
     #[must_use]
     pub const fn motor_mut(&mut self) -> &mut M {
+        self.route = Route::UNKNOWN;
         &mut self.motor
     }
 
