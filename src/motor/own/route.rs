@@ -109,7 +109,7 @@ mod tests {
                     let role = if below(2) == 0 { Role::Feedback } else { Role::Command };
                     let claim = match below(8) {
                         0 => claim(extended, role),
-                        _ => claim(standard(0x200 + below(16) as u16), role),
+                        _ => claim(standard(0x200 + u16::try_from(below(16)).unwrap()), role),
                     };
                     let claim = if below(4) == 0 { claim.with_mask(0x7F0) } else { claim };
                     if below(4) == 0 { claim.shared() } else { claim }
