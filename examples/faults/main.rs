@@ -29,6 +29,8 @@ mod console;
 mod drives;
 #[path = "../../tests/faults/health.rs"]
 mod health;
+#[path = "../../tests/lk/bench.rs"]
+mod lk_bench;
 #[path = "../../tests/faults/plausibility.rs"]
 mod plausibility;
 #[path = "../../tests/faults/receive.rs"]

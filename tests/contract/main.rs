@@ -7,6 +7,7 @@ mod careless;
 mod damiao;
 mod dji;
 mod joints;
+mod lk;
 mod mit;
 #[cfg(feature = "hal")]
 mod pins;

@@ -14,6 +14,8 @@ mod clocks;
 mod commands;
 mod drives;
 mod health;
+#[path = "../lk/bench.rs"]
+mod lk_bench;
 mod plausibility;
 mod receive;
 mod registration;
