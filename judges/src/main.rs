@@ -6,11 +6,13 @@
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
+//! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
+mod lk;
 mod serve;
 
 use defect::Defect;
@@ -102,6 +104,7 @@ fn run(arguments: &[&str]) -> Outcome<()> {
         ["decode", model] => {
             codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
         }
+        ["lk", rest @ ..] => lk::run(rest, defect, &mut output)?,
         ["serve"] => serve::serve(defect, io::stdin().lock(), &mut output)?,
         _ => return Err("see the head of judges/src/main.rs for the arguments".into()),
     }
