@@ -2,6 +2,8 @@
 
 mod damiao;
 mod shaft;
+mod vesc;
 
 pub use damiao::DamiaoDrive;
 pub use shaft::DriveShaft;
+pub use vesc::{VescDrive, VescMotor};
