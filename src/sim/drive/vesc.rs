@@ -238,12 +238,12 @@ impl VescDrive {
             14 | 15 => 0,
             16 => {
                 let [driver, motor] = self.celsius;
-                let degrees = self.shaft.angle_rad.rem_euclid(TAU).to_degrees();
+                let degrees = within_turn(self.shaft.angle_rad).to_degrees();
                 word(driver * 10.0) << 48 | word(motor * 10.0) << 32 | word(degrees * 50.0)
             }
             27 => {
                 let way = (self.shaft.angle_rad - self.zero.0) / TAU * electrical * 6.0;
-                let count = (way.floor() as i64 + i64::from(self.zero.1)) as i32;
+                let count = (floor(way) + i64::from(self.zero.1)) as i32;
                 u64::from(count.cast_unsigned()) << 32 | word(240.0) << 16
             }
             58 => 0,
@@ -283,7 +283,7 @@ impl VescDrive {
             Command::Speed(speed) => shaft.following_nm(speed / erpm(1.0)),
             Command::Position(degrees) => {
                 let way = degrees.to_radians() - shaft.angle_rad;
-                let way = (way + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+                let way = within_turn(way + TAU / 2.0) - TAU / 2.0;
                 shaft.following_nm(10.0 * way)
             }
         }
@@ -292,4 +292,14 @@ impl VescDrive {
 
 fn extended(raw: u32) -> Option<Id> {
     ExtendedId::new(raw).map(Id::Extended)
+}
+
+/// The angle from 0 to a turn.
+fn within_turn(angle_rad: f64) -> f64 {
+    angle_rad - floor(angle_rad / TAU) as f64 * TAU
+}
+
+fn floor(value: f64) -> i64 {
+    let whole = value as i64;
+    if whole as f64 > value { whole - 1 } else { whole }
 }
