@@ -6,12 +6,14 @@
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
+//! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
 mod serve;
+mod vesc;
 
 use defect::Defect;
 use drivetrain::damiao::{Model, Register};
@@ -76,6 +78,11 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[&str]) -> Outcome<()> {
+    if let ["vesc", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        vesc::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
     let (arguments, defect) = match arguments {
         [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
         _ => (arguments, Defect::None),
