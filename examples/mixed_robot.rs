@@ -59,10 +59,13 @@ const AGAIN: u64 = 3_500;
 const STOPPED: u64 = 5_000;
 const END: u64 = 5_500;
 
+/// The wheels of the first bus.
+type Wheels = MecanumWheels<Handle<M3508>>;
+
 /// What the second bus has.
 type Turret = (Own<damiao::Motor<ImpedanceControl>>, Own<vesc::Motor<vesc::CurrentControl>>);
 
-fn chassis_bus() -> Result<(Bus, MecanumWheels<Handle<M3508>>), Box<dyn Error>> {
+fn chassis_bus() -> Result<(Bus, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
     let left = |id| Config::<M3508>::new(id).speed_loop(WHEEL);
     let wheels = MecanumWheels {

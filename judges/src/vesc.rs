@@ -147,7 +147,7 @@ fn statuses(
 }
 
 fn decode(set: &[[u8; 8]], defect: &str) -> Outcome<[f64; 13]> {
-    let mut feedback = Feedback::NONE;
+    let mut feedback = Feedback::default();
     for (packet, data) in PACKETS.into_iter().zip(set) {
         let mut data = *data;
         if defect == "order" {

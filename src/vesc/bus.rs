@@ -1,7 +1,7 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{HOST, SHORT_MESSAGE, extended, question};
-use super::config::{Mode, Rest, sealed};
+use super::config::{At, Mode, Rest, sealed};
 use super::feedback::fault;
 use super::tachometer::Tachometer;
 use super::{ConfigError, Feedback, Model};
@@ -22,9 +22,6 @@ const TACHOMETER: u8 = 27;
 /// Blocks of packets: the first, and the bits that differ within the block.
 const COMMANDS: [(u8, u8); 4] = [(0, 3), (4, 0), (10, 1), (12, 1)];
 const STATUSES: [(u8, u8); 5] = [(MOTION, 0), (14, 1), (TEMPERATURES, 0), (TACHOMETER, 0), (58, 0)];
-
-/// Calls of [`inquire`](OwnMotor::inquire), 10 ms each, for one question.
-const INQUIRIES: u8 = 5;
 
 /// Commands for one question.
 const ORDERS: u8 = 50;
@@ -66,11 +63,12 @@ pub struct Motor<M> {
     tachometer: Tachometer,
     /// Frames with the motion since the last one with the angle.
     angle_age: u8,
-    /// Calls until the next question for the fault code, while resting and while driven.
-    inquiries: u8,
+    /// Commands since the last question for the fault code.
     orders: u8,
-    /// The share of the last command.
-    effort: f32,
+    /// Questions since the last answer.
+    unanswered: u8,
+    /// The share of the last command; `None` where the drive makes its current by a loop of its own.
+    effort: Option<f32>,
 }
 
 impl<M: Mode> Motor<M> {
@@ -92,18 +90,18 @@ impl<M: Mode> Motor<M> {
             rest: Rest::Release,
             has_encoder: <M as sealed::Mode>::HAS_POSITION,
             has_fault_code: true,
-            feedback: Feedback::NONE,
+            feedback: Feedback::default(),
             angle_age: u8::MAX,
-            inquiries: 0,
             orders: 0,
-            effort: 0.0,
+            unanswered: 0,
+            effort: Some(0.0),
         })
     }
 
     /// Sets the command of a motor that is not driven: [`Rest::Release`] at first.
     ///
     /// # Errors
-    /// [`ConfigError::CurrentLimit`] for a current that is not above 0 and within the limit of the model.
+    /// [`ConfigError::Range`] for a current that is not above 0 and within the limit of the model.
     pub fn with_rest(self, rest: Rest) -> Result<Self, ConfigError> {
         rest.check(&self.model)?;
         Ok(Self { rest, ..self })
@@ -146,6 +144,15 @@ impl<M: Mode> Motor<M> {
 
     fn claim(&self, id: u8, (packet, bits): (u8, u8), role: Role) -> Claim {
         Claim::new(extended(packet, id), role, self.name()).with_mask(!(u32::from(bits) << 8))
+    }
+
+    /// Asks for the fault code, which is no longer known when four questions had no answer.
+    fn ask(&mut self) -> CanFrame {
+        if self.unanswered >= 4 {
+            self.feedback.fault = None;
+        }
+        self.unanswered = self.unanswered.saturating_add(1);
+        question(self.id)
     }
 
     /// Takes a status frame of this drive.
@@ -208,32 +215,35 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn rest(&mut self) -> CanFrame {
-        self.effort = 0.0;
+        self.effort = Some(0.0);
         self.rest.command(1.0).frame(self.id)
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        let angle = self.angle();
-        let command = self.mode.command(order, &self.feedback, angle, &self.model);
+        let at = At {
+            model: &self.model,
+            velocity_rad_per_s: self.velocity().as_rad_per_s(),
+            angle: self.angle(),
+            duty: self.model.signed(self.feedback.duty.unwrap_or_default()),
+        };
+        let command = self.mode.command(order, &at);
         let Some((command, effort)) = command else { return self.rest() };
         self.effort = effort;
         self.orders = self.orders.wrapping_add(1);
         if self.has_fault_code && self.orders >= ORDERS {
             self.orders = 0;
-            return question(self.id);
+            return self.ask();
         }
         command.frame(self.id)
     }
 
     fn reset(&mut self) {
         self.mode.reset();
-        self.effort = 0.0;
+        self.effort = Some(0.0);
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.inquiries = self.inquiries.wrapping_add(1) % INQUIRIES;
-        let is_due = self.inquiries == 0 || self.feedback.fault.is_none();
-        (self.has_fault_code && is_due).then(|| question(self.id))
+        self.has_fault_code.then(|| self.ask())
     }
 
     /// Takes all that says nothing of the motion: the other status frames, and fault codes. A motor whose targets need an angle takes
@@ -241,9 +251,9 @@ impl<M: Mode> OwnMotor for Motor<M> {
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
         let (packet, id) = parts(frame.id());
         if packet == SHORT_MESSAGE {
-            let fault = fault(frame.data(), self.id);
-            self.feedback.fault = fault.or(self.feedback.fault);
-            return fault.is_some();
+            let Some(fault) = fault(frame.data(), self.id) else { return false };
+            (self.feedback.fault, self.unanswered) = (Some(fault), 0);
+            return true;
         }
         let lacks_angle = self.mode.needs_angle() && self.angle_age > 0;
         id == self.id && (packet != MOTION || lacks_angle) && self.take(packet, frame.data())
@@ -259,12 +269,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
         })
     }
 
-    /// The drive may have restarted, so its count of turns begins anew.
     fn forget_settings(&mut self) {
         (self.feedback.fault, self.feedback.tachometer) = (None, None);
         self.feedback.position_deg = None;
         self.angle_age = u8::MAX;
-        self.tachometer.restart();
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -284,13 +292,14 @@ impl<M: Mode> OwnMotor for Motor<M> {
         };
         let error_code = drive.fault.unwrap_or_default();
         let current = self.model.signed(drive.current_a.unwrap_or_default());
+        let current = current / self.model.current_limit_a;
         Vitals {
             temperature_c: celsius,
             error: (error_code > 0).then_some(Severity::Fault),
             error_code,
-            effort: self.effort,
+            effort: self.effort.unwrap_or(current),
             speed: self.velocity().as_rad_per_s() / self.model.max_velocity.as_rad_per_s(),
-            current: current / self.model.current_limit_a,
+            current,
         }
     }
 }

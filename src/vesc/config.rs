@@ -1,8 +1,9 @@
 //! The control modes, with what a user chooses for each.
 
 use super::command::Command;
-use super::{ConfigError, Feedback, Model};
-use crate::control::{Cascade, Pid, PidConfig};
+use super::error::within_range;
+use super::{ConfigError, Model};
+use crate::control::{Cascade, ConfigError as LoopError, Pid, PidConfig};
 use crate::math::{wrap_pi, wrap_tau};
 use crate::motor::{Capabilities, Capability, Order, Target};
 use crate::units::{Angle, AngularVelocity};
@@ -12,8 +13,17 @@ pub trait Mode: sealed::Mode {}
 
 impl<M: sealed::Mode> Mode for M {}
 
+/// Where the output shaft is, by the last feedback.
+#[derive(Debug)]
+pub struct At<'a> {
+    pub(super) model: &'a Model,
+    pub(super) velocity_rad_per_s: f32,
+    pub(super) angle: Option<Angle>,
+    pub(super) duty: f32,
+}
+
 pub(super) mod sealed {
-    use super::{Angle, Capabilities, Command, ConfigError, Feedback, Model, Order};
+    use super::{At, Capabilities, Command, ConfigError, Model, Order};
 
     pub trait Mode: core::fmt::Debug + Copy {
         /// The drive itself controls the position, so its angle is that of status 4.
@@ -32,24 +42,19 @@ pub(super) mod sealed {
             Self::HAS_POSITION
         }
 
-        /// Returns the command and its share of the largest effort, 0 where that is not known; `None` to rest.
-        fn command(
-            &mut self,
-            order: Order,
-            drive: &Feedback,
-            angle: Option<Angle>,
-            model: &Model,
-        ) -> Option<(Command, f32)>;
+        /// Returns the command and its share of the largest effort, where that is not the drive's business; `None` to rest.
+        fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)>;
 
         fn reset(&mut self) {}
     }
 }
 
 /// Rest: the command of a motor that is not driven. In each mode it is what a disarmed motor gets, and one without a target.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rest {
     /// A current of 0: the shaft turns freely.
+    #[default]
     Release,
     /// A current in A that brakes the shaft while it turns. It cannot hold a weight.
     Brake(f32),
@@ -70,12 +75,7 @@ impl Rest {
 
     pub(super) fn check(self, model: &Model) -> Result<(), ConfigError> {
         let (Self::Brake(current) | Self::Handbrake(current)) = self else { return Ok(()) };
-        let is_valid = current > 0.0 && current <= model.current_limit_a;
-        if is_valid {
-            Ok(())
-        } else {
-            Err(ConfigError::CurrentLimit(current, model.current_limit_a))
-        }
+        within_range("current of rest in A", current, model.current_limit_a)
     }
 }
 
@@ -92,107 +92,80 @@ impl Rest {
 /// let joint = CurrentControl::new().with_loops(position, speed)?;
 /// # Ok::<(), drivetrain::control::ConfigError>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Default, Clone, Copy)]
 pub struct CurrentControl {
-    loops: Loops,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Loops {
-    None,
-    Speed(Pid),
-    Both(Cascade),
+    loops: Option<Cascade>,
+    has_angle: bool,
 }
 
 impl CurrentControl {
     /// Takes torques.
     #[must_use]
     pub const fn new() -> Self {
-        Self { loops: Loops::None }
+        Self { loops: None, has_angle: false }
     }
 
     /// Takes velocities too, by a loop from rad/s to Nm.
     ///
     /// # Errors
-    /// As [`Pid::new`].
-    pub fn with_speed_loop(self, speed: PidConfig) -> Result<Self, crate::control::ConfigError> {
-        Ok(Self { loops: Loops::Speed(Pid::new(speed)?) })
+    /// As [`Cascade::new`].
+    pub fn with_speed_loop(self, speed: PidConfig) -> Result<Self, LoopError> {
+        let position = PidConfig::new(0.0, 0.0, 0.0);
+        Ok(Self { loops: Some(Cascade::new(position, speed)?), ..self })
     }
 
-    /// Takes velocities and angles too, by loops from rad to rad/s and from rad/s to Nm.
+    /// Takes velocities and angles too, by loops from rad to rad/s and from rad/s to Nm. The tachometer has six steps for an
+    /// electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
     ///
     /// # Errors
     /// As [`Cascade::new`].
-    pub fn with_loops(
-        self,
-        position: PidConfig,
-        speed: PidConfig,
-    ) -> Result<Self, crate::control::ConfigError> {
-        Ok(Self { loops: Loops::Both(Cascade::new(position, speed)?) })
-    }
-}
-
-impl Default for CurrentControl {
-    fn default() -> Self {
-        Self::new()
+    pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, LoopError> {
+        Ok(Self { loops: Some(Cascade::new(position, speed)?), has_angle: true })
     }
 }
 
 impl sealed::Mode for CurrentControl {
     fn capabilities(&self) -> Capabilities {
         let torque = Capabilities::of(&[Capability::Torque]);
-        match self.loops {
-            Loops::None => torque,
-            Loops::Speed(_) => torque.with(Capability::Velocity),
-            Loops::Both(_) => torque.with(Capability::Velocity).with(Capability::Angle),
+        match (self.loops, self.has_angle) {
+            (None, _) => torque,
+            (_, false) => torque.with(Capability::Velocity),
+            (_, true) => torque.with(Capability::Velocity).with(Capability::Angle),
         }
     }
 
     fn needs_angle(&self) -> bool {
-        matches!(self.loops, Loops::Both(_))
+        self.has_angle
     }
 
-    fn command(
-        &mut self,
-        Order { target, share, step }: Order,
-        drive: &Feedback,
-        angle: Option<Angle>,
-        model: &Model,
-    ) -> Option<(Command, f32)> {
-        let velocity = model.velocity_of(drive.erpm?).as_rad_per_s();
-        let limit = model.torque_limit_nm() * share;
-        let (loops, wanted) = match (&mut self.loops, target) {
-            (_, Target::Torque(torque)) => (None, torque),
-            (Loops::Speed(speed), Target::Velocity(target)) => {
-                let torque = speed.step(target.as_rad_per_s(), velocity, &step);
-                (Some(speed), torque)
+    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        let Order { target, share, step } = order;
+        let (model, velocity) = (at.model, at.velocity_rad_per_s);
+        let most = model.torque_limit_nm();
+        let limit = most * share;
+        let wanted = match (target, &mut self.loops) {
+            (Target::Torque(torque), _) => torque,
+            (Target::Velocity(target), Some(loops)) => {
+                let target = within(target, model.max_velocity);
+                loops.speed_mut().step(target, velocity, &step)
             }
-            (Loops::Both(both), Target::Velocity(target)) => {
-                let torque = both.speed_mut().step(target.as_rad_per_s(), velocity, &step);
-                (Some(both.speed_mut()), torque)
-            }
-            (Loops::Both(both), Target::Angle(target)) => {
-                let error = wrap_pi((target - angle?).as_radians());
-                let torque = both.step(error, velocity, &step);
-                (Some(both.speed_mut()), torque)
+            (Target::Angle(target), Some(loops)) if self.has_angle => {
+                loops.step(wrap_pi((target - at.angle?).as_radians()), velocity, &step)
             }
             _ => return None,
         };
-        if let Some(speed) = loops {
-            speed.keep_integral_between(-limit, limit);
+        if let Some(loops) = &mut self.loops {
+            loops.speed_mut().keep_integral_between(-limit, limit);
         }
         let torque = wanted.min(limit).max(-limit);
         // Rounding of the quotient must not take it past the limit.
-        let most = model.current_limit_a * share;
-        let current = model.current_of(torque).min(most).max(-most);
-        Some((Command::Current(current), torque / model.torque_limit_nm()))
+        let current = kept(model.current_of(torque), model.current_limit_a * share);
+        Some((Command::Current(current), Some(torque / most)))
     }
 
     fn reset(&mut self) {
-        match &mut self.loops {
-            Loops::None => {}
-            Loops::Speed(speed) => speed.reset(),
-            Loops::Both(both) => both.reset(),
+        if let Some(loops) = &mut self.loops {
+            loops.reset();
         }
     }
 }
@@ -213,11 +186,8 @@ impl Duty {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(limit: f32, speed: PidConfig) -> Result<Self, ConfigError> {
-        if limit > 0.0 && limit <= 1.0 {
-            Ok(Self { limit, speed: Pid::new(speed)? })
-        } else {
-            Err(ConfigError::Duty(limit))
-        }
+        within_range("duty limit", limit, 1.0)?;
+        Ok(Self { limit, speed: Pid::new(speed)? })
     }
 }
 
@@ -226,24 +196,18 @@ impl sealed::Mode for Duty {
         Capabilities::of(&[Capability::Velocity])
     }
 
-    fn command(
-        &mut self,
-        Order { target, share, step }: Order,
-        drive: &Feedback,
-        _angle: Option<Angle>,
-        model: &Model,
-    ) -> Option<(Command, f32)> {
+    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        let Order { target, share, step } = order;
         let Target::Velocity(target) = target else { return None };
-        let target = within(target, model.max_velocity).as_rad_per_s();
-        let velocity = model.velocity_of(drive.erpm?).as_rad_per_s();
-        let reported = model.signed(drive.duty?).min(self.limit).max(-self.limit);
+        let target = within(target, at.model.max_velocity);
+        let reported = kept(at.duty, self.limit);
         let near = self.limit * share;
-        let (lowest, highest) =
-            ((reported - near).max(-self.limit), (reported + near).min(self.limit));
-        let wanted = self.speed.step(target, velocity, &step);
+        let lowest = (reported - near).max(-self.limit);
+        let highest = (reported + near).min(self.limit);
+        let wanted = self.speed.step(target, at.velocity_rad_per_s, &step);
         self.speed.keep_integral_between(lowest, highest);
         let duty = wanted.min(highest).max(lowest);
-        Some((Command::Duty(model.signed(duty)), duty / self.limit))
+        Some((Command::Duty(at.model.signed(duty)), Some(duty / self.limit)))
     }
 
     fn reset(&mut self) {
@@ -260,7 +224,7 @@ impl sealed::Mode for Duty {
 /// let wheel = Velocity::new().with_standstill(Rest::Brake(5.0)); // a target of 0 brakes
 /// # let _ = wheel;
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Default, Clone, Copy)]
 pub struct Velocity {
     standstill: Rest,
 }
@@ -279,12 +243,6 @@ impl Velocity {
     }
 }
 
-impl Default for Velocity {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl sealed::Mode for Velocity {
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
         self.standstill.check(model)
@@ -294,19 +252,14 @@ impl sealed::Mode for Velocity {
         Capabilities::of(&[Capability::Velocity])
     }
 
-    fn command(
-        &mut self,
-        Order { target, share, step: _ }: Order,
-        _drive: &Feedback,
-        _angle: Option<Angle>,
-        model: &Model,
-    ) -> Option<(Command, f32)> {
+    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        let Order { target, share, step: _ } = order;
         let Target::Velocity(target) = target else { return None };
-        let speed = model.erpm_of(within(target, model.max_velocity));
+        let target = within(target, at.model.max_velocity);
+        let speed = at.model.erpm_of(AngularVelocity::from_rad_per_s(target));
         // Less than a whole number on the wire is a speed of 0.
-        let command =
-            if speed.abs() < 1.0 { self.standstill.command(share) } else { Command::Speed(speed) };
-        Some((command, 0.0))
+        let stands = speed.abs() < 1.0;
+        Some((if stands { self.standstill.command(share) } else { Command::Speed(speed) }, None))
     }
 }
 
@@ -323,21 +276,19 @@ impl sealed::Mode for Position {
         Capabilities::of(&[Capability::Angle])
     }
 
-    fn command(
-        &mut self,
-        Order { target, share: _, step: _ }: Order,
-        _drive: &Feedback,
-        angle: Option<Angle>,
-        model: &Model,
-    ) -> Option<(Command, f32)> {
+    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        let Order { target, share: _, step: _ } = order;
         let Target::Angle(target) = target else { return None };
-        angle?;
-        let angle = Angle::from_radians(wrap_tau(model.signed(target.as_radians())));
-        Some((Command::Position(angle.as_degrees()), 0.0))
+        at.angle?;
+        let angle = Angle::from_radians(wrap_tau(at.model.signed(target.as_radians())));
+        Some((Command::Position(angle.as_degrees()), None))
     }
 }
 
-fn within(target: AngularVelocity, limit: AngularVelocity) -> AngularVelocity {
-    let limit = limit.as_rad_per_s();
-    AngularVelocity::from_rad_per_s(target.as_rad_per_s().min(limit).max(-limit))
+fn within(target: AngularVelocity, limit: AngularVelocity) -> f32 {
+    kept(target.as_rad_per_s(), limit.as_rad_per_s())
+}
+
+const fn kept(value: f32, limit: f32) -> f32 {
+    value.min(limit).max(-limit)
 }

@@ -8,12 +8,12 @@ use super::command::FAULT_CODE;
 /// ```
 /// use drivetrain::vesc::Feedback;
 ///
-/// let mut feedback = Feedback::NONE;
+/// let mut feedback = Feedback::default();
 /// assert!(feedback.take(9, &[0x00, 0x00, 0x2E, 0xE0, 0x00, 0x37, 0x00, 0xFA])); // status 1
 /// assert_eq!((feedback.erpm, feedback.current_a, feedback.duty), (Some(12_000), Some(5.5), Some(0.25)));
 /// assert_eq!(feedback.tachometer, None); // status 5 has not come
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Feedback {
     /// The speed in electrical rpm (status 1).
@@ -45,23 +45,6 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Nothing reported yet.
-    pub const NONE: Self = Self {
-        erpm: None,
-        current_a: None,
-        duty: None,
-        charge_ah: None,
-        energy_wh: None,
-        driver_c: None,
-        motor_c: None,
-        input_a: None,
-        position_deg: None,
-        tachometer: None,
-        supply_v: None,
-        inputs: None,
-        fault: None,
-    };
-
     /// Takes a status frame: bits 8 to 15 of its id, and its data. Returns `false`, and takes nothing, if the packet is no status or
     /// has another length than 8; status 5 of older firmware has 6.
     pub fn take(&mut self, packet: u8, data: &[u8]) -> bool {

@@ -28,16 +28,20 @@
 //! Only [`CurrentControl`] has its current scaled by the share of the order, so heat and a stall reduce it there. In the modes of the
 //! drive's own loops the share has no effect once the output range is open; what stops them is rest.
 //!
+//! The drive lets the shaft go for currents below its smallest, 0.05 A at delivery.
+//!
 //! **Rest** is a current of 0, which lets the shaft go; [`Motor::with_rest`] chooses another one. There is no frame that enables or
 //! disables a VESC: it follows any command at once.
+//!
+//! A command to id 255 moves each drive on the bus: another program that sends one is not seen as a second master.
 //!
 //! **When the program stops, the drive goes on** until its own time-out, then it brakes with its own time-out brake current: 1000 ms
 //! and 0 A at delivery. Neither can be read or written by a short frame, so set them in VESC Tool (App Settings, General): 100 ms is
 //! ten periods of the slowest loop that makes sense. A time-out of 0 means never.
 //!
 //! **The status frames have no fault code.** After a fault the drive ignores commands for 500 ms at delivery, and then follows them
-//! again. So the motor asks for the code: each 50 ms while it rests, and in the place of each 50th command. It is not armed before
-//! the first answer, and a fault trips it.
+//! again. So the motor asks for the code: each 10 ms while it rests, and in the place of each 50th command. It is not armed before
+//! the first answer, nor when four questions in a row had none, and a fault trips it.
 //!
 //! **What to set in VESC Tool**: CAN mode "VESC"; status 1 at 200 Hz or more, as feedback counts as late after 10 ms unless the
 //! [time-outs](crate::motor::Timeouts) say otherwise. Status 5 at the same rate where an angle is controlled, or status 4 with

@@ -1,6 +1,7 @@
 //! Facts of a motor, which a program states: a VESC drives any.
 
 use super::ConfigError;
+use super::error::within_range;
 use crate::encoder::GearRatio;
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
@@ -35,7 +36,7 @@ pub struct Model {
     pub pole_pairs: u8,
     /// Turns of the rotor for turns of the output shaft.
     pub gear: GearRatio,
-    /// Torque of the rotor for a current, in Nm/A, above 0: 9.55 divided by the rpm for a volt.
+    /// Torque of the rotor for a current, in Nm/A, above 0 and at most 1000000: 9.55 divided by the rpm for a volt.
     pub torque_constant_nm_per_a: f32,
     /// The largest current of each command, in A, above 0 and at most 1000. The drive has a limit of its own beside it.
     pub current_limit_a: f32,
@@ -80,23 +81,13 @@ impl Model {
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let positive = |name, value: f32| {
-            let is_valid = value > 0.0 && value.is_finite();
-            if is_valid { Ok(()) } else { Err(ConfigError::NotPositive(name, value)) }
-        };
-        positive("pole_pairs", self.pole_pairs.into())?;
-        positive("torque_constant_nm_per_a", self.torque_constant_nm_per_a)?;
-        positive("current_limit_a", self.current_limit_a)?;
-        positive("max_velocity", self.max_velocity.as_rad_per_s())?;
-        // Torques, currents and speeds stay far from the ends of an `f32`.
-        positive("torque limit", self.torque_limit_nm())?;
+        within_range("pole_pairs", self.pole_pairs.into(), 255.0)?;
+        within_range("torque_constant_nm_per_a", self.torque_constant_nm_per_a, 1e6)?;
+        within_range("current_limit_a", self.current_limit_a, MOST_AMPERES)?;
+        within_range("torque limit in Nm", self.torque_limit_nm(), f32::MAX)?;
+        within_range("max_velocity in rad/s", self.max_velocity.as_rad_per_s(), f32::MAX)?;
         let speed = self.erpm_of(self.max_velocity).abs();
-        if self.current_limit_a > MOST_AMPERES {
-            return Err(ConfigError::CurrentLimit(self.current_limit_a, MOST_AMPERES));
-        }
-        if speed > MOST_ERPM {
-            return Err(ConfigError::Speed(speed));
-        }
+        within_range("max_velocity in electrical rpm", speed, MOST_ERPM)?;
         // Counts of the tachometer are divided by this product in 32 bits.
         let turn = TACHO * u32::from(self.pole_pairs) * u32::from(self.gear.rotor());
         match turn.checked_mul(u32::from(self.gear.output())) {
@@ -110,7 +101,7 @@ impl Model {
 pub(super) const TACHO: u32 = 6;
 
 /// The largest current of a configuration, in A: far beyond any drive, and exact in mA.
-pub(super) const MOST_AMPERES: f32 = 1_000.0;
+const MOST_AMPERES: f32 = 1_000.0;
 
 /// The largest speed of a configuration, in electrical rpm: an `f32` has each whole number up to here.
 const MOST_ERPM: f32 = 16_777_216.0;

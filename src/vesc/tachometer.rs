@@ -28,12 +28,7 @@ impl Tachometer {
         Self { last: 0, turns: 0, phase: 0, turn, output }
     }
 
-    /// Begins anew where the count of the drive is 0: the drive may have restarted.
-    pub(super) const fn restart(&mut self) {
-        (self.last, self.turns, self.phase) = (0, 0, 0);
-    }
-
-    /// Takes a count of the drive, which wraps.
+    /// Takes a count of the drive, which wraps. After a restart of the drive the angle is that of its new zero.
     pub(super) fn take(&mut self, count: i32) {
         let way = count.wrapping_sub(self.last);
         self.last = count;

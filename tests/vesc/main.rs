@@ -70,7 +70,7 @@ fn commands_have_the_golden_bytes() {
 
 #[test]
 fn status_frames_have_the_golden_values() {
-    let mut feedback = Feedback::NONE;
+    let mut feedback = Feedback::default();
     for id in ["vesc.status1", "vesc.status5"] {
         let vector = vector(id);
         let raw = vector["input"]["ext_id"].as_str().unwrap();
@@ -88,7 +88,7 @@ fn status_frames_have_the_golden_values() {
 /// The layouts of `comm_can_send_status2` to `6` of the firmware, computed by hand.
 #[test]
 fn the_other_status_frames_have_their_scales() {
-    let mut feedback = Feedback::NONE;
+    let mut feedback = Feedback::default();
     assert!(feedback.take(14, &[0, 0, 0x30, 0x39, 0xFF, 0xFF, 0xFF, 0xFF]));
     assert_eq!(feedback.charge_ah, Some([1.2345, -0.0001]));
     assert!(feedback.take(15, &[0, 1, 0, 0, 0, 0, 0, 1]));
@@ -570,7 +570,7 @@ fn bad_configurations_are_refused_with_the_limit() {
         assert!(Motor::new(MODEL, 1, mode).is_err());
     }
     assert!(
-        refused(Model { current_limit_a: 1_001.0, ..MODEL }).ends_with("at most 1000 A is allowed")
+        refused(Model { current_limit_a: 1_001.0, ..MODEL }).ends_with("at most 1000 is allowed")
     );
     assert!(
         refused(Model { torque_constant_nm_per_a: 1e-45, current_limit_a: 1e-3, ..MODEL })
@@ -579,9 +579,107 @@ fn bad_configurations_are_refused_with_the_limit() {
     assert!(refused(Model { max_velocity: rad_s(1e7), ..MODEL }).contains("16777216"));
     let motor = Motor::new(MODEL, 1, Position).unwrap();
     let beyond = motor.with_rest(Rest::Brake(20.001)).unwrap_err();
-    assert_eq!(beyond, ConfigError::CurrentLimit(20.001, 20.0));
+    assert_eq!(beyond, ConfigError::Range("current of rest in A", 20.001, 20.0));
     assert!(matches!(
         Duty::new(0.5, PidConfig::new(f32::NAN, 0.0, 0.0)),
         Err(ConfigError::Loop(_))
     ));
+}
+
+/// A drive that answered before the answers were lost may have any fault now.
+#[test]
+fn a_drive_that_no_longer_answers_is_not_armed() {
+    let mut bench = Bench::new(CurrentControl::new());
+    bench.steps(100, |_| {});
+    assert_eq!(bench.own.motor().feedback().fault, Some(0));
+    for ms in 0..100_u64 {
+        bench.now_us += 1_000;
+        let now = bench.now();
+        _ = Devices::ingest(&mut bench.own, &bench.drive.report(9).unwrap(), now);
+        bench.own.update(Tick::new(now, 0.001));
+        while bench.own.next_frame(0).is_some() {}
+        assert!(ms < 60 || bench.own.motor().feedback().fault.is_none());
+    }
+    let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
+    assert_eq!(refused, "6374 #23 has not answered yet what its fault code is");
+}
+
+/// Late feedback makes the motor forget what it knows of the drive, but not how often the count has wrapped: 2^32 is no whole
+/// number of turns, so the angle would jump.
+#[test]
+fn late_feedback_after_a_wrap_does_not_turn_the_angle() {
+    let mut bench = Bench::new(looped());
+    bench.drive.set_tachometer(i32::MAX - 5);
+    bench.arm();
+    let target = bench.own.angle(()).unwrap() + Angle::from_radians(2.0);
+    bench.steps(1_500, |bench| bench.own.set_angle((), target).unwrap());
+    assert!(bench.own.motor().feedback().tachometer.unwrap() < 0, "it has wrapped");
+    let before = bench.own.angle(()).unwrap();
+    bench.is_cut = true;
+    bench.steps(15, |bench| _ = bench.own.set_angle((), target));
+    bench.is_cut = false;
+    bench.steps(40, |bench| _ = bench.own.set_angle((), target));
+    assert!(bench.own.is_armed(), "late, not lost");
+    let after = bench.own.angle(()).unwrap();
+    assert!((after - before).as_radians().abs() < 0.2, "{before:?} {after:?}");
+    assert!((bench.drive.shaft().angle_rad() - 2.0).abs() < 0.2);
+}
+
+/// The current loop of a wheel without load would go on to the end of the drive's speed.
+#[test]
+fn a_velocity_target_keeps_within_the_largest_of_the_model() {
+    let model = Model { max_velocity: rad_s(50.0), ..MODEL };
+    let mode = CurrentControl::new().with_speed_loop(SPEED).unwrap();
+    let mut bench = Bench::of(Motor::new(model, 23, mode).unwrap());
+    bench.arm();
+    bench.steps(2_000, |bench| {
+        bench.own.set_velocity((), rad_s(1e6)).unwrap();
+        assert!(bench.drive.shaft().velocity_rad_per_s() < 58.0);
+    });
+    assert!((bench.drive.shaft().velocity_rad_per_s() - 50.0).abs() < 0.5);
+    let mut own = Bench::of(Motor::new(model, 23, Velocity::new()).unwrap());
+    own.arm();
+    // The drive's own current is no runaway, although no command of ours asks for it.
+    own.steps(500, |bench| bench.own.set_velocity((), rad_s(-1e6)).unwrap());
+    // 50 rad/s are 3342 electrical rpm.
+    assert_eq!(read(&own.frames[0]), (3, -3_342));
+}
+
+/// Heat opens less of the range: 5 A of 20 A at a quarter.
+#[test]
+fn the_share_of_the_order_scales_the_current() {
+    use drivetrain::control::TimeStep;
+    use drivetrain::motor::{Order, OwnMotor, Target};
+    for (share, expected) in [(1.0, 20_000), (0.25, 5_000), (0.0, 0)] {
+        let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
+        _ = motor.decode(&drive(23).report(9).unwrap());
+        _ = motor.decode_answer(&drive(23).report(27).unwrap());
+        for (target, sign) in [
+            (Target::Torque(1e3), 1),
+            (Target::Velocity(rad_s(-300.0)), -1),
+            (Target::Angle(Angle::from_radians(3.0)), 1),
+        ] {
+            let frame = motor.control(Order { target, share, step: TimeStep::of(0.001) });
+            let (packet, value) = read(&frame);
+            let most = i64::from(sign) * expected;
+            assert!(packet == 1 && value.abs() <= expected && value * most >= 0, "{frame:?}");
+        }
+    }
+}
+
+/// A motor that was armed while another program drove the shaft, or a hand: no order before the first feedback after a loss.
+#[test]
+fn targets_between_a_loss_and_the_first_feedback_send_nothing() {
+    let mut bench = Bench::armed(looped());
+    bench.steps(300, |bench| bench.own.set_angle((), Angle::from_radians(1.0)).unwrap());
+    bench.is_cut = true;
+    bench.steps(11, |_| {});
+    bench.steps(120, |bench| {
+        _ = bench.own.set_angle((), Angle::from_radians(-3.0));
+        assert!(bench.frames.iter().all(|f| is_question(f) || read(f) == (1, 0)));
+    });
+    bench.is_cut = false;
+    bench.steps(50, |bench| {
+        assert!(bench.own.set_angle((), Angle::from_radians(-3.0)).is_err());
+    });
 }

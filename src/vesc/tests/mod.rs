@@ -84,11 +84,11 @@ fn the_longest_products_of_the_tachometer_stay_within_32_bits() {
 fn each_status_has_one_length_and_others_change_nothing() {
     for packet in 0..=255_u8 {
         for length in 0..=8_usize {
-            let mut feedback = Feedback::NONE;
+            let mut feedback = Feedback::default();
             let is_status = matches!(packet, 9 | 14 | 15 | 16 | 27 | 58);
             let is_right = is_status && length == 8 || packet == 27 && length == 6;
             assert_eq!(feedback.take(packet, &[1; 8][..length]), is_right, "{packet} {length}");
-            assert_eq!(feedback != Feedback::NONE, is_right);
+            assert_eq!(feedback != Feedback::default(), is_right);
         }
     }
 }
@@ -111,7 +111,7 @@ fn frames_of_other_drives_and_with_other_ids_are_not_its_own() {
     assert_eq!(motor.decode(&other), Ingest::Unrelated);
     let standard = CanFrame::new(StandardId::new(0x117).unwrap(), &[1; 8]).unwrap();
     assert_eq!(motor.decode(&standard), Ingest::Unrelated);
-    assert_eq!(motor.feedback(), &Feedback::NONE);
+    assert_eq!(motor.feedback(), &Feedback::default());
 }
 
 #[test]
