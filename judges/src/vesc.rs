@@ -44,7 +44,7 @@ pub fn run(arguments: &[&str], mut input: impl BufRead, output: &mut impl Write)
         ["other", kind] => values(&mut input, output, |value| other(kind, value)),
         ["frames", kind, value] => frames(kind, value.parse()?, defect, output),
         ["decode"] => statuses(&mut input, output, |data| decode(data, defect)),
-        ["decode-other"] => statuses(&mut input, output, |data| decode_other(data)),
+        ["decode-other"] => statuses(&mut input, output, decode_other),
         ["fault", id] => faults(id.parse()?, &mut input, output),
         ["serve"] => serve(defect, input, output),
         _ => Err("see the head of judges/src/vesc.rs for the arguments".into()),
