@@ -1,4 +1,4 @@
-//! F72 to F74, F75 to F77: drives that are set up, enabled and watched by frames, by the examples of Damiao's and of VESC drives.
+//! F72 to F74, F78 to F80: drives that are set up, enabled and watched by frames, by the examples of Damiao's and of VESC drives.
 
 use crate::bench::{Bench, mit};
 use crate::case::{Case, cases, saw};
@@ -13,9 +13,9 @@ pub(crate) const CASES: &[Case] = cases![
     f72_a_drive_in_another_mode_or_with_other_ranges_is_not_armed_and_the_register_is_named,
     f73_the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time,
     f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itself,
-    f75_a_fault_that_no_status_frame_tells_is_asked_for_and_trips,
-    f76_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on,
-    f77_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing,
+    f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips,
+    f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on,
+    f80_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing,
 ];
 
 #[cfg_attr(test, test)]
@@ -101,7 +101,7 @@ fn f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itse
 }
 
 #[cfg_attr(test, test)]
-fn f75_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
+fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
     let mut bench = vesc_bench::Bench::armed(Velocity::new());
     let wheel = AngularVelocity::from_rad_per_s(60.0);
     bench.steps(500, |bench| bench.own.set_velocity((), wheel).unwrap());
@@ -124,7 +124,7 @@ fn f75_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
 }
 
 #[cfg_attr(test, test)]
-fn f76_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
+fn f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
     let mut bench = vesc_bench::Bench::armed(looped());
     let turn = |bench: &mut vesc_bench::Bench<_>| {
         _ = bench.own.set_angle((), Angle::from_radians(3.0));
@@ -142,7 +142,7 @@ fn f76_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
 }
 
 #[cfg_attr(test, test)]
-fn f77_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing() {
+fn f80_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing() {
     let mut bench = vesc_bench::Bench::new(looped());
     bench.drive = drive(23);
     bench.drive.set_tachometer(i32::MAX);
