@@ -30,6 +30,7 @@ pub mod pwm;
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod snake;
+pub mod vesc;
 
 // F4: the only part that does I/O
 pub mod runner;

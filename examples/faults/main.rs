@@ -45,6 +45,8 @@ mod rows;
 mod timing;
 #[path = "../../tests/faults/transmit.rs"]
 mod transmit;
+#[path = "../../tests/vesc/bench.rs"]
+mod vesc_bench;
 
 use case::{Case, Seen};
 use rows::{Row, TABLE};

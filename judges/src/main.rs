@@ -7,6 +7,7 @@
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
 //! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
+//! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
@@ -14,6 +15,7 @@ mod codec;
 mod defect;
 mod lk;
 mod serve;
+mod vesc;
 
 use defect::Defect;
 use drivetrain::damiao::{Model, Register};
@@ -78,6 +80,11 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[&str]) -> Outcome<()> {
+    if let ["vesc", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        vesc::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
     let (arguments, defect) = match arguments {
         [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
         _ => (arguments, Defect::None),

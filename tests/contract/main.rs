@@ -11,6 +11,7 @@ mod lk;
 mod mit;
 #[cfg(feature = "hal")]
 mod pins;
+mod vesc;
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};

@@ -1,12 +1,14 @@
-//! F72 to F77: drives that are set up, enabled and watched by frames, by the example of Damiao's and of those of LK-TECH.
+//! F72 to F80: drives that are set up, enabled and watched by frames, of several families.
 
 use crate::bench::{Bench, mit};
 use crate::case::{Case, cases, saw};
 use crate::lk_bench;
+use crate::vesc_bench::{self, drive, looped};
 use drivetrain::damiao::{Register, Status};
 use drivetrain::lk;
 use drivetrain::motor::{AngleDrive, ArmError, CanDevice, Devices, Link, VelocityDrive};
 use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::vesc::Velocity;
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
@@ -16,6 +18,9 @@ pub(crate) const CASES: &[Case] = cases![
     f75_a_drive_that_forgets_its_turns_does_not_unwind_them,
     f76_an_echo_or_a_command_that_is_read_back_is_no_feedback,
     f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives,
+    f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips,
+    f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on,
+    f80_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing,
 ];
 
 #[cfg_attr(test, test)]
@@ -192,4 +197,67 @@ fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
     saw(format_args!("disarmed {after} ms after the error"));
     bench.steps(150, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
+}
+fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
+    let mut bench = vesc_bench::Bench::armed(Velocity::new());
+    let wheel = AngularVelocity::from_rad_per_s(60.0);
+    bench.steps(500, |bench| bench.own.set_velocity((), wheel).unwrap());
+    bench.drive.fail(4);
+    let mut asked = 0;
+    while Devices::is_armed(&mut bench.own) && asked < 100 {
+        _ = bench.own.set_velocity((), wheel);
+        bench.step();
+        asked += 1;
+    }
+    assert!(asked <= 52, "{asked} ms");
+    assert_eq!(bench.own.health().error_code, 4);
+    saw(format_args!("tripped with code 4 after {asked} ms"));
+    // The drive follows commands again after half a second. It gets none, until the program arms it as a gesture.
+    bench.steps(1_000, |bench| {
+        assert!(bench.own.set_velocity((), wheel).is_err());
+        assert!(bench.drive.shaft().torque_nm() == 0.0);
+    });
+    assert_eq!(bench.own.arm(bench.now()), Ok(()));
+}
+
+#[cfg_attr(test, test)]
+fn f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
+    let mut bench = vesc_bench::Bench::armed(looped());
+    let turn = |bench: &mut vesc_bench::Bench<_>| {
+        _ = bench.own.set_angle((), Angle::from_radians(3.0));
+    };
+    bench.steps(150, turn);
+    assert!(bench.drive.shaft().velocity_rad_per_s() > 1.0, "on its way");
+    bench.reports.retain(|packet| *packet != 27);
+    bench.steps(12, turn);
+    bench.steps(150, |bench| {
+        turn(bench);
+        assert!(bench.drive.shaft().torque_nm() == 0.0);
+    });
+    assert!(!Devices::is_armed(&mut bench.own) && bench.own.angle(()).is_none());
+    saw("at rest within 12 ms after the last status 5, with status 1 at 1 kHz");
+}
+
+#[cfg_attr(test, test)]
+fn f80_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing() {
+    let mut bench = vesc_bench::Bench::new(looped());
+    bench.drive = drive(23);
+    bench.drive.set_tachometer(i32::MAX);
+    bench.arm();
+    let here = bench.own.angle(()).unwrap();
+    bench.drive.shaft_mut().set_angle(0.2); // past the end of the count
+    bench.steps(500, |bench| {
+        bench.own.set_angle((), here).unwrap();
+        assert!(bench.drive.shaft().angle_rad().abs() < 0.5);
+    });
+    // A restart takes the drive more than 100 ms.
+    bench.is_cut = true;
+    bench.drive.lose_supply();
+    bench.steps(110, |_| {});
+    bench.is_cut = false;
+    bench.steps(300, |bench| {
+        assert!(bench.own.set_angle((), here).is_err());
+        assert!(bench.drive.shaft().torque_nm() == 0.0);
+    });
+    saw("one turn of the count of 2^32 steps, and one restart");
 }

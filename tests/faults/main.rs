@@ -24,3 +24,5 @@ mod rows;
 mod table;
 mod timing;
 mod transmit;
+#[path = "../vesc/bench.rs"]
+mod vesc_bench;

@@ -15,7 +15,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Damiao, Lk, Snake, Subject, Wheel};
+use subjects::{Both, Damiao, Lk, Snake, Subject, Vesc, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -249,6 +249,7 @@ fn every_device(clocks: u64) {
     run("lk, torque", clocks, Lk::torque);
     run("lk, velocity", clocks, Lk::velocity);
     run("lk, position", clocks, Lk::position);
+    run("vesc", clocks, Vesc::new);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

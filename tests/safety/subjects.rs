@@ -4,7 +4,7 @@ use super::custom_motor::MyMotor;
 use super::reference::{BadStep, Rules};
 use drivetrain::damiao::{Mode, Model, Motor, PositionVelocity};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::encoder::Position;
+use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::lk;
 use drivetrain::motor::{
@@ -15,6 +15,7 @@ use drivetrain::sim::{DamiaoDrive, LkDrive};
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
+use drivetrain::vesc;
 use embedded_can::Frame;
 
 /// A device of `N` motors that all hear, and are set, together.
@@ -476,5 +477,62 @@ pub(super) mod pins {
             self.update(tick).unwrap();
             [self.channel().0 != 0]
         }
+    }
+}
+
+/// A wheel on a VESC that turns by torque, without a question for the fault code, which has a time of its own.
+pub(super) struct Vesc(Own<vesc::Motor<vesc::CurrentControl>>);
+
+impl Vesc {
+    pub(super) fn new() -> Self {
+        let model = vesc::Model {
+            name: "wheel",
+            pole_pairs: 7,
+            gear: GearRatio::DIRECT,
+            torque_constant_nm_per_a: 0.05,
+            current_limit_a: 20.0,
+            max_velocity: AngularVelocity::from_rad_per_s(300.0),
+            is_reversed: false,
+        };
+        let motor = vesc::Motor::new(model, 23, vesc::CurrentControl::new()).unwrap();
+        Self(
+            Own::new(motor.without_fault_code())
+                .with_health(&STANDS)
+                .unwrap()
+                .with_opening(Duration::ZERO),
+        )
+    }
+}
+
+impl Subject<1> for Vesc {
+    const RULES: [Rules; 1] = [OWN];
+
+    stops!(self => self.0);
+
+    fn hear(&mut self, now: Instant) {
+        let id = embedded_can::ExtendedId::new(0x917).unwrap();
+        let status = CanFrame::new(id, &[0; 8]).unwrap();
+        _ = Devices::ingest(&mut self.0, &status, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.0.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.0.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [self.0.set_torque(value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// Any other value than 0 in the four bytes of a current.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.0, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.0, 0) {
+            is_driven |= is_driving(&frame);
+        }
+        [is_driven]
     }
 }

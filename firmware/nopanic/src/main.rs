@@ -17,6 +17,7 @@ mod opaque;
 mod pwm;
 mod shaping;
 mod snake;
+mod vesc;
 mod wire;
 
 use core::panic::PanicInfo;

@@ -3,7 +3,9 @@
 mod damiao;
 mod lk;
 mod shaft;
+mod vesc;
 
 pub use damiao::DamiaoDrive;
 pub use lk::LkDrive;
 pub use shaft::DriveShaft;
+pub use vesc::{VescDrive, VescMotor};
