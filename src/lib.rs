@@ -24,6 +24,7 @@ pub mod wire;
 // F3: device families and their simulation
 pub mod damiao;
 pub mod dji;
+pub mod odrive;
 #[cfg(feature = "hal")]
 pub mod pwm;
 #[cfg(feature = "sim")]
