@@ -13,6 +13,8 @@
 mod arguments;
 #[path = "../../tests/faults/arming.rs"]
 mod arming;
+#[path = "../../tests/odrive/bench.rs"]
+mod axle;
 #[path = "../../tests/damiao/bench.rs"]
 mod bench;
 #[path = "../../tests/faults/case.rs"]
@@ -29,6 +31,8 @@ mod console;
 mod drives;
 #[path = "../../tests/faults/health.rs"]
 mod health;
+#[path = "../../tests/faults/odrive.rs"]
+mod odrive;
 #[path = "../../tests/faults/plausibility.rs"]
 mod plausibility;
 #[path = "../../tests/faults/receive.rs"]

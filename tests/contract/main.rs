@@ -8,6 +8,7 @@ mod damiao;
 mod dji;
 mod joints;
 mod mit;
+mod odrive;
 #[cfg(feature = "hal")]
 mod pins;
 

@@ -6,6 +6,8 @@
 #![cfg(test)]
 
 mod arming;
+#[path = "../odrive/bench.rs"]
+mod axle;
 #[path = "../damiao/bench.rs"]
 mod bench;
 mod case;
@@ -14,6 +16,7 @@ mod clocks;
 mod commands;
 mod drives;
 mod health;
+mod odrive;
 mod plausibility;
 mod receive;
 mod registration;

@@ -3,6 +3,7 @@
 #![cfg(test)]
 
 mod bench;
+mod vectors;
 
 use bench::{Bench, GEAR, motor, torque};
 use drivetrain::control::PidConfig;

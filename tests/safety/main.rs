@@ -8,6 +8,7 @@
 #![cfg(test)]
 
 mod clock;
+mod odrive;
 mod reference;
 mod subjects;
 
@@ -246,6 +247,8 @@ fn every_device(clocks: u64) {
     run("snake", clocks, Snake::new);
     run("damiao, MIT", clocks, Damiao::mit);
     run("damiao, position", clocks, Damiao::position);
+    run("odrive, torque", clocks, odrive::Odrive::torque);
+    run("odrive, position", clocks, odrive::Odrive::position);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

@@ -12,6 +12,7 @@ mod damiao;
 mod functions;
 mod geometry;
 mod health;
+mod odrive;
 mod opaque;
 mod pwm;
 mod shaping;
