@@ -6,11 +6,13 @@
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
+//! drivetrain-judges odrive VERB           see `odrive`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
+mod odrive;
 mod serve;
 
 use defect::Defect;
@@ -76,6 +78,11 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[&str]) -> Outcome<()> {
+    if let ["odrive", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        odrive::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
     let (arguments, defect) = match arguments {
         [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
         _ => (arguments, Defect::None),
