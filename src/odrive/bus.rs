@@ -5,7 +5,7 @@ use super::command::{
 };
 use super::config::sealed::Wanted;
 use super::config::{Mode, sealed};
-use super::enabling::{PARTS, Phase};
+use super::enabling::{NOT_SET, PARTS, Phase};
 use super::feedback::{bit_of, endpoint_value};
 use super::{Feedback, Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
@@ -32,6 +32,9 @@ const HEARTBEAT_INQUIRIES: u8 = 50;
 
 /// The limits are sent again after so many commands.
 const LIMITS_EACH: u8 = 100;
+
+/// The frames, 10 ms apart, within which a drive is idle and has answered all that it is asked.
+const MOST_FRAMES: u8 = 200;
 
 /// Added to the bit of a reason for which the drive disarmed.
 const DISARMED: u8 = 128;
@@ -112,13 +115,14 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if self.state() != Some(Heartbeat::CLOSED_LOOP) {
             return self.rest();
         }
-        self.rests = 0;
+        (self.rests, self.clears) = (0, 0);
         self.has_polled = self.age_s > POLL_S && !self.has_polled;
         if self.has_polled {
             return request(self.node, ESTIMATES);
         }
         let (sent, since) = self.limits;
-        let parts = if <M as sealed::Mode>::NUMBER == 1 { PARTS } else { parts_of(order.share) };
+        let parts =
+            if <M as sealed::Mode>::NUMBER == 1 { PARTS } else { parts_of(order.share).min(PARTS) };
         self.limits = (sent, since.saturating_add(1));
         if parts != sent || since >= LIMITS_EACH {
             self.limits = (parts, 0);
@@ -148,6 +152,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let frame = match self.enabling {
             // The bus gave it back.
             Some((number, frame)) if number == sent && sent < u8::MAX => frame,
+            _ if self.stops => self.idle(),
+            _ if sent >= MOST_FRAMES && !matches!(self.phase, Phase::Requested(_)) => {
+                self.refuse(NOT_SET)
+            }
             _ => self.starting(),
         };
         self.enabling = Some((sent, frame));
@@ -279,5 +287,5 @@ impl<M: Mode> Motor<M> {
 /// Returns the whole parts of a share.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn parts_of(share: f32) -> u8 {
-    (share.min(1.0).max(0.0) * f32::from(PARTS)) as u8
+    (share * f32::from(PARTS)) as u8
 }

@@ -15,7 +15,7 @@ pub(super) const PARTS: u8 = 16;
 
 /// Error codes beside those of a heartbeat: settings that the drive did not take; and a request that it refused, to which the
 /// procedure result is added.
-const NOT_SET: u8 = 63;
+pub(super) const NOT_SET: u8 = 63;
 const REFUSED: u8 = 64;
 
 /// How far the drive has been enabled.
@@ -147,7 +147,7 @@ impl<M: Mode> Motor<M> {
         }
     }
 
-    fn refuse(&mut self, code: u8) -> CanFrame {
+    pub(super) fn refuse(&mut self, code: u8) -> CanFrame {
         self.refused = Some((code, 3));
         self.phase = Phase::Off;
         self.idle()

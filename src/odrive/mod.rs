@@ -30,6 +30,8 @@
 //! 5 ms a remote frame asks for them, in the place of a command; so set them to 1 ms or 2 ms for a loop on torque. In 0.6 the motor at rest
 //! also asks for heartbeat and errors. All else is set by the motor each time before it enables the drive, and lost with the supply: control
 //! mode, input mode, velocity limit, current limit, and the limits of a trajectory.
+//! `startup_closed_loop_control` has to be off: a drive that resets would run in a mode that nobody set. A motor at rest requests idle,
+//! so no program with it may run while the drive calibrates.
 //!
 //! **How the drive is enabled**: while the heartbeat says idle, modes and limits, then a target where the shaft is, then a request for closed
 //! loop, which is sent once: a second one would drop the torque. When the drive stays idle for half a second, the motor has a fault for
@@ -47,7 +49,7 @@
 //! |---|---|
 //! | 1 to 32 | the lowest bit of the axis error, or of the active errors of 0.6 |
 //! | 33, 34, 35 | 0.5.6: the motor, the encoder, the controller has an error, and the axis none |
-//! | 63 | the drive did not take modes or watchdog |
+//! | 63 | the drive did not take modes or watchdog, did not answer, or did not become idle, within 2 s |
 //! | 64 to 127 | closed loop was refused: 64 and the procedure result of 0.6, 78 for one that is not calibrated |
 //! | 129 to 160 | a warning: the bit of the disarm reason of 0.6, from 129 |
 //!
@@ -67,8 +69,8 @@
 //!
 //! Sources: firmware and documentation of ODrive 0.5.1 to 0.5.6 (`can_simple.cpp`, `axis.cpp`, `controller.cpp`, `can-protocol.rst`); for 0.6
 //! the DBC 0.6.10 of odrive-can, the enumerations of odrive 0.6.11, and odrive-messages 0.2.2. Not known: which frames feed the watchdog
-//! of 0.6 (targets do, by its documentation); whether its heartbeat has the disarm reason in the axis error; how a drive does that is set to
-//! another node id while it runs. Extended ids are not supported. Never tried on a drive.
+//! of 0.6 (targets do, by its documentation); whether its heartbeat has the disarm reason in the axis error; whether a
+//! drive of 0.6 at rest needs targets to feed its watchdog, in which case it reports at rest that the watchdog expired. Extended ids are not supported. Never tried on a drive.
 
 mod bus;
 mod command;

@@ -169,7 +169,7 @@ impl<M: Mode> Motor<M> {
     }
 
     /// Has the drive clear its errors, in 0.5 those of both axes, while the motor is disarmed: three times, 10 ms apart. Nothing else
-    /// clears them, for an encoder that failed once may fail again.
+    /// clears them, for an encoder that failed once may fail again. A motor that is driven forgets the request.
     pub const fn clear_errors(&mut self) {
         self.clears = 3;
     }

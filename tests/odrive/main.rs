@@ -519,3 +519,63 @@ fn bad_configurations_are_refused_with_the_limit() {
         assert_eq!(pro.with_endpoints(ENDPOINTS, time).unwrap_err(), ConfigError::Watchdog(time));
     }
 }
+
+#[test]
+fn a_drive_that_never_says_that_it_is_idle_is_a_fault_and_not_silence() {
+    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    let mut codes = Vec::new();
+    // Its frames do not reach the axis, which others hold in closed loop.
+    bench.is_cut = true;
+    bench.drive.set_state(Heartbeat::CLOSED_LOOP);
+    bench.steps(150, |_| {});
+    bench.steps(2_500, |bench| {
+        _ = bench.own.set_velocity((), velocity(5.0));
+        codes.push(bench.own.motor().vitals().error_code);
+    });
+    assert!(codes.contains(&63) && !Devices::is_armed(&mut bench.own));
+}
+
+#[test]
+fn a_request_to_clear_errors_does_not_wait_for_errors_to_come() {
+    let mut bench = Bench::armed(torque(), Firmware::V0_6);
+    bench.steps(400, |bench| bench.own.set_torque(0.5).unwrap());
+    bench.own.motor_mut().clear_errors();
+    bench.steps(100, |bench| bench.own.set_torque(0.5).unwrap());
+    bench.drive.fail(0x20);
+    bench.steps(800, |_| {});
+    assert_eq!(bench.drive.error(), 0x20);
+    assert!(bench.own.arm(bench.now()).is_err());
+}
+
+#[test]
+fn nothing_is_enabled_while_a_stop_waits_for_its_heartbeat() {
+    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    bench.own.motor_mut().stop();
+    bench.lost = Some(1);
+    bench.steps(400, |bench| {
+        _ = bench.own.set_velocity((), velocity(5.0));
+        let closes = |frame: &CanFrame| frame.header() == 0x67 && frame.bytes()[0] == 8;
+        assert!(!bench.frames.iter().any(closes), "{:?}", bench.frames);
+    });
+}
+
+/// Each update until the drive reports that it is idle again, at every moment of a run.
+#[test]
+fn whenever_it_is_disarmed_no_torque_follows_the_next_frames() {
+    for firmware in BOTH {
+        for ms in (0..420).step_by(7) {
+            let mut bench = Bench::armed(Position::new(3.0), firmware);
+            bench.steps(ms, |bench| bench.own.set_angle((), angle(1.0)).unwrap());
+            bench.own.disarm();
+            bench.step();
+            bench.steps(120, |bench| assert!(bench.drive.shaft().torque_nm() == 0.0, "{ms}"));
+            assert_eq!(bench.drive.state(), Heartbeat::IDLE);
+            let mut bench = Bench::armed(torque(), firmware);
+            bench.steps(ms, |bench| bench.own.set_torque(1.0).unwrap());
+            Devices::emergency_stop(&mut bench.own);
+            bench.step();
+            bench.steps(120, |bench| assert!(bench.drive.shaft().torque_nm() == 0.0, "{ms}"));
+            assert_eq!(bench.drive.state(), Heartbeat::IDLE);
+        }
+    }
+}

@@ -1,11 +1,7 @@
 //! An axis of an ODrive with its shaft, written from the firmware 0.5.6 and the documentation of 0.6: fields are cut out of the frame as
 //! one number of 64 bits, low byte first.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "fields of a frame, which saturate"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
 use super::DriveShaft;
 use crate::frame::CanFrame;
@@ -203,7 +199,7 @@ impl OdriveDrive {
         let bits = u64::from_le_bytes(*frame.bytes());
         let (low, high) = (bits as u32, (bits >> 32) as u32);
         let float = |word: u32| f64::from(f32::from_bits(word)).clamp(-1e6, 1e6);
-        let milli = |shift: u32| f64::from((bits >> shift) as u16 as i16) / 1_000.0;
+        let milli = |shift: u32| f64::from(((bits >> shift) as u16).cast_signed()) / 1_000.0;
         match number {
             0x02 => self.fail(if self.is_0_6 { 0x0200_0000 } else { 0x4000 }),
             0x04 if self.is_0_6 => return self.hear_endpoint(bits),
