@@ -30,7 +30,7 @@ const HEARTBEAT_S: f32 = 0.5;
 /// The same in inquiries, of which there is one each 10 ms.
 const HEARTBEAT_INQUIRIES: u8 = 50;
 
-/// The limits are sent again after so many commands.
+/// The limits are sent again after so many commands, and the modes between.
 const LIMITS_EACH: u8 = 100;
 
 /// The frames, 10 ms apart, within which a drive is idle and has answered all that it is asked.
@@ -127,6 +127,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if parts != sent || since >= LIMITS_EACH {
             self.limits = (parts, 0);
             return self.limits_of(parts);
+        }
+        // In position mode firmware 0.5 would take the angle of the shaft for its target.
+        if since == LIMITS_EACH / 2 && <M as sealed::Mode>::NUMBER < 3 {
+            return self.modes();
         }
         let velocity = self.velocity();
         let limit = self.velocity_limit.as_rad_per_s();

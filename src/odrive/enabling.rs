@@ -47,6 +47,12 @@ impl<M: Mode> Motor<M> {
         self.send(Command::Limits(velocity, torque_nm / self.model.torque_constant()))
     }
 
+    /// Sets control mode and input mode.
+    pub(super) fn modes(&self) -> CanFrame {
+        let (control, input) = (<M as sealed::Mode>::NUMBER, self.mode.input());
+        self.send(Command::ControllerMode(control.into(), input.into()))
+    }
+
     pub(super) fn idle(&self) -> CanFrame {
         self.send(Command::AxisState(Heartbeat::IDLE.into()))
     }
@@ -71,10 +77,7 @@ impl<M: Mode> Motor<M> {
         }
         self.phase = Phase::Starting(turn.saturating_add(1));
         match (turn, self.endpoints) {
-            (0, _) => {
-                let (control, input) = (<M as sealed::Mode>::NUMBER, self.mode.input());
-                self.send(Command::ControllerMode(control.into(), input.into()))
-            }
+            (0, _) => self.modes(),
             (1, _) => {
                 self.limits = (1, 0);
                 self.limits_of(1)
@@ -122,14 +125,19 @@ impl<M: Mode> Motor<M> {
         self.send(Command::AxisState(Heartbeat::CLOSED_LOOP.into()))
     }
 
-    /// Waits for a heartbeat. A second request would leave closed loop and begin it anew, so none is sent.
+    /// Waits for a heartbeat. A second request would leave closed loop and begin it anew, so none is sent. Modes and limits are: the drive
+    /// may have missed them.
     fn requested(&mut self, calls: u8) -> CanFrame {
         if calls >= PATIENCE {
             let result = self.heartbeat.map_or(0, |heartbeat| heartbeat.procedure_result);
             return self.refuse(REFUSED + result.min(63));
         }
         self.phase = Phase::Requested(calls + 1);
-        self.ask_for_state()
+        match calls {
+            0 => self.modes(),
+            1 => self.limits_of(1),
+            _ => self.ask_for_state(),
+        }
     }
 
     /// Asks for a heartbeat; in 0.5 it comes only by itself.

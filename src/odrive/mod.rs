@@ -38,7 +38,8 @@
 //! a moment. Idle is requested until a heartbeat says so.
 //!
 //! **Modes are read back in 0.6 only**, and there only with [`Endpoints`]: without them, and in 0.5, nothing on the bus tells in which mode
-//! the drive is.
+//! the drive is. So modes and limits are sent again after closed loop was requested, and each 100 commands; the modes not in position
+//! mode, where firmware 0.5 would take the angle of the shaft for its target.
 //!
 //! **When the program stops, the drive goes on** with its last command, unless its watchdog is on. Firmware 0.6 has it set over CAN by
 //! [`Motor::with_endpoints`]. In 0.5 it can only be set by USB: `axis.config.watchdog_timeout`, `axis.config.enable_watchdog`. Each frame to

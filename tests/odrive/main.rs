@@ -3,6 +3,7 @@
 #![cfg(test)]
 
 mod bench;
+mod chaos;
 mod vectors;
 
 use bench::{Bench, GEAR, motor, torque};

@@ -27,7 +27,7 @@ const VELOCITY: u32 = 2;
 /// use drivetrain::sim::OdriveDrive;
 ///
 /// let mut drive = OdriveDrive::new(1, false, 0.05, 1.0); // node 1, firmware 0.5, 0.05 Nm/A, no gear
-/// let closed_loop = CanFrame::standard(0x027, [8, 0, 0, 0]).ok_or("an id")?;
+/// let closed_loop = CanFrame::standard(0x027, [8, 0, 0, 0, 0, 0, 0, 0]).ok_or("an id")?;
 /// drive.hear(&closed_loop);
 /// assert_eq!(drive.state(), 8);
 /// # Ok::<(), &str>(())
@@ -57,6 +57,8 @@ pub struct OdriveDrive {
     is_watched: bool,
     watchdog_s: f64,
     silence_s: f64,
+    /// Until the firmware runs.
+    boot_s: f64,
     /// Periods of heartbeat and estimates, 0 for never, and the time since.
     periods_s: [f64; 2],
     since_s: [f64; 2],
@@ -90,6 +92,7 @@ impl OdriveDrive {
             is_watched: false,
             watchdog_s: 0.0,
             silence_s: 0.0,
+            boot_s: 0.0,
             periods_s: [0.1, 0.01],
             since_s: [0.0; 2],
             shaft: DriveShaft::new(0.01, 0.01),
@@ -126,7 +129,8 @@ impl OdriveDrive {
         self.state = IDLE;
     }
 
-    /// Takes the supply away for a moment: the axis is idle, and has its modes, limits and watchdog as at delivery.
+    /// Takes the supply away for a moment: the axis is idle, and has its modes, limits and watchdog as at delivery. It neither hears nor
+    /// sends for 200 ms.
     pub fn lose_supply(&mut self) {
         let new = Self::new(self.node, self.is_0_6, 1.0, 1.0);
         *self = Self {
@@ -135,6 +139,7 @@ impl OdriveDrive {
             refusal: self.refusal,
             periods_s: self.periods_s,
             shaft: self.shaft,
+            boot_s: 0.2,
             ..new
         };
     }
@@ -189,7 +194,7 @@ impl OdriveDrive {
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let Id::Standard(id) = frame.id() else { return None };
         let (node, number) = (id.as_raw() >> 5, id.as_raw() & 0x1F);
-        if node != u16::from(self.node) {
+        if node != u16::from(self.node) || self.boot_s > 0.0 {
             return None;
         }
         self.silence_s = 0.0;
@@ -219,6 +224,9 @@ impl OdriveDrive {
 
     /// Returns the next frame that the axis sends by itself; `None` until one is due again.
     pub fn next_frame(&mut self) -> Option<CanFrame> {
+        if self.boot_s > 0.0 {
+            return None;
+        }
         let messages = [0x01, 0x09];
         for ((since, period), number) in self.since_s.iter_mut().zip(self.periods_s).zip(messages) {
             if period > 0.0 && *since >= period - 1e-9 {
@@ -233,6 +241,7 @@ impl OdriveDrive {
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.silence_s += dt_s;
+        self.boot_s = (self.boot_s - dt_s).max(0.0);
         for since in &mut self.since_s {
             *since += dt_s;
         }
