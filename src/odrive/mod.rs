@@ -69,9 +69,10 @@
 //! ```
 //!
 //! Sources: firmware and documentation of ODrive 0.5.1 to 0.5.6 (`can_simple.cpp`, `axis.cpp`, `controller.cpp`, `can-protocol.rst`); for 0.6
-//! the DBC 0.6.10 of odrive-can, the enumerations of odrive 0.6.11, and odrive-messages 0.2.2. Not known: which frames feed the watchdog
-//! of 0.6 (targets do, by its documentation); whether its heartbeat has the disarm reason in the axis error; whether a
-//! drive of 0.6 at rest needs targets to feed its watchdog, in which case it reports at rest that the watchdog expired. Extended ids are not supported. Never tried on a drive.
+//! the DBC 0.6.10 of odrive-can, the enumerations of odrive 0.6.11, odrive-messages 0.2.2, and public programs, which send modes and limits
+//! with each command. Not known of 0.6: which frames feed its watchdog, and whether it also expires at rest, where it is sent no targets in
+//! velocity and position mode; whether the heartbeat has the disarm reason in the axis error; which length a remote frame has to have: here it
+//! is that of the message. Extended ids are not supported. Never tried on a drive.
 
 mod bus;
 mod command;
