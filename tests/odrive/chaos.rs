@@ -42,7 +42,7 @@ fn run<M: Mode>(
     for step in 0..4_000_u64 {
         match random.below(1_500) {
             0 => {
-                bench.lost = Some([1, 9][random.below(2) as usize]);
+                bench.lost = Some(if random.below(2) == 0 { 1 } else { 9 });
                 until = step + random.below(700);
             }
             1 => cut_until = step + random.below(60),
@@ -60,7 +60,7 @@ fn run<M: Mode>(
                 let now = bench.now();
                 seen.armed += u32::from(bench.own.arm(now).is_ok());
             }
-            30 => bench.drive.refuse([0, 14][random.below(2) as usize]),
+            30 => bench.drive.refuse(14),
             31..34 => bench.drive.refuse(0),
             _ => {}
         }
