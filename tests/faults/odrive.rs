@@ -1,4 +1,4 @@
-//! F90 to F93: drives whose state comes apart from their feedback, by the example of ODrive's.
+//! F81 to F84: drives whose state comes apart from their feedback, by the example of ODrive's.
 
 use crate::axle::{Bench, torque};
 use crate::case::{Case, cases, saw};
@@ -8,10 +8,10 @@ use drivetrain::units::AngularVelocity;
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
-    f90_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_that_stops_trips_it,
-    f91_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once,
-    f92_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up,
-    f93_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone,
+    f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_that_stops_trips_it,
+    f82_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once,
+    f83_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up,
+    f84_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone,
 ];
 
 fn drive(bench: &mut Bench<Velocity>) {
@@ -19,7 +19,7 @@ fn drive(bench: &mut Bench<Velocity>) {
 }
 
 #[cfg_attr(test, test)]
-fn f90_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_that_stops_trips_it() {
+fn f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_that_stops_trips_it() {
     for firmware in [Firmware::V0_5, Firmware::V0_6] {
         let mut bench = Bench::armed(torque(), firmware);
         bench.drive = bench.drive.with_periods(0.002, 0.002);
@@ -43,7 +43,7 @@ fn f90_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_tha
 }
 
 #[cfg_attr(test, test)]
-fn f91_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
+fn f82_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
     let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_6);
     bench.drive.refuse(14);
     let (mut codes, mut requests) = (Vec::new(), 0);
@@ -59,7 +59,7 @@ fn f91_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
 }
 
 #[cfg_attr(test, test)]
-fn f92_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
+fn f83_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
     let mut bench = Bench::new(torque(), Firmware::V0_6);
     bench.drive.set_state(Heartbeat::CLOSED_LOOP);
     bench.arm();
@@ -75,7 +75,7 @@ fn f92_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
 }
 
 #[cfg_attr(test, test)]
-fn f93_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone() {
+fn f84_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone() {
     let mut bench = Bench::new(Velocity::new(3.0), Firmware::V0_5);
     bench.drive = bench.drive.with_watchdog(0.1);
     bench.arm();
