@@ -25,6 +25,7 @@ pub mod wire;
 pub mod damiao;
 pub mod dji;
 pub mod lk;
+pub mod odrive;
 #[cfg(feature = "hal")]
 pub mod pwm;
 #[cfg(feature = "sim")]

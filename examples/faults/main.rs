@@ -13,6 +13,8 @@
 mod arguments;
 #[path = "../../tests/faults/arming.rs"]
 mod arming;
+#[path = "../../tests/odrive/bench.rs"]
+mod axle;
 #[path = "../../tests/damiao/bench.rs"]
 mod bench;
 #[path = "../../tests/faults/case.rs"]
@@ -31,6 +33,8 @@ mod drives;
 mod health;
 #[path = "../../tests/lk/bench.rs"]
 mod lk_bench;
+#[path = "../../tests/faults/odrive.rs"]
+mod odrive;
 #[path = "../../tests/faults/plausibility.rs"]
 mod plausibility;
 #[path = "../../tests/faults/receive.rs"]

@@ -8,12 +8,14 @@
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
 //! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
 //! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
+//! drivetrain-judges odrive VERB           see `odrive`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
 mod lk;
+mod odrive;
 mod serve;
 mod vesc;
 
@@ -83,6 +85,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["vesc", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         vesc::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["odrive", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        odrive::run(rest, io::stdin().lock(), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

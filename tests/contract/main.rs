@@ -9,6 +9,7 @@ mod dji;
 mod joints;
 mod lk;
 mod mit;
+mod odrive;
 #[cfg(feature = "hal")]
 mod pins;
 mod vesc;

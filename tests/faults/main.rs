@@ -6,6 +6,8 @@
 #![cfg(test)]
 
 mod arming;
+#[path = "../odrive/bench.rs"]
+mod axle;
 #[path = "../damiao/bench.rs"]
 mod bench;
 mod case;
@@ -16,6 +18,7 @@ mod drives;
 mod health;
 #[path = "../lk/bench.rs"]
 mod lk_bench;
+mod odrive;
 mod plausibility;
 mod receive;
 mod registration;

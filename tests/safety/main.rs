@@ -8,6 +8,7 @@
 #![cfg(test)]
 
 mod clock;
+mod odrive;
 mod reference;
 mod subjects;
 
@@ -250,6 +251,8 @@ fn every_device(clocks: u64) {
     run("lk, velocity", clocks, Lk::velocity);
     run("lk, position", clocks, Lk::position);
     run("vesc", clocks, Vesc::new);
+    run("odrive, torque", clocks, odrive::Odrive::torque);
+    run("odrive, position", clocks, odrive::Odrive::position);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

@@ -13,6 +13,7 @@ mod functions;
 mod geometry;
 mod health;
 mod lk;
+mod odrive;
 mod opaque;
 mod pwm;
 mod shaping;

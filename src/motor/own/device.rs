@@ -73,7 +73,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             .claims()
             .into_iter()
             .filter(|claim| claim.role() == Role::Command && (is_known || !claim.is_shared()));
-        let is_own = !frame.is_remote() && commands.any(|claim| claim.covers(frame.id()));
+        let is_own = match frame.is_remote() {
+            true => is_known,
+            false => commands.any(|claim| claim.covers(frame.id())),
+        };
         self.superseded = self.superseded.wrapping_add(u32::from(is_own));
         is_own
     }
@@ -262,6 +265,11 @@ impl<M: OwnMotor> Own<M> {
     fn enable(&mut self) {
         if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
             self.guard.relax_until_armed();
+            return;
+        }
+        // Of several frames none is left out: the one before still waits for the bus.
+        if self.switching.is_some() && self.enabling > 0 {
+            self.has_posted = true;
             return;
         }
         let frame = self.motor.enable(self.enabling);

@@ -2,10 +2,12 @@
 
 mod damiao;
 mod lk;
+mod odrive;
 mod shaft;
 mod vesc;
 
 pub use damiao::DamiaoDrive;
 pub use lk::LkDrive;
+pub use odrive::OdriveDrive;
 pub use shaft::DriveShaft;
 pub use vesc::{VescDrive, VescMotor};
