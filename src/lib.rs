@@ -26,6 +26,7 @@ pub mod damiao;
 pub mod dji;
 #[cfg(feature = "hal")]
 pub mod pwm;
+pub mod robstride;
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod snake;

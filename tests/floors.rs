@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 15] = [
+const FLOORS: [(&str, u32); 16] = [
     ("units", 0),
     ("time", 0),
     ("math", 0),
@@ -19,6 +19,7 @@ const FLOORS: [(&str, u32); 15] = [
     ("chassis", 21),
     ("damiao", 30),
     ("dji", 30),
+    ("robstride", 30),
     ("snake", 30),
     ("pwm", 30),
     ("runner", 40),
@@ -269,7 +270,7 @@ fn the_decisions_are_numbered_in_their_order() {
 }
 
 /// The device families on CAN.
-const FAMILIES: [&str; 3] = ["damiao", "dji", "snake"];
+const FAMILIES: [&str; 4] = ["damiao", "dji", "robstride", "snake"];
 
 /// The first column of each table row of a text that begins with a path.
 fn paths(text: &str) -> impl Iterator<Item = &str> {
@@ -330,7 +331,7 @@ fn own_rules(text: &str) -> Vec<String> {
 #[test]
 fn no_family_has_a_safety_rule_of_its_own() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    for family in ["damiao", "dji", "snake", "pwm", "motor/own"] {
+    for family in ["damiao", "dji", "robstride", "snake", "pwm", "motor/own"] {
         let files = rust_files(&src.join(family));
         for file in
             files.iter().filter(|file| !file.components().any(|part| part.as_os_str() == "tests"))

@@ -37,6 +37,8 @@ mod receive;
 mod registration;
 #[path = "../../tests/faults/rig.rs"]
 mod rig;
+#[path = "../../tests/robstride/bench.rs"]
+mod robstride;
 #[path = "../../tests/faults/rows.rs"]
 mod rows;
 #[path = "../../tests/faults/timing.rs"]

@@ -10,6 +10,7 @@ mod joints;
 mod mit;
 #[cfg(feature = "hal")]
 mod pins;
+mod robstride;
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};

@@ -18,6 +18,8 @@ mod plausibility;
 mod receive;
 mod registration;
 mod rig;
+#[path = "../robstride/bench.rs"]
+mod robstride;
 mod rows;
 mod table;
 mod timing;

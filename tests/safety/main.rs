@@ -15,7 +15,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Damiao, Snake, Subject, Wheel};
+use subjects::{Both, Damiao, RobStride, Snake, Subject, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -246,6 +246,8 @@ fn every_device(clocks: u64) {
     run("snake", clocks, Snake::new);
     run("damiao, MIT", clocks, Damiao::mit);
     run("damiao, position", clocks, Damiao::position);
+    run("robstride, operation", clocks, RobStride::operation);
+    run("robstride, current", clocks, RobStride::current);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

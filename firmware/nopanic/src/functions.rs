@@ -41,6 +41,7 @@ pub fn call_all() {
     crate::chassis::call_all();
     crate::pwm::call_all();
     crate::damiao::call_all();
+    crate::robstride::call_all();
     crate::snake::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();

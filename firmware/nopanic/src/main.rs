@@ -14,6 +14,7 @@ mod geometry;
 mod health;
 mod opaque;
 mod pwm;
+mod robstride;
 mod shaping;
 mod snake;
 mod wire;
