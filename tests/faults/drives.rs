@@ -154,9 +154,7 @@ fn f85_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_ne
 
 #[cfg_attr(test, test)]
 fn f86_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
-    let mut bench = robstride::Bench::new(ImpedanceControl::new(3.0).unwrap());
-    bench.steps(150, |_| {});
-    bench.own.arm(bench.now()).unwrap();
+    let mut bench = robstride::Bench::armed(robstride::operation());
     bench.steps(300, |bench| _ = bench.own.set_torque(0.5));
     // Over-voltage, and the drive goes on.
     let mut failed = bench.drive;

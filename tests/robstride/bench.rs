@@ -2,10 +2,9 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own};
-use drivetrain::robstride::{Mode, Model, Motor, Status};
+use drivetrain::robstride::{Mode, Model, Motor};
 use drivetrain::sim::RobStrideDrive;
 use drivetrain::time::{Instant, Tick};
-use embedded_can::ExtendedId;
 
 /// A motor and its drive on a bus that loses nothing unless told.
 pub(crate) struct Bench<M: Mode> {
@@ -75,24 +74,11 @@ impl<M: Mode> Bench<M> {
             each(self);
         }
     }
-
-    pub(crate) fn status(&self) -> Status {
-        self.own.motor().feedback().unwrap().status
-    }
 }
 
 /// The type of a frame.
-pub(crate) fn kind(frame: &CanFrame) -> u32 {
+fn kind(frame: &CanFrame) -> u32 {
     frame.header() >> 24 & 0x1F
-}
-
-/// The index of a parameter in a frame.
-pub(crate) fn index(frame: &CanFrame) -> u16 {
-    u16::from_le_bytes([frame.bytes()[0], frame.bytes()[1]])
-}
-
-pub(crate) fn extended(raw: u32, data: [u8; 8]) -> CanFrame {
-    CanFrame::of(ExtendedId::new(raw).unwrap(), data)
 }
 
 pub(crate) fn operation() -> ImpedanceControl {

@@ -1,6 +1,7 @@
 //! Frames that are damaged, of others, or unexpected.
 
-use crate::bench::{Bench, extended, operation};
+use crate::bench::{Bench, operation};
+use crate::extended;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Ingest, Malformed};
 use embedded_can::{ExtendedId, Frame, StandardId};

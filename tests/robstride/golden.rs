@@ -1,6 +1,7 @@
 //! Golden frames, each with its origin in `tests/data/robstride/vectors.json`.
 
-use crate::bench::{Bench, extended, operation};
+use crate::bench::{Bench, operation};
+use crate::extended;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, OwnMotor};
 use drivetrain::robstride::{Command, Feedback, Model, Motor, Register, Status};

@@ -49,7 +49,12 @@ fn the_count_times_65535_is_the_range() {
 fn rest_is_within_half_a_count_of_no_torque_and_has_no_gains() {
     for model in Model::ALL {
         let frame = Command::Operation(mit::Command::REST).encode(model, 0xFD, 1);
-        assert_eq!(format!("{frame:?}"), "017FFF01 [8] 7F FF 7F FF 00 00 00 00", "{}", model.name());
+        assert_eq!(
+            format!("{frame:?}"),
+            "017FFF01 [8] 7F FF 7F FF 00 00 00 00",
+            "{}",
+            model.name()
+        );
     }
 }
 
