@@ -2,12 +2,13 @@
 
 use super::command::{Command, extended};
 use super::config::{Mode, sealed};
-use super::feedback::{Answer, answer, register, report_code};
+use super::feedback::{Answer, answer, laps, register, report_code};
+use super::setup::Setup;
 use super::{ConfigError, Feedback, Model, Register, Status};
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
-    Settings, Severity, Vitals, WrongSetting,
+    Severity, Vitals, WrongSetting,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -59,13 +60,8 @@ pub struct Motor<M> {
     reported: u32,
     /// Faults were cleared since then.
     has_cleared: bool,
-    settings: Settings<Register, 3>,
-    /// A command that waits for the drive to rest.
-    once: Option<Command>,
-    /// How many of the preparations the drive has confirmed since it was to be enabled.
-    prepared: usize,
-    is_written: bool,
-    /// Counts the frames of which every second is another one.
+    setup: Setup,
+    /// Counts the frames that disable since the drive reported a fault.
     turn: u8,
 }
 
@@ -90,10 +86,7 @@ impl<M: Mode> Motor<M> {
             laps: 0,
             reported: 0,
             has_cleared: false,
-            settings: Settings::new([Register::RunMode, Register::MechanicalPosition, last]),
-            once: None,
-            prepared: 0,
-            is_written: false,
+            setup: Setup::new([Register::RunMode, Register::MechanicalPosition, last]),
             turn: 0,
         })
     }
@@ -137,7 +130,7 @@ impl<M: Mode> Motor<M> {
     /// Asks the drive for a parameter. While the motor is disarmed the frame goes out within some 10 ms, and again until
     /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
     pub const fn read(&mut self, register: Register) {
-        self.settings.request(Inquiry::Read(register));
+        self.setup.settings.request(Inquiry::Read(register));
     }
 
     /// Writes a parameter of the drive, until the supply is lost, and reads it back; while the motor is disarmed, as
@@ -149,7 +142,7 @@ impl<M: Mode> Motor<M> {
         if !register.is_writable() || !register.holds(value) {
             return Err(ConfigError::Register(register, value));
         }
-        self.settings.request(Inquiry::Write(register, value));
+        self.setup.settings.request(Inquiry::Write(register, value));
         Ok(())
     }
 
@@ -162,14 +155,14 @@ impl<M: Mode> Motor<M> {
         if !self.model.can_store() {
             return Err(ConfigError::Unsupported("frame to store parameters"));
         }
-        self.settings.request(Inquiry::Store);
+        self.setup.settings.request(Inquiry::Store);
         Ok(())
     }
 
     /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A RobStride keeps the zero over a loss of
     /// the supply if it is [stored](Self::store), a CyberGear does not.
     pub const fn set_zero(&mut self) {
-        self.once = Some(Command::SetZero);
+        self.setup.once = Some(Command::SetZero);
     }
 
     /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once. This motor then hears no more
@@ -181,7 +174,7 @@ impl<M: Mode> Motor<M> {
         if !matches!(id, 1..=127) || id == self.host {
             return Err(ConfigError::Id(id));
         }
-        self.once = Some(Command::SetId(id));
+        self.setup.once = Some(Command::SetId(id));
         Ok(())
     }
 
@@ -189,40 +182,19 @@ impl<M: Mode> Motor<M> {
     /// the drive does not have it.
     #[must_use]
     pub const fn register(&self) -> Option<(Register, f32)> {
-        self.settings.answer()
+        self.setup.settings.answer()
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
         command.encode(&self.model, self.host, self.id)
     }
 
-    /// Returns the frame of a question. A drive answers a write with its feedback, so the next frame about it reads the value.
-    fn ask(&mut self, inquiry: Inquiry<Register>) -> CanFrame {
-        let command = match self.settings.ask(inquiry) {
-            Inquiry::Write(register, value) if !self.is_written => {
-                self.is_written = true;
-                Command::Write(register, value)
-            }
-            Inquiry::Write(register, _) => {
-                self.is_written = false;
-                Command::Read(register)
-            }
-            Inquiry::Read(register) => Command::Read(register),
-            Inquiry::Store => Command::Store,
-        };
-        self.frame_of(command)
-    }
-
     /// Returns what the drive has to confirm before it is enabled: first its time-out.
     fn preparation(&self) -> Option<(Register, f32)> {
-        match (self.prepared, self.model.has_timeout()) {
+        match (self.setup.prepared, self.model.has_timeout()) {
             (0, true) => Some((Register::Timeout, self.timeout_units as f32)),
             (index, has_timeout) => self.mode.preparation(index - usize::from(has_timeout)),
         }
-    }
-
-    fn prepare_anew(&mut self) {
-        (self.prepared, self.is_written) = (0, false);
     }
 
     /// Returns the value that a parameter has to have; of the position the end of its range.
@@ -249,7 +221,7 @@ impl<M: Mode> Motor<M> {
     fn has_wrong_mode(&self) -> bool {
         let is_right =
             |register, found| register != Register::RunMode || self.is_right(register, found);
-        matches!(self.settings.wrong(is_right), Some((Register::RunMode, Some(_))))
+        matches!(self.setup.settings.wrong(is_right), Some((Register::RunMode, Some(_))))
     }
 
     fn has_fault(&self) -> bool {
@@ -259,34 +231,12 @@ impl<M: Mode> Motor<M> {
                 .is_some_and(|drive| drive.faults != 0 || drive.status == Status::Calibration)
     }
 
-    /// Disables the drive; where it reports a fault, clears that in turn.
+    /// Disables the drive; where it reports a fault, each second frame since then clears that.
     fn off(&mut self) -> CanFrame {
-        self.turn = self.turn.wrapping_add(1);
-        let clears = self.has_fault() && self.turn & 1 != 0;
+        self.turn = if self.has_fault() { self.turn.wrapping_add(1) } else { 0 };
+        let clears = self.turn != 0 && self.turn.is_multiple_of(2);
         self.has_cleared |= clears;
         self.frame_of(if clears { Command::ClearFaults } else { Command::Disable })
-    }
-
-    fn take_value(&mut self, register: Register, value: f32) {
-        if register == Register::MechanicalPosition {
-            self.laps = laps(value, self.model.pmax_rad());
-        }
-        let preparation = self.preparation().filter(|(wanted, _)| *wanted == register);
-        match self.settings.asked() {
-            Some(asked @ Inquiry::Read(wanted)) if wanted == register => {
-                self.settings.take(asked, value);
-                if let Some((_, wanted)) = preparation.filter(|_| self.is_written) {
-                    self.is_written = false;
-                    // A drive may know a lower limit of its own; a time-out of 0 is none.
-                    let is_lower = register != Register::Timeout && value >= 0.0 && value < wanted;
-                    self.prepared += usize::from(is_lower || value.to_bits() == wanted.to_bits());
-                }
-            }
-            Some(asked @ Inquiry::Write(wanted, _)) if wanted == register => {
-                self.settings.take(asked, value);
-            }
-            _ => {}
-        }
     }
 }
 
@@ -346,7 +296,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     fn control(&mut self, order: Order) -> CanFrame {
         let angle = self.angle();
         let command =
-            self.drive.and_then(|drive| self.mode.command(order, angle, &drive, &self.model));
+            self.drive.and_then(|drive| self.mode.command(order, (angle, &drive), &self.model));
         match command {
             Some(command) => self.frame_of(command),
             None => self.rest(),
@@ -360,24 +310,15 @@ impl<M: Mode> OwnMotor for Motor<M> {
     /// First what is not known of the settings, then the preparations, each written and read back, then the frame that enables:
     /// all of that anew each time, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        if let Some(unknown) = self.settings.complete() {
-            return Some(self.ask(unknown));
-        }
-        let Some((register, value)) = self.preparation() else {
-            self.prepare_anew();
-            self.settings.forget();
+        let command = self.setup.next(self.preparation());
+        if command == Command::Enable {
             self.mode.reset();
-            return Some(self.frame_of(Command::Enable));
-        };
-        if self.is_written {
-            return Some(self.ask(Inquiry::Read(register)));
         }
-        self.is_written = true;
-        Some(self.frame_of(Command::Write(register, value)))
+        Some(self.frame_of(command))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
-        self.prepare_anew();
+        self.setup.prepare_anew();
         <M as sealed::Mode>::REST.is_some().then(|| self.off())
     }
 
@@ -389,20 +330,9 @@ impl<M: Mode> OwnMotor for Motor<M> {
         self.drive.map(|drive| drive.status == Status::Run)
     }
 
-    /// Every fourth question sets the run mode where it is another one: a drive starts in the operation mode.
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.prepared = 0;
-        if let Some(command) = self.once.take() {
-            self.settings.forget();
-            return Some(self.frame_of(command));
-        }
-        self.turn = self.turn.wrapping_add(1);
-        if self.turn.is_multiple_of(4) && self.has_wrong_mode() {
-            let number = self.expected(Register::RunMode);
-            return Some(self.frame_of(Command::Write(Register::RunMode, number)));
-        }
-        let inquiry = self.settings.inquire()?;
-        Some(self.ask(inquiry))
+        let number = self.has_wrong_mode().then(|| self.expected(Register::RunMode));
+        self.setup.inquire(number).map(|command| self.frame_of(command))
     }
 
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
@@ -410,7 +340,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
             Some(Answer::Value(index, bytes)) => {
                 if let Some(register) = register(index) {
                     let value = bytes.map_or(f32::NAN, |bytes| register.value_of(bytes));
-                    self.take_value(register, value);
+                    if register == Register::MechanicalPosition {
+                        self.laps = laps(value, self.model.pmax_rad());
+                    }
+                    self.setup.take(register, value, self.preparation());
                 }
             }
             Some(Answer::Faults(faults)) => (self.reported, self.has_cleared) = (faults, false),
@@ -422,7 +355,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_right = |register, found| self.is_right(register, found);
-        self.settings.wrong(is_right).map(|(register, found)| WrongSetting {
+        self.setup.settings.wrong(is_right).map(|(register, found)| WrongSetting {
             motor: self.name(),
             setting: match register {
                 Register::RunMode => "run_mode",
@@ -435,8 +368,8 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn forget_settings(&mut self) {
-        self.settings.forget();
-        self.prepare_anew();
+        self.setup.settings.forget();
+        self.setup.prepare_anew();
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -464,14 +397,4 @@ impl<M: Mode> OwnMotor for Motor<M> {
             current: drive.measured.torque_nm / self.model.tmax_nm(),
         }
     }
-}
-
-/// Returns how many times the range of the feedback a position is away from it.
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn laps(position_rad: f32, pmax: f32) -> i32 {
-    if position_rad.abs() <= pmax {
-        return 0;
-    }
-    let turns = ((position_rad.abs() + pmax) / (2.0 * pmax)) as i32;
-    if position_rad > 0.0 { turns } else { -turns }
 }

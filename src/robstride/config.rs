@@ -12,8 +12,13 @@ pub trait Mode: sealed::Mode {}
 
 impl<M: sealed::Mode> Mode for M {}
 
+use sealed::Seen;
+
 pub(super) mod sealed {
     use super::{Angle, Capabilities, Command, ConfigError, Feedback, Model, Order, Register};
+
+    /// The angle of the shaft, where it has one, and the last feedback.
+    pub(super) type Seen<'a> = (Option<Angle>, &'a Feedback);
 
     pub trait Mode: core::fmt::Debug + Copy {
         /// What the drive reads as rest; `None` for a drive that only rests when it is disabled.
@@ -34,13 +39,7 @@ pub(super) mod sealed {
         fn preparation(&self, index: usize) -> Option<(Register, f32)>;
 
         /// Returns what the drive is told within the share of its largest effort; `None` to rest.
-        fn command(
-            &mut self,
-            order: Order,
-            angle: Option<Angle>,
-            drive: &Feedback,
-            model: &Model,
-        ) -> Option<Command>;
+        fn command(&mut self, order: Order, drive: Seen, model: &Model) -> Option<Command>;
 
         /// Returns a target where the shaft is, for before the drive is enabled.
         fn stay(&self, drive: &Feedback) -> Command;
@@ -75,13 +74,8 @@ impl sealed::Mode for ImpedanceControl {
         (index == 0).then(|| (Register::TorqueLimit, self.torque_limit_nm()))
     }
 
-    fn command(
-        &mut self,
-        order: Order,
-        angle: Option<Angle>,
-        drive: &Feedback,
-        model: &Model,
-    ) -> Option<Command> {
+    fn command(&mut self, order: Order, drive: Seen, model: &Model) -> Option<Command> {
+        let (angle, drive) = drive;
         let velocity = AngularVelocity::from_rad_per_s(drive.measured.velocity_rad_per_s);
         let Impedance { angle, velocity, stiffness, damping, torque_nm } =
             self.step(order, angle, velocity, &model.most(), &model.count())?;
@@ -189,13 +183,7 @@ impl sealed::Mode for Position {
     }
 
     /// Goes to the position nearest to the shaft's that has the target's angle, within the range of the feedback.
-    fn command(
-        &mut self,
-        order: Order,
-        angle: Option<Angle>,
-        _: &Feedback,
-        model: &Model,
-    ) -> Option<Command> {
+    fn command(&mut self, order: Order, (angle, _): Seen, model: &Model) -> Option<Command> {
         let (Target::Angle(target), Some(angle)) = (order.target, angle) else { return None };
         let way = wrap_pi((target - angle).as_radians());
         // At the very end a position is none any more.
@@ -244,13 +232,7 @@ impl sealed::Mode for Velocity {
         (index == 0).then_some((Register::CurrentLimit, 0.0))
     }
 
-    fn command(
-        &mut self,
-        order: Order,
-        _: Option<Angle>,
-        _: &Feedback,
-        _: &Model,
-    ) -> Option<Command> {
+    fn command(&mut self, order: Order, _: Seen, _: &Model) -> Option<Command> {
         let Target::Velocity(velocity) = order.target else { return None };
         let end = self.0.velocity_limit.as_rad_per_s();
         let velocity = velocity.as_rad_per_s().min(end).max(-end);
@@ -305,13 +287,7 @@ impl sealed::Mode for Current {
         (index == 0).then_some((Register::CurrentTarget, 0.0))
     }
 
-    fn command(
-        &mut self,
-        order: Order,
-        _: Option<Angle>,
-        _: &Feedback,
-        _: &Model,
-    ) -> Option<Command> {
+    fn command(&mut self, order: Order, _: Seen, _: &Model) -> Option<Command> {
         let Target::Torque(torque_nm) = order.target else { return None };
         let end = self.limit_a * order.share;
         let current = (torque_nm / self.nm_per_ampere).min(end).max(-end);

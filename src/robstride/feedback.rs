@@ -152,3 +152,13 @@ const fn lowest(bits: u32) -> u8 {
 pub(super) fn register(index: u16) -> Option<Register> {
     Register::ALL.iter().copied().find(|register| register.index() == index)
 }
+
+/// Returns how many times the range of the feedback a position is away from it.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn laps(position_rad: f32, pmax: f32) -> i32 {
+    if position_rad.abs() <= pmax {
+        return 0;
+    }
+    let turns = ((position_rad.abs() + pmax) / (2.0 * pmax)) as i32;
+    if position_rad > 0.0 { turns } else { -turns }
+}

@@ -80,6 +80,7 @@ mod error;
 mod feedback;
 mod model;
 mod register;
+mod setup;
 #[cfg(test)]
 mod tests;
 
