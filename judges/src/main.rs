@@ -5,12 +5,14 @@
 //! drivetrain-judges registers             one a line: number, kind, access
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
+//! drivetrain-judges robstride ...         the family `robstride`: see `robstride`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
+mod robstride;
 mod serve;
 
 use defect::Defect;
@@ -101,6 +103,9 @@ fn run(arguments: &[&str]) -> Outcome<()> {
         }
         ["decode", model] => {
             codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
+        }
+        ["robstride", rest @ ..] => {
+            robstride::run(rest, defect, io::stdin().lock(), &mut output)?;
         }
         ["serve"] => serve::serve(defect, io::stdin().lock(), &mut output)?,
         _ => return Err("see the head of judges/src/main.rs for the arguments".into()),
