@@ -60,7 +60,7 @@ pub fn run(
 fn model_of(ranges: &[&str]) -> Outcome<Model> {
     let numbers: Vec<f32> = ranges.iter().map(|number| number.parse()).collect::<Result<_, _>>()?;
     let [p, v, t, kp, kd] = numbers[..] else { return Err("five ranges are needed".into()) };
-    Ok(Model::RS00.with_ranges(Ranges::new(p, v, t)?.with_gains(kp, kd)?))
+    Ok(Model::new("judged", Ranges::new(p, v, t)?.with_gains(kp, kd)?, 1.0)?)
 }
 
 fn encode(

@@ -323,7 +323,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        self.drive.map(|drive| self.frame_of(self.mode.stay(&drive)))
+        self.drive.map(|drive| self.frame_of(self.mode.stay((self.angle(), &drive))))
     }
 
     fn is_enabled(&self) -> Option<bool> {

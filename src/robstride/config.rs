@@ -42,7 +42,7 @@ pub(super) mod sealed {
         fn command(&mut self, order: Order, drive: Seen, model: &Model) -> Option<Command>;
 
         /// Returns a target where the shaft is, for before the drive is enabled.
-        fn stay(&self, drive: &Feedback) -> Command;
+        fn stay(&self, drive: Seen) -> Command;
 
         /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
         fn effort(&self) -> f32 {
@@ -89,7 +89,7 @@ impl sealed::Mode for ImpedanceControl {
     }
 
     /// A drive that is enabled follows the last command, which was rest.
-    fn stay(&self, _: &Feedback) -> Command {
+    fn stay(&self, _: Seen) -> Command {
         Command::Operation(mit::Command::REST)
     }
 
@@ -192,8 +192,10 @@ impl sealed::Mode for Position {
         Some(self.0.command(order.share, Register::PositionTarget, position))
     }
 
-    fn stay(&self, drive: &Feedback) -> Command {
-        Command::Write(Register::PositionTarget, drive.measured.position_rad)
+    /// Without an angle the limit of the current stays zero.
+    fn stay(&self, (angle, _): Seen) -> Command {
+        let Some(angle) = angle else { return Command::Write(Register::CurrentLimit, 0.0) };
+        Command::Write(Register::PositionTarget, angle.as_radians())
     }
 
     fn reset(&mut self) {
@@ -239,7 +241,7 @@ impl sealed::Mode for Velocity {
         Some(self.0.command(order.share, Register::VelocityTarget, velocity))
     }
 
-    fn stay(&self, drive: &Feedback) -> Command {
+    fn stay(&self, (_, drive): Seen) -> Command {
         Command::Write(Register::VelocityTarget, drive.measured.velocity_rad_per_s)
     }
 
@@ -295,7 +297,7 @@ impl sealed::Mode for Current {
         Some(Command::Write(Register::CurrentTarget, current))
     }
 
-    fn stay(&self, _: &Feedback) -> Command {
+    fn stay(&self, _: Seen) -> Command {
         Command::Write(Register::CurrentTarget, 0.0)
     }
 

@@ -2,6 +2,7 @@
 
 use super::Register;
 use crate::time::Duration;
+use crate::wire::mit::RangeError;
 
 /// A configuration that no drive has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,6 +13,8 @@ pub enum ConfigError {
     Id(u8),
     /// A host id that is the id of the motor.
     HostId(u8),
+    /// A range of the model.
+    Range(RangeError),
     /// A torque limit that is not above zero and at most the range of the torque: the limit, and the range, in Nm.
     TorqueLimit(f32, f32),
     /// A velocity limit that is not above zero and at most the range of the velocity: the limit, and the range, in rad/s.
@@ -33,6 +36,7 @@ impl core::fmt::Display for ConfigError {
         match self {
             Self::Id(id) => write!(f, "id {id}: 1 to 127 are allowed, but for the id of the host"),
             Self::HostId(id) => write!(f, "host id {id}: another one than the motor's is needed"),
+            Self::Range(error) => write!(f, "{error}"),
             Self::TorqueLimit(limit, most) => {
                 write!(f, "torque limit {limit} Nm: above 0 and at most {most} Nm")
             }

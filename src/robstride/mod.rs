@@ -49,6 +49,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Every frame to the motor that another node sends counts as that of a second master, also the question of a tool for a parameter.
+//!
 //! A fault is an error of the motor, with a code:
 //!
 //! | code | fault | from |
@@ -63,6 +65,8 @@
 //! Not known:
 //! * Whether all drives truncate to counts, as the manuals' code does, or round: half a count either way.
 //! * To which host a drive answers an operation frame, which names none. So feedback counts whichever host it names.
+//! * Whether a drive that is disabled answers an operation frame. The manuals name the answer without a condition, and
+//!   [`arm`](crate::motor::Devices::arm) finds no feedback where it does not.
 //! * Whether the firmware resets a limit when it is enabled. The current limit goes out again with every 16th command.
 //! * Which position a drive's own loop sees beyond the range of its feedback. So none is sent there.
 //! * What a CyberGear with a firmware before 1.2.1.5 answers for `mechPos`. If it does not, it is never armed.

@@ -30,18 +30,18 @@ use crate::wire::mit::Ranges;
 /// | RS06 | 20 rad/s and 60 Nm | robstride-dynamics 0.0.1 |
 /// | RS03, RS04 | kp 500, kd 5 | public programs |
 ///
-/// [`with_ranges`](Self::with_ranges) sets others. Before a motor is enabled its torque limit is written to the drive too
+/// [`with_position_range`](Self::with_position_range) and [`with_gain_ranges`](Self::with_gain_ranges) set others, and
+/// [`new`](Self::new) all of them. Before a motor is enabled its torque limit is written to the drive too
 /// (`limit_torque`, in Nm), so that the drive itself limits it whatever the ranges are.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::robstride::Model;
-/// use drivetrain::wire::mit::Ranges;
+/// use drivetrain::robstride::{ConfigError, Model};
 ///
 /// assert_eq!((Model::RS04.name(), Model::RS04.tmax_nm()), ("RS04", 120.0));
-/// let old = Model::RS00.with_ranges(Ranges::new(12.5, 33.0, 14.0)?);
-/// assert_eq!(old.pmax_rad(), 12.5);
-/// # Ok::<(), drivetrain::wire::mit::RangeError>(())
+/// let old = Model::RS00.with_position_range(12.5)?;
+/// assert_eq!((old.pmax_rad(), old.vmax_rad_per_s()), (12.5, 33.0));
+/// # Ok::<(), ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -80,7 +80,8 @@ models! {
 }
 
 impl Model {
-    /// Describes a RobStride that the table does not have: its ranges, and its largest current in A.
+    /// Describes a RobStride that the table does not have: its ranges, and its largest current in A. The ranges of kp and kd are 500 and
+    /// 5 unless [`Ranges::with_gains`] sets them.
     ///
     /// # Errors
     /// [`ConfigError::CurrentLimit`] for a current that is zero, negative or not finite.
@@ -112,10 +113,28 @@ impl Model {
         Self { name, ranges, current_a, is_cybergear }
     }
 
-    /// Sets other ranges: those of another firmware, or of a source that was found right.
-    #[must_use]
-    pub const fn with_ranges(self, ranges: Ranges) -> Self {
-        Self { ranges, ..self }
+    /// Sets another range of the position, in rad, and keeps all others: that of another firmware.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    pub const fn with_position_range(self, pmax_rad: f32) -> Result<Self, ConfigError> {
+        let (kp, kd) = self.ranges.gains();
+        match Ranges::new(pmax_rad, self.vmax_rad_per_s(), self.tmax_nm()) {
+            Ok(ranges) => Self { ranges, ..self }.with_gain_ranges(kp, kd),
+            Err(error) => Err(ConfigError::Range(error)),
+        }
+    }
+
+    /// Sets other ranges of kp and kd, in Nm/rad and Nm s/rad, and keeps all others. **A range that is less than the drive's makes the
+    /// drive stiffer than asked by the quotient.**
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    pub const fn with_gain_ranges(self, kp: f32, kd: f32) -> Result<Self, ConfigError> {
+        match self.ranges.with_gains(kp, kd) {
+            Ok(ranges) => Ok(Self { ranges, ..self }),
+            Err(error) => Err(ConfigError::Range(error)),
+        }
     }
 
     /// Returns the name, as errors print it.

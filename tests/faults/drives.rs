@@ -165,6 +165,7 @@ fn f86_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
     assert_eq!(bench.own.health().error_code, 35);
     bench.steps(3, |bench| assert!(!bench.drive.is_enabled()));
     assert!(!Devices::is_armed(&mut bench.own));
+    assert!(matches!(bench.own.arm(bench.now()), Err(ArmError::Faulty(_))));
     bench.steps(200, |_| {});
     assert_eq!(bench.own.motor().reported_faults(), 0);
     assert_eq!(bench.own.arm(bench.now()), Ok(()));

@@ -16,6 +16,10 @@ pub(crate) struct Bench<M: Mode> {
     /// Whether the drive hears a frame.
     pub(crate) passes: fn(&CanFrame) -> bool,
     pub(crate) is_cut: bool,
+    /// The answers of the drive are lost.
+    pub(crate) is_deaf: bool,
+    /// The time step that an update is given.
+    pub(crate) dt_s: f32,
 }
 
 impl<M: Mode> Bench<M> {
@@ -33,7 +37,16 @@ impl<M: Mode> Bench<M> {
         } else {
             RobStrideDrive::new(1, ranges)
         };
-        Self { own, drive, now_us: 1_000, frames: Vec::new(), passes: |_| true, is_cut: false }
+        Self {
+            own,
+            drive,
+            now_us: 1_000,
+            frames: Vec::new(),
+            passes: |_| true,
+            is_cut: false,
+            is_deaf: false,
+            dt_s: 0.001,
+        }
     }
 
     pub(crate) fn armed(mode: M) -> Self {
@@ -50,14 +63,14 @@ impl<M: Mode> Bench<M> {
     pub(crate) fn step(&mut self) {
         self.now_us += 1_000;
         let now = self.now();
-        self.own.update(Tick::new(now, 0.001));
+        self.own.update(Tick::new(now, self.dt_s));
         self.frames.clear();
         while let Some(frame) = self.own.next_frame(0) {
             self.frames.push(frame);
             if self.is_cut || !(self.passes)(&frame) {
                 continue;
             }
-            if let Some(answer) = self.drive.hear(&frame) {
+            if let Some(answer) = self.drive.hear(&frame).filter(|_| !self.is_deaf) {
                 let outcome = Devices::ingest(&mut self.own, &answer, now);
                 assert!(outcome == Ingest::Taken || kind(&answer) == 0, "{answer:?}");
             }

@@ -7,7 +7,8 @@ use drivetrain::robstride::*;
 
 pub fn call_all() {
     Model::new.call();
-    Model::with_ranges.call();
+    Model::with_position_range.call();
+    Model::with_gain_ranges.call();
     Model::name.call();
     Model::ranges.call();
     Model::most.call();

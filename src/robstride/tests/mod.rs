@@ -135,3 +135,14 @@ fn an_integer_parameter_holds_whole_numbers_of_its_width_only() {
     }
     assert_eq!(Register::RunMode.value_of([5, 0xFF, 0xFF, 0xFF]).to_bits(), 5.0_f32.to_bits());
 }
+
+/// An RS03 with the kp of another drive would be ten times as stiff as asked.
+#[test]
+fn another_range_of_the_position_keeps_those_of_the_gains() {
+    let old = Model::RS03.with_position_range(12.5).unwrap();
+    assert_eq!(old.ranges().gains(), (5_000.0, 100.0));
+    assert_eq!((old.pmax_rad(), old.vmax_rad_per_s(), old.tmax_nm()), (12.5, 20.0, 60.0));
+    let soft = old.with_gain_ranges(500.0, 5.0).unwrap();
+    assert_eq!((soft.ranges().gains(), soft.pmax_rad()), ((500.0, 5.0), 12.5));
+    assert!(old.with_gain_ranges(0.0, 5.0).is_err() && old.with_position_range(f32::NAN).is_err());
+}
