@@ -114,8 +114,9 @@ struct Follower {
 }
 
 impl Follower {
-    /// The current limit goes out again after this many commands, for a frame may be lost.
-    const PERIOD: u8 = 16;
+    /// The current limit goes out again after 16 commands, for a frame may be lost; a new one with each second command.
+    const PERIOD_MASK: u8 = 15;
+    const CHANGE_MASK: u8 = 1;
 
     const fn new(velocity_limit: AngularVelocity, current_limit_a: f32) -> Self {
         Self { velocity_limit, current_limit_a, told_a: 0.0, turn: 0 }
@@ -134,7 +135,8 @@ impl Follower {
         let wanted = self.current_limit_a * share;
         self.turn = self.turn.wrapping_add(1);
         let has_changed = wanted.to_bits() != self.told_a.to_bits();
-        if self.turn % if has_changed { 2 } else { Self::PERIOD } != 1 {
+        let mask = if has_changed { Self::CHANGE_MASK } else { Self::PERIOD_MASK };
+        if self.turn & mask != 1 {
             return Command::Write(register, target);
         }
         self.told_a = wanted;
