@@ -551,7 +551,7 @@ class Trial:
     def drive(self):
         """The judge drives the simulated drive."""
         ranges = self.judge.ranges("RS02")
-        p, v, t, *_ = ranges
+        p, v, t, most_kp, most_kd = ranges
         with self.program.serve("robstride") as wire:
             for drive in (1, 2):
                 wire.ask(f"drive {drive} {' '.join(str(np.float32(end)) for end in ranges)}")
@@ -570,7 +570,10 @@ class Trial:
                     expected = kp * (position - angle) + kd * (speed - velocity) + torque
                     expected = min(max(expected, -t), t)
                     found = shaft(wire)[2]
-                    require(abs(found - expected) < 0.02, f"{found} Nm, expected {expected}")
+                    # Two counts of each field, one truncated and one less in its span, times what it is multiplied by.
+                    apart = 4 * (kp * p + kd * v + t) / 65_534 + 1e-3
+                    apart += (abs(position - angle) * most_kp + abs(speed - velocity) * most_kd) / 65_535
+                    require(abs(found - expected) < apart, f"{found} Nm, expected {expected}")
                     self.judge.command([0.0, 0.0, 10.0, 1.0, 0.0])
                     wire.ask("step 0.05")
                     self.state(wire, p, v, t)
