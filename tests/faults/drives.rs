@@ -1,4 +1,4 @@
-//! F72 to F74 and F84 to F87: drives that are set up, enabled and watched by frames, by the example of Damiao's and RobStride's.
+//! F72 to F74 and F85 to F88: drives that are set up, enabled and watched by frames, by the example of Damiao's and RobStride's.
 
 use crate::bench::{Bench, mit};
 use crate::case::{Case, cases, saw};
@@ -16,10 +16,10 @@ pub(crate) const CASES: &[Case] = cases![
     f72_a_drive_in_another_mode_or_with_other_ranges_is_not_armed_and_the_register_is_named,
     f73_the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time,
     f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itself,
-    f84_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if_it_does_not_take_it,
-    f85_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_needs_one,
-    f86_a_fault_that_only_a_report_tells_trips_and_is_cleared,
-    f87_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target,
+    f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if_it_does_not_take_it,
+    f86_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_needs_one,
+    f87_a_fault_that_only_a_report_tells_trips_and_is_cleared,
+    f88_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target,
 ];
 
 #[cfg_attr(test, test)]
@@ -105,7 +105,7 @@ fn f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itse
 }
 
 #[cfg_attr(test, test)]
-fn f84_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if_it_does_not_take_it()
+fn f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if_it_does_not_take_it()
  {
     let slow = AngularVelocity::from_rad_per_s(10.0);
     let mut bench = robstride::Bench::new(Velocity::new(slow, 8.0));
@@ -127,7 +127,7 @@ fn f84_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if
 }
 
 #[cfg_attr(test, test)]
-fn f85_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_needs_one() {
+fn f86_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_needs_one() {
     for model in [Model::RS02, Model::CYBERGEAR] {
         let spring = ImpedanceControl::new(3.0).unwrap();
         let mut bench = robstride::Bench::of(model, spring);
@@ -153,7 +153,7 @@ fn f85_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_ne
 }
 
 #[cfg_attr(test, test)]
-fn f86_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
+fn f87_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
     let mut bench = robstride::Bench::armed(robstride::operation());
     bench.steps(300, |bench| _ = bench.own.set_torque(0.5));
     // Over-voltage, and the drive goes on.
@@ -173,7 +173,7 @@ fn f86_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
 }
 
 #[cfg_attr(test, test)]
-fn f87_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target() {
+fn f88_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target() {
     for model in [Model::RS02, Model::CYBERGEAR] {
         let mode = Position::new(AngularVelocity::from_rad_per_s(10.0), 8.0);
         let mut bench = robstride::Bench::of(model, mode);
