@@ -43,6 +43,10 @@ mod receive;
 mod registration;
 #[path = "../../tests/faults/rig.rs"]
 mod rig;
+#[path = "../../tests/faults/robstride.rs"]
+mod robstride;
+#[path = "../../tests/robstride/bench.rs"]
+mod robstride_bench;
 #[path = "../../tests/faults/rows.rs"]
 mod rows;
 #[path = "../../tests/faults/timing.rs"]

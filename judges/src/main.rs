@@ -5,6 +5,7 @@
 //! drivetrain-judges registers             one a line: number, kind, access
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
+//! drivetrain-judges robstride ...         the family `robstride`: see `robstride`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
 //! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
 //! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
@@ -16,6 +17,7 @@ mod codec;
 mod defect;
 mod lk;
 mod odrive;
+mod robstride;
 mod serve;
 mod vesc;
 
@@ -119,6 +121,9 @@ fn run(arguments: &[&str]) -> Outcome<()> {
             codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
         }
         ["lk", rest @ ..] => lk::run(rest, defect, &mut output)?,
+        ["robstride", rest @ ..] => {
+            robstride::run(rest, defect, io::stdin().lock(), &mut output)?;
+        }
         ["serve"] => serve::serve(defect, io::stdin().lock(), &mut output)?,
         _ => return Err("see the head of judges/src/main.rs for the arguments".into()),
     }

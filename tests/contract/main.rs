@@ -12,6 +12,7 @@ mod mit;
 mod odrive;
 #[cfg(feature = "hal")]
 mod pins;
+mod robstride;
 mod vesc;
 
 use drivetrain::control::PidConfig;

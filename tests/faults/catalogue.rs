@@ -2,11 +2,11 @@
 
 use crate::case::Case;
 use crate::{
-    arming, clocks, commands, drives, health, odrive, plausibility, receive, registration, timing,
-    transmit,
+    arming, clocks, commands, drives, health, odrive, plausibility, receive, registration,
+    robstride, timing, transmit,
 };
 
-pub(crate) const CATALOGUE: [&[Case]; 11] = [
+pub(crate) const CATALOGUE: [&[Case]; 12] = [
     receive::CASES,
     plausibility::CASES,
     timing::CASES,
@@ -18,4 +18,5 @@ pub(crate) const CATALOGUE: [&[Case]; 11] = [
     health::CASES,
     drives::CASES,
     odrive::CASES,
+    robstride::CASES,
 ];

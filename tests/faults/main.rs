@@ -23,6 +23,9 @@ mod plausibility;
 mod receive;
 mod registration;
 mod rig;
+mod robstride;
+#[path = "../robstride/bench.rs"]
+mod robstride_bench;
 mod rows;
 mod table;
 mod timing;

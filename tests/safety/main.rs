@@ -16,7 +16,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Damiao, Lk, Snake, Subject, Vesc, Wheel};
+use subjects::{Both, Damiao, Lk, RobStride, Snake, Subject, Vesc, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -253,6 +253,8 @@ fn every_device(clocks: u64) {
     run("vesc", clocks, Vesc::new);
     run("odrive, torque", clocks, odrive::Odrive::torque);
     run("odrive, position", clocks, odrive::Odrive::position);
+    run("robstride, operation", clocks, RobStride::operation);
+    run("robstride, current", clocks, RobStride::current);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

@@ -11,7 +11,8 @@ use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
     Reaction, Recovery, TargetError, VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, LkDrive};
+use drivetrain::robstride;
+use drivetrain::sim::{DamiaoDrive, LkDrive, RobStrideDrive};
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
@@ -532,6 +533,85 @@ impl Subject<1> for Vesc {
         let mut is_driven = false;
         while let Some(frame) = Devices::next_frame(&mut self.0, 0) {
             is_driven |= is_driving(&frame);
+        }
+        [is_driven]
+    }
+}
+
+pub(super) struct RobStride<M: robstride::Mode> {
+    motor: Own<robstride::Motor<M>>,
+    drive: RobStrideDrive,
+    set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+}
+
+impl RobStride<ImpedanceControl> {
+    pub(super) fn operation() -> Self {
+        let mode = ImpedanceControl::new(3.0).unwrap();
+        Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
+    }
+}
+
+impl RobStride<robstride::Current> {
+    pub(super) fn current() -> Self {
+        let mode = robstride::Current::new(4.0, 1.0);
+        Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
+    }
+}
+
+impl<M: robstride::Mode> RobStride<M> {
+    fn new(
+        mode: M,
+        set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+    ) -> Self {
+        let motor = Own::new(robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap());
+        let drive = RobStrideDrive::new(1, [12.566, 44.0, 17.0, 500.0, 5.0]);
+        let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
+        Self { motor, drive, set }
+    }
+
+    /// Gives the drive a frame, and the motor an answer about a parameter.
+    fn tell(&mut self, frame: &CanFrame) {
+        if let Some(answer) = self.drive.hear(frame) {
+            self.motor.motor_mut().decode_answer(&answer);
+        }
+    }
+}
+
+impl<M: robstride::Mode> Subject<1> for RobStride<M> {
+    const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
+
+    stops!(self => self.motor);
+
+    /// A write of a parameter that no mode uses is answered with feedback.
+    fn hear(&mut self, now: Instant) {
+        let id = embedded_can::ExtendedId::new(0x1200_FD01).unwrap();
+        let refresh = CanFrame::of(id, [0x1E, 0x70, 0, 0, 0, 0, 0xF0, 0x41]);
+        let feedback = self.drive.hear(&refresh).unwrap();
+        _ = Devices::ingest(&mut self.motor, &feedback, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.motor.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.motor.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [(self.set)(&mut self.motor, value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// The drive takes each frame; it is driven by one that leaves it enabled and with a torque.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.motor, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.motor, 0) {
+            self.tell(&frame);
+            let mut turned = self.drive;
+            turned.step(1e-6);
+            is_driven |= frame.header() >> 24 & 0x1F != 17
+                && turned.is_enabled()
+                && turned.shaft().torque_nm().abs() > 17.0 / 65_535.0;
         }
         [is_driven]
     }

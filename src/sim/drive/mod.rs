@@ -3,11 +3,13 @@
 mod damiao;
 mod lk;
 mod odrive;
+mod robstride;
 mod shaft;
 mod vesc;
 
 pub use damiao::DamiaoDrive;
 pub use lk::LkDrive;
 pub use odrive::OdriveDrive;
+pub use robstride::RobStrideDrive;
 pub use shaft::DriveShaft;
 pub use vesc::{VescDrive, VescMotor};
