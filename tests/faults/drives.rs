@@ -198,6 +198,8 @@ fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
     bench.steps(150, |_| {});
     assert_eq!(bench.own.arm(bench.now()), Ok(()));
 }
+
+#[cfg_attr(test, test)]
 fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
     let mut bench = vesc_bench::Bench::armed(Velocity::new());
     let wheel = AngularVelocity::from_rad_per_s(60.0);
