@@ -12,7 +12,7 @@ pub fn call_all() {
     Model::velocity_of.call();
     Command::frame.call();
     (|feedback: &mut Feedback, packet: u8, data: &[u8; 8], length: usize| {
-        feedback.take(packet, data.get(..length).unwrap_or_default())
+        Feedback::take(feedback, packet, data.get(..length).unwrap_or_default())
     })
     .call();
     CurrentControl::new.call();
