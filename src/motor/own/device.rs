@@ -78,6 +78,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             false => commands.any(|claim| claim.covers(frame.id())),
         };
         self.superseded = self.superseded.wrapping_add(u32::from(is_own));
+        // What was not sent may have been the rest that another frame would give way to.
+        self.has_rested &= !is_own;
         is_own
     }
 
