@@ -43,9 +43,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let command = self.act(may_drive, step, left);
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
-        let gives_way = is_at_rest && self.has_rested && has_other;
+        let gives_way = is_at_rest && self.rested.is_some() && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.has_rested = is_at_rest && !gives_way;
+        self.rested = command.filter(|_| is_at_rest && !gives_way);
     }
 
     #[inline]
@@ -78,8 +78,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             false => commands.any(|claim| claim.covers(frame.id())),
         };
         self.superseded = self.superseded.wrapping_add(u32::from(is_own));
-        // What was not sent may have been the rest that another frame would give way to.
-        self.has_rested &= !is_own;
+        // Rest that was not sent gives way to no other frame.
+        self.rested = self.rested.filter(|rest| rest != frame);
         is_own
     }
 
@@ -225,7 +225,7 @@ impl<M: OwnMotor> Own<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        let is_idle = !self.power.is_on() && !self.has_posted && self.has_rested;
+        let is_idle = !self.power.is_on() && !self.has_posted && self.rested.is_some();
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
             return None;

@@ -102,8 +102,8 @@ pub struct Own<M> {
     command: Option<CanFrame>,
     /// This update offers a frame for the drive's power.
     has_posted: bool,
-    /// The last update offered a frame of rest.
-    has_rested: bool,
+    /// The frame of rest that the last update offered, unless the driver gave it back.
+    rested: Option<CanFrame>,
     was_online: bool,
     /// The time of the last question.
     inquired: Instant,
@@ -138,7 +138,7 @@ impl<M: OwnMotor> Own<M> {
             switching: None,
             command: None,
             has_posted: false,
-            has_rested: false,
+            rested: None,
             was_online: false,
             last: None,
             inquired: Instant::START,
