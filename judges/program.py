@@ -20,8 +20,8 @@ class Program:
     def lines(self, *arguments):
         return [line.split() for line in self.run(*arguments).decode().splitlines()]
 
-    def serve(self):
-        return Conversation([self.path, "serve", *self.plant])
+    def serve(self, *family):
+        return Conversation([self.path, *family, "serve", *self.plant])
 
 
 class Conversation:

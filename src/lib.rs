@@ -24,11 +24,15 @@ pub mod wire;
 // F3: device families and their simulation
 pub mod damiao;
 pub mod dji;
+pub mod lk;
+pub mod odrive;
 #[cfg(feature = "hal")]
 pub mod pwm;
+pub mod robstride;
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod snake;
+pub mod vesc;
 
 // F4: the only part that does I/O
 pub mod runner;

@@ -2,6 +2,8 @@
 
 #![cfg(test)]
 
+#[path = "../examples/candump/motor.rs"]
+mod motor;
 #[path = "../examples/candump/options.rs"]
 mod options;
 #[path = "../examples/candump/replay.rs"]
@@ -31,7 +33,7 @@ fn options(arguments: &str) -> Options {
 /// Returns what goes to standard output and to standard error.
 fn run(arguments: &str, log: &str) -> (String, String) {
     let (mut output, mut complaints) = (Vec::new(), Vec::new());
-    report::run(&options(arguments), log.as_bytes(), &mut output, &mut complaints).unwrap();
+    report::run(options(arguments), log.as_bytes(), &mut output, &mut complaints).unwrap();
     (String::from_utf8(output).unwrap(), String::from_utf8(complaints).unwrap())
 }
 
@@ -117,7 +119,7 @@ fn long_line() -> impl Read {
 fn a_line_of_60_mb_is_one_line_with_one_complaint() {
     let (mut output, mut complaints) = (Vec::new(), Vec::new());
     let input = BufReader::new(long_line());
-    report::run(&options(""), input, &mut output, &mut complaints).unwrap();
+    report::run(options(""), input, &mut output, &mut complaints).unwrap();
     assert_eq!(row(&String::from_utf8(output).unwrap(), "M3508 #1")[0], "1");
     let complaints = String::from_utf8(complaints).unwrap();
     let expected =
@@ -191,12 +193,37 @@ fn frames_of_others_are_counted_not_decoded() {
     assert_eq!(run("--interface can2", log).0.lines().count(), 1);
 }
 
+/// Two drives with one master id, an error and a register's answer among their feedback: codes of PMAX 12.5, VMAX 30.
+#[test]
+fn motors_of_damiao_are_decoded_beside_others() {
+    let mut log = String::new();
+    for ms in 0..100 {
+        let angle = 0x8000 + 100 * ms;
+        let velocity = 0xC00; // 3/4 of the range: 15 rad/s
+        log.push_str(&format!("(5.{ms:03}000) can0 011#11{angle:04X}{velocity:03X}7FF2832\n"));
+        log.push_str(&format!("(5.{ms:03}100) can0 012#D280007FF7FF1E1F\n"));
+    }
+    log.push_str("(5.100000) can0 011#0100330A01000000\n(5.101000) can0 011#1180\n");
+    let (table, complaints) = run("--motors damiao4310:1-2,m3508:2", &log);
+    let first = row(&table, "DM-J4310 #1");
+    assert_eq!(first[..2], ["101", "1000.0"], "the answer of a register is a frame of the motor");
+    let turns = 9_900.0 * 25.0 / 65_535.0 / std::f64::consts::TAU;
+    assert!((first[2].parse::<f64>().unwrap() - turns).abs() < 1e-4, "{first:?}");
+    let rpm = (f64::from(0xC00) * 60.0 / 4095.0 - 30.0) * 60.0 / std::f64::consts::TAU;
+    assert!((first[3].parse::<f64>().unwrap() - rpm).abs() < 0.01, "{first:?}");
+    assert_eq!(first[4..], ["-", "50", "0", "1.000", "-"]);
+    assert_eq!(row(&table, "DM-J4310 #2")[5..].join(" "), "31 0 1.000 error 13");
+    assert!(complaints.contains("DM-J4310 #1: 1 frames with its id are not its feedback"));
+    let (csv, _) = run("--csv --motors damiao4310:2", &log);
+    assert_eq!(csv.lines().nth(1).unwrap().split(',').nth(1), Some("DM-J4310 #2"));
+}
+
 #[test]
 fn wrong_options_say_what_is_wrong() {
     for (arguments, message) in [
         (
             "--motors m3508:5,gm6020-current:1",
-            "GM6020 (current) #1 collides with M3508 #5 on 0x205",
+            "feedback of GM6020 (current) #1 on 0x205, which is feedback of M3508 #5 on 0x205",
         ),
         ("--motors m3508:9", "1..=8"),
         ("--motors m3508:4-1", "4-1 is no id or range of ids"),

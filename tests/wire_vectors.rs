@@ -370,6 +370,49 @@ fn mit_feedback() {
 }
 
 #[test]
+fn lk_commands() {
+    use drivetrain::lk::Command;
+    for (id, command) in [
+        ("lk.cmd.read_state1", Command::ReadState),
+        ("lk.cmd.clear_error", Command::ClearErrors),
+        ("lk.cmd.read_multi_turn", Command::ReadAngle),
+        ("lk.cmd.read_state2", Command::ReadFeedback),
+        ("lk.a1", Command::Torque(100)),
+        ("lk.a1.neg", Command::Torque(-2_048)),
+        ("lk.a4", Command::Position(36_000, 360)),
+    ] {
+        let vector = vector(id);
+        assert_eq!(command.encode()[..], hex(&vector["expect"]["data"])[..], "{id}");
+    }
+}
+
+#[test]
+fn lk_feedback() {
+    use drivetrain::lk::{Feedback, Series, State};
+    let data = |id: &str| -> [u8; 8] { hex(&vector(id)["input"]["data"]).try_into().unwrap() };
+    let feedback = Feedback::decode(&data("lk.fb.9C")).unwrap();
+    let expect = &vector("lk.fb.9C")["expect"];
+    let values = [
+        (i64::from(feedback.temperature_c), "temperature_c"),
+        (i64::from(feedback.current), "iq_raw"),
+        (i64::from(feedback.velocity_dps), "speed_dps"),
+        (i64::from(feedback.encoder), "encoder_raw"),
+    ];
+    for (value, name) in values {
+        assert_eq!(expect[name], value, "{name}");
+    }
+    for (series, name) in [(Series::Mf, "iq_a_MF(33/4096)"), (Series::Mg, "iq_a_MG(66/4096)")] {
+        close(&[f32::from(feedback.current) * series.amperes_per_count()], &expect[name], 1e-6);
+    }
+    let state = State::decode(&data("lk.fb.9A")).unwrap();
+    let expect = &vector("lk.fb.9A")["expect"];
+    assert_eq!(expect["temperature_c"], i64::from(state.temperature_c));
+    close(&[state.supply_v], &expect["bus_v"], 1e-4);
+    close(&[state.supply_a], &expect["bus_a"], 1e-4);
+    assert!(!state.is_on && state.errors == 0b1001);
+}
+
+#[test]
 fn f62_dbus_frames_with_impossible_values_are_refused() {
     for id in ["dbus.out_of_range", "dbus.switch_zero"] {
         let mut dbus = Dbus::new();

@@ -1,10 +1,11 @@
-//! Reads a log of candump and tells what the DJI motors in it did.
+//! Reads a log of candump and tells what the motors in it did.
 //!
 //! `cargo run --example candump -- --motors "m3508:1-4,gm6020:1" drive.log`, or `candump can0 | .. candump`; `--help`
 //! lists the options.
 
 #[path = "../arguments/mod.rs"]
 mod arguments;
+mod motor;
 mod options;
 mod replay;
 mod report;
@@ -33,10 +34,10 @@ fn main() -> ExitCode {
             }
         },
     };
-    finish(run(&options, input))
+    finish(run(options, input))
 }
 
-fn run(options: &Options, input: impl BufRead) -> io::Result<()> {
+fn run(options: Options, input: impl BufRead) -> io::Result<()> {
     let mut output = io::BufWriter::new(io::stdout().lock());
     report::run(options, input, &mut output, &mut io::stderr())?;
     output.flush()

@@ -1,45 +1,26 @@
 //! What was asked for on the command line.
 
-use drivetrain::dji::{
-    AnyHandle, AttachError, Bus, Config, Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model,
-};
+use drivetrain::dji::{Gm6020Current, Gm6020Voltage, M2006, M3508};
 use drivetrain::time::Duration;
+
+use super::motor::{self, Listener};
 
 pub(crate) const HELP: &str = "\
 usage: candump [--motors LIST] [--interface NAME] [--gap MS] [--csv] [FILE]
 
-Reads what candump printed, from FILE or standard input, and decodes DJI motors.
+Reads what candump printed, from FILE or standard input, and decodes motors of DJI and of Damiao.
 
   --motors LIST     model:ids, for instance \"m3508:1-4,gm6020:1\"
-                    models: m2006 or c610, m3508 or c620, gm6020, gm6020-current
+                    models: m2006 or c610, m3508 or c620, gm6020, gm6020-current; damiao and the number of the model, as
+                    in damiao4310:1-4, whose master id is that of the motor and 0x10
                     (default: m3508:1-8, those that are heard)
   --interface NAME  only frames of this interface (default: the first one in the log)
   --gap MS          a silence longer than this is a gap (default: 10)
   --csv             one row a frame instead of one row a motor";
 
-/// A motor to look for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Motor {
-    pub(crate) facts: &'static Facts,
-    pub(crate) id: u8,
-    attach: fn(&mut Bus, u8) -> Result<AnyHandle, AttachError>,
-}
-
-impl Motor {
-    pub(crate) fn attach(&self, bus: &mut Bus) -> Result<AnyHandle, AttachError> {
-        (self.attach)(bus, self.id)
-    }
-
-    fn of<M: Model>(id: u8) -> Self {
-        let attach =
-            |bus: &mut Bus, id| bus.attach(Config::<M>::new(id)).map(|motor| motor.erase());
-        Self { facts: M::FACTS, id, attach }
-    }
-}
-
 #[derive(Debug)]
 pub(crate) struct Options {
-    pub(crate) motors: Vec<Motor>,
+    pub(crate) motors: Vec<Box<dyn Listener>>,
     /// Show motors that were not heard, because they were asked for.
     pub(crate) show_silent: bool,
     pub(crate) interface: Option<String>,
@@ -56,7 +37,7 @@ pub(crate) enum Asked {
 
 pub(crate) fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
     let mut options = Options {
-        motors: (1..=8).map(Motor::of::<M3508>).collect(),
+        motors: motors("m3508:1-8")?,
         show_silent: false,
         interface: None,
         gap: Duration::from_millis(10),
@@ -90,38 +71,46 @@ pub(crate) fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked
 }
 
 /// Reads `m3508:1-4,gm6020:1`.
-fn motors(list: &str) -> Result<Vec<Motor>, String> {
-    let mut motors = Vec::new();
-    let mut bus = Bus::new();
+fn motors(list: &str) -> Result<Vec<Box<dyn Listener>>, String> {
+    let mut motors: Vec<Box<dyn Listener>> = Vec::new();
     for item in list.split(',') {
         let example = "as in m3508:1-4";
         let (model, ids) = item
             .trim()
             .split_once(':')
             .ok_or(format!("--motors {item}: not model:ids, {example}"))?;
-        let of = of_model(model).ok_or(format!(
-            "--motors {item}: no model {model}; there are m2006, m3508, gm6020 and gm6020-current"
-        ))?;
         let (first, last) = ids.split_once('-').unwrap_or((ids, ids));
         let range = first.trim().parse::<u8>().ok().zip(last.trim().parse::<u8>().ok());
         let (first, last) = range
             .filter(|(first, last)| first <= last)
             .ok_or(format!("--motors {item}: {ids} is no id or range of ids, {example}"))?;
         for id in first..=last {
-            let motor = of(id);
-            motor.attach(&mut bus).map_err(|error| format!("--motors {item}: {error}"))?;
+            let motor = motor(model, id).map_err(|error| format!("--motors {item}: {error}"))?;
+            let others = motors.iter().flat_map(|other| other.feedback());
+            for (claim, other) in others
+                .flat_map(|other| motor.feedback().into_iter().map(move |claim| (claim, other)))
+            {
+                if claim.clashes_with(&other) {
+                    return Err(format!("--motors {item}: {claim}, which is {other}"));
+                }
+            }
             motors.push(motor);
         }
     }
     Ok(motors)
 }
 
-fn of_model(name: &str) -> Option<fn(u8) -> Motor> {
-    match name.trim().to_ascii_lowercase().as_str() {
-        "m2006" | "c610" => Some(Motor::of::<M2006>),
-        "m3508" | "c620" => Some(Motor::of::<M3508>),
-        "gm6020" | "gm6020-voltage" => Some(Motor::of::<Gm6020Voltage>),
-        "gm6020-current" => Some(Motor::of::<Gm6020Current>),
-        _ => None,
+/// Makes the motor of a model, as the command line calls it.
+fn motor(model: &str, id: u8) -> Result<Box<dyn Listener>, String> {
+    let model = model.trim().to_ascii_lowercase();
+    match model.as_str() {
+        "m2006" | "c610" => motor::dji::<M2006>(id),
+        "m3508" | "c620" => motor::dji::<M3508>(id),
+        "gm6020" | "gm6020-voltage" => motor::dji::<Gm6020Voltage>(id),
+        "gm6020-current" => motor::dji::<Gm6020Current>(id),
+        other => match motor::damiao_model(other) {
+            Some(model) => motor::damiao(model, id),
+            None => Err(format!("no model {other}; --help lists them")),
+        },
     }
 }

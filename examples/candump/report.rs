@@ -2,10 +2,9 @@
 
 use std::io::{self, BufRead, Read, Write};
 
-use drivetrain::dji::State;
-use drivetrain::time::Instant;
 use drivetrain::wire::candump::{ParseError, Record};
 
+use super::motor::Reading;
 use super::options::Options;
 use super::replay::{Account, Replay};
 
@@ -26,13 +25,14 @@ pub(crate) fn next_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> io::Res
 
 /// Reads all of `input`. Bad lines are reported to `complaints` and skipped.
 pub(crate) fn run(
-    options: &Options,
+    options: Options,
     mut input: impl BufRead,
     output: &mut impl Write,
     complaints: &mut impl Write,
 ) -> io::Result<()> {
-    let mut replay = Replay::new(options).map_err(io::Error::other)?;
-    if options.csv {
+    let (csv, show_silent) = (options.csv, options.show_silent);
+    let mut replay = Replay::new(options);
+    if csv {
         writeln!(output, "time_s,motor,turns,rpm,amperes,temperature_c,error,rotor_counts")?;
     }
     let (mut line, mut number, mut bad) = (Vec::new(), 0_u64, 0_u64);
@@ -50,7 +50,7 @@ pub(crate) fn run(
         }
         match Record::parse(&line) {
             Ok(record) => match replay.take(&record) {
-                Some((now, state)) if options.csv => row_of_frame(output, now, &state)?,
+                Some(account) if csv => row_of_frame(output, account)?,
                 _ => {}
             },
             Err(ParseError::Blank(_)) => {}
@@ -60,26 +60,27 @@ pub(crate) fn run(
             }
         }
     }
-    if !options.csv {
-        table(options, &replay, output)?;
+    if !csv {
+        table(show_silent, &replay, output)?;
     }
     notes(&replay, bad, complaints)
 }
 
-fn row_of_frame(output: &mut impl Write, now: Instant, state: &State) -> io::Result<()> {
+fn row_of_frame(output: &mut impl Write, account: &Account) -> io::Result<()> {
+    let Some((now, reading)) = &account.latest else { return Ok(()) };
     let micros = now.as_micros();
-    write!(output, "{}.{:06},{},", micros / 1_000_000, micros % 1_000_000, state.motor)?;
-    let turns = state.position.turns() as f64 + f64::from(state.position.angle().as_turns());
-    write!(output, "{turns:.6},{:.3},", state.velocity.as_rpm())?;
-    write!(output, "{:.4},{},", state.current.as_amperes(), or_nothing(state.temperature_c))?;
-    writeln!(output, "{},{}", or_nothing(state.error), state.rotor_counts)
+    write!(output, "{}.{:06},{},", micros / 1_000_000, micros % 1_000_000, account.motor.name())?;
+    let amperes = reading.amperes.map(|amperes| format!("{amperes:.4}"));
+    write!(output, "{:.6},{:.3},{},", reading.turns, reading.rpm, or_nothing(amperes))?;
+    let (temperature, error) = (or_nothing(reading.temperature_c), reading.error.as_deref());
+    writeln!(output, "{temperature},{},{}", or_nothing(error), or_nothing(reading.rotor_counts))
 }
 
 fn or_nothing(value: Option<impl ToString>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-fn table(options: &Options, replay: &Replay, output: &mut impl Write) -> io::Result<()> {
+fn table(show_silent: bool, replay: &Replay, output: &mut impl Write) -> io::Result<()> {
     writeln!(
         output,
         "{:<20} {:>8} {:>8} {:>11} {:>8} {:>8} {:>4} {:>5} {:>10}  error",
@@ -87,9 +88,9 @@ fn table(options: &Options, replay: &Replay, output: &mut impl Write) -> io::Res
     )?;
     for account in &replay.accounts {
         match &account.latest {
-            Some((_, state)) => row_of_motor(output, account, state, replay.has_times)?,
-            None if options.show_silent => {
-                writeln!(output, "{:<20} {:>8}  not heard", account.name.to_string(), 0)?;
+            Some((_, reading)) => row_of_motor(output, account, reading, replay.has_times)?,
+            None if show_silent => {
+                writeln!(output, "{:<20} {:>8}  not heard", account.motor.name().to_string(), 0)?;
             }
             None => {}
         }
@@ -100,23 +101,24 @@ fn table(options: &Options, replay: &Replay, output: &mut impl Write) -> io::Res
 fn row_of_motor(
     output: &mut impl Write,
     account: &Account,
-    state: &State,
+    reading: &Reading,
     has_times: bool,
 ) -> io::Result<()> {
     let timed = |text: String| if has_times { text } else { "-".to_owned() };
     let rate = account.rate_hz().map_or("-".to_owned(), |hz| format!("{hz:.1}"));
     let longest_ms = account.longest_silence.as_micros() as f64 / 1e3;
-    let temperature = state.temperature_c.map_or("-".to_owned(), |degrees| degrees.to_string());
-    let error = state.error.map_or("-".to_owned(), |error| error.to_string());
+    let or_dash = |text: Option<String>| text.unwrap_or("-".to_owned());
+    let temperature = or_dash(reading.temperature_c.map(|degrees| degrees.to_string()));
+    let amperes = or_dash(reading.amperes.map(|amperes| format!("{amperes:.3}")));
+    let error = or_dash(reading.error.clone());
     writeln!(
         output,
-        "{:<20} {:>8} {:>8} {:>11.4} {:>8.2} {:>8.3} {temperature:>4} {:>5} {:>10}  {error}",
-        account.name.to_string(),
+        "{:<20} {:>8} {:>8} {:>11.4} {:>8.2} {amperes:>8} {temperature:>4} {:>5} {:>10}  {error}",
+        account.motor.name().to_string(),
         account.frames,
         timed(rate),
         account.turns().unwrap_or(0.0),
-        state.velocity.as_rpm(),
-        state.current.as_amperes(),
+        reading.rpm,
         timed(account.gaps.to_string()),
         timed(format!("{longest_ms:.3}")),
     )
@@ -125,11 +127,12 @@ fn row_of_motor(
 fn notes(replay: &Replay, bad: u64, complaints: &mut impl Write) -> io::Result<()> {
     for account in &replay.accounts {
         if account.malformed > 0 {
-            let (name, count) = (account.name, account.malformed);
+            let (name, count) = (account.motor.name(), account.malformed);
             writeln!(complaints, "{name}: {count} frames with its id are not its feedback")?;
         }
-        if let Some((_, state)) = account.latest.filter(|(_, state)| state.ambiguous_gaps > 0) {
-            let (name, count) = (account.name, state.ambiguous_gaps);
+        let gaps = account.latest.as_ref().map_or(0, |(_, reading)| reading.ambiguous_gaps);
+        if gaps > 0 {
+            let (name, count) = (account.motor.name(), gaps);
             writeln!(
                 complaints,
                 "{name}: after {count} gaps its turns are a guess from its speed"

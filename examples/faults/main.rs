@@ -13,6 +13,8 @@
 mod arguments;
 #[path = "../../tests/faults/arming.rs"]
 mod arming;
+#[path = "../../tests/odrive/bench.rs"]
+mod axle;
 #[path = "../../tests/damiao/bench.rs"]
 mod bench;
 #[path = "../../tests/faults/case.rs"]
@@ -29,6 +31,10 @@ mod console;
 mod drives;
 #[path = "../../tests/faults/health.rs"]
 mod health;
+#[path = "../../tests/lk/bench.rs"]
+mod lk_bench;
+#[path = "../../tests/faults/odrive.rs"]
+mod odrive;
 #[path = "../../tests/faults/plausibility.rs"]
 mod plausibility;
 #[path = "../../tests/faults/receive.rs"]
@@ -37,12 +43,18 @@ mod receive;
 mod registration;
 #[path = "../../tests/faults/rig.rs"]
 mod rig;
+#[path = "../../tests/faults/robstride.rs"]
+mod robstride;
+#[path = "../../tests/robstride/bench.rs"]
+mod robstride_bench;
 #[path = "../../tests/faults/rows.rs"]
 mod rows;
 #[path = "../../tests/faults/timing.rs"]
 mod timing;
 #[path = "../../tests/faults/transmit.rs"]
 mod transmit;
+#[path = "../../tests/vesc/bench.rs"]
+mod vesc_bench;
 
 use case::{Case, Seen};
 use rows::{Row, TABLE};

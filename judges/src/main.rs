@@ -5,13 +5,21 @@
 //! drivetrain-judges registers             one a line: number, kind, access
 //! drivetrain-judges encode MODEL MODE     five f32 a command in, the 8 bytes of a frame out
 //! drivetrain-judges decode MODEL          the 8 bytes of a frame in, 20 bytes out: see `decode`
+//! drivetrain-judges robstride ...         the family `robstride`: see `robstride`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
+//! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
+//! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
+//! drivetrain-judges odrive VERB           see `odrive`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
+mod lk;
+mod odrive;
+mod robstride;
 mod serve;
+mod vesc;
 
 use defect::Defect;
 use drivetrain::damiao::{Model, Register};
@@ -76,6 +84,16 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[&str]) -> Outcome<()> {
+    if let ["vesc", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        vesc::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["odrive", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        odrive::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
     let (arguments, defect) = match arguments {
         [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
         _ => (arguments, Defect::None),
@@ -101,6 +119,10 @@ fn run(arguments: &[&str]) -> Outcome<()> {
         }
         ["decode", model] => {
             codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
+        }
+        ["lk", rest @ ..] => lk::run(rest, defect, &mut output)?,
+        ["robstride", rest @ ..] => {
+            robstride::run(rest, defect, io::stdin().lock(), &mut output)?;
         }
         ["serve"] => serve::serve(defect, io::stdin().lock(), &mut output)?,
         _ => return Err("see the head of judges/src/main.rs for the arguments".into()),

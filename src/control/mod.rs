@@ -53,6 +53,8 @@ pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};
+pub(crate) use number::limited;
+
 pub(crate) use pid::Input;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};

@@ -2,7 +2,7 @@
 
 /// Returns `value` within `lower..=upper`, which the caller knows to be in order.
 #[inline]
-pub(super) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
+pub(crate) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
     if value > upper {
         upper
     } else if value < lower {

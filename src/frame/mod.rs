@@ -25,7 +25,7 @@ const EXTENDED: u32 = 1 << 29;
 const REMOTE: u32 = 1 << 30;
 /// Bytes are missing: one comparison tells a whole standard data frame from all others.
 const SHORT: u32 = 1 << 31;
-const ID_MASK: u32 = 0x1FFF_FFFF;
+pub(crate) const ID_MASK: u32 = 0x1FFF_FFFF;
 
 /// 0 to 8. The compiler knows that there is no other, so that no frame and a frame take the same room.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
@@ -189,7 +189,7 @@ const fn key_of(header: u32, length: Length) -> u32 {
     if matches!(length, Length::L8) { header } else { header | SHORT }
 }
 
-fn header_of(id: Id) -> u32 {
+pub(crate) fn header_of(id: Id) -> u32 {
     match id {
         Id::Standard(id) => u32::from(id.as_raw()),
         Id::Extended(id) => id.as_raw() | EXTENDED,

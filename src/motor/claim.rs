@@ -104,6 +104,11 @@ impl Claim {
         extended == other_extended && (raw ^ other_raw) & self.mask & other.mask == 0
     }
 
+    /// Returns the header that frames with the id have, and the bits of it that count.
+    pub(super) fn pattern(&self) -> (u32, u32) {
+        (crate::frame::header_of(self.id), self.mask | !crate::frame::ID_MASK)
+    }
+
     /// Returns the id.
     #[must_use]
     pub const fn id(&self) -> Id {

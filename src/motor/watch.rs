@@ -23,11 +23,12 @@ pub(crate) struct Watch {
     monitor: Monitor,
     traffic: Traffic,
     window_from: Instant,
-    heard: Option<Instant>,
     rival: Option<Instant>,
     saturated: u16,
     error_code: u8,
     looked: Instant,
+    /// The time of the next look at what changes slowly.
+    next: Instant,
     /// What is left of the output.
     share: f32,
 }
@@ -39,11 +40,11 @@ impl Watch {
             monitor: Monitor::NEW,
             traffic: Traffic::NONE,
             window_from: Instant::START,
-            heard: None,
             rival: None,
             saturated: 0,
             error_code: 0,
             looked: Instant::START,
+            next: Instant::START,
             share: 1.0,
         }
     }
@@ -53,13 +54,11 @@ impl Watch {
         Ok(Self { config, ..self })
     }
 
-    /// Feedback came.
-    pub(crate) fn hear(&mut self, now: Instant) {
-        match self.heard.replace(now) {
-            Some(before) => {
-                let gap = now.since(before).micros_u32();
-                self.traffic.gap(gap.unwrap_or(u32::MAX));
-            }
+    /// Feedback came; the guard has not heard of it yet.
+    #[inline]
+    pub(crate) fn hear(&mut self, guard: &Guard, now: Instant) {
+        match guard.gap_us(now) {
+            Some(gap_us) => self.traffic.gap(gap_us),
             None => self.window_from = now,
         }
         self.traffic.count();
@@ -91,7 +90,28 @@ impl Watch {
     }
 
     /// Looks at the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
-    pub(crate) fn look(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
+    #[inline]
+    pub(crate) fn look(
+        &mut self,
+        guard: &mut Guard,
+        vitals: impl Fn() -> Vitals,
+        now: Instant,
+    ) -> f32 {
+        let Vitals { error, error_code, .. } = vitals();
+        let is_well = error.is_none()
+            && error_code == self.error_code
+            && self.rival.is_none()
+            && guard.link() == Link::Online
+            && guard.conditions().is_empty();
+        if is_well && now < self.next {
+            return self.share;
+        }
+        self.look_closely(guard, &vitals(), now)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look_closely(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
         let before = guard.conditions();
         self.count_frames(now);
         self.rival = self.rival.filter(|rival| now.since(*rival) <= RIVAL_FORGOTTEN);
@@ -103,6 +123,7 @@ impl Watch {
             let since = now.since(self.looked);
             if since >= PERIOD {
                 self.looked = now;
+                self.next = now + PERIOD;
                 self.share = self.look_at(guard, vitals, elapsed(since.micros_u32()), now);
             }
         }

@@ -91,7 +91,9 @@ mod wheel;
 pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState};
 pub use controller::Controller;
-pub use drive::{DamiaoDrive, DriveShaft};
+pub use drive::{
+    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive, VescMotor,
+};
 pub use error::SimError;
 pub use fault::Fault;
 pub use joint::JointConfig;

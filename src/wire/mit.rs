@@ -42,8 +42,8 @@ pub const DISABLE: [u8; 8] = special(0xFD);
 /// The data that makes the present position zero.
 pub const SET_ZERO: [u8; 8] = special(0xFE);
 
-/// The last byte of the largest command below the special frames, which end with 0xFB to 0xFE.
-const HIGHEST_LAST: u8 = 0xFA;
+/// The second half of the largest command below the special frames, which end with 0xFB to 0xFE.
+const HIGHEST_SECOND: u32 = 0xFFFF_FFFA;
 
 const TOP_16: u16 = 0xFFFF;
 const TOP_12: u16 = 0x0FFF;
@@ -78,15 +78,6 @@ impl Command {
     #[must_use]
     pub const fn torque(torque_nm: f32) -> Self {
         Self { torque_nm, ..Self::REST }
-    }
-
-    /// Tells whether no field is NaN.
-    const fn is_number(&self) -> bool {
-        !(self.position_rad.is_nan()
-            || self.velocity_rad_per_s.is_nan()
-            || self.kp.is_nan()
-            || self.kd.is_nan()
-            || self.torque_nm.is_nan())
     }
 }
 
@@ -206,18 +197,20 @@ impl Ranges {
     /// counts less torque.
     #[must_use]
     pub const fn encode(&self, command: &Command) -> [u8; 8] {
-        let wanted = if command.is_number() { *command } else { Command::REST };
-        let [a, b] = self.position.counts(wanted.position_rad, TOP_16).to_be_bytes();
-        let [c, d, e] = pair(
-            self.velocity.counts(wanted.velocity_rad_per_s, TOP_12),
-            self.kp.counts(wanted.kp, TOP_12),
-        );
-        let [f, g, h] =
-            pair(self.kd.counts(wanted.kd, TOP_12), self.torque.counts(wanted.torque_nm, TOP_12));
-        match [a, b, c, d, e, f, g, h] {
-            [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFB..=0xFE] => special(HIGHEST_LAST),
-            data => data,
-        }
+        let (Some(position), Some(velocity), Some(kp), Some(kd), Some(torque)) = (
+            self.position.counts(command.position_rad, TOP_16),
+            self.velocity.counts(command.velocity_rad_per_s, TOP_12),
+            self.kp.counts(command.kp, TOP_12),
+            self.kd.counts(command.kd, TOP_12),
+            self.torque.counts(command.torque_nm, TOP_12),
+        ) else {
+            return self.encode(&Command::REST);
+        };
+        let first = position << 16 | velocity << 4 | kp >> 8;
+        let second = kp << 24 | kd << 12 | torque;
+        let is_special = first == u32::MAX && matches!(second, 0xFFFF_FFFB..=0xFFFF_FFFE);
+        let second = if is_special { HIGHEST_SECOND } else { second };
+        ((first as u64) << 32 | second as u64).to_be_bytes()
     }
 
     /// Reads a command, as a drive does.
@@ -249,21 +242,16 @@ impl Ranges {
     /// Writes the five bytes of a feedback frame, as a drive does. A field outside its range saturates, NaN is zero.
     #[must_use]
     pub const fn encode_feedback(&self, feedback: &Feedback) -> [u8; 5] {
-        let [a, b] = self.position.counts(feedback.position_rad, TOP_16).to_be_bytes();
-        let [c, d, e] = pair(
-            self.velocity.counts(feedback.velocity_rad_per_s, TOP_12),
-            self.torque.counts(feedback.torque_nm, TOP_12),
-        );
+        let [_, _, a, b] =
+            self.position.counts_or_zero(feedback.position_rad, TOP_16).to_be_bytes();
+        let velocity = self.velocity.counts_or_zero(feedback.velocity_rad_per_s, TOP_12);
+        let torque = self.torque.counts_or_zero(feedback.torque_nm, TOP_12);
+        let [_, c, d, e] = (velocity << 12 | torque).to_be_bytes();
         [a, b, c, d, e]
     }
 }
 
-/// Packs two numbers of 12 bits.
-const fn pair(first: u16, second: u16) -> [u8; 3] {
-    let [_, a, b, c] = (((first as u32) << 12) | second as u32).to_be_bytes();
-    [a, b, c]
-}
-
+/// Reads two numbers of 12 bits.
 const fn unpair([a, b, c]: [u8; 3]) -> (u16, u16) {
     let (a, b, c) = (a as u16, b as u16, c as u16);
     (a << 4 | b >> 4, (b & 0xF) << 8 | c)
@@ -296,14 +284,26 @@ impl Range {
         }
     }
 
-    /// Truncates to counts of 0 to `top`. NaN is zero.
+    /// Truncates to counts of 0 to `top`; `None` for NaN.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    const fn counts(self, value: f32, top: u16) -> u16 {
-        let value = if value.is_nan() { 0.0 } else { value };
+    #[inline]
+    const fn counts(self, value: f32, top: u16) -> Option<u32> {
         if value >= self.upper {
-            return top;
+            Some(top as u32)
+        } else if value > self.lower {
+            Some(((value - self.lower) * top as f32 / (self.upper - self.lower)) as u32)
+        } else if value.is_nan() {
+            None
+        } else {
+            Some(0)
         }
-        ((value - self.lower) * top as f32 / (self.upper - self.lower)) as u16
+    }
+
+    const fn counts_or_zero(self, value: f32, top: u16) -> u32 {
+        match (self.counts(value, top), self.counts(0.0, top)) {
+            (Some(counts), _) | (None, Some(counts)) => counts,
+            (None, None) => 0,
+        }
     }
 
     const fn value(self, counts: u16, top: u16) -> f32 {

@@ -7,9 +7,13 @@ mod careless;
 mod damiao;
 mod dji;
 mod joints;
+mod lk;
 mod mit;
+mod odrive;
 #[cfg(feature = "hal")]
 mod pins;
+mod robstride;
+mod vesc;
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};

@@ -1063,3 +1063,41 @@ fn a_shared_command_of_an_own_motor_can_be_given_back() {
     let frame = own.next_frame(0).unwrap();
     assert!(own.requeue(&frame), "{frame:?}");
 }
+
+/// The driver refuses the frames of rest while feedback is late, and then a frame that clears an error took the place of the next one: the
+/// drive went on with its last command. Found by a fuzzer.
+#[test]
+fn rest_that_the_driver_refused_gives_way_to_no_other_frame() {
+    let mode = ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap();
+    for lost in 1..8 {
+        let mut bench = Bench::armed(mode, 1.0);
+        bench.steps(200, |b| {
+            b.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0)).unwrap();
+        });
+        bench.drive.shaft_mut().set_load(-1.0);
+        bench.steps(20, |b| b.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0)).unwrap());
+        assert!(bench.drive.shaft().torque_nm() > 0.5);
+        let update = |bench: &mut Bench<ImpedanceControl>| {
+            bench.now_us += 12_000;
+            let now = bench.now();
+            Devices::update(&mut bench.own, Tick::new(now, 0.001));
+        };
+        for _ in 0..lost {
+            update(&mut bench);
+            while let Some(frame) = Devices::next_frame(&mut bench.own, 0) {
+                assert!(Devices::requeue(&mut bench.own, &frame));
+            }
+        }
+        // Somebody else's frame with the id of the feedback: an error that the drive does not have.
+        let fake = CanFrame::standard(0x11, [0xA1, 0x80, 0, 0x7F, 0xF7, 0xFF, 30, 30]).unwrap();
+        let now = bench.now();
+        assert_eq!(Devices::ingest(&mut bench.own, &fake, now), drivetrain::motor::Ingest::Taken);
+        update(&mut bench);
+        assert!(!Devices::is_armed(&mut bench.own));
+        while let Some(frame) = Devices::next_frame(&mut bench.own, 0) {
+            _ = bench.drive.hear(&frame);
+        }
+        bench.drive.step(1e-5);
+        assert!(bench.drive.shaft().torque_nm().abs() < 0.003, "after {lost} refused frames");
+    }
+}

@@ -2,10 +2,11 @@
 
 use crate::case::Case;
 use crate::{
-    arming, clocks, commands, drives, health, plausibility, receive, registration, timing, transmit,
+    arming, clocks, commands, drives, health, odrive, plausibility, receive, registration,
+    robstride, timing, transmit,
 };
 
-pub(crate) const CATALOGUE: [&[Case]; 10] = [
+pub(crate) const CATALOGUE: [&[Case]; 12] = [
     receive::CASES,
     plausibility::CASES,
     timing::CASES,
@@ -16,4 +17,6 @@ pub(crate) const CATALOGUE: [&[Case]; 10] = [
     transmit::CASES,
     health::CASES,
     drives::CASES,
+    odrive::CASES,
+    robstride::CASES,
 ];

@@ -6,6 +6,8 @@
 #![cfg(test)]
 
 mod arming;
+#[path = "../odrive/bench.rs"]
+mod axle;
 #[path = "../damiao/bench.rs"]
 mod bench;
 mod case;
@@ -14,11 +16,19 @@ mod clocks;
 mod commands;
 mod drives;
 mod health;
+#[path = "../lk/bench.rs"]
+mod lk_bench;
+mod odrive;
 mod plausibility;
 mod receive;
 mod registration;
 mod rig;
+mod robstride;
+#[path = "../robstride/bench.rs"]
+mod robstride_bench;
 mod rows;
 mod table;
 mod timing;
 mod transmit;
+#[path = "../vesc/bench.rs"]
+mod vesc_bench;

@@ -8,6 +8,7 @@
 #![cfg(test)]
 
 mod clock;
+mod odrive;
 mod reference;
 mod subjects;
 
@@ -15,7 +16,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Damiao, Snake, Subject, Wheel};
+use subjects::{Both, Damiao, Lk, RobStride, Snake, Subject, Vesc, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -246,6 +247,14 @@ fn every_device(clocks: u64) {
     run("snake", clocks, Snake::new);
     run("damiao, MIT", clocks, Damiao::mit);
     run("damiao, position", clocks, Damiao::position);
+    run("lk, torque", clocks, Lk::torque);
+    run("lk, velocity", clocks, Lk::velocity);
+    run("lk, position", clocks, Lk::position);
+    run("vesc", clocks, Vesc::new);
+    run("odrive, torque", clocks, odrive::Odrive::torque);
+    run("odrive, position", clocks, odrive::Odrive::position);
+    run("robstride, operation", clocks, RobStride::operation);
+    run("robstride, current", clocks, RobStride::current);
     #[cfg(feature = "hal")]
     {
         run("RC ESC", clocks, subjects::pins::esc);

@@ -4,16 +4,19 @@ use super::custom_motor::MyMotor;
 use super::reference::{BadStep, Rules};
 use drivetrain::damiao::{Mode, Model, Motor, PositionVelocity};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
-use drivetrain::encoder::Position;
+use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
+use drivetrain::lk;
 use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
     Reaction, Recovery, TargetError, VelocityDrive,
 };
-use drivetrain::sim::DamiaoDrive;
+use drivetrain::robstride;
+use drivetrain::sim::{DamiaoDrive, LkDrive, RobStrideDrive};
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
+use drivetrain::vesc;
 use embedded_can::Frame;
 
 /// A device of `N` motors that all hear, and are set, together.
@@ -244,6 +247,85 @@ impl<M: Mode> Subject<1> for Damiao<M> {
     }
 }
 
+/// A drive that is asked for its state, switched on, and asked for its angle, before it is driven.
+pub(super) struct Lk<M: lk::Mode> {
+    motor: Own<lk::Motor<M>>,
+    drive: LkDrive,
+    set: fn(&mut Own<lk::Motor<M>>, f32) -> Result<(), TargetError>,
+}
+
+impl Lk<ImpedanceControl> {
+    pub(super) fn torque() -> Self {
+        let mode = ImpedanceControl::new(2.0).unwrap();
+        Self::new(mode, |motor, value| motor.set_torque(2.0 * value))
+    }
+}
+
+impl Lk<lk::Velocity> {
+    pub(super) fn velocity() -> Self {
+        let mode = lk::Velocity::new(AngularVelocity::from_rad_per_s(10.0));
+        Self::new(mode, |motor, value| {
+            motor.set_velocity((), AngularVelocity::from_rad_per_s(5.0 * value))
+        })
+    }
+}
+
+impl Lk<lk::PositionVelocity> {
+    pub(super) fn position() -> Self {
+        let mode = lk::PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        Self::new(mode, |motor, value| motor.set_angle((), Angle::from_radians(value)))
+    }
+}
+
+impl<M: lk::Mode> Lk<M> {
+    fn new(mode: M, set: fn(&mut Own<lk::Motor<M>>, f32) -> Result<(), TargetError>) -> Self {
+        let motor = Own::new(lk::Motor::new(lk::Model::MF9025_16T, 1, mode).unwrap());
+        let drive = LkDrive::new(1, 33.0 / 4096.0, 0.32, 1.0, 16);
+        let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
+        Self { motor, drive, set }
+    }
+}
+
+impl<M: lk::Mode> Subject<1> for Lk<M> {
+    const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
+
+    stops!(self => self.motor);
+
+    fn hear(&mut self, now: Instant) {
+        let question = CanFrame::standard(0x141, [0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        let feedback = self.drive.hear(&question).unwrap();
+        _ = Devices::ingest(&mut self.motor, &feedback, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.motor.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.motor.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [(self.set)(&mut self.motor, value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// The drive takes each frame, and the motor each answer that is no feedback; it is driven by one that leaves it on and with a torque.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.motor, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.motor, 0) {
+            let answer = self.drive.hear(&frame);
+            let is_feedback = matches!(frame.bytes()[0], 0xA1 | 0xA2 | 0xA4);
+            if let Some(answer) = answer.filter(|_| !is_feedback) {
+                self.motor.motor_mut().decode_answer(&answer);
+            }
+            let mut turned = self.drive;
+            turned.step(1e-6);
+            is_driven |= turned.is_on() && turned.shaft().torque_nm() != 0.0;
+        }
+        [is_driven]
+    }
+}
+
 pub(super) struct Snake(Joints, Joint);
 
 impl Snake {
@@ -396,5 +478,141 @@ pub(super) mod pins {
             self.update(tick).unwrap();
             [self.channel().0 != 0]
         }
+    }
+}
+
+/// A wheel on a VESC that turns by torque, without a question for the fault code, which has a time of its own.
+pub(super) struct Vesc(Own<vesc::Motor<vesc::CurrentControl>>);
+
+impl Vesc {
+    pub(super) fn new() -> Self {
+        let model = vesc::Model {
+            name: "wheel",
+            pole_pairs: 7,
+            gear: GearRatio::DIRECT,
+            torque_constant_nm_per_a: 0.05,
+            current_limit_a: 20.0,
+            max_velocity: AngularVelocity::from_rad_per_s(300.0),
+            is_reversed: false,
+        };
+        let motor = vesc::Motor::new(model, 23, vesc::CurrentControl::new()).unwrap();
+        Self(
+            Own::new(motor.without_fault_code())
+                .with_health(&STANDS)
+                .unwrap()
+                .with_opening(Duration::ZERO),
+        )
+    }
+}
+
+impl Subject<1> for Vesc {
+    const RULES: [Rules; 1] = [OWN];
+
+    stops!(self => self.0);
+
+    fn hear(&mut self, now: Instant) {
+        let id = embedded_can::ExtendedId::new(0x917).unwrap();
+        let status = CanFrame::new(id, &[0; 8]).unwrap();
+        _ = Devices::ingest(&mut self.0, &status, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.0.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.0.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [self.0.set_torque(value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// Any other value than 0 in the four bytes of a current.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.0, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.0, 0) {
+            is_driven |= is_driving(&frame);
+        }
+        [is_driven]
+    }
+}
+
+pub(super) struct RobStride<M: robstride::Mode> {
+    motor: Own<robstride::Motor<M>>,
+    drive: RobStrideDrive,
+    set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+}
+
+impl RobStride<ImpedanceControl> {
+    pub(super) fn operation() -> Self {
+        let mode = ImpedanceControl::new(3.0).unwrap();
+        Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
+    }
+}
+
+impl RobStride<robstride::Current> {
+    pub(super) fn current() -> Self {
+        let mode = robstride::Current::new(4.0, 1.0);
+        Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
+    }
+}
+
+impl<M: robstride::Mode> RobStride<M> {
+    fn new(
+        mode: M,
+        set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+    ) -> Self {
+        let motor = Own::new(robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap());
+        let drive = RobStrideDrive::new(1, [12.566, 44.0, 17.0, 500.0, 5.0]);
+        let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
+        Self { motor, drive, set }
+    }
+
+    /// Gives the drive a frame, and the motor an answer about a parameter.
+    fn tell(&mut self, frame: &CanFrame) {
+        if let Some(answer) = self.drive.hear(frame) {
+            self.motor.motor_mut().decode_answer(&answer);
+        }
+    }
+}
+
+impl<M: robstride::Mode> Subject<1> for RobStride<M> {
+    const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
+
+    stops!(self => self.motor);
+
+    /// A write of a parameter that no mode uses is answered with feedback.
+    fn hear(&mut self, now: Instant) {
+        let id = embedded_can::ExtendedId::new(0x1200_FD01).unwrap();
+        let refresh = CanFrame::of(id, [0x1E, 0x70, 0, 0, 0, 0, 0xF0, 0x41]);
+        let feedback = self.drive.hear(&refresh).unwrap();
+        _ = Devices::ingest(&mut self.motor, &feedback, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.motor.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.motor.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [(self.set)(&mut self.motor, value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// The drive takes each frame; it is driven by one that leaves it enabled and with a torque.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.motor, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.motor, 0) {
+            self.tell(&frame);
+            let mut turned = self.drive;
+            turned.step(1e-6);
+            is_driven |= frame.header() >> 24 & 0x1F != 17
+                && turned.is_enabled()
+                && turned.shaft().torque_nm().abs() > 17.0 / 65_535.0;
+        }
+        [is_driven]
     }
 }

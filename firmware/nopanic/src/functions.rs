@@ -40,6 +40,10 @@ pub fn call_all() {
     crate::chassis::call_all();
     crate::pwm::call_all();
     crate::damiao::call_all();
+    crate::lk::call_all();
+    crate::vesc::call_all();
+    crate::odrive::call_all();
+    crate::robstride::call_all();
     crate::snake::call_all();
     crate::shaping::call_all();
     crate::wire::call_all();

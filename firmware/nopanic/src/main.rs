@@ -12,10 +12,14 @@ mod damiao;
 mod functions;
 mod geometry;
 mod health;
+mod lk;
+mod odrive;
 mod opaque;
 mod pwm;
+mod robstride;
 mod shaping;
 mod snake;
+mod vesc;
 mod wire;
 
 use core::panic::PanicInfo;

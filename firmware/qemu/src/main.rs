@@ -11,6 +11,7 @@ mod closed_loop;
 mod constant_time;
 mod controllers;
 mod cycle;
+mod joints;
 mod meter;
 mod rows;
 mod wiring;
@@ -27,6 +28,7 @@ fn main() -> ! {
         hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
         cycle::rows();
+        joints::rows();
         rows::control();
         controllers::rows();
         rows::math();

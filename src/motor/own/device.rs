@@ -1,5 +1,6 @@
 //! The motor as a device of the runner.
 
+use super::route::Route;
 use super::{Impedance, Order, Own, OwnMotor, Target};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -19,32 +20,15 @@ const LONGEST_STEP_S: f32 = 0.02;
 const INQUIRY: Duration = Duration::from_millis(10);
 
 impl<M: OwnMotor> CanDevice for Own<M> {
+    #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if frame.is_remote() {
-            return Ingest::Unrelated;
+        if !self.route.fits(frame) {
+            Ingest::Unrelated
+        } else if self.route.is_feedback(frame) {
+            self.take(frame, now)
+        } else {
+            self.take_by_claims(frame, now)
         }
-        let (mut is_feedback, mut command) = (false, None);
-        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
-            match claim.role() {
-                Role::Feedback => is_feedback = true,
-                // What others send on a shared id may be for another drive.
-                Role::Command if claim.is_shared() => {}
-                Role::Command => command = Some(claim),
-            }
-        }
-        if is_feedback && self.motor.decode_answer(frame) {
-            return Ingest::Taken;
-        }
-        let outcome = if is_feedback { self.motor.decode(frame) } else { Ingest::Unrelated };
-        if outcome == Ingest::Taken {
-            self.watch.hear(now);
-            self.guard.hear(now);
-            self.hear_power(now);
-        } else if outcome == Ingest::Unrelated && command.is_some() {
-            self.rival = command;
-            self.watch.hear_rival(now);
-        }
-        outcome
     }
 
     fn update(&mut self, tick: Tick) {
@@ -59,18 +43,21 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let command = self.act(may_drive, step, left);
         // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
         let has_other = self.has_posted || inquiry.is_some();
-        let gives_way = is_at_rest && self.has_rested && has_other;
+        let gives_way = is_at_rest && self.rested.is_some() && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.has_rested = is_at_rest && !gives_way;
+        self.rested = command.filter(|_| is_at_rest && !gives_way);
     }
 
+    #[inline]
     fn next_frame(&mut self) -> Option<CanFrame> {
-        if let Some(frame) = self.switching.take() {
-            return Some(frame);
+        if self.switching.is_some() {
+            return self.switching.take();
         }
-        let command = self.command.take();
-        self.last = command.or(self.last);
-        command
+        if self.command.is_some() {
+            self.last = self.command.take();
+            return self.last;
+        }
+        None
     }
 
     /// Each update offers the newest command anyway. A frame for the drive's power comes again if it is still wanted.
@@ -86,8 +73,13 @@ impl<M: OwnMotor> CanDevice for Own<M> {
             .claims()
             .into_iter()
             .filter(|claim| claim.role() == Role::Command && (is_known || !claim.is_shared()));
-        let is_own = !frame.is_remote() && commands.any(|claim| claim.covers(frame.id()));
+        let is_own = match frame.is_remote() {
+            true => is_known,
+            false => commands.any(|claim| claim.covers(frame.id())),
+        };
         self.superseded = self.superseded.wrapping_add(u32::from(is_own));
+        // Rest that was not sent gives way to no other frame.
+        self.rested = self.rested.filter(|rest| rest != frame);
         is_own
     }
 
@@ -160,11 +152,53 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 }
 
+/// Received frames.
+impl<M: OwnMotor> Own<M> {
+    /// Takes a frame with an id of the feedback.
+    fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if self.motor.decode_answer(frame) {
+            return Ingest::Taken;
+        }
+        let outcome = self.motor.decode(frame);
+        if outcome == Ingest::Taken {
+            self.watch.hear(&self.guard, now);
+            self.guard.hear(now);
+            self.hear_power(now);
+        }
+        outcome
+    }
+
+    #[inline(never)]
+    fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        if frame.is_remote() {
+            return Ingest::Unrelated;
+        }
+        if self.route.is_unknown() {
+            self.route = Route::of(self.motor.claims());
+        }
+        let (mut is_feedback, mut command) = (false, None);
+        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
+            match claim.role() {
+                Role::Feedback => is_feedback = true,
+                // What others send on a shared id may be for another drive.
+                Role::Command if claim.is_shared() => {}
+                Role::Command => command = Some(claim),
+            }
+        }
+        let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
+        if outcome == Ingest::Unrelated && command.is_some() {
+            self.rival = command;
+            self.watch.hear_rival(now);
+        }
+        outcome
+    }
+}
+
 /// The update, step by step.
 impl<M: OwnMotor> Own<M> {
     /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
     fn look(&mut self, now: Instant) -> f32 {
-        let share = self.watch.look(&mut self.guard, &self.motor.vitals(), now);
+        let share = self.watch.look(&mut self.guard, || self.motor.vitals(), now);
         if share <= 0.0 {
             self.guard.relax();
         }
@@ -177,7 +211,7 @@ impl<M: OwnMotor> Own<M> {
             return;
         }
         let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
-        _ = self.watch.look(&mut self.guard, &vitals, now);
+        _ = self.watch.look(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
         self.motor.forget_settings();
     }
@@ -191,7 +225,7 @@ impl<M: OwnMotor> Own<M> {
         if was_online && !self.was_online {
             self.motor.forget_settings();
         }
-        let is_idle = !self.power.is_on() && !self.has_posted && self.has_rested;
+        let is_idle = !self.power.is_on() && !self.has_posted && self.rested.is_some();
         let is_due = now < self.inquired || now.since(self.inquired) >= INQUIRY;
         if !is_idle || !is_due || self.motor.is_enabled() == Some(true) {
             return None;
@@ -233,6 +267,11 @@ impl<M: OwnMotor> Own<M> {
     fn enable(&mut self) {
         if self.motor.wrong_setting().is_some_and(|wrong| wrong.found.is_some()) {
             self.guard.relax_until_armed();
+            return;
+        }
+        // Of several frames none is left out: the one before still waits for the bus.
+        if self.switching.is_some() && self.enabling > 0 {
+            self.has_posted = true;
             return;
         }
         let frame = self.motor.enable(self.enabling);

@@ -1,7 +1,7 @@
 //! Impedance: a target, and the control of a drive that follows one.
 
 use super::{Order, Target};
-use crate::control::{Cascade, ConfigError, PidConfig, TimeStep};
+use crate::control::{Cascade, ConfigError, PidConfig, TimeStep, limited};
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
@@ -163,6 +163,13 @@ impl ImpedanceControl {
         self.effort = 0.0;
         let limit = self.torque_limit_nm * share;
         let wanted = self.wanted(target, angle, velocity, limit, &step)?;
+        let torque_nm = limited(wanted.torque_nm, -limit, limit);
+        if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
+            self.effort = torque_nm / self.torque_limit_nm;
+            let (stiffness, damping) = (0.25 * count.stiffness, 0.25 * count.damping);
+            let angle = angle.unwrap_or(Angle::ZERO);
+            return Some(Impedance { angle, velocity, stiffness, damping, torque_nm });
+        }
         let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
         let end = most.velocity.as_rad_per_s();
         // A velocity at the end of its range is there or beyond.
@@ -171,7 +178,6 @@ impl ImpedanceControl {
         let stiffness =
             whole(share * wanted.stiffness.min(most.stiffness), per_count, limit, count.stiffness);
         let damping = whole(share * damping, per_count_s, limit, count.damping);
-        let torque_nm = wanted.torque_nm.min(limit).max(-limit);
         // Angle and velocity are truncated, by the drive that reports them and in the command.
         let limit = limit - 2.0 * (stiffness * per_count + damping * per_count_s);
         let at = match angle {
@@ -180,10 +186,10 @@ impl ImpedanceControl {
             None => 0.0,
         };
         let end = most.angle.as_radians();
-        let way = wanted.angle.as_radians().min(end).max(-end) - at;
+        let way = limited(wanted.angle.as_radians(), -end, end) - at;
         let way = within(way, torque_nm, stiffness, limit);
         let spring_nm = torque_nm + stiffness * way;
-        let change = wanted.velocity.as_rad_per_s().min(end).max(-end) - velocity.as_rad_per_s();
+        let change = limited(wanted.velocity.as_rad_per_s(), -end, end) - velocity.as_rad_per_s();
         let change = within(change, spring_nm, damping, limit);
         self.effort = (spring_nm + damping * change) / self.torque_limit_nm;
         Some(Impedance {

@@ -5,6 +5,7 @@ mod impedance;
 mod motor;
 mod order;
 mod power;
+mod route;
 mod settings;
 
 pub use impedance::{Impedance, ImpedanceControl};
@@ -20,6 +21,7 @@ use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use power::Power;
+use route::Route;
 
 /// A motor of your own as a device of the runner, beside all others.
 ///
@@ -83,6 +85,7 @@ use power::Power;
 #[derive(Debug, Clone, Copy)]
 pub struct Own<M> {
     motor: M,
+    route: Route,
     guard: Guard,
     watch: Watch,
     power: Power,
@@ -99,8 +102,8 @@ pub struct Own<M> {
     command: Option<CanFrame>,
     /// This update offers a frame for the drive's power.
     has_posted: bool,
-    /// The last update offered a frame of rest.
-    has_rested: bool,
+    /// The frame of rest that the last update offered, unless the driver gave it back.
+    rested: Option<CanFrame>,
     was_online: bool,
     /// The time of the last question.
     inquired: Instant,
@@ -123,6 +126,7 @@ impl<M: OwnMotor> Own<M> {
     pub const fn new(motor: M) -> Self {
         Self {
             motor,
+            route: Route::UNKNOWN,
             guard: Guard::new(),
             watch: Watch::new(),
             power: Power::NEW,
@@ -134,7 +138,7 @@ impl<M: OwnMotor> Own<M> {
             switching: None,
             command: None,
             has_posted: false,
-            has_rested: false,
+            rested: None,
             was_online: false,
             last: None,
             inquired: Instant::START,
@@ -182,6 +186,7 @@ impl<M: OwnMotor> Own<M> {
     /// Returns the motor, to change its gains or to ask for a setting of its drive. What is sent is unchanged until the next update.
     #[must_use]
     pub const fn motor_mut(&mut self) -> &mut M {
+        self.route = Route::UNKNOWN;
         &mut self.motor
     }
 

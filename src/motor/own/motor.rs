@@ -70,7 +70,7 @@ pub trait OwnMotor {
     }
 
     /// Returns a frame that asks the drive for its feedback and changes nothing; `None`, unless said otherwise, for a drive that
-    /// reports by itself.
+    /// reports by itself. A remote frame has an id of the motor's feedback.
     fn poll(&mut self) -> Option<CanFrame> {
         None
     }

@@ -1,5 +1,6 @@
 //! The rules of a motor that is a device by itself.
 
+use super::stamp::age;
 use super::{DeviceGuard, MotorGuard, OPENING};
 use crate::motor::{
     Condition, Conditions, Edge, Health, Latch, Link, MotorName, TargetError, Timeouts,
@@ -69,13 +70,32 @@ impl Guard {
     }
 
     /// Notes valid feedback that arrived at `now`.
+    #[inline]
     pub fn hear(&mut self, now: Instant) {
+        let is_usual = self.device.is_running()
+            && self.motor.hear_soon(now.stamp(), self.device.now(), self.device.timeouts());
+        if !is_usual {
+            self.hear_anytime(now);
+        }
+    }
+
+    /// Notes feedback, whenever the one before came.
+    #[cold]
+    #[inline(never)]
+    fn hear_anytime(&mut self, now: Instant) {
+        self.device.disturb();
         if !self.device.is_running() {
             let before = self.device.pass_unwatched(now);
             self.forget_bygones(before, now);
         }
         let timeouts = *self.device.timeouts();
         self.change(now, |motor| motor.hear(now.stamp(), &timeouts));
+    }
+
+    /// Returns the time since the last feedback in µs; `None` before the first.
+    pub(in crate::motor) fn gap_us(&self, now: Instant) -> Option<u32> {
+        let is_heard = self.motor.link() != Link::Unheard;
+        is_heard.then(|| age(now.stamp(), self.motor.heard()))
     }
 
     fn forget_bygones(&mut self, before: Instant, now: Instant) {
@@ -100,8 +120,12 @@ impl Guard {
     /// # Errors
     /// Says why not. A target that is not finite is counted. It takes the present one away, as does any that comes without
     /// fresh feedback: an older target must not act in the place of a newer one when the feedback is back.
+    #[inline]
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.motor.admit(is_finite)?;
+        if !self.motor.has_target() {
+            self.device.disturb();
+        }
         self.motor.take_target(self.device.now());
         Ok(())
     }
@@ -109,8 +133,17 @@ impl Guard {
     /// Moves the time on to that of a tick and tells whether the motor may be driven in it. When it may not, send
     /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
     #[must_use]
+    #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
         let before = self.device.begin(now);
+        (self.device.is_quiet(before) || self.look_around(before, now)) && self.motor.drives()
+    }
+
+    /// Sees to all that the time that passed brings with it, and finds out until when there is nothing of it; `false` when
+    /// none passed.
+    #[cold]
+    #[inline(never)]
+    fn look_around(&mut self, before: Instant, now: Instant) -> bool {
         if !self.device.moves_on(before) {
             self.end_without_time(before, now);
             return false;
@@ -122,11 +155,21 @@ impl Guard {
         // A range that opens for nobody is open before its stamp repeats.
         self.motor.share(now.stamp());
         let timeouts = *self.device.timeouts();
-        self.change(now, |motor| {
+        let is_settled = self.change(now, |motor| {
             motor.end_what_is_over();
-            motor.age(now.stamp(), &timeouts);
+            motor.age(now.stamp(), &timeouts)
         });
-        self.motor.drives()
+        let ages = self.device.ages().filter(|_| is_settled);
+        let quiet = ages.and_then(|mut ages| {
+            ages.add(&self.motor);
+            ages.within_limits_us()
+        });
+        match quiet {
+            Some(micros) => self.device.rest_for(micros),
+            None if is_settled => {}
+            None => self.device.disturb(),
+        }
+        true
     }
 
     /// Returns the share of the output range that is open, 0 to 1: it rises from zero after arming.

@@ -42,13 +42,15 @@ mod gesture;
 mod guard;
 mod motor;
 mod stamp;
+mod state;
 
 use crate::time::Duration;
 
 pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
 pub use guard::Guard;
-pub(crate) use motor::{MotorGuard, Rest};
+pub(crate) use motor::MotorGuard;
 pub(crate) use stamp::age;
+pub(crate) use state::Rest;
 
 /// The time in which the output range of a motor opens after arming, unless configured otherwise: 0.2 s.
 pub const OPENING: Duration = Duration::from_millis(200);

@@ -1,30 +1,9 @@
 //! The rules of one motor.
 
 use super::stamp::{LONGEST_PAUSE_US, age, is_near, whole_ms};
+use super::state::{Arming, Rest};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
-
-/// Whether a motor takes targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Arming {
-    Disarmed,
-    Armed,
-    /// Relaxed since it was armed, because it was lost.
-    Latched,
-    /// Relaxed since it was armed, for something else.
-    Tripped,
-}
-
-/// How a motor rested since its loops ran last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Rest {
-    /// Not at all.
-    None,
-    /// Its feedback was late: what was measured before says nothing of a rate.
-    Pause,
-    /// Nothing was asked of it: the loops start afresh.
-    Relaxed,
-}
 
 /// What a device has to know of a motor before a change of it.
 #[derive(Debug, Clone, Copy)]
@@ -183,6 +162,18 @@ impl MotorGuard {
     pub(crate) fn trust(&mut self, gap_us: u32) {
         let gap_us = if self.link == Link::Online { gap_us.min(u32::MAX >> COUNT_BITS) } else { 0 };
         self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
+    }
+
+    /// Notes feedback of a motor that is online, if it came soon after the one before and after the update before; otherwise
+    /// does nothing and returns `false`.
+    #[inline]
+    pub(super) fn hear_soon(&mut self, now: u32, updated: u32, timeouts: &Timeouts) -> bool {
+        let is_soon = |before| now.wrapping_sub(before) <= timeouts.late_us();
+        let is_usual = self.link == Link::Online && is_soon(self.heard) && is_soon(updated);
+        if is_usual {
+            self.heard = now;
+        }
+        is_usual
     }
 
     /// Notes feedback, whenever the one before came.

@@ -38,7 +38,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Looks after the motor, which may be relaxed for what is found; returns the share of its limit that it is left with.
     pub(super) fn look(&mut self, now: Instant) -> f32 {
         let vitals = self.vitals();
-        self.watch.look(&mut self.guard, &vitals, now)
+        self.watch.look(&mut self.guard, || vitals, now)
     }
 
     /// A motor without an encoder is not known to turn or to stand.

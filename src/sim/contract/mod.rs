@@ -92,7 +92,8 @@ pub trait Subject {
 pub enum Rule {
     /// Its claims have the ids that its motors send, and no two of them clash.
     ClaimsFeedback,
-    /// Each frame that it offers is a data frame with an id that it claims as a command (I3).
+    /// Each frame that it offers is a data frame with an id that it claims as a command, or a remote frame with one that it claims as
+    /// feedback (I3).
     SendsWhatItClaims,
     /// It offers no more than 64 frames between two updates.
     IsBounded,

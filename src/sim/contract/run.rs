@@ -148,11 +148,9 @@ impl<S: Subject> Run<S> {
 
     fn is_command(&mut self, frame: &CanFrame) -> bool {
         use embedded_can::Frame;
-        let claimed = self
-            .subject
-            .device()
-            .claims()
-            .any(|claim| claim.role() == Role::Command && claim.covers(frame.id()));
-        claimed && frame.is_data_frame()
+        // A remote frame asks for feedback, and commands nothing.
+        let role = if frame.is_data_frame() { Role::Command } else { Role::Feedback };
+        let mut claims = self.subject.device().claims();
+        claims.any(|claim| claim.role() == role && claim.covers(frame.id()))
     }
 }

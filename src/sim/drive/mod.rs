@@ -1,7 +1,15 @@
 //! Drives with command frames of their own, each written from its manual and without the codec of its family.
 
 mod damiao;
+mod lk;
+mod odrive;
+mod robstride;
 mod shaft;
+mod vesc;
 
 pub use damiao::DamiaoDrive;
+pub use lk::LkDrive;
+pub use odrive::OdriveDrive;
+pub use robstride::RobStrideDrive;
 pub use shaft::DriveShaft;
+pub use vesc::{VescDrive, VescMotor};

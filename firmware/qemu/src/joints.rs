@@ -1,0 +1,138 @@
+//! Eight joints of Damiao in MIT mode, as a program drives them: each an own motor with our speed loop.
+
+use crate::meter::instructions;
+use crate::row;
+use core::hint::black_box;
+use drivetrain::control::PidConfig;
+use drivetrain::damiao::{Model, Motor};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, VelocityDrive};
+use drivetrain::sim::DamiaoDrive;
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::AngularVelocity;
+
+const MOTORS: usize = 8;
+
+type Joints = [Own<Motor<ImpedanceControl>>; MOTORS];
+
+struct Arm {
+    joints: Joints,
+    drives: [DamiaoDrive; MOTORS],
+    answers: [Option<CanFrame>; MOTORS],
+    now: Instant,
+}
+
+impl Arm {
+    /// Makes eight joints that are driven. Their drives have one master id, or each its own.
+    fn new(is_shared: bool, is_armed: bool) -> Self {
+        let ids: [u8; MOTORS] = core::array::from_fn(|index| index as u8 + 1);
+        let master_id = |id: u8| if is_shared { 0x7E } else { 0x10 + u16::from(id) };
+        let mode = ImpedanceControl::new(3.0).unwrap();
+        let mode = mode.with_loops(PidConfig::new(10.0, 0.0, 0.0), PidConfig::new(0.8, 4.0, 0.001));
+        let mode = mode.unwrap();
+        let joints = ids.map(|id| {
+            let motor = Motor::new(Model::J4310, black_box(id), mode).unwrap();
+            Own::new(motor.with_master_id(master_id(id)).unwrap()).with_opening(Duration::ZERO)
+        });
+        let drives = ids.map(|id| DamiaoDrive::new(id, master_id(id), [12.5, 30.0, 10.0]));
+        let now = Instant::from_micros(1_000);
+        let mut arm = Self { joints, drives, answers: [None; MOTORS], now };
+        for cycle in 0..300 {
+            arm.cycle();
+            if is_armed && cycle == 100 {
+                arm.joints.arm(arm.now).unwrap();
+            }
+        }
+        assert!(arm.drives.iter().all(|drive| drive.is_enabled() == is_armed));
+        arm
+    }
+
+    fn ask(&mut self) {
+        for joint in &mut self.joints {
+            _ = joint.set_velocity((), AngularVelocity::from_rad_per_s(1.0));
+        }
+    }
+
+    fn cycle(&mut self) {
+        self.pass();
+        for frame in self.answers.iter().flatten() {
+            assert_eq!(self.joints.ingest(frame, self.now), Ingest::Taken);
+        }
+        self.joints.update(Tick::new(self.now, 0.001));
+        self.send();
+    }
+
+    /// Lets a period pass, with new targets.
+    fn pass(&mut self) {
+        self.now = self.now + Duration::from_millis(1);
+        self.ask();
+    }
+
+    /// Has the drives take the commands, move and answer.
+    fn send(&mut self) {
+        self.answers = [None; MOTORS];
+        while let Some(frame) = self.joints.next_frame(0) {
+            self.hear(&frame);
+        }
+        for drive in &mut self.drives {
+            drive.step(0.001);
+        }
+    }
+
+    fn hear(&mut self, frame: &CanFrame) {
+        for (drive, place) in self.drives.iter_mut().zip(&mut self.answers) {
+            *place = drive.hear(frame).or(*place);
+        }
+    }
+}
+
+/// The whole tick: feedback in, loops, commands out.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_tick(joints: &mut Joints, answers: &[CanFrame; MOTORS], tick: Tick) {
+    for answer in answers {
+        _ = joints.ingest(answer, tick.now());
+    }
+    joints.update(tick);
+    while let Some(frame) = joints.next_frame(0) {
+        black_box(&frame);
+    }
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_ingest(joints: &mut Joints, answers: &[CanFrame; MOTORS], now: Instant) {
+    for answer in answers {
+        _ = joints.ingest(answer, now);
+    }
+}
+
+/// Commands do not arrive here, so the drives answer with what they had: the targets are the same in each cycle.
+fn tick(is_shared: bool, is_armed: bool) -> u32 {
+    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, is_armed);
+    let answers = answers.map(Option::unwrap);
+    let mut now = now;
+    instructions(joints_tick as fn(&mut Joints, &[CanFrame; MOTORS], Tick), |tick, _| {
+        now = now + Duration::from_millis(1);
+        for joint in &mut joints {
+            _ = joint.set_velocity((), AngularVelocity::from_rad_per_s(1.0));
+        }
+        tick(&mut joints, &answers, Tick::new(now, 0.001));
+    })
+}
+
+fn ingest(is_shared: bool) -> u32 {
+    let Arm { mut joints, answers, now, .. } = Arm::new(is_shared, true);
+    let answers = answers.map(Option::unwrap);
+    let function = joints_ingest as fn(&mut Joints, &[CanFrame; MOTORS], Instant);
+    let whole = instructions(function, |ingest, _| ingest(&mut joints, &answers, now));
+    whole / MOTORS as u32
+}
+
+pub fn rows() {
+    row("joints_tick", &[tick(false, true)]);
+    row("joints_tick_shared", &[tick(true, true)]);
+    row("joints_disarmed", &[tick(false, false)]);
+    row("joints_ingest", &[ingest(false)]);
+    row("joints_ingest_shared", &[ingest(true)]);
+}

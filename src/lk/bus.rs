@@ -1,0 +1,362 @@
+//! The motor as an own motor: its claims, its frames, and their order.
+
+use super::command::{id_of, is_command};
+use super::config::sealed::Goal;
+use super::config::{Mode, sealed};
+use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
+use super::{Command, ConfigError, Feedback, Model, State};
+use crate::frame::CanFrame;
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
+    Vitals, WrongSetting,
+};
+use crate::units::{Angle, AngularVelocity};
+
+/// Each so many commands one is a question for the state: 32 ms at 1 kHz.
+const QUESTION: u8 = 32;
+
+/// The place of the question for the angle among them.
+const HALF_WAY: u8 = QUESTION / 2;
+
+/// After so many commands without feedback the drive may have lost its supply. One of them may be a question.
+const SILENT: u8 = 4;
+
+/// A turn of the rotor in the unit of the drive, 0.01°.
+const TURN: i64 = 36_000;
+
+/// The state of a drive that is off.
+const OFF: u8 = 0x10;
+
+/// How many echoes may be due at once.
+const ECHOES: u8 = 3;
+
+/// A motor of this family, in the control mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::lk::{Model, Motor, Velocity};
+/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let motor = Motor::new(Model::MG5010E_I10, 3, mode)?;
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims, ["command of MG5010E-i10 #3 on 0x143", "feedback of MG5010E-i10 #3 on 0x143"]);
+/// # Ok::<(), drivetrain::lk::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    model: Model,
+    id: u8,
+    is_reversed: bool,
+    mode: M,
+    /// The last feedback; `None` before the first.
+    drive: Option<Feedback>,
+    /// The angle of the rotor in 1/65536 of a turn, with turns.
+    rotor: i64,
+    /// The last state; `None` when it is not known.
+    state: Option<State>,
+    /// The drive was on when it said last, and was not told to be off since.
+    is_on: bool,
+    /// What the angle that the drive counts is ahead of the rotor's, in 0.01°; `None` when it is not known.
+    ahead: Option<i64>,
+    /// How many commands were made since the last feedback or the last angle.
+    silent: u8,
+    /// The drive is to be on.
+    is_wanted: bool,
+    /// How many echoes of off and run are due.
+    echoes: u8,
+    commands: u8,
+    /// The last command that was no question.
+    last: Command,
+    /// A question has waited for a new command.
+    has_waited: bool,
+    clears: bool,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the model, the id of the drive, 1 to 32, and the control mode.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+        if !matches!(id, 1..=32) {
+            return Err(ConfigError::Id(id));
+        }
+        mode.check(&model)?;
+        Ok(Self {
+            model,
+            id,
+            is_reversed: false,
+            mode,
+            drive: None,
+            rotor: 0,
+            state: None,
+            is_on: false,
+            ahead: None,
+            silent: 0,
+            is_wanted: false,
+            echoes: 0,
+            commands: 0,
+            last: Command::REST,
+            has_waited: false,
+            clears: false,
+        })
+    }
+
+    /// Turns the positive direction round: angle, velocity and torque.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self { is_reversed: !self.is_reversed, ..self }
+    }
+
+    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the last state of the drive; `None` before the first, and after its feedback was lost.
+    #[must_use]
+    pub const fn state(&self) -> Option<&State> {
+        self.state.as_ref()
+    }
+
+    fn frame_of(&self, command: Command) -> CanFrame {
+        CanFrame::of(id_of(self.id), command.encode())
+    }
+
+    /// Returns a value of the output shaft in the direction of the drive, or the other way round.
+    const fn turned(&self, value: f32) -> f32 {
+        if self.is_reversed { -value } else { value }
+    }
+
+    /// Returns the angle of the rotor in 0.01°, with turns.
+    const fn rotor_angle(&self) -> i64 {
+        (self.rotor * TURN) >> 16
+    }
+
+    /// Returns the command for a goal; `None` if the drive cannot be told.
+    fn command(&self, goal: Goal) -> Option<Command> {
+        let to_rotor = 100.0 * self.model.gear() / RAD_PER_DEGREE;
+        match goal {
+            Goal::Torque(torque_nm) => {
+                let counts = self.turned(torque_nm) / self.model.torque_per_count();
+                Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
+            }
+            Goal::Velocity(velocity, limit) => {
+                Some(Command::Velocity(whole(self.turned(velocity) * to_rotor), limit))
+            }
+            Goal::Way(way, limit) => {
+                let way = i64::from(whole(self.turned(way) * to_rotor));
+                let angle = self.ahead? + self.rotor_angle() + way;
+                Some(Command::Position(i32::try_from(angle).ok()?, limit))
+            }
+        }
+    }
+
+    /// Takes the angle that the drive has counted. One that differs from the last by more than half a turn has begun anew, so
+    /// the drive had no supply: it counts as off.
+    fn take_angle(&mut self, angle: i64) {
+        let ahead = angle - self.rotor_angle();
+        let is_other = |before: i64| (ahead - before).abs() > TURN / 2;
+        if self.ahead.is_some_and(is_other) {
+            self.doubt();
+        } else if self.is_on {
+            self.ahead = Some(ahead);
+            self.silent = 0;
+        }
+    }
+
+    /// Forgets that the drive is on, until it says so again.
+    const fn doubt(&mut self) {
+        (self.is_on, self.ahead) = (false, None);
+    }
+
+    /// Switches the drive on or off, which it echoes.
+    fn switch(&mut self, command: Command) -> CanFrame {
+        self.echoes = (self.echoes + 1).min(ECHOES);
+        self.frame_of(command)
+    }
+}
+
+impl<M: Mode> OwnMotor for Motor<M> {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name(), self.id)
+    }
+
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |role| Claim::new(id_of(self.id), role, self.name());
+        [claim(Role::Command), claim(Role::Feedback)]
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        if frame.length() != 8 {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let data = frame.bytes();
+        let [code, ..] = *data;
+        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&code);
+        if !is_answer || is_command(data, self.mode.limit(&self.model)) {
+            return Ingest::Unrelated;
+        }
+        let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
+        let Some(phase) = feedback.phase(&self.model) else {
+            return Ingest::Malformed(Malformed::Field);
+        };
+        match self.drive.and_then(|drive| drive.phase(&self.model)) {
+            Some(before) => self.rotor += i64::from(phase.wrapping_sub(before).cast_signed()),
+            None => self.rotor = phase.into(),
+        }
+        self.drive = Some(feedback);
+        // An angle alone ends a silence that was long.
+        self.silent = if self.silent < SILENT { 0 } else { SILENT };
+        Ingest::Taken
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        let velocity = self.drive.map_or(0.0, |drive| drive.velocity_rad_per_s(&self.model));
+        AngularVelocity::from_rad_per_s(self.turned(velocity))
+    }
+
+    /// Turns of the output shaft count.
+    fn angle(&self) -> Option<Angle> {
+        self.drive?;
+        Some(Angle::from_turns(self.turned(self.rotor as f32 / 65_536.0 / self.model.gear())))
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        self.frame_of(Command::REST)
+    }
+
+    /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
+    /// from the angle until that has been read again.
+    fn control(&mut self, order: Order) -> CanFrame {
+        let needs_angle = <M as sealed::Mode>::NEEDS_ANGLE;
+        let shaft = (self.angle(), self.velocity());
+        let goal = self.mode.goal(order, shaft, &self.model);
+        let command = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
+        let due = match self.commands {
+            0 => Some(Command::ReadState),
+            // Not beside the other question, so that no more than one answer in a row is no feedback.
+            HALF_WAY if needs_angle => Some(Command::ReadAngle),
+            _ => None,
+        };
+        let question = due.filter(|_| self.has_waited || command == self.last);
+        self.has_waited = question.is_none() && due.is_some();
+        if !self.has_waited {
+            self.commands = (self.commands + 1) % QUESTION;
+        }
+        self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };
+        if self.silent > SILENT {
+            return self.frame_of(Command::ReadAngle);
+        }
+        self.last = question.map_or(command, |_| self.last);
+        self.frame_of(question.unwrap_or(command))
+    }
+
+    fn reset(&mut self) {
+        self.mode.reset();
+        (self.commands, self.silent) = (1, 0);
+        (self.last, self.has_waited) = (Command::REST, false);
+    }
+
+    /// Run and the question for the state in turn, then the question for the angle if commands count from it.
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        (self.is_wanted, self.clears) = (true, false);
+        if sent == 0 {
+            self.doubt();
+        }
+        Some(if self.is_on {
+            self.frame_of(Command::ReadAngle)
+        } else if sent.is_multiple_of(2) {
+            self.switch(Command::Run)
+        } else {
+            self.frame_of(Command::ReadState)
+        })
+    }
+
+    /// Off, which counts as followed until the drive says otherwise; where it reports an error, clears that in turn.
+    fn disable(&mut self) -> Option<CanFrame> {
+        self.is_wanted = false;
+        self.doubt();
+        let has_error = self.state.is_some_and(|state| state.errors != 0);
+        self.clears = has_error && !self.clears;
+        // Off goes first.
+        Some(if has_error && !self.clears {
+            self.frame_of(Command::ClearErrors)
+        } else {
+            self.switch(Command::Off)
+        })
+    }
+
+    fn is_enabled(&self) -> Option<bool> {
+        let lacks_angle =
+            <M as sealed::Mode>::NEEDS_ANGLE && self.is_wanted && self.ahead.is_none();
+        Some(self.is_on && !lacks_angle)
+    }
+
+    fn inquire(&mut self) -> Option<CanFrame> {
+        Some(self.frame_of(Command::ReadState))
+    }
+
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        let data = frame.bytes();
+        if frame.length() != 8 {
+            return false;
+        }
+        if let Some(state) = State::decode(data) {
+            self.is_on = state.is_on;
+            self.state = Some(state);
+            return true;
+        }
+        if let Some(angle) =
+            Feedback::decode_angle(data).filter(|_| <M as sealed::Mode>::NEEDS_ANGLE)
+        {
+            self.take_angle(angle);
+            return true;
+        }
+        let is_echo = [Command::Off, Command::Run].map(Command::encode).contains(data);
+        let is_due = is_echo && self.echoes > 0;
+        self.echoes -= u8::from(is_due);
+        is_due
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        self.state.is_none().then(|| WrongSetting {
+            motor: self.name(),
+            setting: "motorState",
+            expected: f32::from(OFF),
+            found: None,
+        })
+    }
+
+    fn forget_settings(&mut self) {
+        self.state = None;
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let capabilities = self.mode.capabilities();
+        let known = capabilities.with(Capability::Feedback).with(Capability::Temperature);
+        known.with(Capability::ErrorCodes)
+    }
+
+    fn vitals(&self) -> Vitals {
+        let Some(drive) = self.drive else { return Vitals::default() };
+        let errors = self.state.map_or(0, |state| state.errors);
+        Vitals {
+            temperature_c: Some(drive.temperature_c.into()),
+            error: (errors != 0).then_some(Severity::Fault),
+            error_code: errors,
+            effort: self.mode.effort(),
+            speed: self.model.speed_share(self.velocity().as_rad_per_s()),
+            current: self.turned(f32::from(drive.current) / MOST_COUNTS),
+        }
+    }
+}
+
+/// Truncates, so that a limit holds; NaN is zero.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+const fn whole(value: f32) -> i32 {
+    value as i32
+}

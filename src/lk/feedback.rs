@@ -1,0 +1,147 @@
+//! The codec of what a drive sends.
+
+use super::Model;
+use super::model::RAD_PER_DEGREE;
+
+/// Feedback of the rotor: the answer to a control command and to [`ReadFeedback`](super::Command::ReadFeedback).
+///
+/// ```text
+/// byte 0             1                2 .. 3       4 .. 5         6 .. 7
+/// 0x9C, 0xA1 .. A8 | temperature i8 | current i16 | velocity i16 | encoder u16
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::lk::Feedback;
+///
+/// let feedback = Feedback::decode(&[0x9C, 0x32, 0x64, 0x00, 0x0C, 0xFE, 0x00, 0xC0]).ok_or("no feedback")?;
+/// assert_eq!((feedback.temperature_c, feedback.current, feedback.velocity_dps), (50, 100, -500));
+/// assert_eq!(feedback.encoder, 0xC000); // 270° with 16 bits
+/// assert_eq!(Feedback::decode(&[0x88, 0, 0, 0, 0, 0, 0, 0]), None); // the echo of "run"
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Feedback {
+    /// The temperature of the motor in °C.
+    pub temperature_c: i8,
+    /// The torque current in counts of the [series](super::Series::amperes_per_count).
+    pub current: i16,
+    /// The velocity of the rotor in °/s.
+    pub velocity_dps: i16,
+    /// The angle of the rotor in counts of the encoder.
+    pub encoder: u16,
+}
+
+impl Feedback {
+    /// Reads a feedback frame; `None` for any other frame.
+    #[must_use]
+    pub const fn decode(data: &[u8; 8]) -> Option<Self> {
+        let [0x9C | 0xA1..=0xA8, temperature, a, b, c, d, e, f] = *data else { return None };
+        Some(Self {
+            temperature_c: temperature.cast_signed(),
+            current: i16::from_le_bytes([a, b]),
+            velocity_dps: i16::from_le_bytes([c, d]),
+            encoder: u16::from_le_bytes([e, f]),
+        })
+    }
+
+    /// Reads the answer to [`ReadAngle`](super::Command::ReadAngle): the angle of the rotor over its turns in 0.01°. `None` for any
+    /// other frame.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::lk::Feedback;
+    ///
+    /// let one_turn_back = [0x92, 0x60, 0x73, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
+    /// assert_eq!(Feedback::decode_angle(&one_turn_back), Some(-36_000));
+    /// ```
+    #[must_use]
+    pub const fn decode_angle(data: &[u8; 8]) -> Option<i64> {
+        let [0x92, a, b, c, d, e, f, g] = *data else { return None };
+        Some(i64::from_le_bytes([0, a, b, c, d, e, f, g]) >> 8)
+    }
+
+    /// Returns the torque of the output shaft in Nm.
+    #[must_use]
+    pub const fn torque_nm(&self, model: &Model) -> f32 {
+        self.current as f32 * model.torque_per_count()
+    }
+
+    /// Returns the velocity of the output shaft in rad/s.
+    #[must_use]
+    pub const fn velocity_rad_per_s(&self, model: &Model) -> f32 {
+        self.velocity_dps as f32 * RAD_PER_DEGREE / model.gear()
+    }
+
+    /// Returns the angle of the rotor in 1/65536 of a turn; `None` if the encoder of the model does not have this value.
+    pub(super) const fn phase(&self, model: &Model) -> Option<u16> {
+        let spare = 16 - model.encoder_bits() as u32;
+        let phase = self.encoder << spare;
+        if phase >> spare == self.encoder { Some(phase) } else { None }
+    }
+}
+
+/// The state of a drive: the answer to [`ReadState`](super::Command::ReadState) and [`ClearErrors`](super::Command::ClearErrors).
+///
+/// ```text
+/// byte 0         1                2 .. 3        4 .. 5        6                  7
+/// 0x9A or 0x9B | temperature i8 | 0.01 V u16  | 0.01 A i16  | 0 on, 0x10 off   | errors
+/// ```
+///
+/// | bit of the errors | |
+/// |--:|---|
+/// | 0 | supply too low |
+/// | 1 | supply too high |
+/// | 2 | driver too hot |
+/// | 3 | motor too hot |
+/// | 4 | current too high |
+/// | 5 | short circuit |
+/// | 6 | stalled |
+/// | 7 | no input for longer than a time-out |
+///
+/// Drives with protocol V2.35 have bits 0 and 3 alone.
+///
+/// # Examples
+/// ```
+/// use drivetrain::lk::State;
+///
+/// let state = State::decode(&[0x9A, 0x23, 0x60, 0x09, 0x96, 0x00, 0x10, 0x09]).ok_or("no state")?;
+/// assert_eq!((state.temperature_c, state.is_on, state.errors), (35, false, 0b1001));
+/// assert!((state.supply_v - 24.0).abs() < 1e-3 && (state.supply_a - 1.5).abs() < 1e-3);
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct State {
+    /// The temperature of the motor in °C.
+    pub temperature_c: i8,
+    /// The voltage of the supply in V.
+    pub supply_v: f32,
+    /// The current of the supply in A; negative while the motor generates. The manual has it without a sign, so one beyond 327 A
+    /// reads negative.
+    pub supply_a: f32,
+    /// The drive follows commands, as after its supply came.
+    pub is_on: bool,
+    /// The errors, a bit each; 0 for none.
+    pub errors: u8,
+}
+
+impl State {
+    /// Reads a state frame; `None` for any other frame. A frame without a voltage is a question that is read back.
+    #[must_use]
+    pub const fn decode(data: &[u8; 8]) -> Option<Self> {
+        let [0x9A | 0x9B, temperature, a, b, c, d, state, errors] = *data else { return None };
+        let supply = u16::from_le_bytes([a, b]);
+        if supply == 0 {
+            return None;
+        }
+        Some(Self {
+            temperature_c: temperature.cast_signed(),
+            supply_v: supply as f32 / 100.0,
+            supply_a: i16::from_le_bytes([c, d]) as f32 / 100.0,
+            is_on: state == 0,
+            errors,
+        })
+    }
+}

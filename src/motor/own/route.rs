@@ -1,0 +1,143 @@
+//! Which frames may concern an own motor.
+
+use crate::frame::CanFrame;
+use crate::motor::{Claim, Role};
+
+/// The ids of the feedback and of the commands of one motor, each as one pattern: a frame that fits neither is another's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Route {
+    feedback: Pattern,
+    command: Pattern,
+}
+
+impl Route {
+    /// Before the claims are known, only they tell.
+    pub(super) const UNKNOWN: Self = Self { feedback: Pattern::ANY, command: Pattern::ANY };
+
+    pub(super) const fn is_unknown(&self) -> bool {
+        self.feedback.mask == 0
+    }
+
+    /// Takes the claims of the motor. A command with a shared id tells nothing: it may be for another drive.
+    pub(super) fn of(claims: impl IntoIterator<Item = Claim>) -> Self {
+        let mut route = Self { feedback: Pattern::NONE, command: Pattern::NONE };
+        for claim in claims {
+            match claim.role() {
+                Role::Feedback => route.feedback.add(&claim),
+                Role::Command if claim.is_shared() => {}
+                Role::Command => route.command.add(&claim),
+            }
+        }
+        route
+    }
+
+    /// Tells whether a frame may concern the motor; false for most frames of others, and for every remote frame.
+    #[inline]
+    pub(super) const fn fits(&self, frame: &CanFrame) -> bool {
+        self.feedback.fits(frame) || self.command.fits(frame)
+    }
+
+    /// Tells whether a frame that [fits](Self::fits) is the motor's feedback for certain, and no command of another node.
+    #[inline]
+    pub(super) const fn is_feedback(&self, frame: &CanFrame) -> bool {
+        self.feedback.is_exact && self.feedback.fits(frame) && !self.command.fits(frame)
+    }
+}
+
+/// The bits that the ids of some claims have in common.
+#[derive(Debug, Clone, Copy)]
+struct Pattern {
+    header: u32,
+    mask: u32,
+    /// There is one claim, so an id that fits belongs to it.
+    is_exact: bool,
+}
+
+impl Pattern {
+    /// Fits nothing: no header has all bits.
+    const NONE: Self = Self { header: u32::MAX, mask: u32::MAX, is_exact: false };
+
+    const ANY: Self = Self { header: 0, mask: 0, is_exact: false };
+
+    const fn is_none(&self) -> bool {
+        self.header == u32::MAX
+    }
+
+    fn add(&mut self, claim: &Claim) {
+        let (header, mask) = claim.pattern();
+        *self = if self.is_none() {
+            Self { header, mask, is_exact: true }
+        } else {
+            let mask = self.mask & mask & !(self.header ^ header);
+            Self { header: header & mask, mask, is_exact: false }
+        };
+    }
+
+    #[inline]
+    const fn fits(&self, frame: &CanFrame) -> bool {
+        (frame.header() ^ self.header) & self.mask == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor::MotorName;
+    use embedded_can::{ExtendedId, Frame, Id, StandardId};
+    use std::vec::Vec;
+
+    fn claim(id: impl Into<Id>, role: Role) -> Claim {
+        Claim::new(id, role, MotorName::new("mine", 1))
+    }
+
+    fn standard(raw: u16) -> StandardId {
+        StandardId::new(raw).unwrap()
+    }
+
+    #[test]
+    fn a_route_refuses_no_frame_of_its_motor_and_is_exact_where_it_answers() {
+        let extended = ExtendedId::new(0x201).unwrap();
+        let mut state = 1_u32;
+        let mut below = |limit: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % limit
+        };
+        let (mut refused, mut certain) = (0, 0);
+        for _ in 0..2_000 {
+            let claims: Vec<Claim> = (0..below(5))
+                .map(|_| {
+                    let role = if below(2) == 0 { Role::Feedback } else { Role::Command };
+                    let claim = match below(8) {
+                        0 => claim(extended, role),
+                        _ => claim(standard(0x200 + u16::try_from(below(16)).unwrap()), role),
+                    };
+                    let claim = if below(4) == 0 { claim.with_mask(0x7F0) } else { claim };
+                    if below(4) == 0 { claim.shared() } else { claim }
+                })
+                .collect();
+            let route = Route::of(claims.iter().copied());
+            for raw in 0x1F0..0x220 {
+                let ids = [Id::from(standard(raw)), ExtendedId::new(raw.into()).unwrap().into()];
+                for id in ids {
+                    let frame = CanFrame::of(id, [0; 8]);
+                    let covered = |role: Role, shared: bool| {
+                        claims.iter().any(|claim| {
+                            claim.role() == role
+                                && (shared || !claim.is_shared())
+                                && claim.covers(frame.id())
+                        })
+                    };
+                    let is_feedback = covered(Role::Feedback, true);
+                    let concerns = is_feedback || covered(Role::Command, false);
+                    assert!(route.fits(&frame) || !concerns, "{frame:?} of {claims:?}");
+                    refused += u32::from(!route.fits(&frame));
+                    let is_certain = route.is_feedback(&frame);
+                    let is_only = is_feedback && !covered(Role::Command, false);
+                    assert!(!is_certain || is_only, "{frame:?} of {claims:?}");
+                    certain += u32::from(is_certain);
+                }
+            }
+        }
+        assert!(refused > 100_000 && certain > 1_000, "{refused}, {certain}");
+    }
+}

@@ -1,0 +1,144 @@
+//! The codec of what a drive is sent.
+
+use super::Firmware;
+use crate::frame::CanFrame;
+use embedded_can::{Frame, Id, StandardId};
+
+/// The number of the heartbeat.
+pub(super) const HEARTBEAT: u8 = 0x01;
+/// The number of the drive's errors, in 0.6.
+pub(super) const ERRORS: u8 = 0x03;
+/// The number of a question about an endpoint, in 0.6.
+pub(super) const ASK_ENDPOINT: u8 = 0x04;
+/// The number of the answer about an endpoint, in 0.6.
+pub(super) const ENDPOINT: u8 = 0x05;
+/// The number of the encoder estimates.
+pub(super) const ESTIMATES: u8 = 0x09;
+
+/// A command to a drive, in units of the motor's shaft: turns, turns/s, Nm, A.
+///
+/// ```text
+///        byte 0 .. 3                 4 .. 7             low byte first
+/// 0x02   -                                              stop, with an error
+/// 0x07   axis state u32
+/// 0x0B   control mode u32          | input mode u32
+/// 0x0C   position f32              | velocity i16, torque i16, both in 1/1000
+/// 0x0D   velocity f32              | torque f32
+/// 0x0E   torque f32
+/// 0x0F   velocity limit f32        | current limit f32
+/// 0x11   velocity of trajectories f32
+/// 0x12   their acceleration f32    | deceleration f32
+/// 0x18   0                                              clear errors, without blinking
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::odrive::Command;
+///
+/// let frame = Command::Position(1.5, 0.5, -0.1).frame(1);
+/// assert_eq!(format!("{frame:?}"), "02C [8] 00 00 C0 3F F4 01 9C FF");
+/// assert_eq!(format!("{:?}", Command::AxisState(8).frame(1)), "027 [4] 08 00 00 00");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Command {
+    /// Disarms the drive, which then has the error that a stop was requested.
+    Stop,
+    /// Requests a state of the axis: 1 idle, 8 closed loop.
+    AxisState(u32),
+    /// Sets control mode (1 torque, 2 velocity, 3 position) and input mode (1 passthrough, 3 filter, 5 trajectory).
+    ControllerMode(u32, u32),
+    /// Sets a position, a velocity beside it and a torque beside both.
+    Position(f32, f32, f32),
+    /// Sets a velocity and a torque beside it.
+    Velocity(f32, f32),
+    /// Sets a torque.
+    Torque(f32),
+    /// Limits velocity and current.
+    Limits(f32, f32),
+    /// Sets the velocity of trajectories.
+    TrajectoryVelocity(f32),
+    /// Sets acceleration and deceleration of trajectories, in turns/s².
+    TrajectoryAcceleration(f32, f32),
+    /// Clears the errors of the drive: in 0.5 those of both axes.
+    ClearErrors,
+}
+
+impl Command {
+    /// Writes the frame for a node, 0 to 63; the upper bits of a larger one are left out.
+    #[must_use]
+    pub fn frame(self, node: u8) -> CanFrame {
+        match self {
+            Self::Stop => CanFrame::of(id(node, 0x02), []),
+            Self::AxisState(state) => CanFrame::of(id(node, 0x07), state.to_le_bytes()),
+            Self::ControllerMode(control, input) => {
+                words(node, 0x0B, control.to_le_bytes(), input.to_le_bytes())
+            }
+            Self::Position(position, velocity, torque) => {
+                let [a, b] = thousandths(velocity).to_le_bytes();
+                let [c, d] = thousandths(torque).to_le_bytes();
+                words(node, 0x0C, position.to_le_bytes(), [a, b, c, d])
+            }
+            Self::Velocity(velocity, torque) => floats(node, 0x0D, velocity, torque),
+            Self::Torque(torque) => CanFrame::of(id(node, 0x0E), torque.to_le_bytes()),
+            Self::Limits(velocity, current) => floats(node, 0x0F, velocity, current),
+            Self::TrajectoryVelocity(limit) => CanFrame::of(id(node, 0x11), limit.to_le_bytes()),
+            Self::TrajectoryAcceleration(up, down) => floats(node, 0x12, up, down),
+            Self::ClearErrors => CanFrame::of(id(node, 0x18), [0]),
+        }
+    }
+}
+
+fn floats(node: u8, number: u8, first: f32, second: f32) -> CanFrame {
+    words(node, number, first.to_le_bytes(), second.to_le_bytes())
+}
+
+fn words(node: u8, number: u8, [a, b, c, d]: [u8; 4], [e, f, g, h]: [u8; 4]) -> CanFrame {
+    CanFrame::of(id(node, number), [a, b, c, d, e, f, g, h])
+}
+
+/// Rounds to nearest and saturates; NaN is zero.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+fn thousandths(value: f32) -> i16 {
+    let scaled = value * 1_000.0;
+    (scaled + 0.5_f32.copysign(scaled)) as i16
+}
+
+/// Asks for a message: a remote frame with its id and length.
+pub(super) fn request(node: u8, number: u8) -> CanFrame {
+    let id = id(node, number);
+    CanFrame::new_remote(id, 8).unwrap_or_else(|| CanFrame::of(id, []))
+}
+
+/// Asks for the value of an endpoint, or writes one of 1 or 4 bytes.
+///
+/// ```text
+/// byte 0            1 .. 2       3   4 ..
+/// 0 read, 1 write   endpoint     0   value, low byte first
+/// ```
+pub(super) fn endpoint(node: u8, number: u16, value: Option<&[u8; 4]>, length: usize) -> CanFrame {
+    let [low, high] = number.to_le_bytes();
+    let id = id(node, ASK_ENDPOINT);
+    match (value, length) {
+        (None, _) => CanFrame::of(id, [0, low, high, 0]),
+        (Some([a, ..]), 1) => CanFrame::of(id, [1, low, high, 0, *a]),
+        (Some([a, b, c, d]), _) => CanFrame::of(id, [1, low, high, 0, *a, *b, *c, *d]),
+    }
+}
+
+/// Returns the id of a message: `node * 32 + number`.
+pub(super) fn id(node: u8, number: u8) -> Id {
+    let raw = u16::from(node & 0x3F) << 5 | u16::from(number & 0x1F);
+    StandardId::new(raw).unwrap_or(StandardId::MAX).into()
+}
+
+/// Numbers of the commands that each motor sends, besides that of its target.
+pub(super) const COMMANDS: [u8; 5] = [0x02, 0x07, 0x0B, 0x0F, 0x18];
+
+/// Returns the numbers of what a firmware sends a motor that listens: all, then those of 0.6.
+pub(super) const fn heard(firmware: Firmware) -> &'static [u8] {
+    match firmware {
+        Firmware::V0_5 => &[HEARTBEAT, ESTIMATES],
+        Firmware::V0_6 => &[HEARTBEAT, ESTIMATES, ERRORS, ENDPOINT],
+    }
+}

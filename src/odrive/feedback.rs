@@ -1,0 +1,151 @@
+//! The codec of what a drive sends.
+
+/// The generation of the firmware, which decides what a heartbeat means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Firmware {
+    /// 0.5.1 to 0.5.6: ODrive v3.
+    V0_5,
+    /// 0.6: ODrive Pro, S1 and Micro.
+    V0_6,
+}
+
+/// What a drive reports of its encoder: turns and turns/s of the motor's shaft, since it was switched on.
+///
+/// Firmware 0.5 reports zeros for an encoder that has failed; its heartbeat tells that within 100 ms.
+///
+/// # Examples
+/// ```
+/// use drivetrain::odrive::Feedback;
+///
+/// let data = [0x00, 0x00, 0x44, 0x41, 0x00, 0x00, 0x60, 0xC0];
+/// let feedback = Feedback::decode(&data).ok_or("not finite")?;
+/// assert_eq!((feedback.turns, feedback.turns_per_s), (12.25, -3.5));
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Feedback {
+    /// The position.
+    pub turns: f32,
+    /// The velocity.
+    pub turns_per_s: f32,
+}
+
+impl Feedback {
+    /// Reads the encoder estimates, message 0x09; `None` if one is not finite.
+    #[must_use]
+    pub const fn decode(data: &[u8; 8]) -> Option<Self> {
+        let [a, b, c, d, e, f, g, h] = *data;
+        let (turns, turns_per_s) =
+            (f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h]));
+        if turns.is_finite() && turns_per_s.is_finite() {
+            Some(Self { turns, turns_per_s })
+        } else {
+            None
+        }
+    }
+}
+
+/// The state of an axis.
+///
+/// ```text
+///       byte 0 .. 3        4        5                   6                7
+/// 0.5   axis error u32   | state  | bit 0 motor error | bit 0 encoder  | bit 0 controller error, bit 7 done
+/// 0.6   axis error u32   | state  | procedure result  | bit 0 done     | reserved
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::odrive::{Firmware, Heartbeat};
+///
+/// let data = [0, 0, 0, 0, 8, 0, 1, 0];
+/// let pro = Heartbeat::decode(&data, Firmware::V0_6).ok_or("no heartbeat")?;
+/// assert!(pro.state == Heartbeat::CLOSED_LOOP && pro.is_done && pro.error_code() == 0);
+/// let v3 = Heartbeat::decode(&data, Firmware::V0_5).ok_or("no heartbeat")?;
+/// assert_eq!((v3.is_done, v3.error_code()), (false, 34)); // the encoder has an error
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Heartbeat {
+    /// The errors of the axis, a bit each: other ones in 0.5 than in 0.6.
+    pub axis_error: u32,
+    /// The state: [`IDLE`](Self::IDLE), [`CLOSED_LOOP`](Self::CLOSED_LOOP), or that of a calibration.
+    pub state: u8,
+    /// 0.5: whether motor, encoder and controller have errors.
+    pub has_errors: [bool; 3],
+    /// 0.6: how the last request for a state ended: 0 success, 1 busy, 14 not calibrated; 0 in 0.5.
+    pub procedure_result: u8,
+    /// The trajectory is done.
+    pub is_done: bool,
+}
+
+impl Heartbeat {
+    /// The axis gives no torque.
+    pub const IDLE: u8 = 1;
+    /// The axis follows commands.
+    pub const CLOSED_LOOP: u8 = 8;
+
+    /// Reads the heartbeat, message 0x01; `None` if it has a bit that the firmware never sets.
+    #[must_use]
+    pub const fn decode(data: &[u8; 8], firmware: Firmware) -> Option<Self> {
+        let [a, b, c, d, state, x, y, z] = *data;
+        let axis_error = u32::from_le_bytes([a, b, c, d]);
+        match firmware {
+            Firmware::V0_5 => {
+                if x > 1 || y > 1 || z & 0x7E != 0 {
+                    return None;
+                }
+                let has_errors = [x == 1, y == 1, z & 1 == 1];
+                let is_done = z & 0x80 != 0;
+                Some(Self { axis_error, state, has_errors, procedure_result: 0, is_done })
+            }
+            Firmware::V0_6 => {
+                let is_done = y & 1 == 1;
+                let has_errors = [false; 3];
+                Some(Self { axis_error, state, has_errors, procedure_result: x, is_done })
+            }
+        }
+    }
+
+    /// Returns the number of an error, 0 where there is none: 1 to 32 for the lowest bit of the axis error, 33 to 35 for an error of
+    /// motor, encoder or controller alone.
+    #[must_use]
+    pub const fn error_code(&self) -> u8 {
+        match (self.axis_error, self.has_errors) {
+            (0, [false, false, false]) => 0,
+            (0, [true, ..]) => 33,
+            (0, [_, true, _]) => 34,
+            (0, _) => 35,
+            (error, _) => bit_of(error),
+        }
+    }
+
+    /// Tells whether a stop was requested over CAN.
+    pub(super) const fn is_stopped(&self, firmware: Firmware) -> bool {
+        let bit = match firmware {
+            Firmware::V0_5 => 0x4000,
+            Firmware::V0_6 => 0x0200_0000,
+        };
+        self.axis_error & bit != 0
+    }
+}
+
+/// Returns the number of the lowest bit, from 1; 0 for no bit.
+#[expect(clippy::cast_possible_truncation, reason = "at most 32")]
+pub(super) const fn bit_of(error: u32) -> u8 {
+    if error == 0 { 0 } else { error.trailing_zeros() as u8 + 1 }
+}
+
+/// Reads the value of an endpoint from an answer of 5 to 8 bytes; `None` for that of another one.
+///
+/// ```text
+/// byte 0   1 .. 2     3   4 ..
+/// 0        endpoint   0   value, low byte first
+/// ```
+pub(super) fn endpoint_value(data: &[u8; 8], length: usize, number: u16) -> Option<[u8; 4]> {
+    let [_, low, high, _, value @ ..] = *data;
+    (length > 4 && u16::from_le_bytes([low, high]) == number).then_some(value)
+}

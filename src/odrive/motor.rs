@@ -1,0 +1,182 @@
+//! The motor: what a program configures, and what it may ask and request.
+
+use super::config::{Endpoints, Mode, Setting};
+use super::enabling::Phase;
+use super::{ConfigError, Feedback, Firmware, Heartbeat, Model};
+use crate::frame::CanFrame;
+use crate::motor::Settings;
+use crate::time::Duration;
+use crate::units::AngularVelocity;
+
+/// A motor of this family, in the control mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::odrive::{Firmware, Model, Motor, Velocity};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let fastest = AngularVelocity::from_rpm(300.0); // of the output shaft
+/// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Velocity::new(4.0))?.with_gear(8.0)?;
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x61"));
+/// assert!(claims.contains(&"command of D6374 #3 on 0x6D".into()));
+/// # Ok::<(), drivetrain::odrive::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    pub(super) model: Model,
+    pub(super) firmware: Firmware,
+    pub(super) node: u8,
+    pub(super) velocity_limit: AngularVelocity,
+    /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
+    pub(super) gear: f32,
+    pub(super) mode: M,
+    /// The endpoints, and the watchdog in s.
+    pub(super) endpoints: Option<(Endpoints, f32)>,
+    pub(super) settings: Settings<Setting, { Setting::ALL.len() }>,
+    /// The last estimates; `None` before the first.
+    pub(super) drive: Option<Feedback>,
+    /// The last heartbeat; `None` before the first, and when it is too old.
+    pub(super) heartbeat: Option<Heartbeat>,
+    /// 0.6: active errors and disarm reason.
+    pub(super) errors: (u32, u32),
+    pub(super) phase: Phase,
+    /// The number of the last enabling frame, and that frame.
+    pub(super) enabling: Option<(u8, CanFrame)>,
+    /// A request that was refused: its code, and the frames to disable the drive until that is forgotten.
+    pub(super) refused: Option<(u8, u8)>,
+    /// Since the last estimates, while driven.
+    pub(super) age_s: f32,
+    /// Since the last heartbeat, while driven.
+    pub(super) silence_s: f32,
+    /// Inquiries since the last heartbeat, while at rest.
+    pub(super) inquiries: u8,
+    /// The last command was a request for estimates.
+    pub(super) has_polled: bool,
+    /// Frames of rest since the last estimates.
+    pub(super) rests: u8,
+    /// The share in the last limits that were sent, in parts, and the commands since.
+    pub(super) limits: (u8, u8),
+    /// How often errors are still to be cleared.
+    pub(super) clears: u8,
+    pub(super) stops: bool,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the model, the firmware and the node id of the drive, 0 to 62, the velocity limit of the output shaft, and the control mode
+    /// with the torque limit. The output shaft is that of the motor.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn new(
+        model: Model,
+        firmware: Firmware,
+        node: u8,
+        velocity_limit: AngularVelocity,
+        mode: M,
+    ) -> Result<Self, ConfigError> {
+        if node > 62 {
+            return Err(ConfigError::Node(node));
+        }
+        mode.check()?;
+        let limit = velocity_limit.as_rad_per_s();
+        if !(limit > 0.0 && limit.is_finite()) {
+            return Err(ConfigError::VelocityLimit(limit));
+        }
+        if let Some(limit) = mode.acceleration().filter(|it| !(*it > 0.0 && it.is_finite())) {
+            return Err(ConfigError::Acceleration(limit));
+        }
+        Ok(Self {
+            model,
+            firmware,
+            node,
+            velocity_limit,
+            gear: 1.0,
+            mode,
+            endpoints: None,
+            settings: Settings::new(Setting::ALL),
+            drive: None,
+            heartbeat: None,
+            errors: (0, 0),
+            phase: Phase::Off,
+            enabling: None,
+            refused: None,
+            age_s: 0.0,
+            silence_s: 0.0,
+            inquiries: 0,
+            has_polled: false,
+            rests: 0,
+            limits: (0, 0),
+            clears: 0,
+            stops: false,
+        })
+    }
+
+    /// Sets the turns of the motor for one of the output shaft.
+    ///
+    /// # Errors
+    /// [`ConfigError::GearRatio`] for a ratio that is not between 0.001 and 100000.
+    pub fn with_gear(self, ratio: f32) -> Result<Self, ConfigError> {
+        let is_valid = (0.001..=100_000.0).contains(&ratio);
+        let gear = ratio.copysign(self.gear);
+        if is_valid { Ok(Self { gear, ..self }) } else { Err(ConfigError::GearRatio(ratio)) }
+    }
+
+    /// Has the output shaft turn clockwise when the position of the drive rises.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        Self { gear: -self.gear, ..self }
+    }
+
+    /// Has the drive's watchdog set, and its modes read back, each time before the drive is enabled: 0.6 only. The drive disarms itself
+    /// after `watchdog` without a frame, 10 ms to 10 s.
+    ///
+    /// # Errors
+    /// [`ConfigError::Endpoints`] for firmware 0.5; [`ConfigError::Watchdog`] for another time.
+    pub fn with_endpoints(
+        self,
+        endpoints: Endpoints,
+        watchdog: Duration,
+    ) -> Result<Self, ConfigError> {
+        if self.firmware == Firmware::V0_5 {
+            return Err(ConfigError::Endpoints);
+        }
+        match u32::try_from(watchdog.as_micros()) {
+            Ok(micros @ 10_000..=10_000_000) => {
+                Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
+            }
+            _ => Err(ConfigError::Watchdog(watchdog)),
+        }
+    }
+
+    /// Returns the last encoder estimates; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the last heartbeat; `None` before the first, and if it is older than half a second.
+    #[must_use]
+    pub const fn heartbeat(&self) -> Option<&Heartbeat> {
+        self.heartbeat.as_ref()
+    }
+
+    /// Returns the active errors of firmware 0.6 and the reason for which it disarmed last, a bit each, as asked for at rest.
+    #[must_use]
+    pub const fn errors(&self) -> (u32, u32) {
+        self.errors
+    }
+
+    /// Has the drive clear its errors, in 0.5 those of both axes, while the motor is disarmed: three times, 10 ms apart. Nothing else
+    /// clears them, for an encoder that failed once may fail again. A motor that is driven forgets the request.
+    pub const fn clear_errors(&mut self) {
+        self.clears = 3;
+    }
+
+    /// Has the drive disarm with an error, beside the emergency stop of the bus: with each update, until a heartbeat has that error.
+    /// The drive stays disarmed, whatever it is sent, until its errors are [cleared](Self::clear_errors).
+    pub const fn stop(&mut self) {
+        self.stops = true;
+    }
+}

@@ -1,0 +1,400 @@
+//! The motor as an own motor: its claims, its frames, and their order.
+
+use super::command::{Command, extended};
+use super::config::{Mode, sealed};
+use super::feedback::{Answer, answer, laps, register, report_code};
+use super::setup::Setup;
+use super::{ConfigError, Feedback, Model, Register, Status};
+use crate::frame::CanFrame;
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
+    Severity, Vitals, WrongSetting,
+};
+use crate::time::Duration;
+use crate::units::{Angle, AngularVelocity};
+
+/// A unit of the parameter canTimeout.
+const TIMEOUT_UNIT_US: u32 = 50;
+
+/// The time-out of the drive unless configured otherwise: 100 ms.
+const TIMEOUT_UNITS: u32 = 100_000 / TIMEOUT_UNIT_US;
+
+/// The code of a drive that calibrates itself.
+const CALIBRATION_CODE: u8 = 1;
+
+/// The bits of an id that tell the target of a command and its type, some bits of which are left out: 1, 3, 17 and 19; 4 to 7; 18
+/// and 22.
+const COMMANDS: [(u32, u32); 3] =
+    [(0x0100_0000, 0x0D00_00FF), (0x0400_0000, 0x1C00_00FF), (0x1200_0000, 0x1B00_00FF)];
+
+/// A motor of this family, in the run mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Claim, ImpedanceControl, OwnMotor};
+/// use drivetrain::robstride::{Model, Motor};
+///
+/// let motor = Motor::new(Model::RS02, 1, ImpedanceControl::new(5.0)?)?; // at most 5 Nm
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims, [
+///     "feedback of RS02 #1 on 0x2000100", // whatever its state, to whichever host
+///     "feedback of RS02 #1 on 0x110001FD", // parameters, and faults
+///     "command of RS02 #1 on 0x1000001", // whatever the torque
+///     "command of RS02 #1 on 0x4000001",
+///     "command of RS02 #1 on 0x12000001",
+/// ]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    model: Model,
+    id: u8,
+    host: u8,
+    timeout_units: u32,
+    mode: M,
+    /// The last feedback; `None` before the first.
+    drive: Option<Feedback>,
+    /// How many times the range of the feedback the shaft is away from the turns that it can report.
+    laps: i32,
+    /// The faults of the last report.
+    reported: u32,
+    /// Faults were cleared since then.
+    has_cleared: bool,
+    setup: Setup,
+    /// Counts the frames that disable since the drive reported a fault.
+    turn: u8,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the model, the id of the drive, 1 to 127, and the run mode. The id of the host is 0xFD.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+        if !matches!(id, 1..=127) {
+            return Err(ConfigError::Id(id));
+        }
+        mode.check(&model)?;
+        let last = if model.has_timeout() { Register::Timeout } else { Register::RunMode };
+        Ok(Self {
+            model,
+            id,
+            host: 0xFD,
+            timeout_units: TIMEOUT_UNITS,
+            mode,
+            drive: None,
+            laps: 0,
+            reported: 0,
+            has_cleared: false,
+            setup: Setup::new([Register::RunMode, Register::MechanicalPosition, last]),
+            turn: 0,
+        })
+    }
+
+    /// Sets the id of the host: any but that of a motor.
+    ///
+    /// # Errors
+    /// [`ConfigError::HostId`] for the id of this motor. That of another one is found where both are attached.
+    pub fn with_host_id(self, host: u8) -> Result<Self, ConfigError> {
+        if host == self.id { Err(ConfigError::HostId(host)) } else { Ok(Self { host, ..self }) }
+    }
+
+    /// Sets the time without a command after which the drive disables itself: 1 ms to 5 s, 100 ms at first.
+    ///
+    /// # Errors
+    /// [`ConfigError::Timeout`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
+    pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
+        if !self.model.has_timeout() {
+            return Err(ConfigError::Unsupported("time-out"));
+        }
+        match u32::try_from(timeout.as_micros()) {
+            Ok(micros @ 1_000..=5_000_000) => {
+                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
+            }
+            _ => Err(ConfigError::Timeout(timeout)),
+        }
+    }
+
+    /// Returns the last feedback of the drive; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the faults of the drive's last report, as the manual counts their bits; 0 once they are cleared.
+    #[must_use]
+    pub const fn reported_faults(&self) -> u32 {
+        self.reported
+    }
+
+    /// Asks the drive for a parameter. While the motor is disarmed the frame goes out within some 10 ms, and again until
+    /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
+    pub const fn read(&mut self, register: Register) {
+        self.setup.settings.request(Inquiry::Read(register));
+    }
+
+    /// Writes a parameter of the drive, until the supply is lost, and reads it back; while the motor is disarmed, as
+    /// [`read`](Self::read).
+    ///
+    /// # Errors
+    /// [`ConfigError::Register`] if the parameter is read only, or cannot hold the value.
+    pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
+        if !register.is_writable() || !register.holds(value) {
+            return Err(ConfigError::Register(register, value));
+        }
+        self.setup.settings.request(Inquiry::Write(register, value));
+        Ok(())
+    }
+
+    /// Has the drive keep its parameters over a loss of the supply; while the motor is disarmed.
+    /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
+    ///
+    /// # Errors
+    /// [`ConfigError::Unsupported`] for a CyberGear, whose bit rate the frame would change.
+    pub fn store(&mut self) -> Result<(), ConfigError> {
+        if !self.model.can_store() {
+            return Err(ConfigError::Unsupported("frame to store parameters"));
+        }
+        self.setup.settings.request(Inquiry::Store);
+        Ok(())
+    }
+
+    /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A RobStride keeps the zero over a loss of
+    /// the supply if it is [stored](Self::store), a CyberGear does not.
+    pub const fn set_zero(&mut self) {
+        self.setup.once = Some(Command::SetZero);
+    }
+
+    /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once. This motor then hears no more
+    /// of it: make another one.
+    ///
+    /// # Errors
+    /// [`ConfigError::Id`] for another id, and for that of the host.
+    pub const fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
+        if !matches!(id, 1..=127) || id == self.host {
+            return Err(ConfigError::Id(id));
+        }
+        self.setup.once = Some(Command::SetId(id));
+        Ok(())
+    }
+
+    /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the parameter and its value in the drive, NaN if
+    /// the drive does not have it.
+    #[must_use]
+    pub const fn register(&self) -> Option<(Register, f32)> {
+        self.setup.settings.answer()
+    }
+
+    fn frame_of(&self, command: Command) -> CanFrame {
+        command.encode(&self.model, self.host, self.id)
+    }
+
+    /// Returns what the drive has to confirm before it is enabled: first its time-out.
+    fn preparation(&self) -> Option<(Register, f32)> {
+        match (self.setup.prepared, self.model.has_timeout()) {
+            (0, true) => Some((Register::Timeout, self.timeout_units as f32)),
+            (index, has_timeout) => self.mode.preparation(index - usize::from(has_timeout)),
+        }
+    }
+
+    /// Returns the value that a parameter has to have; of the position the end of its range.
+    fn expected(&self, register: Register) -> f32 {
+        match register {
+            Register::RunMode => self.mode.number(&self.model).into(),
+            Register::Timeout => self.timeout_units as f32,
+            _ => self.model.pmax_rad(),
+        }
+    }
+
+    /// Tells whether a value in the drive is right. The time-out only has to be there: it is written later.
+    fn is_right(&self, register: Register, found: f32) -> bool {
+        match register {
+            Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
+            Register::MechanicalPosition if <M as sealed::Mode>::NEEDS_ANGLE => {
+                found.abs() < self.model.pmax_rad()
+            }
+            _ => found.is_finite(),
+        }
+    }
+
+    /// Tells whether the drive is in another mode, as far as it says.
+    fn has_wrong_mode(&self) -> bool {
+        let is_right =
+            |register, found| register != Register::RunMode || self.is_right(register, found);
+        matches!(self.setup.settings.wrong(is_right), Some((Register::RunMode, Some(_))))
+    }
+
+    fn has_fault(&self) -> bool {
+        self.reported != 0
+            || self
+                .drive
+                .is_some_and(|drive| drive.faults != 0 || drive.status == Status::Calibration)
+    }
+
+    /// Disables the drive; where it reports a fault, each second frame since then clears that.
+    fn off(&mut self) -> CanFrame {
+        self.turn = if self.has_fault() { self.turn.wrapping_add(1) } else { 0 };
+        let clears = self.turn != 0 && self.turn.is_multiple_of(2);
+        self.has_cleared |= clears;
+        self.frame_of(if clears { Command::ClearFaults } else { Command::Disable })
+    }
+}
+
+impl<M: Mode> OwnMotor for Motor<M> {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name(), self.id)
+    }
+
+    /// The state of the drive is in the id of its feedback, and the torque in that of the operation mode.
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let (motor, name) = (u32::from(self.id), self.name());
+        let claim = move |raw, mask, role| Claim::new(extended(raw), role, name).with_mask(mask);
+        let answer = 0x1100_0000 | motor << 8 | u32::from(self.host);
+        let feedback = [
+            claim(0x0200_0000 | motor << 8, 0x1F00_FF00, Role::Feedback),
+            claim(answer, 0x1B00_FFFF, Role::Feedback),
+        ];
+        let command = COMMANDS.map(|(raw, mask)| claim(raw | motor, mask, Role::Command));
+        feedback.into_iter().chain(command)
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        if frame.length() != 8 {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let Some(feedback) = Feedback::decode(frame, &self.model) else {
+            return Ingest::Malformed(Malformed::Field);
+        };
+        let pmax = self.model.pmax_rad();
+        let before = self.drive.map(|drive| drive.measured.position_rad);
+        let way = before.map_or(0.0, |before| feedback.measured.position_rad - before);
+        self.laps = self.laps.saturating_add(i32::from(way < -pmax) - i32::from(way > pmax));
+        if self.has_cleared && feedback.faults == 0 {
+            (self.reported, self.has_cleared) = (0, false);
+        }
+        self.drive = Some(feedback);
+        Ingest::Taken
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        let velocity = self.drive.map_or(0.0, |drive| drive.measured.velocity_rad_per_s);
+        AngularVelocity::from_rad_per_s(velocity)
+    }
+
+    /// Beyond the range of the feedback there is none: a RobStride reports the rest of a lap then.
+    fn angle(&self) -> Option<Angle> {
+        self.drive.filter(|_| self.laps == 0)?.angle()
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        match <M as sealed::Mode>::REST {
+            Some(command) => self.frame_of(command),
+            None => self.off(),
+        }
+    }
+
+    fn control(&mut self, order: Order) -> CanFrame {
+        let angle = self.angle();
+        let command =
+            self.drive.and_then(|drive| self.mode.command(order, (angle, &drive), &self.model));
+        match command {
+            Some(command) => self.frame_of(command),
+            None => self.rest(),
+        }
+    }
+
+    fn reset(&mut self) {
+        self.mode.reset();
+    }
+
+    /// First what is not known of the settings, then the preparations, each written and read back, then the frame that enables:
+    /// all of that anew each time, for the drive may have lost its supply since.
+    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
+        let command = self.setup.next(self.preparation());
+        if command == Command::Enable {
+            self.mode.reset();
+        }
+        Some(self.frame_of(command))
+    }
+
+    fn disable(&mut self) -> Option<CanFrame> {
+        self.setup.prepare_anew();
+        <M as sealed::Mode>::REST.is_some().then(|| self.off())
+    }
+
+    fn poll(&mut self) -> Option<CanFrame> {
+        self.drive.map(|drive| self.frame_of(self.mode.stay((self.angle(), &drive))))
+    }
+
+    fn is_enabled(&self) -> Option<bool> {
+        self.drive.map(|drive| drive.status == Status::Run)
+    }
+
+    fn inquire(&mut self) -> Option<CanFrame> {
+        let number = self.has_wrong_mode().then(|| self.expected(Register::RunMode));
+        self.setup.inquire(number).map(|command| self.frame_of(command))
+    }
+
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        match answer(frame) {
+            Some(Answer::Value(index, bytes)) => {
+                if let Some(register) = register(index) {
+                    let value = bytes.map_or(f32::NAN, |bytes| register.value_of(bytes));
+                    if register == Register::MechanicalPosition {
+                        self.laps = laps(value, self.model.pmax_rad());
+                    }
+                    self.setup.take(register, value, self.preparation());
+                }
+            }
+            Some(Answer::Faults(faults)) => (self.reported, self.has_cleared) = (faults, false),
+            Some(Answer::Version) => {}
+            None => return false,
+        }
+        true
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        let is_right = |register, found| self.is_right(register, found);
+        self.setup.settings.wrong(is_right).map(|(register, found)| WrongSetting {
+            motor: self.name(),
+            setting: match register {
+                Register::RunMode => "run_mode",
+                Register::Timeout => "canTimeout",
+                _ => "mechPos",
+            },
+            expected: self.expected(register),
+            found,
+        })
+    }
+
+    fn forget_settings(&mut self) {
+        self.setup.settings.forget();
+        self.setup.prepare_anew();
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.mode
+            .capabilities()
+            .with(Capability::Feedback)
+            .with(Capability::Temperature)
+            .with(Capability::ErrorCodes)
+            .with(Capability::AbsoluteAngle)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
+    fn vitals(&self) -> Vitals {
+        let Some(drive) = self.drive else { return Vitals::default() };
+        let error_code = match (report_code(self.reported), drive.fault_code(), drive.status) {
+            (0, 0, Status::Calibration) => CALIBRATION_CODE,
+            (0, code, _) | (code, ..) => code,
+        };
+        Vitals {
+            temperature_c: Some(drive.temperature_c as i16),
+            error: self.has_fault().then_some(Severity::Fault),
+            error_code,
+            effort: self.mode.effort(),
+            speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
+            current: drive.measured.torque_nm / self.model.tmax_nm(),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The codec of what a drive sends: its feedback, parameters and reports of faults.
+
+use super::command::{kind_of, raw_of};
+use super::{Model, Register};
+use crate::frame::CanFrame;
+use crate::units::Angle;
+use crate::wire::mit;
+
+/// What a drive reports with each answer.
+///
+/// ```text
+/// id     28 .. 24    23 .. 22    21 .. 16    15 ..  8    7 ..  0
+///        2           mode        faults      motor       host
+/// data   byte 0 .. 1 2 ..  3     4 .. 5   6 .. 7                   high byte first
+///        position    velocity    torque   temperature in 0.1 °C
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::robstride::{Feedback, Model, Status};
+/// use embedded_can::ExtendedId;
+///
+/// let id = ExtendedId::new(0x0295_2C7F).ok_or("29 bits")?;
+/// let frame = CanFrame::of(id, [0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x00, 0xFA]);
+/// let feedback = Feedback::decode(&frame, &Model::CYBERGEAR).ok_or("no feedback")?;
+/// assert_eq!((feedback.id, feedback.status, feedback.faults), (0x2C, Status::Run, 0b01_0101));
+/// assert_eq!(feedback.fault_code(), 16); // under-voltage, bit 16 of the id, is the lowest
+/// assert_eq!(feedback.temperature_c, 25.0);
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Feedback {
+    /// The state of the drive.
+    pub status: Status,
+    /// Bits 16 to 21 of the id: under-voltage, over-current, over-temperature, magnetic encoder, stall (CyberGear: Hall encoder), not
+    /// calibrated.
+    pub faults: u8,
+    /// The id of the drive.
+    pub id: u8,
+    /// Position, velocity and torque of the output shaft.
+    pub measured: mit::Feedback,
+    /// The position is at an end of its range, so the shaft is there or beyond.
+    pub is_at_end: bool,
+    /// The temperature in °C.
+    pub temperature_c: f32,
+}
+
+impl Feedback {
+    /// Reads a frame of feedback; `None` for any other frame, and for a state that no drive has.
+    #[must_use]
+    pub fn decode(frame: &CanFrame, model: &Model) -> Option<Self> {
+        let raw = raw_of(frame)?;
+        let [_, state, id, _] = raw.to_be_bytes();
+        if kind_of(raw) != 2 || frame.length() != 8 {
+            return None;
+        }
+        let status = Status::of(state >> 6)?;
+        let [a, b, c, d, e, f, g, h] = *frame.bytes();
+        let value =
+            |bytes, end: f32| f32::from(u16::from_be_bytes(bytes)) * (2.0 * end) / 65_535.0 - end;
+        Some(Self {
+            status,
+            faults: state & 0x3F,
+            id,
+            measured: mit::Feedback {
+                position_rad: value([a, b], model.pmax_rad()),
+                velocity_rad_per_s: value([c, d], model.vmax_rad_per_s()),
+                torque_nm: value([e, f], model.tmax_nm()),
+            },
+            is_at_end: matches!([a, b], [0, 0] | [0xFF, 0xFF]),
+            temperature_c: f32::from(i16::from_be_bytes([g, h])) / 10.0,
+        })
+    }
+
+    /// Returns the angle of the output shaft; `None` at an end of the range.
+    #[must_use]
+    pub const fn angle(&self) -> Option<Angle> {
+        if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
+    }
+
+    /// Returns the number of the lowest fault, 16 to 21 as the manual counts the bits of the id; 0 without a fault.
+    #[must_use]
+    pub const fn fault_code(&self) -> u8 {
+        if self.faults == 0 { 0 } else { 16 + lowest(self.faults as u32) }
+    }
+}
+
+/// The state of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub enum Status {
+    /// 0: it gives no torque.
+    Reset = 0,
+    /// 1: it calibrates itself, and turns.
+    Calibration = 1,
+    /// 2: it follows commands.
+    Run = 2,
+}
+
+impl Status {
+    const fn of(bits: u8) -> Option<Self> {
+        Some(match bits {
+            0 => Self::Reset,
+            1 => Self::Calibration,
+            2 => Self::Run,
+            _ => return None,
+        })
+    }
+}
+
+/// Something that a drive says beside its feedback.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Answer {
+    /// The value of the parameter with an index; `None` if the drive cannot read it.
+    Value(u16, Option<[u8; 4]>),
+    /// Its faults, as the manual counts their bits.
+    Faults(u32),
+    /// Its firmware, which another node has asked for: the id is that of feedback.
+    Version,
+}
+
+/// Reads a frame that is no feedback.
+pub(super) fn answer(frame: &CanFrame) -> Option<Answer> {
+    let raw = raw_of(frame)?;
+    let [_, status, ..] = raw.to_be_bytes();
+    let [a, b, c, d, value @ ..] = *frame.bytes();
+    if frame.length() != 8 {
+        return None;
+    }
+    match kind_of(raw) {
+        2 if [a, b, c] == [0x00, 0xC4, 0x56] => Some(Answer::Version),
+        17 => Some(Answer::Value(u16::from_le_bytes([a, b]), (status == 0).then_some(value))),
+        21 => Some(Answer::Faults(u32::from_le_bytes([a, b, c, d]))),
+        _ => None,
+    }
+}
+
+/// Returns the code of a report of faults: 32 and the number of the lowest bit; 0 without a fault.
+pub(super) const fn report_code(faults: u32) -> u8 {
+    if faults == 0 { 0 } else { 32 + lowest(faults) }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "at most 32")]
+const fn lowest(bits: u32) -> u8 {
+    bits.trailing_zeros() as u8
+}
+
+/// Returns the register with an index.
+pub(super) fn register(index: u16) -> Option<Register> {
+    Register::ALL.iter().copied().find(|register| register.index() == index)
+}
+
+/// Returns how many times the range of the feedback a position is away from it.
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(super) fn laps(position_rad: f32, pmax: f32) -> i32 {
+    if position_rad.abs() <= pmax {
+        return 0;
+    }
+    let turns = ((position_rad.abs() + pmax) / (2.0 * pmax)) as i32;
+    if position_rad > 0.0 { turns } else { -turns }
+}

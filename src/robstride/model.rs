@@ -1,0 +1,216 @@
+//! Facts of the models, as a table that a program can extend.
+
+use super::ConfigError;
+use crate::motor::Impedance;
+use crate::units::{Angle, AngularVelocity};
+use crate::wire::mit::Ranges;
+
+/// A model of motor: its name, the ranges of its fields, and its largest current.
+///
+/// | model | position rad | velocity rad/s | torque Nm | kp, kd | current A |
+/// |---|--:|--:|--:|--:|--:|
+/// | [`RS00`](Self::RS00) | 4π | 33 | 14 | 500, 5 | 16 |
+/// | [`RS01`](Self::RS01) | 4π | 44 | 17 | 500, 5 | 23 |
+/// | [`RS02`](Self::RS02) | 4π | 44 | 17 | 500, 5 | 16 |
+/// | [`RS03`](Self::RS03) | 4π | 20 | 60 | 5000, 100 | 43 |
+/// | [`RS04`](Self::RS04) | 4π | 15 | 120 | 5000, 100 | 90 |
+/// | [`RS05`](Self::RS05) | 4π | 50 | 5.5 | 500, 5 | 11 |
+/// | [`RS06`](Self::RS06) | 4π | 50 | 36 | 5000, 100 | 57 |
+/// | [`CYBERGEAR`](Self::CYBERGEAR) | 4π | 30 | 12 | 500, 5 | 23 |
+///
+/// Ranges and currents are those of the maker's manuals of 28 April 2026, and of the manual of the CyberGear. **A drive does not tell
+/// its ranges, and not all sources agree**: a torque or a stiffness is wrong by the quotient where they differ, up to tenfold.
+///
+/// | model | contested | says |
+/// |---|---|---|
+/// | all | position 12.57, or 12.5 before firmware 0.0.2.6 of the RS00 | sample code in the manuals |
+/// | CyberGear | position 12.5 | sample code in the manual |
+/// | RS00, RS05 | 50 rad/s and 17 Nm; 33 rad/s and 17 Nm | robstride-dynamics 0.0.1 |
+/// | RS03 | 50 rad/s | robstride-dynamics 0.0.1 |
+/// | RS06 | 20 rad/s and 60 Nm | robstride-dynamics 0.0.1 |
+/// | RS03, RS04 | kp 500, kd 5 | public programs |
+///
+/// [`with_position_range`](Self::with_position_range) and [`with_gain_ranges`](Self::with_gain_ranges) set others, and
+/// [`new`](Self::new) all of them. Before a motor is enabled its torque limit is written to the drive too
+/// (`limit_torque`, in Nm), so that the drive itself limits it whatever the ranges are.
+///
+/// # Examples
+/// ```
+/// use drivetrain::robstride::{ConfigError, Model};
+///
+/// assert_eq!((Model::RS04.name(), Model::RS04.tmax_nm()), ("RS04", 120.0));
+/// let old = Model::RS00.with_position_range(12.5)?;
+/// assert_eq!((old.pmax_rad(), old.vmax_rad_per_s()), (12.5, 33.0));
+/// # Ok::<(), ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Model {
+    name: &'static str,
+    ranges: Ranges,
+    current_a: f32,
+    is_cybergear: bool,
+}
+
+const FOUR_PI: f32 = 4.0 * core::f32::consts::PI;
+
+macro_rules! models {
+    ($($model:ident $name:literal $vmax:literal $tmax:literal $kp:literal $kd:literal $current:literal $is_cybergear:literal,)+) => {
+        impl Model {
+            $(
+                #[doc = concat!("The ", $name, ".")]
+                pub const $model: Self = Self::known($name, [$vmax, $tmax, $kp, $kd], $current, $is_cybergear);
+            )+
+
+            /// The models of the table.
+            pub const ALL: &[Self] = &[$(Self::$model),+];
+        }
+    };
+}
+
+models! {
+    RS00 "RS00" 33.0 14.0 500.0 5.0 16.0 false,
+    RS01 "RS01" 44.0 17.0 500.0 5.0 23.0 false,
+    RS02 "RS02" 44.0 17.0 500.0 5.0 16.0 false,
+    RS03 "RS03" 20.0 60.0 5000.0 100.0 43.0 false,
+    RS04 "RS04" 15.0 120.0 5000.0 100.0 90.0 false,
+    RS05 "RS05" 50.0 5.5 500.0 5.0 11.0 false,
+    RS06 "RS06" 50.0 36.0 5000.0 100.0 57.0 false,
+    CYBERGEAR "CyberGear" 30.0 12.0 500.0 5.0 23.0 true,
+}
+
+impl Model {
+    /// Describes a RobStride that the table does not have: its ranges, and its largest current in A. The ranges of kp and kd are 500 and
+    /// 5 unless [`Ranges::with_gains`] sets them.
+    ///
+    /// # Errors
+    /// [`ConfigError::CurrentLimit`] for a current that is zero, negative or not finite.
+    pub const fn new(
+        name: &'static str,
+        ranges: Ranges,
+        current_a: f32,
+    ) -> Result<Self, ConfigError> {
+        if current_a > 0.0 && current_a.is_finite() {
+            Ok(Self { name, ranges, current_a, is_cybergear: false })
+        } else {
+            Err(ConfigError::CurrentLimit(current_a, f32::MAX))
+        }
+    }
+
+    /// Ranges that `Ranges::with_gains` refuses are found by a test.
+    const fn known(
+        name: &'static str,
+        ranges: [f32; 4],
+        current_a: f32,
+        is_cybergear: bool,
+    ) -> Self {
+        let [vmax, tmax, kp, kd] = ranges;
+        let ranges = Ranges::of(FOUR_PI, vmax, tmax);
+        let ranges = match ranges.with_gains(kp, kd) {
+            Ok(ranges) => ranges,
+            Err(_) => ranges,
+        };
+        Self { name, ranges, current_a, is_cybergear }
+    }
+
+    /// Sets another range of the position, in rad, and keeps all others: that of another firmware.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    pub const fn with_position_range(self, pmax_rad: f32) -> Result<Self, ConfigError> {
+        let (kp, kd) = self.ranges.gains();
+        match Ranges::new(pmax_rad, self.vmax_rad_per_s(), self.tmax_nm()) {
+            Ok(ranges) => Self { ranges, ..self }.with_gain_ranges(kp, kd),
+            Err(error) => Err(ConfigError::Range(error)),
+        }
+    }
+
+    /// Sets other ranges of kp and kd, in Nm/rad and Nm s/rad, and keeps all others. **A range that is less than the drive's makes the
+    /// drive stiffer than asked by the quotient.**
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    pub const fn with_gain_ranges(self, kp: f32, kd: f32) -> Result<Self, ConfigError> {
+        match self.ranges.with_gains(kp, kd) {
+            Ok(ranges) => Ok(Self { ranges, ..self }),
+            Err(error) => Err(ConfigError::Range(error)),
+        }
+    }
+
+    /// Returns the name, as errors print it.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Returns the ranges of the fields.
+    #[must_use]
+    pub const fn ranges(&self) -> &Ranges {
+        &self.ranges
+    }
+
+    /// Returns the largest value of each field of the operation mode.
+    #[must_use]
+    pub const fn most(&self) -> Impedance {
+        self.scaled(1.0, 1.0)
+    }
+
+    /// Returns the value of a count of each field of the operation mode.
+    #[must_use]
+    pub const fn count(&self) -> Impedance {
+        self.scaled(2.0 / 65_535.0, 1.0 / 65_535.0)
+    }
+
+    const fn scaled(&self, signed: f32, gain: f32) -> Impedance {
+        let (stiffness, damping) = self.ranges.gains();
+        Impedance {
+            angle: Angle::from_radians(self.pmax_rad() * signed),
+            velocity: AngularVelocity::from_rad_per_s(self.vmax_rad_per_s() * signed),
+            stiffness: stiffness * gain,
+            damping: damping * gain,
+            torque_nm: self.tmax_nm() * signed,
+        }
+    }
+
+    /// Returns the largest position of the fields, in rad.
+    #[must_use]
+    pub const fn pmax_rad(&self) -> f32 {
+        self.ranges.position_rad()
+    }
+
+    /// Returns the largest velocity of the fields, in rad/s.
+    #[must_use]
+    pub const fn vmax_rad_per_s(&self) -> f32 {
+        self.ranges.velocity_rad_per_s()
+    }
+
+    /// Returns the largest torque of the fields, in Nm.
+    #[must_use]
+    pub const fn tmax_nm(&self) -> f32 {
+        self.ranges.torque_nm()
+    }
+
+    /// Returns the largest current, in A.
+    #[must_use]
+    pub const fn current_a(&self) -> f32 {
+        self.current_a
+    }
+
+    /// Tells whether the drive has a time-out for commands. A CyberGear has none: it goes on with its last command for ever.
+    #[must_use]
+    pub const fn has_timeout(&self) -> bool {
+        !self.is_cybergear
+    }
+
+    /// Tells whether the drive keeps its parameters over a loss of the supply when told. The frame for that changes the bit rate of a
+    /// CyberGear.
+    #[must_use]
+    pub const fn can_store(&self) -> bool {
+        !self.is_cybergear
+    }
+
+    /// Returns the run mode that follows a position at once: 5 (CSP), for a CyberGear 1.
+    pub(super) const fn position_mode(&self) -> u8 {
+        if self.is_cybergear { 1 } else { 5 }
+    }
+}

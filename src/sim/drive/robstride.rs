@@ -1,0 +1,366 @@
+//! A drive of RobStride, or a CyberGear, with its shaft, written from the manual: fields are cut out of the frame as numbers.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "fields of a frame and parameters, which saturate"
+)]
+
+use super::DriveShaft;
+use crate::frame::CanFrame;
+use embedded_can::{ExtendedId, Frame, Id};
+
+/// Indices of the parameters that the drive has, in the order of their places.
+const PARAMETERS: [u16; 8] = [0x7005, 0x7006, 0x700A, 0x700B, 0x7016, 0x7017, 0x7018, 0x7028];
+const RUN_MODE: usize = 0;
+const IQ_REF: usize = 1;
+const SPD_REF: usize = 2;
+const LIMIT_TORQUE: usize = 3;
+const LOC_REF: usize = 4;
+const LIMIT_SPD: usize = 5;
+const LIMIT_CUR: usize = 6;
+const TIMEOUT: usize = 7;
+
+/// Parameters that the drive measures.
+const MECH_POS: u16 = 0x7019;
+const MECH_VEL: u16 = 0x701B;
+const VBUS: u16 = 0x701C;
+
+/// A drive of RobStride and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+///
+/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
+/// Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. An ampere makes 1 Nm. It goes on to the targets that it
+/// has when it is enabled. The position that it reports starts again at the other end of its range; that of a
+/// [CyberGear](Self::cybergear) stays at the end. An operation frame names no host, so the drive answers to the last one that it heard.
+///
+/// # Examples
+/// ```
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::sim::RobStrideDrive;
+/// use embedded_can::ExtendedId;
+///
+/// let mut drive = RobStrideDrive::new(1, [12.57, 44.0, 17.0, 500.0, 5.0]); // the ranges of an RS02
+/// let enable = CanFrame::of(ExtendedId::new(0x0300_FD01).ok_or("29 bits")?, [0; 8]);
+/// let answer = drive.hear(&enable).ok_or("no answer")?;
+/// assert_eq!(format!("{answer:?}"), "028001FD [8] 7F FF 7F FF 7F FF 00 FA"); // it runs, at 25.0 °C
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct RobStrideDrive {
+    id: u8,
+    host: u8,
+    ranges: [f64; 5],
+    is_cybergear: bool,
+    values: [f64; PARAMETERS.len()],
+    stored: [f64; PARAMETERS.len()],
+    is_enabled: bool,
+    is_calibrating: bool,
+    faults: u32,
+    /// The bit rate that a frame has set, 1 for that of the bus.
+    bit_rate: u8,
+    /// Since the last frame of the drive's own.
+    silence_s: f64,
+    /// Position, velocity, kp, kd and torque.
+    operation: [f64; 5],
+    shaft: DriveShaft,
+}
+
+impl RobStrideDrive {
+    /// Makes a drive with an id and the ranges of position in rad, velocity in rad/s, torque in Nm, kp and kd: in the operation mode,
+    /// without a time-out, with an inertia of 0.01 kg m².
+    #[must_use]
+    pub fn new(id: u8, ranges: [f32; 5]) -> Self {
+        let ranges = ranges.map(f64::from);
+        let [_, velocity, torque, ..] = ranges;
+        let values = [0.0, 0.0, 0.0, torque, 0.0, velocity, torque, 0.0];
+        Self {
+            id,
+            host: 0,
+            ranges,
+            is_cybergear: false,
+            values,
+            stored: values,
+            is_enabled: false,
+            is_calibrating: false,
+            faults: 0,
+            bit_rate: 1,
+            silence_s: 0.0,
+            operation: [0.0; 5],
+            shaft: DriveShaft::new(0.01, 0.01),
+        }
+    }
+
+    /// Makes a CyberGear with an id: position mode 1, no time-out, and no frame that stores parameters.
+    #[must_use]
+    pub fn cybergear(id: u8) -> Self {
+        let pmax = 4.0 * core::f32::consts::PI;
+        Self { is_cybergear: true, ..Self::new(id, [pmax, 30.0, 12.0, 500.0, 5.0]) }
+    }
+
+    /// Sets a parameter, also over a loss of the supply; one that the drive does not have is left out.
+    #[must_use]
+    pub fn with_parameter(mut self, index: u16, value: f32) -> Self {
+        self.write(index, value.into());
+        self.stored = self.values;
+        self
+    }
+
+    /// Gives the drive another shaft.
+    #[must_use]
+    pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
+        Self { shaft, ..self }
+    }
+
+    /// Returns the shaft.
+    #[must_use]
+    pub const fn shaft(&self) -> &DriveShaft {
+        &self.shaft
+    }
+
+    /// Returns the shaft, to load or to turn it.
+    pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
+        &mut self.shaft
+    }
+
+    /// Returns the value of a parameter; `None` if the drive does not have it.
+    #[must_use]
+    pub fn parameter(&self, index: u16) -> Option<f32> {
+        self.value_of(index).map(single)
+    }
+
+    /// Has the drive find faults, by the bits of its report, and switch itself off.
+    pub const fn fail(&mut self, faults: u32) {
+        self.faults = faults;
+        self.is_enabled = false;
+    }
+
+    /// Has the drive calibrate itself.
+    pub const fn calibrate(&mut self, is_calibrating: bool) {
+        self.is_calibrating = is_calibrating;
+    }
+
+    /// Returns the report of the drive's faults.
+    #[must_use]
+    pub fn report(&self) -> CanFrame {
+        self.answer(21, 0, u64::from(self.faults).to_le_bytes())
+    }
+
+    /// Takes the supply away for a moment: the drive is disabled and in the operation mode, and what was written but not stored is
+    /// lost.
+    pub fn lose_supply(&mut self) {
+        self.values = self.stored;
+        self.write(0x7005, 0.0);
+        (self.is_enabled, self.faults, self.operation) = (false, 0, [0.0; 5]);
+    }
+
+    /// Tells whether the drive follows commands.
+    #[must_use]
+    pub const fn is_enabled(&self) -> bool {
+        self.is_enabled
+    }
+
+    /// Returns the faults, by the bits of the report; 0 for none.
+    #[must_use]
+    pub const fn faults(&self) -> u32 {
+        self.faults
+    }
+
+    /// Returns the number of the bit rate, 1 for 1 Mbit/s: another one than that of the bus, and the drive would be gone.
+    #[must_use]
+    pub const fn bit_rate(&self) -> u8 {
+        self.bit_rate
+    }
+
+    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let Id::Extended(id) = frame.id() else { return None };
+        let id = id.as_raw();
+        if !frame.is_data_frame() || frame.length() != 8 || id & 0xFF != u32::from(self.id) {
+            return None;
+        }
+        let (kind, middle) = (id >> 24, id >> 8 & 0xFFFF);
+        let data = u64::from_be_bytes(*frame.bytes());
+        let index = (*frame.bytes()).first_chunk().map_or(0, |index| u16::from_le_bytes(*index));
+        if kind != 1 {
+            self.host = middle as u8;
+        }
+        self.silence_s = 0.0;
+        match kind {
+            0 => return Some(self.broadcast()),
+            1 => self.operation = self.fields(middle, data),
+            3 => self.is_enabled = self.faults == 0 && !self.is_calibrating,
+            4 => {
+                self.is_enabled = false;
+                self.is_calibrating = false;
+                if data >> 56 == 1 {
+                    self.faults = 0;
+                } else if data >> 48 == 0x00C4 {
+                    return Some(self.answer(2, self.state(), [0, 0xC4, 0x56, 0, 0, 3, 6, 0]));
+                }
+            }
+            6 if data >> 56 == 1 => {
+                self.shaft.angle_rad = 0.0;
+            }
+            7 => {
+                self.id = (middle >> 8) as u8;
+                return Some(self.broadcast());
+            }
+            17 => return Some(self.read(index, *frame.bytes())),
+            18 => self.set(index, data as u32),
+            22 if self.is_cybergear => self.bit_rate = (data >> 56) as u8,
+            22 if data == 0x0102_0304_0506_0708 => self.stored = self.values,
+            _ => return None,
+        }
+        Some(self.feedback())
+    }
+
+    /// Moves on by a time in s.
+    pub fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        let timeout_s = self.value(TIMEOUT) * 50e-6;
+        if timeout_s > 0.0 && self.silence_s > timeout_s {
+            self.is_enabled = false;
+        }
+        let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
+        self.shaft.step(wanted, dt_s);
+    }
+
+    fn wanted_nm(&self) -> f64 {
+        let [_, _, most, ..] = self.ranges;
+        let shaft = &self.shaft;
+        let current = self.value(LIMIT_CUR).clamp(0.0, most);
+        let torque = match self.value(RUN_MODE) as u8 {
+            0 => {
+                let [position, velocity, kp, kd, torque] = self.operation;
+                kp * (position - shaft.angle_rad)
+                    + kd * (velocity - shaft.velocity_rad_per_s)
+                    + torque
+            }
+            2 => shaft.following_nm(self.value(SPD_REF)).clamp(-current, current),
+            3 => self.value(IQ_REF),
+            _ => {
+                let limit = self.value(LIMIT_SPD).abs();
+                let velocity = (5.0 * (self.value(LOC_REF) - shaft.angle_rad)).clamp(-limit, limit);
+                shaft.following_nm(velocity).clamp(-current, current)
+            }
+        };
+        let limit = self.value(LIMIT_TORQUE).clamp(0.0, most);
+        torque.clamp(-limit, limit)
+    }
+
+    /// The fields of an operation frame, whose torque is in the id.
+    fn fields(&self, torque: u32, data: u64) -> [f64; 5] {
+        let [pmax, vmax, tmax, kp, kd] = self.ranges;
+        let share = |lowest: u32| (data >> lowest & 0xFFFF) as f64 / 65_535.0;
+        [
+            (2.0 * share(48) - 1.0) * pmax,
+            (2.0 * share(32) - 1.0) * vmax,
+            share(16) * kp,
+            share(0) * kd,
+            (2.0 * f64::from(torque) / 65_535.0 - 1.0) * tmax,
+        ]
+    }
+
+    /// Mode and faults, as bits 16 to 23 of the id have them.
+    fn state(&self) -> u32 {
+        let mode = if self.is_calibrating { 1 } else { u32::from(self.is_enabled) << 1 };
+        let bit = |bits: u32, place: u32| u32::from(self.faults & bits != 0) << place;
+        let faults =
+            bit(1 << 2, 0) | bit(0x1_0030, 1) | bit(1, 2) | bit(1 << 14, 4) | bit(1 << 7, 5);
+        mode << 6 | faults
+    }
+
+    fn feedback(&self) -> CanFrame {
+        let [pmax, vmax, tmax, ..] = self.ranges;
+        let field = |value: f64, most: f64| {
+            ((value.clamp(-most, most) + most) * 65_535.0 / (2.0 * most)) as u64
+        };
+        let angle = self.shaft.angle_rad;
+        let is_beyond = angle.abs() > pmax && !self.is_cybergear;
+        let angle = if is_beyond { rest_of(angle + pmax, 2.0 * pmax) - pmax } else { angle };
+        let bits = field(angle, pmax) << 48
+            | field(self.shaft.velocity_rad_per_s, vmax) << 32
+            | field(self.shaft.torque_nm, tmax) << 16
+            | 250;
+        self.answer(2, self.state(), bits.to_be_bytes())
+    }
+
+    fn answer(&self, kind: u32, state: u32, data: [u8; 8]) -> CanFrame {
+        extended(kind << 24 | state << 16 | u32::from(self.id) << 8 | u32::from(self.host), data)
+    }
+
+    /// The answer about an id: the id, and what its processor is called.
+    fn broadcast(&self) -> CanFrame {
+        extended(u32::from(self.id) << 8 | 0xFE, [self.id, 1, 2, 3, 4, 5, 6, 7])
+    }
+
+    fn read(&self, index: u16, [low, high, ..]: [u8; 8]) -> CanFrame {
+        let Some(value) = self.value_of(index) else {
+            return self.answer(17, 1, [low, high, 0, 0, 0, 0, 0, 0]);
+        };
+        let bits = match index {
+            0x7005 | 0x7028 => value as u32,
+            _ => single(value).to_bits(),
+        };
+        let [a, b, c, d] = bits.to_le_bytes();
+        self.answer(17, 0, [low, high, 0, 0, a, b, c, d])
+    }
+
+    fn set(&mut self, index: u16, swapped: u32) {
+        let bits = swapped.swap_bytes();
+        match index {
+            // The mode of a drive that runs stays.
+            0x7005 if self.is_enabled => {}
+            0x7005 => {
+                let mode = bits & 0xFF;
+                let is_known = mode <= 3 || mode == 5 && !self.is_cybergear;
+                if is_known {
+                    self.write(index, mode.into());
+                }
+            }
+            0x7028 => self.write(index, bits.into()),
+            _ => self.write(index, f64::from(f32::from_bits(bits)).clamp(-1e6, 1e6)),
+        }
+    }
+
+    fn value_of(&self, index: u16) -> Option<f64> {
+        match index {
+            MECH_POS => Some(self.shaft.angle_rad),
+            MECH_VEL => Some(self.shaft.velocity_rad_per_s),
+            VBUS => Some(48.0),
+            0x7028 if self.is_cybergear => None,
+            _ => {
+                let place = PARAMETERS.iter().position(|parameter| *parameter == index)?;
+                Some(self.value(place))
+            }
+        }
+    }
+
+    fn value(&self, place: usize) -> f64 {
+        self.values.get(place).copied().unwrap_or_default()
+    }
+
+    fn write(&mut self, index: u16, value: f64) {
+        let is_there = index != 0x7028 || !self.is_cybergear;
+        for (parameter, place) in PARAMETERS.iter().zip(&mut self.values) {
+            if *parameter == index && is_there {
+                *place = value;
+            }
+        }
+    }
+}
+
+fn extended(raw: u32, data: [u8; 8]) -> CanFrame {
+    CanFrame::of(ExtendedId::new(raw).unwrap_or(ExtendedId::MAX), data)
+}
+
+/// The rest of a division, not negative. The shaft is not billions of turns away.
+fn rest_of(value: f64, span: f64) -> f64 {
+    let rest = value % span;
+    if rest < 0.0 { rest + span } else { rest }
+}
+
+fn single(value: f64) -> f32 {
+    value as f32
+}

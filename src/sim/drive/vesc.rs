@@ -1,0 +1,305 @@
+//! A VESC with its shaft, written from the firmware `bldc`: ids and values are cut out of the frame as numbers.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "fields of a frame, which saturate, and a tachometer, which wraps"
+)]
+
+use super::DriveShaft;
+use crate::frame::CanFrame;
+use core::f64::consts::TAU;
+use embedded_can::{ExtendedId, Frame, Id};
+
+/// After a fault the drive ignores commands for this time.
+const FAULT_STOP_S: f64 = 0.5;
+
+/// Currents below are taken for 0, in A.
+const LEAST_CURRENT: f64 = 0.05;
+
+/// Speeds below are taken for 0, in electrical rpm.
+const LEAST_SPEED: f64 = 900.0;
+
+/// The motor behind a simulated VESC.
+#[derive(Debug, Clone, Copy)]
+pub struct VescMotor {
+    /// Pole pairs of the rotor.
+    pub pole_pairs: u8,
+    /// Turns of the rotor for one of the output shaft.
+    pub gear: f64,
+    /// Torque of the rotor for a current, in Nm/A.
+    pub torque_constant_nm_per_a: f64,
+    /// The drive's own current limit in A.
+    pub current_max_a: f64,
+    /// The velocity of the output shaft without load at a duty of 1, in rad/s.
+    pub no_load_rad_per_s: f64,
+}
+
+/// A VESC and the shaft that it turns, for tests: it takes frames, answers questions for its fault code, and moves.
+///
+/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear), and put there its
+/// answers and the status frames that [`report`](Self::report) makes. It brakes with its time-out current when commands stop, and ignores
+/// commands for half a second after a fault. The shaft is an inertia with viscous friction.
+///
+/// # Examples
+/// ```
+/// use drivetrain::sim::{VescDrive, VescMotor};
+///
+/// let motor = VescMotor {
+///     pole_pairs: 7,
+///     gear: 1.0,
+///     torque_constant_nm_per_a: 0.05,
+///     current_max_a: 40.0,
+///     no_load_rad_per_s: 600.0,
+/// };
+/// let drive = VescDrive::new(23, motor);
+/// let status = drive.report(9).ok_or("no such status")?;
+/// assert_eq!((status.header() & 0x1FFF_FFFF, status.bytes()), (0x917, &[0; 8]));
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct VescDrive {
+    id: u8,
+    motor: VescMotor,
+    command: Command,
+    fault: u8,
+    /// What is left of the time in which commands are ignored.
+    ignores_s: f64,
+    /// Since the last command that was heard.
+    silence_s: f64,
+    timeout_s: f64,
+    timeout_brake_a: f64,
+    celsius: [f64; 2],
+    /// Where the shaft was when the tachometer was this count.
+    zero: (f64, i32),
+    /// The angle that the handbrake holds.
+    held_rad: f64,
+    shaft: DriveShaft,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Command {
+    Duty(f64),
+    Current(f64),
+    Brake(f64),
+    Speed(f64),
+    Position(f64),
+    Handbrake(f64),
+}
+
+impl VescDrive {
+    /// Makes a drive that stands at 0, with a time-out of 1 s, a time-out brake current of 0, and an inertia of 0.01 kg m².
+    #[must_use]
+    pub fn new(id: u8, motor: VescMotor) -> Self {
+        Self {
+            id,
+            motor,
+            command: Command::Current(0.0),
+            fault: 0,
+            ignores_s: 0.0,
+            silence_s: 0.0,
+            timeout_s: 1.0,
+            timeout_brake_a: 0.0,
+            celsius: [30.0, 25.0],
+            zero: (0.0, 0),
+            held_rad: 0.0,
+            shaft: DriveShaft::new(0.01, 0.001),
+        }
+    }
+
+    /// Sets the time-out in s, 0 for never, and its brake current in A.
+    #[must_use]
+    pub fn with_timeout(self, timeout_s: f32, brake_a: f32) -> Self {
+        Self { timeout_s: timeout_s.into(), timeout_brake_a: brake_a.into(), ..self }
+    }
+
+    /// Gives the drive another shaft.
+    #[must_use]
+    pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
+        Self { shaft, ..self }
+    }
+
+    /// Sets the count of the tachometer where the shaft is.
+    pub fn set_tachometer(&mut self, count: i32) {
+        self.zero = (self.shaft.angle_rad, count);
+    }
+
+    /// Sets the temperatures of driver and motor, in °C.
+    pub fn set_temperatures(&mut self, driver_c: f32, motor_c: f32) {
+        self.celsius = [driver_c.into(), motor_c.into()];
+    }
+
+    /// Returns the shaft.
+    #[must_use]
+    pub const fn shaft(&self) -> &DriveShaft {
+        &self.shaft
+    }
+
+    /// Returns the shaft, to load or to turn it.
+    pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
+        &mut self.shaft
+    }
+
+    /// Has the drive stop with a fault: it lets the shaft go, and ignores commands for half a second.
+    pub fn fail(&mut self, fault: u8) {
+        self.fault = fault;
+        self.ignores_s = FAULT_STOP_S;
+        self.command = Command::Current(0.0);
+    }
+
+    /// Takes the supply away for a moment: the last command is lost, and the tachometer begins at 0.
+    pub fn lose_supply(&mut self) {
+        self.zero = (self.shaft.angle_rad, 0);
+        (self.fault, self.ignores_s, self.silence_s) = (0, 0.0, 0.0);
+        self.command = Command::Current(0.0);
+    }
+
+    /// Returns the fault code, 0 for none.
+    #[must_use]
+    pub const fn fault(&self) -> u8 {
+        self.fault
+    }
+
+    /// Takes a frame from the bus and returns the answer, if the frame is a question.
+    pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let Id::Extended(id) = frame.id() else { return None };
+        let id = id.as_raw();
+        let is_own = id & 0xFF == u32::from(self.id) || id & 0xFF == 0xFF;
+        if !frame.is_data_frame() || !is_own {
+            return None;
+        }
+        let data = frame.data();
+        let packet = id >> 8;
+        if packet == 8 {
+            // Values are answered by a short message where they fit: the fault code alone is value 15.
+            let &[host, 0, 50, 0, 0, 0x80, 0, ..] = data else { return None };
+            return extended(8 << 8 | u32::from(host))
+                .map(|id| CanFrame::of(id, [self.id, 1, 50, 0, 0, 0x80, 0, self.fault]));
+        }
+        // A current of six bytes and more begins with a delay.
+        let from = if packet == 1 && data.len() >= 6 { 2 } else { 0 };
+        let bytes = data.get(from..)?.first_chunk::<4>()?;
+        let value = f64::from(i32::from_be_bytes(*bytes));
+        let limit = self.motor.current_max_a;
+        let command = match packet {
+            0 => Command::Duty(value / 1e5),
+            1 => Command::Current(value / 1e3),
+            2 => Command::Brake(value / 1e3),
+            3 => Command::Speed(value),
+            4 => Command::Position(value / 1e6),
+            10 => Command::Current(value / 1e5 * limit),
+            11 => Command::Brake(value / 1e5 * limit),
+            12 => Command::Handbrake(value / 1e3),
+            13 => Command::Handbrake(value / 1e5 * limit),
+            _ => return None,
+        };
+        self.silence_s = 0.0;
+        if self.ignores_s <= 0.0 {
+            self.follow(command);
+        }
+        None
+    }
+
+    fn follow(&mut self, command: Command) {
+        if !matches!(self.command, Command::Handbrake(_)) {
+            self.held_rad = self.shaft.angle_rad;
+        }
+        self.command = command;
+    }
+
+    /// Moves on by a time in s.
+    pub fn step(&mut self, dt_s: f32) {
+        let dt_s = f64::from(dt_s);
+        self.silence_s += dt_s;
+        self.ignores_s -= dt_s;
+        if self.ignores_s <= 0.0 {
+            self.fault = 0;
+        }
+        if self.timeout_s > 0.0 && self.silence_s > self.timeout_s {
+            self.follow(Command::Brake(self.timeout_brake_a));
+        }
+        let current = self.wanted_nm() / self.nm_per_a();
+        let most = self.motor.current_max_a;
+        self.shaft.step(current.clamp(-most, most) * self.nm_per_a(), dt_s);
+    }
+
+    /// Returns a status frame, by its packet: 9, 14, 15, 16, 27 or 58; `None` for another.
+    #[must_use]
+    pub fn report(&self, packet: u8) -> Option<CanFrame> {
+        let electrical = self.motor.gear * f64::from(self.motor.pole_pairs);
+        let word = |value: f64| u64::from((value as i16).cast_unsigned());
+        let wide = |value: f64| u64::from((value as i32).cast_unsigned());
+        let bits = match packet {
+            9 => {
+                let erpm = self.shaft.velocity_rad_per_s * electrical * 60.0 / TAU;
+                let current = self.shaft.torque_nm / self.nm_per_a();
+                let duty = self.shaft.velocity_rad_per_s / self.motor.no_load_rad_per_s;
+                wide(erpm) << 32 | word(current * 10.0) << 16 | word(duty * 1e3)
+            }
+            14 | 15 => 0,
+            16 => {
+                let [driver, motor] = self.celsius;
+                let degrees = within_turn(self.shaft.angle_rad).to_degrees();
+                word(driver * 10.0) << 48 | word(motor * 10.0) << 32 | word(degrees * 50.0)
+            }
+            27 => {
+                let way = (self.shaft.angle_rad - self.zero.0) / TAU * electrical * 6.0;
+                let count = (floor(way) + i64::from(self.zero.1)) as i32;
+                u64::from(count.cast_unsigned()) << 32 | word(240.0) << 16
+            }
+            58 => 0,
+            _ => return None,
+        };
+        let id = extended(u32::from(packet) << 8 | u32::from(self.id))?;
+        Some(CanFrame::of(id, bits.to_be_bytes()))
+    }
+
+    fn nm_per_a(&self) -> f64 {
+        self.motor.gear * self.motor.torque_constant_nm_per_a
+    }
+
+    fn wanted_nm(&self) -> f64 {
+        let shaft = &self.shaft;
+        let erpm = |velocity: f64| {
+            velocity * self.motor.gear * f64::from(self.motor.pole_pairs) * 60.0 / TAU
+        };
+        match self.command {
+            Command::Current(current) | Command::Brake(current) | Command::Handbrake(current)
+                if current.abs() < LEAST_CURRENT =>
+            {
+                0.0
+            }
+            Command::Current(current) => current * self.nm_per_a(),
+            Command::Brake(current) => {
+                let most = current.abs() * self.nm_per_a();
+                shaft.following_nm(0.0).clamp(-most, most)
+            }
+            Command::Handbrake(current) => {
+                let most = current.abs() * self.nm_per_a();
+                let velocity = 20.0 * (self.held_rad - shaft.angle_rad);
+                shaft.following_nm(velocity).clamp(-most, most)
+            }
+            Command::Duty(duty) => shaft.following_nm(duty * self.motor.no_load_rad_per_s),
+            Command::Speed(speed) if speed.abs() < LEAST_SPEED => 0.0,
+            Command::Speed(speed) => shaft.following_nm(speed / erpm(1.0)),
+            Command::Position(degrees) => {
+                let way = degrees.to_radians() - shaft.angle_rad;
+                let way = within_turn(way + TAU / 2.0) - TAU / 2.0;
+                shaft.following_nm(10.0 * way)
+            }
+        }
+    }
+}
+
+fn extended(raw: u32) -> Option<Id> {
+    ExtendedId::new(raw).map(Id::Extended)
+}
+
+/// The angle from 0 to a turn.
+fn within_turn(angle_rad: f64) -> f64 {
+    angle_rad - floor(angle_rad / TAU) as f64 * TAU
+}
+
+fn floor(value: f64) -> i64 {
+    let whole = value as i64;
+    if whole as f64 > value { whole - 1 } else { whole }
+}

@@ -1,0 +1,321 @@
+//! The motor as an own motor: its claims, its frames, and their order.
+
+use super::command::{HOST, SHORT_MESSAGE, extended, question};
+use super::config::{At, Mode, Rest, sealed};
+use super::feedback::fault;
+use super::tachometer::Tachometer;
+use super::{ConfigError, Feedback, Model};
+use crate::encoder;
+use crate::frame::CanFrame;
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
+    Vitals, WrongSetting,
+};
+use crate::units::{Angle, AngularVelocity};
+use embedded_can::{Frame, Id};
+
+/// Packets of status 1, 4 and 5.
+const MOTION: u8 = 9;
+const TEMPERATURES: u8 = 16;
+const TACHOMETER: u8 = 27;
+
+/// Blocks of packets: the first, and the bits that differ within the block.
+const COMMANDS: [(u8, u8); 4] = [(0, 3), (4, 0), (10, 1), (12, 1)];
+const STATUSES: [(u8, u8); 5] = [(MOTION, 0), (14, 1), (TEMPERATURES, 0), (TACHOMETER, 0), (58, 0)];
+
+/// Commands for one question.
+const ORDERS: u8 = 50;
+
+/// A motor on a VESC, in the control mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::encoder::GearRatio;
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::motor::OwnMotor;
+/// use drivetrain::units::AngularVelocity;
+/// use drivetrain::vesc::{Model, Motor, Rest, Velocity};
+///
+/// const WHEEL: Model = Model {
+///     name: "hub",
+///     pole_pairs: 15,
+///     gear: GearRatio::DIRECT,
+///     torque_constant_nm_per_a: 0.5,
+///     current_limit_a: 20.0,
+///     max_velocity: AngularVelocity::from_rpm(500.0),
+///     is_reversed: false,
+/// };
+/// let mut wheel = Motor::new(WHEEL, 1, Velocity::new())?;
+/// assert_eq!(format!("{:?}", wheel.rest()), "00000101 [4] 00 00 00 00"); // current 0
+/// let mut wheel = wheel.with_rest(Rest::Brake(4.0))?;
+/// assert_eq!(format!("{:?}", wheel.rest()), "00000201 [4] 00 00 0F A0"); // brake 4000 mA
+/// # Ok::<(), drivetrain::vesc::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    model: Model,
+    id: u8,
+    mode: M,
+    rest: Rest,
+    has_encoder: bool,
+    has_fault_code: bool,
+    feedback: Feedback,
+    tachometer: Tachometer,
+    /// Frames with the motion since the last one with the angle.
+    angle_age: u8,
+    /// Commands since the last question for the fault code.
+    orders: u8,
+    /// Questions since the last answer.
+    unanswered: u8,
+    /// The share of the last command; `None` where the drive makes its current by a loop of its own.
+    effort: Option<f32>,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the motor, the id of the drive, 0 to 253, and the control mode.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+        if id >= HOST {
+            return Err(ConfigError::Id(id));
+        }
+        model.check()?;
+        mode.check(&model)?;
+        Ok(Self {
+            tachometer: Tachometer::new(&model),
+            model,
+            id,
+            mode,
+            rest: Rest::Release,
+            has_encoder: <M as sealed::Mode>::HAS_POSITION,
+            has_fault_code: true,
+            feedback: Feedback::default(),
+            angle_age: u8::MAX,
+            orders: 0,
+            unanswered: 0,
+            effort: Some(0.0),
+        })
+    }
+
+    /// Sets the command of a motor that is not driven: [`Rest::Release`] at first.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for a current that is not above 0 and within the limit of the model.
+    pub fn with_rest(self, rest: Rest) -> Result<Self, ConfigError> {
+        rest.check(&self.model)?;
+        Ok(Self { rest, ..self })
+    }
+
+    /// Takes the angle from status 4, the position of the drive's encoder, instead of the tachometer in status 5. In the mode
+    /// [`Position`](super::Position) it always does.
+    ///
+    /// It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio. Without an encoder,
+    /// status 4 has the electrical angle.
+    #[must_use]
+    pub const fn with_encoder(self) -> Self {
+        Self { has_encoder: true, ..self }
+    }
+
+    /// Never asks for the fault code, for firmware that does not answer. A fault is then not seen: after it the drive ignores commands
+    /// for a time, and follows them again.
+    #[must_use]
+    pub const fn without_fault_code(self) -> Self {
+        Self { has_fault_code: false, ..self }
+    }
+
+    /// Returns the last values that the drive has reported.
+    #[must_use]
+    pub const fn feedback(&self) -> &Feedback {
+        &self.feedback
+    }
+
+    /// Returns the position of the output shaft with all turns since the drive has started, by its tachometer; `None` before the first
+    /// status 5, and when 100 frames of status 1 have come since the last.
+    #[must_use]
+    pub fn position(&self) -> Option<encoder::Position> {
+        self.feedback.tachometer.filter(|_| !self.has_encoder && self.has_fresh_angle())?;
+        Some(self.tachometer.position())
+    }
+
+    const fn has_fresh_angle(&self) -> bool {
+        self.angle_age < 100
+    }
+
+    fn claim(&self, id: u8, (packet, bits): (u8, u8), role: Role) -> Claim {
+        Claim::new(extended(packet, id), role, self.name()).with_mask(!(u32::from(bits) << 8))
+    }
+
+    /// Asks for the fault code, which is no longer known when four questions had no answer.
+    fn ask(&mut self) -> CanFrame {
+        if self.unanswered >= 4 {
+            self.feedback.fault = None;
+        }
+        self.unanswered = self.unanswered.saturating_add(1);
+        question(self.id)
+    }
+
+    /// Takes a status frame of this drive.
+    fn take(&mut self, packet: u8, data: &[u8]) -> bool {
+        if !self.feedback.take(packet, data) {
+            return false;
+        }
+        if packet == MOTION {
+            self.angle_age = self.angle_age.saturating_add(1);
+        } else if packet == TACHOMETER {
+            self.tachometer.take(self.feedback.tachometer.unwrap_or_default());
+        }
+        if packet == if self.has_encoder { TEMPERATURES } else { TACHOMETER } {
+            self.angle_age = 0;
+        }
+        true
+    }
+}
+
+impl<M: Mode> OwnMotor for Motor<M> {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name, self.id)
+    }
+
+    /// All commands of the drive are claimed, in whatever mode: another program that sends one is a second master. Tools may ask.
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let own = |block, role| self.claim(self.id, block, role);
+        let commands = COMMANDS.map(|block| own(block, Role::Command));
+        let statuses = STATUSES.map(|block| own(block, Role::Feedback));
+        let questions = self.has_fault_code.then(|| {
+            let answer = self.claim(HOST, (SHORT_MESSAGE, 0), Role::Feedback);
+            [own((SHORT_MESSAGE, 0), Role::Command).shared(), answer.shared()]
+        });
+        commands.into_iter().chain(questions.into_iter().flatten()).chain(statuses)
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        let (packet, id) = parts(frame.id());
+        if id != self.id {
+            return Ingest::Unrelated;
+        }
+        // What `decode_answer` has not taken: the motion, and damaged frames.
+        if self.take(packet, frame.data()) {
+            Ingest::Taken
+        } else {
+            Ingest::Malformed(Malformed::Length(frame.length()))
+        }
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        self.model.velocity_of(self.feedback.erpm.unwrap_or_default())
+    }
+
+    fn angle(&self) -> Option<Angle> {
+        if !self.has_encoder {
+            return self.position().map(encoder::Position::angle);
+        }
+        let degrees = self.feedback.position_deg.filter(|_| self.has_fresh_angle())?;
+        Some(Angle::from_degrees(self.model.signed(degrees)))
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        self.effort = Some(0.0);
+        self.rest.command(1.0).frame(self.id)
+    }
+
+    fn control(&mut self, order: Order) -> CanFrame {
+        let at = At {
+            model: &self.model,
+            velocity_rad_per_s: self.velocity().as_rad_per_s(),
+            angle: self.angle(),
+            duty: self.model.signed(self.feedback.duty.unwrap_or_default()),
+        };
+        let command = self.mode.command(order, &at);
+        let Some((command, effort)) = command else { return self.rest() };
+        self.effort = effort;
+        self.orders = self.orders.wrapping_add(1);
+        if self.has_fault_code && self.orders >= ORDERS {
+            self.orders = 0;
+            return self.ask();
+        }
+        command.frame(self.id)
+    }
+
+    fn reset(&mut self) {
+        self.mode.reset();
+        self.effort = Some(0.0);
+    }
+
+    fn inquire(&mut self) -> Option<CanFrame> {
+        self.has_fault_code.then(|| self.ask())
+    }
+
+    /// Takes all that says nothing of the motion: the other status frames, and fault codes. A motor whose targets need an angle takes
+    /// the motion without one here too, so that feedback is late when either of them is.
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        let (packet, id) = parts(frame.id());
+        if packet == SHORT_MESSAGE {
+            let Some(fault) = fault(frame.data(), self.id) else { return false };
+            (self.feedback.fault, self.unanswered) = (Some(fault), 0);
+            return true;
+        }
+        let lacks_angle = self.mode.needs_angle() && self.angle_age > 0;
+        id == self.id && (packet != MOTION || lacks_angle) && self.take(packet, frame.data())
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        let is_unknown = self.has_fault_code && self.feedback.fault.is_none();
+        is_unknown.then(|| WrongSetting {
+            motor: self.name(),
+            setting: "fault code",
+            expected: 0.0,
+            found: None,
+        })
+    }
+
+    fn forget_settings(&mut self) {
+        (self.feedback.fault, self.feedback.tachometer) = (None, None);
+        self.feedback.position_deg = None;
+        self.angle_age = u8::MAX;
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let mut capabilities =
+            self.mode.capabilities().with(Capability::Feedback).with(Capability::Temperature);
+        if self.has_fault_code {
+            capabilities = capabilities.with(Capability::ErrorCodes);
+        }
+        if self.has_encoder { capabilities.with(Capability::AbsoluteAngle) } else { capabilities }
+    }
+
+    fn vitals(&self) -> Vitals {
+        let drive = &self.feedback;
+        let celsius = match (drive.driver_c, drive.motor_c) {
+            (Some(driver), Some(motor)) => Some(whole(driver.max(motor))),
+            _ => None,
+        };
+        let error_code = drive.fault.unwrap_or_default();
+        let current = self.model.signed(drive.current_a.unwrap_or_default());
+        let current = current / self.model.current_limit_a;
+        Vitals {
+            temperature_c: celsius,
+            error: (error_code > 0).then_some(Severity::Fault),
+            error_code,
+            effort: self.effort.unwrap_or(current),
+            speed: self.velocity().as_rad_per_s() / self.model.max_velocity.as_rad_per_s(),
+            current,
+        }
+    }
+}
+
+/// Returns packet and id of a drive; for a standard id, or one with more bits, those of none.
+fn parts(id: Id) -> (u8, u8) {
+    match id {
+        Id::Extended(id) => match id.as_raw().to_be_bytes() {
+            [0, 0, packet, id] => (packet, id),
+            _ => (u8::MAX, u8::MAX),
+        },
+        Id::Standard(_) => (u8::MAX, u8::MAX),
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a tenth of an i16")]
+const fn whole(celsius: f32) -> i16 {
+    celsius as i16
+}

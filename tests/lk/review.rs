@@ -1,0 +1,189 @@
+//! What could hurt: frames that drive after the motor was told to rest, at every moment of its life, and frames that are drawn.
+
+use super::*;
+use drivetrain::motor::Claim;
+
+/// What a motor at rest may send, read by the manual alone: off, questions, clear, and a torque without current.
+fn is_rest(frame: &CanFrame) -> bool {
+    let [code, rest @ ..] = *frame.bytes();
+    [0x80, 0x92, 0x9A, 0x9B, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Event {
+    Disarm,
+    EmergencyStop,
+    NoTarget,
+    NoFeedback,
+    BadSteps,
+    ClockBack,
+}
+
+const EVENTS: [Event; 6] = [
+    Event::Disarm,
+    Event::EmergencyStop,
+    Event::NoTarget,
+    Event::NoFeedback,
+    Event::BadSteps,
+    Event::ClockBack,
+];
+
+/// Lets an event come at a moment after arming; each frame from then on, or from its limit on, is one of rest.
+fn rests_after<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), event: Event, moment_ms: u32) {
+    let mut bench = Bench::armed(Model::MF9025_16T, mode);
+    bench.steps(moment_ms, |bench| set(&mut bench.own));
+    let allowed_ms = match event {
+        Event::NoTarget => 101,
+        Event::NoFeedback => 11,
+        Event::BadSteps => 1,
+        _ => 0,
+    };
+    match event {
+        Event::Disarm => bench.own.disarm(),
+        Event::EmergencyStop => bench.own.emergency_stop(),
+        Event::NoFeedback => bench.is_cut = true,
+        Event::ClockBack => bench.now_us -= 5_000,
+        Event::NoTarget | Event::BadSteps => {}
+    }
+    for ms in 0..150 {
+        if event != Event::NoTarget {
+            set(&mut bench.own);
+        }
+        let dt_s = if event == Event::BadSteps { f32::NAN } else { 0.001 };
+        // The clock goes back once, and on from there.
+        bench.now_us += if event == Event::ClockBack && ms == 0 { 0 } else { 1_000 };
+        let now = bench.now();
+        bench.own.update(Tick::new(now, dt_s));
+        while let Some(frame) = bench.own.next_frame(0) {
+            let is_safe = is_rest(&frame) || ms < allowed_ms;
+            assert!(is_safe, "{mode:?}, {event:?} after {moment_ms} ms, {ms} ms later: {frame:?}");
+            if !bench.is_cut
+                && let Some(answer) = bench.drive.hear(&frame)
+            {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_frame_after_an_event_is_one_of_rest_at_every_moment() {
+    for event in EVENTS {
+        // Through enabling, opening, and the places of the questions.
+        for moment_ms in (0..70).chain([150, 223, 301]) {
+            rests_after(torque(), |own| _ = own.set_torque(1.0), event, moment_ms);
+            let velocity = Velocity::new(rad_s(20.0)).with_torque_limit(2.0);
+            rests_after(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), event, moment_ms);
+            let position = PositionVelocity::new(rad_s(8.0));
+            rests_after(position, |own| _ = own.set_angle((), rad(2.0)), event, moment_ms);
+        }
+    }
+}
+
+/// Frames that are drawn, on the id of the drive, while it drives and while it rests: a disarmed motor sends frames of rest alone, and
+/// a driven one no current beyond its limit.
+#[test]
+fn drawn_frames_drive_nothing() {
+    let mut state = 0x2545_F491_4F6C_DD1D_u64;
+    let mut draw = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let codes = [0x80, 0x81, 0x88, 0x92, 0x9A, 0x9B, 0x9C, 0xA1, 0xA2, 0xA4, 0xA8, 0x00];
+    let limit = 2.0 / Model::MF9025_16T.max_torque_nm() * 2_048.0;
+    for is_armed in [false, true] {
+        let mut bench = Bench::new(Model::MF9025_16T, torque());
+        bench.steps(100, |_| {});
+        for _ in 0..20_000 {
+            let mut data = draw().to_le_bytes();
+            data[0] = codes[usize::from(data[0]) % codes.len()];
+            if draw() % 4 == 0 {
+                data = [data[0], 0, 0, 0, 0, 0, 0, 0];
+            }
+            let now = bench.now();
+            _ = Devices::ingest(&mut bench.own, &frame(data), now);
+            if is_armed {
+                _ = bench.own.arm(bench.now());
+                _ = bench.own.set_angle((), rad(1.0));
+            }
+            bench.now_us += 1_000;
+            let now = bench.now();
+            bench.own.update(Tick::new(now, 0.001));
+            while let Some(sent) = bench.own.next_frame(0) {
+                let [code, _, _, _, a, b, _, _] = *sent.bytes();
+                let current = f32::from(i16::from_le_bytes([a, b]));
+                assert!(is_armed || is_rest(&sent), "{sent:?}");
+                assert!(code != 0xA1 || current.abs() <= limit, "{sent:?}");
+                if let Some(answer) = bench.drive.hear(&sent) {
+                    _ = Devices::ingest(&mut bench.own, &answer, now);
+                }
+            }
+        }
+    }
+}
+
+/// A second drive with the same id, or a motor attached twice, is a clash.
+#[test]
+fn both_directions_on_one_id_clash_with_each_other_motor_on_it() {
+    let claims = |name: &'static str| -> Vec<Claim> {
+        let model = Model::new(name, Series::Mf, 1.0, 0.3, 16).unwrap();
+        Motor::new(model, 1, torque()).unwrap().claims().into_iter().collect()
+    };
+    let (one, other) = (claims("one"), claims("other"));
+    assert!(!one[0].clashes_with(&one[1]));
+    for (one, other) in one.iter().flat_map(|one| other.iter().map(move |other| (one, other))) {
+        assert!(one.clashes_with(other));
+    }
+}
+
+/// 0 in the field of a limit stands for none with some drives, and the share of the output is 0 right after arming.
+#[test]
+fn a_limit_is_never_sent_as_none() {
+    fn limits<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), code: u8) -> Vec<u16> {
+        let mut bench = Bench::armed(Model::MF9025_16T, mode);
+        let mut limits = Vec::new();
+        bench.steps(400, |bench| {
+            set(&mut bench.own);
+            let data = bench.frames.iter().map(|frame| *frame.bytes());
+            let commands = data.filter(|data| data[0] == code);
+            limits.extend(commands.map(|data| u16::from_le_bytes([data[2], data[3]])));
+        });
+        limits
+    }
+    let velocity = Velocity::new(rad_s(20.0)).with_torque_limit(2.0);
+    let position = PositionVelocity::new(rad_s(8.0));
+    let weak = Velocity::new(rad_s(20.0)).with_torque_limit(0.006);
+    let slow = PositionVelocity::new(rad_s(0.05));
+    for (limits, most) in [
+        (limits(weak, |own| _ = own.set_velocity((), rad_s(6.0)), 0xA2), 2),
+        (limits(slow, |own| _ = own.set_angle((), rad(2.0)), 0xA4), 2),
+        (limits(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), 0xA2), 775),
+        (limits(position, |own| _ = own.set_angle((), rad(2.0)), 0xA4), 458),
+    ] {
+        assert!(limits.iter().all(|limit| (1..=most).contains(limit)), "{limits:?}");
+        assert!(limits.len() > 300 && limits.contains(&most), "{limits:?}");
+    }
+}
+
+#[test]
+fn a_question_for_the_state_that_is_read_back_is_no_state() {
+    let mut motor = Motor::new(Model::MF9025_16T, 1, torque()).unwrap();
+    for code in [0x9A, 0x9B] {
+        assert!(!motor.decode_answer(&frame([code, 0, 0, 0, 0, 0, 0, 0])));
+    }
+    assert!(motor.state().is_none() && motor.is_enabled() == Some(false));
+}
+
+/// An answer that is older than the frame that switched the drive off.
+#[test]
+fn a_drive_that_was_on_before_is_switched_on_and_asked_again() {
+    let mut motor = Motor::new(Model::MF9025_16T, 1, torque()).unwrap();
+    motor.disable();
+    assert!(motor.decode_answer(&frame([0x9A, 30, 0x60, 0x09, 0, 0, 0, 0])));
+    assert_eq!(motor.is_enabled(), Some(true));
+    let run = motor.enable(0).unwrap();
+    assert_eq!((run.bytes()[0], motor.is_enabled()), (0x88, Some(false)));
+    assert_eq!(motor.enable(1).unwrap().bytes()[0], 0x9A);
+}
