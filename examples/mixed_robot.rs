@@ -7,7 +7,7 @@
 
 mod console;
 
-use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumGeometry, MecanumWheels};
+use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::damiao;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -26,8 +26,9 @@ use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::vesc;
 use std::error::Error;
 
-const GEOMETRY: MecanumGeometry =
-    MecanumGeometry { wheel_radius_m: 0.076, half_wheelbase_m: 0.20, half_track_m: 0.18 };
+const WHEEL_RADIUS_M: f32 = 0.076;
+/// The place of the front left wheel.
+const FRONT_LEFT_M: Vec2 = Vec2::new(0.20, 0.18);
 /// A per rad/s and A per rad of the output shaft, as in the example `two_buses`.
 const WHEEL: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
 /// In m/s and m/s².
@@ -146,8 +147,8 @@ fn body(world: &Simulation) -> Result<[MotorKey; 4], Box<dyn Error>> {
     let wheel = |id| world.attach(MotorConfig::m3508(id).with_line(Line::Can1));
     let keys = [wheel(1)?, wheel(2)?, wheel(3)?, wheel(4)?];
     let [front_left, front_right, rear_left, rear_right] = keys;
-    let (x, y) = (GEOMETRY.half_wheelbase_m, GEOMETRY.half_track_m);
-    let mounted = |motor, x, y| Wheel::mecanum(motor, GEOMETRY.wheel_radius_m, Vec2::new(x, y));
+    let Vec2 { x, y } = FRONT_LEFT_M;
+    let mounted = |motor, x, y| Wheel::mecanum(motor, WHEEL_RADIUS_M, Vec2::new(x, y));
     world.attach_chassis(ChassisConfig::new(&[
         mounted(front_left, x, y),
         mounted(front_right, x, -y).reversed(),
@@ -176,7 +177,7 @@ fn simulate() -> Result<Seen, Box<dyn Error>> {
     let (bus, wheels) = chassis_bus()?;
     let mut lower = Runner::new(Nb(world.controller_on(Line::Can1)), world.clock(), bus);
     let mut upper = Runner::new(Nb(world.controller_on(Line::Can2)), world.clock(), turret()?);
-    let mut chassis = Chassis::new(Mecanum::new(GEOMETRY)?);
+    let mut chassis = Chassis::new(Mecanum::new(WHEEL_RADIUS_M, FRONT_LEFT_M)?);
     chassis.set_limits(ChassisLimits::new().with_acceleration(ACCELERATION, 10.0))?;
     let mut seen = Seen::default();
     for ms in 0..END {
