@@ -116,6 +116,30 @@ impl CanFrame {
         }
     }
 
+    /// An empty frame, to be written over.
+    pub(crate) const EMPTY: Self = Self { key: SHORT, data: [0; 8], length: Length::L0 };
+
+    /// [`copy_of`](Self::copy_of) in the place of this frame, which stays when there is none; tells whether there is one.
+    // In place: a frame that is returned is moved three times on its way.
+    #[inline(always)]
+    pub(crate) fn copy_from(&mut self, frame: &impl Frame) -> bool {
+        if !frame.is_remote_frame() {
+            if let Ok(data) = frame.data().try_into() {
+                (self.key, self.data, self.length) = (header_of(frame.id()), data, Length::L8);
+                return true;
+            }
+        }
+        self.copy_unusual(frame)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn copy_unusual(&mut self, frame: &impl Frame) -> bool {
+        let copy = Self::copy_of(frame);
+        *self = copy.unwrap_or(*self);
+        copy.is_some()
+    }
+
     /// Builds a driver's frame with the same content; `None` when the driver's type cannot hold it.
     #[must_use]
     pub fn convert<F: Frame>(&self) -> Option<F> {

@@ -18,11 +18,11 @@ pub trait Port: Driver {}
 /// How frames go to a driver and come from it. Sealed: a [`Port`] outside of this module is made from the traits of
 /// `embedded-can`.
 pub trait Driver {
-    /// Offers a frame to the driver.
-    fn try_send(&mut self, frame: &CanFrame) -> Sent;
+    /// Offers a frame to the driver; writes one that it evicts over `evicted`.
+    fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent;
 
-    /// Asks the driver for a received frame.
-    fn try_receive(&mut self) -> Received;
+    /// Asks the driver for a received frame, and writes it over `frame`.
+    fn try_receive(&mut self, frame: &mut CanFrame) -> Received;
 }
 
 /// What became of a frame that was offered to the driver.
@@ -31,8 +31,8 @@ pub trait Driver {
 pub enum Sent {
     /// It waits in the controller.
     Accepted,
-    /// It waits in the controller, in the place of this frame of lower priority.
-    Evicted(CanFrame),
+    /// It waits in the controller, in the place of a frame of lower priority, which stands in the argument.
+    Evicted,
     /// It waits in the controller, in the place of a frame that is no classic CAN frame of at most 8 bytes.
     EvictedForeign,
     /// There is no place now.
@@ -45,8 +45,8 @@ pub enum Sent {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[must_use]
 pub enum Received {
-    /// A frame.
-    Frame(CanFrame),
+    /// A frame, which stands in the argument.
+    Frame,
     /// A frame that is no classic CAN frame of at most 8 bytes.
     Foreign,
     /// Nothing now.
@@ -62,21 +62,24 @@ pub struct Nb<C>(pub C);
 impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
 impl<C: embedded_can::nb::Can> Driver for Nb<C> {
-    fn try_send(&mut self, frame: &CanFrame) -> Sent {
+    // The length of the frame is known where it comes from: no loop copies its bytes then.
+    #[inline(always)]
+    fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
         match self.0.transmit(&frame) {
             Ok(None) => Sent::Accepted,
-            Ok(Some(evicted)) => {
-                CanFrame::copy_of(&evicted).map_or(Sent::EvictedForeign, Sent::Evicted)
-            }
+            Ok(Some(other)) if evicted.copy_from(&other) => Sent::Evicted,
+            Ok(Some(_)) => Sent::EvictedForeign,
             Err(nb::Error::WouldBlock) => Sent::Full,
             Err(nb::Error::Other(error)) => Sent::Failed(error.kind()),
         }
     }
 
-    fn try_receive(&mut self) -> Received {
+    #[inline]
+    fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
         match self.0.receive() {
-            Ok(frame) => CanFrame::copy_of(&frame).map_or(Received::Foreign, Received::Frame),
+            Ok(received) if frame.copy_from(&received) => Received::Frame,
+            Ok(_) => Received::Foreign,
             Err(nb::Error::WouldBlock) => Received::Empty,
             Err(nb::Error::Other(error)) => Received::Failed(error.kind()),
         }
@@ -94,7 +97,7 @@ pub struct BlockingTx<C>(pub C);
 impl<C: embedded_can::blocking::Can> Port for BlockingTx<C> {}
 
 impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
-    fn try_send(&mut self, frame: &CanFrame) -> Sent {
+    fn try_send(&mut self, frame: &CanFrame, _: &mut CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
         match self.0.transmit(&frame) {
             Ok(()) => Sent::Accepted,
@@ -102,9 +105,21 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
         }
     }
 
-    fn try_receive(&mut self) -> Received {
+    fn try_receive(&mut self, _: &mut CanFrame) -> Received {
         Received::Empty
     }
+}
+
+/// One reading of the clock is for so many frames: those that wait in the driver came before it, and those that come meanwhile
+/// look older by the time that the others take.
+const FRAMES_A_READING: usize = 16;
+
+/// The frames of one call that are no feedback in 8 bytes: what else there is follows from their number, and costs no counter.
+#[derive(Default)]
+struct Tally {
+    /// Not of 8 bytes with an 11-bit id.
+    others: u32,
+    rejected: u32,
 }
 
 /// A bound on the frames of one tick, for devices that would offer frames for ever.
@@ -126,31 +141,41 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Never waits, goes on after errors, and ends: an error counts against the budget as well.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
+        let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
+        let mut tally = Tally::default();
         let mut frames = 0;
         for _ in 0..budget {
-            match self.port.try_receive() {
-                Received::Frame(frame) => {
+            match self.port.try_receive(&mut frame) {
+                Received::Frame => {
+                    if frames % FRAMES_A_READING == 0 {
+                        now = self.read_clock();
+                    }
                     frames += 1;
-                    let now = self.read_clock();
-                    if self.ingest(&frame, now) == Ingest::Unrelated {
+                    if self.take(&frame, now, &mut tally) == Ingest::Unrelated {
                         unrelated(&frame);
                     }
                 }
                 Received::Foreign => {
                     frames += 1;
+                    (tally.others, tally.rejected) = (tally.others + 1, tally.rejected + 1);
                     increment(&mut self.statistics.unrelated);
                 }
                 Received::Empty => break,
-                Received::Failed(kind) => {
-                    self.statistics.receive_errors.count(kind);
-                    if kind == ErrorKind::Overrun {
-                        let now = self.read_clock();
-                        self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
-                    }
-                }
+                Received::Failed(kind) => self.note_failure(kind),
             }
         }
+        self.enter(frames, &tally);
         frames
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_failure(&mut self, kind: ErrorKind) {
+        self.statistics.receive_errors.count(kind);
+        if kind == ErrorKind::Overrun {
+            let now = self.read_clock();
+            self.watch.edges.begin(BusCondition::ReceiveOverrun, now);
+        }
     }
 
     /// Takes at most `budget` frames from a queue, with the times of their arrival; those of others are dropped. Returns
@@ -199,31 +224,55 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ) -> usize {
         self.watch.receive_ran();
         self.note_lost(queue.take_dropped());
+        let mut tally = Tally::default();
         let mut frames = 0;
         while frames < budget {
             let Some((frame, arrived)) = queue.pop() else { break };
             frames += 1;
-            if self.ingest(&frame, arrived) == Ingest::Unrelated {
+            if self.take(&frame, arrived, &mut tally) == Ingest::Unrelated {
                 unrelated(&frame);
             }
         }
+        self.enter(frames, &tally);
         frames
     }
 
     /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        self.watch.standstill.receive();
-        self.meter.count(frame);
-        let outcome = self.device.ingest(frame, now);
-        increment(match outcome {
-            Ingest::Taken => {
-                self.watch.hear();
-                &mut self.statistics.taken
-            }
-            Ingest::Unrelated => &mut self.statistics.unrelated,
-            Ingest::Malformed(_) => &mut self.statistics.malformed,
-        });
+        let mut tally = Tally::default();
+        let outcome = self.take(frame, now, &mut tally);
+        self.enter(1, &tally);
         outcome
+    }
+
+    #[inline(always)]
+    fn take(&mut self, frame: &CanFrame, now: Instant, tally: &mut Tally) -> Ingest {
+        if !frame.is_whole() {
+            self.meter.count_other(frame);
+            tally.others += 1;
+        }
+        let outcome = self.device.ingest(frame, now);
+        if outcome != Ingest::Taken {
+            tally.rejected += 1;
+            increment(match outcome {
+                Ingest::Malformed(_) => &mut self.statistics.malformed,
+                _ => &mut self.statistics.unrelated,
+            });
+        }
+        outcome
+    }
+
+    /// Counts the frames of one call.
+    #[expect(clippy::cast_possible_truncation, reason = "a budget of 2^32 frames takes a day")]
+    fn enter(&mut self, frames: usize, tally: &Tally) {
+        let frames = frames as u32;
+        self.watch.standstill.receive(frames);
+        self.meter.count_whole(frames.saturating_sub(tally.others));
+        let taken = frames.saturating_sub(tally.rejected);
+        self.statistics.taken = self.statistics.taken.saturating_add(taken);
+        if taken > 0 {
+            self.watch.hear();
+        }
     }
 
     /// Notes received frames that were lost before they came here: what a queue of your own dropped. 0 changes nothing.
@@ -238,32 +287,60 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 
 impl<P: Port, K, D: Devices> Runner<P, K, D> {
     /// Offers the frames of one tick to the driver; hands frames of others that it evicts to `evicted`.
+    pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
+        if self.yields.is_some() {
+            return self.send_rest(0, None, now, evicted);
+        }
+        let mut other = CanFrame::EMPTY;
+        for sent in 0..FRAMES_A_TICK {
+            let Some(frame) = self.device.next_frame(self.turn) else { break };
+            let outcome = self.port.try_send(&frame, &mut other);
+            if outcome != Sent::Accepted {
+                return self.send_rest(sent, Some((frame, outcome, other)), now, evicted);
+            }
+            self.note_accepted(&frame, now);
+        }
+    }
+
+    /// Offers the frames after one that the driver did not simply take, and those of a tick in which one takes another turn.
     ///
     /// A frame for which there is no place goes first in the next tick. One that fails again and again takes another
     /// turn: the last if it was the first, the first otherwise. So a driver that fails one call in each tick, always the
     /// first or always the last, keeps no frame from the bus.
-    pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
+    #[cold]
+    #[inline(never)]
+    fn send_rest(
+        &mut self,
+        sent: usize,
+        mut offered: Option<(CanFrame, Sent, CanFrame)>,
+        now: Instant,
+        evicted: &mut impl FnMut(&CanFrame),
+    ) {
         let yields = self.yields.take();
         let (mut held, mut goes_first, mut refused) = (None, None, None);
-        let mut is_first = true;
-        for _ in 0..FRAMES_A_TICK {
-            let frame = match self.device.next_frame(self.turn) {
-                Some(frame) if yields == Some(frame.header()) && held.is_none() => {
-                    held = Some(frame);
-                    continue;
+        let mut is_first = sent == 0;
+        for _ in sent..FRAMES_A_TICK {
+            let (frame, outcome, other) = match offered.take() {
+                Some(offered) => offered,
+                None => {
+                    let frame = match self.device.next_frame(self.turn) {
+                        Some(frame) if yields == Some(frame.header()) && held.is_none() => {
+                            held = Some(frame);
+                            continue;
+                        }
+                        Some(frame) => frame,
+                        None => match held.take() {
+                            Some(frame) => frame,
+                            None => break,
+                        },
+                    };
+                    let mut other = CanFrame::EMPTY;
+                    (frame, self.port.try_send(&frame, &mut other), other)
                 }
-                Some(frame) => frame,
-                None => match held.take() {
-                    Some(frame) => frame,
-                    None => break,
-                },
             };
-            match self.port.try_send(&frame) {
-                Sent::Accepted => {
-                    self.count_sent(&frame);
-                    self.watch.accepted(frame.header(), now);
-                }
-                Sent::Evicted(other) => {
+            match outcome {
+                Sent::Accepted => self.note_accepted(&frame, now),
+                Sent::Evicted => {
                     self.count_sent(&frame);
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
@@ -308,6 +385,11 @@ impl<P: Port, K, D: Devices> Runner<P, K, D> {
         for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);
         }
+    }
+
+    fn note_accepted(&mut self, frame: &CanFrame, now: Instant) {
+        self.count_sent(frame);
+        self.watch.accepted(frame.header(), now);
     }
 
     fn count_sent(&mut self, frame: &CanFrame) {

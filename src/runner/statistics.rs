@@ -242,9 +242,15 @@ impl Meter {
         }
     }
 
+    /// Counts standard data frames of 8 bytes.
+    #[inline]
+    pub(super) const fn count_whole(&mut self, frames: u32) {
+        self.whole = self.whole.saturating_add(frames);
+    }
+
     #[cold]
     #[inline(never)]
-    const fn count_other(&mut self, frame: &CanFrame) {
+    pub(super) const fn count_other(&mut self, frame: &CanFrame) {
         let (nominal, worst_case) = BusLoad::frame_bits(frame);
         self.others = self.others.saturating_add(1);
         self.nominal = self.nominal.saturating_add(nominal);

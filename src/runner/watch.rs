@@ -64,6 +64,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.waiting
     }
 
+    #[inline(never)]
     pub(super) fn read_clock(&mut self) -> Instant {
         let now = self.clock.now();
         self.watch.read(now);
@@ -341,9 +342,9 @@ impl Standstill {
         self.is_fixed = true;
     }
 
-    /// Notes a received frame: time passed.
-    pub(super) const fn receive(&mut self) {
-        self.frames = self.frames.saturating_add(1);
+    /// Notes received frames: time passed.
+    pub(super) const fn receive(&mut self, frames: u32) {
+        self.frames = self.frames.saturating_add(frames);
     }
 
     /// Notes a reading of the clock.
@@ -562,7 +563,7 @@ mod standstill_tests {
                 // As many frames as a bus of 1 Mbit/s carries.
                 while heard_ns + 111_000 <= ns {
                     heard_ns += 111_000;
-                    standstill.receive();
+                    standstill.receive(1);
                 }
                 let us = ns / 1_000 / resolution_us * resolution_us;
                 standstill.read(Instant::from_micros(us));

@@ -65,8 +65,15 @@ impl Duration {
     pub const fn as_secs_f32(self) -> f32 {
         match self.micros_u32() {
             Some(micros) => micros as f32 * 1e-6,
-            None => self.0 as f32 * 1e-6,
+            None => self.long_as_secs_f32(),
         }
+    }
+
+    /// Out of line: a 64-bit conversion would run for each short duration as well, and be dropped.
+    #[cold]
+    #[inline(never)]
+    const fn long_as_secs_f32(self) -> f32 {
+        self.0 as f32 * 1e-6
     }
 
     /// Adds; stays at [`MAX`](Self::MAX) rather than wrap.

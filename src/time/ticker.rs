@@ -88,22 +88,34 @@ impl Ticker {
         if now < next {
             return self.go_back(now);
         }
-        match now.since(next).micros_u32() {
-            Some(late_us) => {
-                let skipped = late_us / self.period_us;
-                self.overruns = self.overruns.saturating_add(skipped);
-                let steps = u64::from(skipped) + 1;
-                self.next =
-                    Some(next + Duration::from_micros(steps * u64::from(self.period_us.get())));
-            }
-            None => {
-                self.overruns = u32::MAX;
-                self.next = Some(now + self.period());
-            }
+        let late = now.since(next);
+        if late < self.period() {
+            self.next = Some(next + self.period());
+        } else {
+            self.skip(next, late);
         }
         let tick = Tick::new(now, now.since(self.last).as_secs_f32());
         self.last = now;
         Some(tick)
+    }
+
+    /// Leaves out the steps that passed, and stays on the grid.
+    #[cold]
+    #[inline(never)]
+    fn skip(&mut self, next: Instant, late: Duration) {
+        match late.micros_u32() {
+            Some(late_us) => {
+                let skipped = late_us / self.period_us;
+                self.overruns = self.overruns.saturating_add(skipped);
+                let steps = u64::from(skipped) + 1;
+                let micros = steps * u64::from(self.period_us.get());
+                self.next = Some(next + Duration::from_micros(micros));
+            }
+            None => {
+                self.overruns = u32::MAX;
+                self.next = Some(next + late + self.period());
+            }
+        }
     }
 
     /// A clock that went back behind the last step starts a new grid with a step at once.
