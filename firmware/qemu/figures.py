@@ -27,7 +27,7 @@ TARGET = "thumbv7em-none-eabihf"
 PROFILES = {"3": "release", "2": "o2", "s": "os"}
 LEVELS = list(PROFILES)
 # How the functions of the rows are called in the image.
-MEASURED = ("row_", "bytes_", "control_", "runner_", "joints_")
+MEASURED = ("row_", "call_", "bytes_", "control_", "runner_", "joints_")
 QEMU = "qemu-system-arm -M mps2-an386 -icount shift=0 -nographic -monitor none -serial null".split()
 QEMU += ["-semihosting-config", "enable=on,target=native", "-kernel"]
 

@@ -129,7 +129,13 @@ impl<B> Bus<B> {
     /// assert_eq!(bus.next_edge(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
+    #[inline]
     pub fn next_edge(&mut self) -> Option<Edge> {
+        if self.guard.journal().is_empty() { None } else { self.take_edge() }
+    }
+
+    #[inline(never)]
+    fn take_edge(&mut self) -> Option<Edge> {
         let updated = self.guard.updated();
         while let Some(entry) = self.guard.journal_mut().pop() {
             let at = self.guard.journal().time_of(&entry, updated);
@@ -141,12 +147,16 @@ impl<B> Bus<B> {
             }
         }
         let at = self.guard.journal().last_time(updated);
-        self.slots.iter_mut().find_map(|slot| {
+        let edge = self.slots.iter_mut().find_map(|slot| {
             let motor = slot.name()?;
             let (condition, began) = slot.guard.latch().next()?;
             slot.guard.latch_mut().take(condition, began);
             Some(Edge { motor, condition, began, at })
-        })
+        });
+        if edge.is_none() {
+            self.guard.journal_mut().clear();
+        }
+        edge
     }
 
     /// Looks at a motor in a round that ends a window, or begins a round.

@@ -170,8 +170,9 @@ impl Shaft {
 
     /// Returns the position as turns and angle; the angle is rounded to `f32`.
     #[must_use]
+    #[inline]
     pub const fn position(&self) -> Position {
-        Position::new(self.turns.get(), self.angle())
+        Position { turns: self.turns.get(), angle: self.angle() }
     }
 
     /// Returns the angle within the turn: 0 up to, but not including, one turn.
@@ -185,6 +186,7 @@ impl Shaft {
     /// Returns the rotor's counts in the direction of the shaft, since the seed (which counts its angle) or
     /// since zero was set; exact. After a position other than zero was set, rounded to whole counts.
     #[must_use]
+    #[inline]
     pub const fn rotor_counts(&self) -> i64 {
         let fine = self
             .turns

@@ -7,6 +7,7 @@
 #![no_main]
 
 mod bytes;
+mod calls;
 mod closed_loop;
 mod constant_time;
 mod controllers;
@@ -28,6 +29,7 @@ fn main() -> ! {
         hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
         cycle::rows();
+        calls::rows();
         joints::rows();
         rows::control();
         controllers::rows();

@@ -85,6 +85,10 @@ impl Drive {
         }
     }
 
+    pub fn motors(&self) -> [Handle<M3508>; MOTORS] {
+        self.motors
+    }
+
     pub fn frames(&self) -> &[CanFrame; MOTORS] {
         &self.frames
     }

@@ -277,6 +277,8 @@ impl Slot {
     }
 
     /// Returns what is known; `None` before the first frame.
+    // The compiler leaves out what nobody reads, in line only.
+    #[inline(always)]
     pub(in crate::dji) fn state(&self) -> Option<State> {
         let facts = self.facts?;
         if self.guard.link() == Link::Unheard {

@@ -126,6 +126,8 @@ pub(crate) struct Journal<const N: usize> {
     what: [u16; N],
     first: u8,
     length: u8,
+    /// Some change has found no room since the last time that none waited.
+    is_overfull: bool,
     /// The time of the entry that was written last.
     last: u32,
 }
@@ -140,7 +142,8 @@ pub(crate) struct Entry {
 }
 
 impl<const N: usize> Journal<N> {
-    pub(crate) const EMPTY: Self = Self { at: [0; N], what: [0; N], first: 0, length: 0, last: 0 };
+    pub(crate) const EMPTY: Self =
+        Self { at: [0; N], what: [0; N], first: 0, length: 0, is_overfull: false, last: 0 };
 
     /// Notes the changes of a motor since `before`.
     #[inline]
@@ -161,6 +164,7 @@ impl<const N: usize> Journal<N> {
     fn push(&mut self, motor: u8, condition: Condition, began: bool, at: u32) {
         let index = self.index(self.length);
         if usize::from(self.length) >= N {
+            self.is_overfull = true;
             return;
         }
         if let (Some(time), Some(what)) = (self.at.get_mut(index), self.what.get_mut(index)) {
@@ -169,6 +173,17 @@ impl<const N: usize> Journal<N> {
             self.length += 1;
             self.last = at;
         }
+    }
+
+    /// Tells whether no change waits, with an entry or without.
+    #[inline]
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.length == 0 && !self.is_overfull
+    }
+
+    /// Notes that every change was read, those without an entry too.
+    pub(crate) const fn clear(&mut self) {
+        self.is_overfull = false;
     }
 
     /// Takes the oldest entry.
