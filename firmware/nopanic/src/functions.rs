@@ -73,6 +73,8 @@ fn units() {
     Angle::as_radians.call();
     Angle::as_degrees.call();
     Angle::as_turns.call();
+    Angle::wrapped.call();
+    Angle::wrapped_positive.call();
     AngularVelocity::from_rad_per_s.call();
     AngularVelocity::from_rpm.call();
     AngularVelocity::from_degrees_per_s.call();
