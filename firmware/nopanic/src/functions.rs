@@ -468,6 +468,7 @@ fn dji() {
     Measured::<Position>::way_to.call();
     WordGains::per_rotor_rpm.call();
     WordGains::per_output_rpm.call();
+    WordGains::per_rotor_degree_per_s.call();
     WordGains::each_step.call();
     WordGains::speed_loop::<M3508>.call();
     family::<Bus>();
