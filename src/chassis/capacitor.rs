@@ -10,8 +10,9 @@ const CHARGING_SHARE: f32 = 0.1;
 /// Plans a burst from a super-capacitor: the power that the chassis may take beside what the controller takes from the supply.
 ///
 /// A burst adds `2/s (energy - reserve)`, at most the power that the controller can give. So the charge nears the reserve with a
-/// time constant of 0.5 s. Below the reserve the same rule takes power away, at most a tenth, with or without a burst: what a power
-/// model has wrong, or an empty capacitor, is charged back. Otherwise nothing is added without a burst, and nothing without a reading.
+/// time constant of 0.5 s. Below the reserve the same rule takes power away, at most a tenth, with or without a burst: an empty
+/// capacitor charges, and an error of the power model is charged back. Without a burst nothing is added, and without a reading nothing
+/// is added or taken away.
 ///
 /// The power of the supply has to be the one that the controller was told. With a controller, that is the limit of the referee, or
 /// [`PowerBuffer`](super::PowerBuffer)'s allowance where it is lower: then a burst takes all of it from the capacitor, and the buffer is

@@ -16,7 +16,7 @@
 //! | 3 | `left_x` | `left_y` |
 //!
 //! Read it with a [`Receiver`](super::Receiver): when the remote control falls silent its `latest` is `None` and an edge is latched.
-//! The serial line is often that of the [`referee`](super::referee) system too; give the same bytes to both.
+//! The serial line is often that of the [`referee`] system too; give the same bytes to both.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
@@ -56,7 +56,7 @@ pub const FRAME_LENGTH: usize = 21;
 /// The usual dead band: so many of 660 counts around the centre are zero. It is the option of the frames.
 pub const DEAD_BAND: u16 = 10;
 
-/// What the remote control of the video link shows.
+/// State of the remote control of the video link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -39,7 +39,7 @@
 //!     while let Some(message) = referee.read(&mut received, now) {}
 //! }
 //! assert_eq!((referee.power_limit_w(now), referee.buffer_energy_j(now)), (80.0, Some(60.0)));
-//! let allowed_w = buffer.allowance_w(80.0, Some(60.0), 0.001);
+//! let allowed_w = buffer.allowance_w(referee.power_limit_w(now), referee.buffer_energy_j(now), 0.001);
 //! assert_eq!(allowed_w, 160.0); // 40 J to spend
 //!
 //! let later = now + Duration::from_millis(501); // silence
@@ -48,7 +48,9 @@
 //! ```
 //!
 //! Limits: a frame of more than [`MAX_DATA`] bytes of data is refused by its length, and its bytes are searched for shorter ones. A robot
-//! receives none (`0301` between robots has 118); `0310`, of 300 bytes, goes from a robot to its custom client.
+//! receives none (`0301` between robots has 118); `0310`, of 300 bytes, goes from a robot to its custom client. Of the
+//! bytes `A5` in noise, one in 131 000 has a fitting length and CRC-8 behind it: the frames that follow then wait until so many bytes have
+//! come. [`Referee::abandon`] in a pause of the line frees them.
 //!
 //! Source: frame and checksums: taproot (GPL, facts only), librm, the self-test of a public driver. Layouts: four public drivers each of
 //! the versions before and since 2.0.0, agreeing in lengths and offsets. The structure of `0202` in the document of 2026 has two

@@ -36,7 +36,7 @@ const LIMITS_W: (u16, u16) = (30, 250);
 /// A power of the chassis beyond this is none, in W: the controller is built for 22.5 A at 28.8 V.
 const MOST_W: f32 = 2_000.0;
 
-/// What the controller tells.
+/// State that the controller reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

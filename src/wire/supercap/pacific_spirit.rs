@@ -27,7 +27,7 @@ pub const COMMAND_ID: u16 = 0x2C7;
 /// The usual id of the frame from the controller.
 pub const STATE_ID: u16 = 0x2C8;
 
-/// What the controller tells.
+/// State that the controller reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
