@@ -279,6 +279,45 @@ proptest! {
     }
 }
 
+/// Every truncation and every single-bit flip of a frame gives nothing, and the frame behind it is found.
+fn damage_is_refused<F: Decode<Options: Copy> + PartialEq + Copy, const N: usize>(
+    options: F::Options,
+    frame: &[u8],
+) {
+    let found = |bytes: &[u8]| {
+        let mut decoder = Deframer::<F, N>::with_options(options);
+        let (mut input, mut found) = (bytes, Vec::new());
+        while let Some(frame) = decoder.read(&mut input) {
+            found.push(frame);
+        }
+        found
+    };
+    let good = F::decode(&options, frame).ok().unwrap();
+    // A damaged header may wait for as many bytes as the longest frame has.
+    let rest = [0; N];
+    for cut in 0..frame.len() {
+        assert!(found(&frame[..cut]).is_empty(), "{cut} bytes");
+        assert!(found(&[&frame[..cut], frame, &rest].concat()) == [good], "{cut} bytes before");
+    }
+    for bit in 0..8 * frame.len() {
+        let mut flipped = frame.to_vec();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        assert!(found(&[&flipped[..], &rest].concat()).is_empty(), "bit {bit}");
+        assert!(found(&[&flipped[..], frame, &rest].concat()) == [good], "bit {bit} before");
+    }
+}
+
+#[test]
+fn every_truncation_and_every_flipped_bit_is_refused_and_costs_only_its_frame() {
+    for bytes in [robot(80), power(50), hex(&vector("referee.0201.17")["input"]["frame"])] {
+        damage_is_refused::<RefereeMessage, MAX_FRAME>((), &bytes);
+    }
+    for id in ["vt03.mixed", "vt03.center"] {
+        let bytes = hex(&vector(id)["input"]["frame"]);
+        damage_is_refused::<VideoRemote, FRAME_LENGTH>(DEAD_BAND, &bytes);
+    }
+}
+
 fn remote(id: &str) -> (Vec<VideoRemote>, Counts) {
     read::<VideoRemote, FRAME_LENGTH>(DEAD_BAND, id)
 }
