@@ -5,6 +5,15 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+/// The examples of the pages for those who come from another framework.
+#[cfg(doctest)]
+mod coming_from {
+    #[doc = include_str!("../docs/coming-from.md")]
+    mod english {}
+    #[doc = include_str!("../docs/coming-from.zh-CN.md")]
+    mod chinese {}
+}
+
 // F0: vocabulary
 pub mod frame;
 pub mod math;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
 const FLOORS: [(&str, u32); 19] = [
-    ("units", 0),
+    ("units", 1),
     ("time", 0),
     ("math", 0),
     ("frame", 0),

@@ -9,7 +9,9 @@ use drivetrain::wire::hipnuc::Imu;
 use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
 };
+use drivetrain::wire::referee::{self, RefereeMessage};
 use drivetrain::wire::vofa::{JustFloat, justfloat};
+use drivetrain::wire::vt13::{DEAD_BAND, VideoRemote};
 use drivetrain::wire::{Counts, Decode, Deframer};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
@@ -104,6 +106,51 @@ impl Subject for Status {
         frame.extend(bytes.take(count));
         let sum = frame[2..].iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
         frame.push(!sum);
+        frame
+    }
+}
+
+impl Subject for RefereeMessage {
+    /// One of the messages that are read, or any other, now and then with a whole frame in its data.
+    fn frame(_: (), seed: u64) -> Vec<u8> {
+        let mut bytes = scramble(seed);
+        let mut byte = || bytes.next().unwrap();
+        let (command, length) = match byte() % 8 {
+            0 => (0x0201, 13),
+            1 => (0x0201, 17),
+            2 => (0x0202, 14),
+            3 => (0x0202, 16),
+            4 => (0x0207, 7),
+            _ => (u16::from_le_bytes([byte(), 3]), usize::from(byte()) % (referee::MAX_DATA + 1)),
+        };
+        let mut data: Vec<u8> = (0..length).map(|_| byte()).collect();
+        match (command, length) {
+            (0x0201, 17) => data[12..16].copy_from_slice(&30.0_f32.to_le_bytes()),
+            (0x0207, 7) => data[3..7].copy_from_slice(&24.5_f32.to_le_bytes()),
+            (_, 60..) => {
+                let inner = [0xEE; 13];
+                _ = referee::encode(0x0201, 0, &inner, &mut data[..22]).unwrap();
+            }
+            _ => {}
+        }
+        referee::encode(command, byte(), &data, &mut [0; 160]).unwrap().to_vec()
+    }
+}
+
+impl Subject for VideoRemote {
+    fn frame(_: u16, seed: u64) -> Vec<u8> {
+        let mut bytes = scramble(seed);
+        let mut byte = || u64::from(bytes.next().unwrap());
+        let mut bits = (byte() & 7) << 46 | (byte() & 0xF) << 60 | (byte() % 3) << 44;
+        for place in [0, 11, 22, 33, 49] {
+            bits |= (364 + (byte() << 8 | byte()) % 1_321) << place;
+        }
+        let mut frame = vec![0xA9, 0x53];
+        frame.extend(bits.to_le_bytes());
+        // A header among the counts of the mouse.
+        frame.extend([0xA9, 0x53, 0xA9, 0x53, 1, 2, 0b01_0001, 0x34, 0x12]);
+        let crc = crc::Crc::<u16>::new(&crc::CRC_16_MCRF4XX).checksum(&frame);
+        frame.extend(crc.to_le_bytes());
         frame
     }
 }
@@ -313,6 +360,8 @@ laws! {
     host_link_telemetry_of_the_document: Telemetry, TelemetryFormat::new().with_document_header();
     imu: Imu, ();
     servo: Status, ();
+    referee_system: RefereeMessage, ();
+    video_remote: VideoRemote, DEAD_BAND;
     plot: JustFloat<3>, ();
 }
 
@@ -332,6 +381,19 @@ fn f60_a_length_of_zero_or_too_large_is_refused_at_once() {
         assert_eq!(decoder.read(&mut &[0xFF, 0xFF, 1, length][..]), None);
         assert!(decoder.counts().length_errors >= 1, "{length}");
         assert!(decoder.read(&mut &[0xFF, 0xFF, 1, 2, 0, 0xFC][..]).is_some(), "{length}");
+    }
+}
+
+#[test]
+fn f60_a_referee_header_with_a_wrong_sum_or_too_much_data_holds_nothing_back() {
+    let good = RefereeMessage::frame((), 5);
+    // 129 bytes of data with a sum that fits, and 8 bytes with one that does not.
+    let long = referee::encode(0x0310, 0, &[0; 129], &mut [0; 160]).unwrap()[..5].to_vec();
+    for header in [&long[..], &[0xA5, 8, 0, 0, 0]] {
+        let mut decoder = Deframer::<RefereeMessage, BUFFER>::new();
+        assert_eq!(decoder.read(&mut &header[..]), None);
+        assert_eq!(decoder.counts().length_errors, 1, "{header:02X?}");
+        assert!(decoder.read(&mut &good[..]).is_some(), "{header:02X?}");
     }
 }
 

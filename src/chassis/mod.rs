@@ -26,6 +26,7 @@
 //! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
+//! | [`CapacitorPlan`] | adds the power of a super-capacitor to the limit, down to its reserve |
 //!
 //! References: K. Lynch, F. Park, *Modern Robotics* (2017), chapters 3 and 13.
 //!
@@ -46,6 +47,7 @@
 //! ```
 
 mod base;
+mod capacitor;
 mod clock;
 mod differential;
 mod drive;
@@ -66,6 +68,7 @@ mod swerve;
 mod wheels;
 
 pub use base::Chassis;
+pub use capacitor::CapacitorPlan;
 pub use differential::Differential;
 pub use drive::{ModuleMotors, WheelDrive};
 pub use error::ChassisError;

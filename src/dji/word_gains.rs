@@ -65,6 +65,27 @@ impl WordGains {
         Self { kp, ki, kd, of_rotor: false }
     }
 
+    /// Takes gains in command words per degree/s of the rotor, as `basic_framework` and its descendants have them: `ki` a second, `kd`
+    /// in seconds.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Config, M3508, WordGains};
+    ///
+    /// let wheel = Config::<M3508>::new(1);
+    /// let (kp, ..) = WordGains::per_rotor_degree_per_s(1.5, 0.0, 0.0).speed_loop(&wheel).gains();
+    /// assert!((kp - 2.0148).abs() < 1e-3); // 9 words per rpm of the rotor
+    /// ```
+    #[must_use]
+    pub const fn per_rotor_degree_per_s(kp: f32, ki: f32, kd: f32) -> Self {
+        let degree_per_s_per_rpm = 6.0;
+        Self::per_rotor_rpm(
+            kp * degree_per_s_per_rpm,
+            ki * degree_per_s_per_rpm,
+            kd * degree_per_s_per_rpm,
+        )
+    }
+
     /// Takes `ki` and `kd` as those of a program that runs every `dt_s` seconds and knows of no time: it adds the error up, and
     /// takes the difference to the step before.
     ///

@@ -1,3 +1,4 @@
+use crate::math::{wrap_pi, wrap_tau};
 use core::f32::consts::TAU;
 
 /// An angle; counter-clockwise is positive. Any `f32`, not reduced to one turn.
@@ -58,5 +59,43 @@ impl Angle {
     #[must_use]
     pub const fn as_turns(self) -> f32 {
         self.0 * (1.0 / TAU)
+    }
+
+    /// Returns the angle in -180 to 180 degrees, the upper end excluded, that points the same way.
+    ///
+    /// The shortest way from `a` to `b` is `(b - a).wrapped()`. Errors, NaN and infinity are those of
+    /// [`wrap_pi`](crate::math::wrap_pi).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::units::Angle;
+    ///
+    /// let degrees = |degrees| Angle::from_degrees(degrees).wrapped().as_degrees();
+    /// assert!((degrees(270.0) + 90.0).abs() < 1e-4);
+    /// assert!((degrees(-190.0) - 170.0).abs() < 1e-4);
+    /// let way = Angle::from_degrees(10.0) - Angle::from_degrees(350.0);
+    /// assert!((way.wrapped().as_degrees() - 20.0).abs() < 1e-4); // through zero
+    /// ```
+    #[must_use]
+    pub const fn wrapped(self) -> Self {
+        Self(wrap_pi(self.0))
+    }
+
+    /// Returns the angle in 0 to 360 degrees, the upper end excluded, that points the same way.
+    ///
+    /// For display and for programs that count so. Errors, NaN and infinity are those of [`wrap_tau`](crate::math::wrap_tau).
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::units::Angle;
+    ///
+    /// let degrees = |degrees| Angle::from_degrees(degrees).wrapped_positive().as_degrees();
+    /// assert!((degrees(-90.0) - 270.0).abs() < 1e-4);
+    /// assert!((degrees(725.0) - 5.0).abs() < 1e-4);
+    /// assert!(degrees(360.0) < 1e-4);
+    /// ```
+    #[must_use]
+    pub const fn wrapped_positive(self) -> Self {
+        Self(wrap_tau(self.0))
     }
 }

@@ -26,6 +26,13 @@ pub enum EncodeError {
         /// The number of parameter bytes asked for; at most 253 fit.
         parameters: usize,
     },
+    /// The data is more than the length field of its frame can tell.
+    DataTooLong {
+        /// The length of the data in bytes.
+        given: usize,
+        /// The most bytes that one frame takes.
+        most: usize,
+    },
 }
 
 impl fmt::Display for EncodeError {
@@ -36,6 +43,9 @@ impl fmt::Display for EncodeError {
             }
             Self::TooManyParameters { parameters } => {
                 write!(f, "{parameters} parameter bytes, one frame takes 253: split it")
+            }
+            Self::DataTooLong { given, most } => {
+                write!(f, "{given} data bytes, one frame takes {most}: split them")
             }
         }
     }

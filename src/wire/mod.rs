@@ -1,4 +1,5 @@
-//! Byte protocols: host link, IMU, servo, remote control, plotting, the text of `candump`, and the payload of MIT-mode drives.
+//! Byte protocols: host link, IMU, servo, remote control, referee system, plotting, the text of `candump`, and the payload of MIT-mode
+//! drives and of super-capacitor controllers.
 //!
 //! | module | other side | frame | check | decoder | encoder |
 //! |---|---|---|---|:-:|:-:|
@@ -6,9 +7,12 @@
 //! | [`hipnuc`] | HiPNUC IMU | 6 + length | CRC-16/XMODEM, low byte first | x | |
 //! | [`feetech`] | STS and SMS servos on one half-duplex line | 6 + parameters | sum, inverted | x | x |
 //! | [`dbus`] | DR16 receiver of a remote control | 18 bytes between pauses | none: plausibility | x | |
+//! | [`vt13`] | remote control of the video link, VT03 and VT13 | 21 bytes | CRC-16/MCRF4XX, low byte first | x | |
+//! | [`referee`] | referee system of the RoboMaster | 9 + length | CRC-8 of the header; CRC-16/MCRF4XX, low byte first | x | x |
 //! | [`vofa`] | plotting tool on a computer | 4 bytes a channel + tail | none | x | x |
 //! | [`candump`] | SocketCAN's log | a line of text | none | x | x |
 //! | [`mit`] | motors in MIT mode | the 8 bytes of a CAN frame | that of CAN | x | x |
+//! | [`supercap`] | controllers of super-capacitors | the 8 bytes of a CAN frame | that of CAN | x | x |
 //!
 //! All of them are sans-I/O: bytes in, values out, and back; who moves the bytes (interrupt, DMA, async task, file) is
 //! no concern of theirs. The framed protocols share one decoder, [`Deframer`], and with it one law: **the frames
@@ -45,7 +49,10 @@ pub mod feetech;
 pub mod hipnuc;
 pub mod host_link;
 pub mod mit;
+pub mod referee;
+pub mod supercap;
 pub mod vofa;
+pub mod vt13;
 
 mod deadline;
 mod deframer;

@@ -103,6 +103,9 @@ pub fn call_all() {
     PowerBuffer::new.call();
     PowerBuffer::with_blind_share.call();
     PowerBuffer::allowance_w.call();
+    CapacitorPlan::new.call();
+    CapacitorPlan::with_most_w.call();
+    CapacitorPlan::allowance_w.call();
     PowerFit::new.call();
     PowerFit::model.call();
     PowerFit::rejected.call();

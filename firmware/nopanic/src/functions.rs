@@ -73,6 +73,8 @@ fn units() {
     Angle::as_radians.call();
     Angle::as_degrees.call();
     Angle::as_turns.call();
+    Angle::wrapped.call();
+    Angle::wrapped_positive.call();
     AngularVelocity::from_rad_per_s.call();
     AngularVelocity::from_rpm.call();
     AngularVelocity::from_degrees_per_s.call();
@@ -466,6 +468,7 @@ fn dji() {
     Measured::<Position>::way_to.call();
     WordGains::per_rotor_rpm.call();
     WordGains::per_output_rpm.call();
+    WordGains::per_rotor_degree_per_s.call();
     WordGains::each_step.call();
     WordGains::speed_loop::<M3508>.call();
     family::<Bus>();

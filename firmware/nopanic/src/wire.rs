@@ -7,7 +7,10 @@ use drivetrain::wire::feetech::*;
 use drivetrain::wire::hipnuc::*;
 use drivetrain::wire::host_link::*;
 use drivetrain::wire::mit;
+use drivetrain::wire::referee::{self, RawMessage, Referee, RefereeMessage};
+use drivetrain::wire::supercap::{hkust, pacific_spirit};
 use drivetrain::wire::vofa::*;
+use drivetrain::wire::vt13::VideoRemote;
 use drivetrain::wire::{Deframer, Receiver};
 
 pub fn call_all() {
@@ -88,4 +91,31 @@ pub fn call_all() {
     })
     .call();
     mit::Command::torque.call();
+    referee_system();
+}
+
+fn referee_system() {
+    Referee::new.call();
+    Referee::with_highest_limit_w.call();
+    Referee::with_deadlines.call();
+    Referee::abandon.call();
+    Referee::power_limit_w.call();
+    Referee::buffer_energy_j.call();
+    Referee::is_live.call();
+    Referee::edge.call();
+    Referee::counts.call();
+    (|referee: &mut Referee, input: &mut &'static [u8], now| Referee::read(referee, input, now))
+        .call();
+    Deframer::<RefereeMessage, { referee::MAX_FRAME }>::read.call();
+    RawMessage::command.call();
+    RawMessage::data.call();
+    referee::encode.call();
+    Deframer::<VideoRemote, 21>::with_options.call();
+    Deframer::<VideoRemote, 21>::read.call();
+    hkust::command.call();
+    hkust::decode.call();
+    hkust::HkustState::energy.call();
+    pacific_spirit::command.call();
+    pacific_spirit::decode.call();
+    pacific_spirit::PacificSpiritState::energy.call();
 }

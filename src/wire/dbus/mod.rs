@@ -35,7 +35,7 @@
 //! Source: taproot (GPL, facts only), librm; a public dump. Older headers, made after the first manual, put Q, E, Shift and
 //! Ctrl into bits 4 to 7 of the keys.
 
-mod remote;
+pub(super) mod remote;
 
 pub use remote::{Keys, Remote, Switch};
 

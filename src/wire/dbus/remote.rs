@@ -147,13 +147,13 @@ impl Remote {
     }
 }
 
-fn field(bits: u64, first: u32, mask: u16) -> u16 {
+pub(in crate::wire) fn field(bits: u64, first: u32, mask: u16) -> u16 {
     let [low, high, ..] = (bits >> first).to_le_bytes();
     u16::from_le_bytes([low, high]) & mask
 }
 
 /// Scales a channel to -1..=1; `None` outside of 364..=1684.
-fn scaled(raw: u16, dead_band: u16) -> Option<f32> {
+pub(in crate::wire) fn scaled(raw: u16, dead_band: u16) -> Option<f32> {
     let distance = raw.abs_diff(CENTRE);
     if distance > SPAN {
         return None;

@@ -1,0 +1,166 @@
+use super::{MAX_FRAME, RefereeMessage};
+use crate::time::{ConditionEdge, Duration, Instant};
+use crate::wire::deadline::Deadline;
+use crate::wire::{Counts, Deframer, Silence};
+
+/// A buffer energy above this is no reading: a public super-capacitor controller (HKUST, 2024) counts no more either.
+const MOST_BUFFER_J: u16 = 300;
+
+/// The same controller switches itself off when it is told a higher limit.
+const HIGHEST_LIMIT_W: u16 = 250;
+
+/// Reads the referee system, and says which power limit and which buffer energy hold now.
+///
+/// | what is heard | power limit | buffer energy |
+/// |---|---|---|
+/// | nothing yet, or nothing in time | the safe limit, or the last that was heard if that is lower | `None` |
+/// | a first frame | the same | `None` |
+/// | two frames or more | the lower of the last two | the lower of the last two |
+/// | a value that cannot be | as if the frame had not come | as if the frame had not come |
+///
+/// So a limit falls with the first frame that says so and rises with the second, and neither silence nor a single frame raises one.
+/// Both are only numbers: no message arms a motor, moves one, or stops one.
+///
+/// # Examples
+/// ```
+/// use drivetrain::time::{Duration, Instant};
+/// use drivetrain::wire::referee::{Referee, encode};
+///
+/// let ms = |ms| Instant::START + Duration::from_millis(ms);
+/// let state = |limit_w| [3, 1, 200, 0, 200, 0, 40, 0, 100, 0, limit_w, 0, 0b111];
+/// let mut referee = Referee::new(45);
+/// for (at, limit_w) in [(0, 100), (100, 100), (200, 60)] {
+///     let mut frame = [0; 32];
+///     let mut received = encode(0x0201, 0, &state(limit_w), &mut frame)?;
+///     assert!(referee.read(&mut received, ms(at)).is_some());
+/// }
+/// assert_eq!(referee.power_limit_w(ms(700)), 60.0);
+/// assert_eq!(referee.power_limit_w(ms(701)), 45.0); // 500 ms without a frame
+/// assert!(referee.edge(ms(701)).is_some_and(|heard| !heard.began && heard.at == ms(0)));
+/// assert!(referee.edge(ms(701)).is_some_and(|silent| silent.began && silent.at == ms(700)));
+/// # Ok::<(), drivetrain::wire::EncodeError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Referee {
+    decoder: Deframer<RefereeMessage, MAX_FRAME>,
+    safe_limit_w: u16,
+    highest_limit_w: u16,
+    limit_w: LowerOfTwo,
+    buffer_j: LowerOfTwo,
+}
+
+impl Referee {
+    /// Takes the power limit in W that holds while nothing is heard: the lowest that the rules give the robot.
+    ///
+    /// A limit above 250 W is not believed. The limit is lost 500 ms after the last frame that told it (five at 10 Hz), the buffer energy
+    /// after 250 ms: at 160 W with a limit of 80 W that costs 20 J of the buffer.
+    #[must_use]
+    pub const fn new(safe_limit_w: u16) -> Self {
+        Self {
+            decoder: Deframer::new(),
+            safe_limit_w,
+            highest_limit_w: HIGHEST_LIMIT_W,
+            limit_w: LowerOfTwo::new(Duration::from_millis(500)),
+            buffer_j: LowerOfTwo::new(Duration::from_millis(250)),
+        }
+    }
+
+    /// Sets the highest power limit in W that is believed. Frames with a higher one do not count.
+    #[must_use]
+    pub const fn with_highest_limit_w(self, highest_limit_w: u16) -> Self {
+        Self { highest_limit_w, ..self }
+    }
+
+    /// Sets the ages at which the power limit and the buffer energy are lost.
+    #[must_use]
+    pub const fn with_deadlines(self, limit: Duration, buffer: Duration) -> Self {
+        Self { limit_w: LowerOfTwo::new(limit), buffer_j: LowerOfTwo::new(buffer), ..self }
+    }
+
+    /// Returns the next message of `input`, as [`Deframer::read`] does; `now` is when the bytes arrived.
+    #[must_use]
+    pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<RefereeMessage> {
+        let message = self.decoder.read(input)?;
+        match message {
+            RefereeMessage::Robot(state) => {
+                self.limit_w.note(state.chassis_power_limit_w, self.highest_limit_w, now);
+            }
+            RefereeMessage::Power(power) => {
+                self.buffer_j.note(power.buffer_energy_j, MOST_BUFFER_J, now)
+            }
+            RefereeMessage::Shot(_) | RefereeMessage::Raw(_) => {}
+        }
+        Some(message)
+    }
+
+    /// Gives up a frame that was begun and not finished; see [`Deframer::abandon`].
+    pub fn abandon(&mut self) {
+        self.decoder.abandon();
+    }
+
+    /// Returns the power limit of the chassis in W.
+    #[must_use]
+    pub fn power_limit_w(&self, now: Instant) -> f32 {
+        let fallback = self.safe_limit_w.min(self.limit_w.latest);
+        f32::from(self.limit_w.value(now).unwrap_or(fallback))
+    }
+
+    /// Returns the charge of the buffer in J.
+    #[must_use]
+    pub fn buffer_energy_j(&self, now: Instant) -> Option<f32> {
+        self.buffer_j.value(now).map(f32::from)
+    }
+
+    /// Returns whether a power limit that is believed came in time.
+    #[must_use]
+    pub fn is_live(&self, now: Instant) -> bool {
+        self.limit_w.deadline.is_live(now)
+    }
+
+    /// Returns the oldest edge of the power limit's silence that was not fetched yet.
+    #[must_use]
+    pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
+        self.limit_w.deadline.edge(now)
+    }
+
+    /// Returns how many frames were found, and what was thrown away. A header with a wrong CRC-8 is a length error.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.decoder.counts()
+    }
+}
+
+/// A number that is what the last two frames agree on at least.
+#[derive(Debug, Clone)]
+struct LowerOfTwo {
+    previous: u16,
+    /// Of the last frame that counted; the largest number before the first.
+    latest: u16,
+    is_second: bool,
+    deadline: Deadline,
+}
+
+impl LowerOfTwo {
+    const fn new(limit: Duration) -> Self {
+        Self {
+            previous: u16::MAX,
+            latest: u16::MAX,
+            is_second: false,
+            deadline: Deadline::new(limit),
+        }
+    }
+
+    fn note(&mut self, value: u16, most: u16, now: Instant) {
+        if value > most {
+            return;
+        }
+        self.is_second = self.deadline.is_live(now);
+        (self.previous, self.latest) = (self.latest, value);
+        self.deadline.meet(now);
+    }
+
+    fn value(&self, now: Instant) -> Option<u16> {
+        let holds = self.is_second && self.deadline.is_live(now);
+        holds.then_some(self.previous.min(self.latest))
+    }
+}
