@@ -46,7 +46,6 @@ class Core:
         """Cycles that were not slept."""
         self.interrupted = 0
         """Cycles within interrupts."""
-        self.hang_in = None
         self.reset()
 
     def reset(self):
@@ -62,6 +61,8 @@ class Core:
         self.asleep = None
         self._returns = False
         self.hang_in = None
+        self.stall_until = 0
+        """The core executes nothing before this cycle."""
         base, top = self.image.stack
         self.uc.mem_write(base, bytes([PAINT]) * (top - base))
 
@@ -159,6 +160,9 @@ class Core:
                 break
             upcoming = clock.next()
             clock.limit = until if upcoming is None else min(until, upcoming)
+            if self.stall_until > clock.now:
+                clock.now = max(clock.now, min(clock.limit, self.stall_until))
+                continue
             if self.asleep:
                 if self._wakes():
                     self.asleep = None
@@ -167,8 +171,7 @@ class Core:
                     continue
             if self._is_due():
                 self._enter()
-            where = self.nvic.active[-1] if self.nvic.active else None
-            if self.hang_in is not None and self.hang_in[0] == where:
+            if self.hang_in is not None and self.hang_in[0] == (self.nvic.active[-1] if self.nvic.active else None):
                 self.pc, self.hang_in = HANG, None
             self._returns = False
             try:
