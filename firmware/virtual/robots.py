@@ -10,7 +10,7 @@ ARM_AT_US, DRIVE_AT_US, FAULT_AT_US = 60_000, 110_000, 250_000
 
 
 class Program:
-    def __init__(self, name, package, chip, motors, remote=None, key=None, held=4, control=None):
+    def __init__(self, name, package, chip, motors, remote=None, key=None, held=0, control=None):
         self.name, self.package, self.chip, self.remote, self.key = name, package, chip, remote, key
         # Frames that may still leave when the line is back, and the interrupt in which the control loop runs.
         self.held, self.control = held, control

@@ -66,11 +66,7 @@ impl World {
         Ok(*self.motors.get(index.parse::<usize>()?).ok_or("no such motor")?)
     }
 
-    fn run<'a>(
-        &self,
-        until: Instant,
-        frames: impl Iterator<Item = &'a str>,
-    ) -> Outcome<String> {
+    fn run<'a>(&self, until: Instant, frames: impl Iterator<Item = &'a str>) -> Outcome<String> {
         for frame in frames {
             self.simulation.inject(Line::Can1, parse(frame)?).map_err(|_| "too many frames")?;
         }
