@@ -6,6 +6,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import controls
 import scenarios
 import table
 from board.core import Fault
@@ -31,13 +32,28 @@ def run(task):
     return result
 
 
+def run_controls(builds, world):
+    """Returns how many planted defects no row found."""
+    missed = 0
+    with ProcessPoolExecutor(2) as pool:
+        tasks = [(place, builds, world) for place in range(len(controls.PLANTS))]
+        for (name, scenario, defect), said in zip(controls.PLANTS, pool.map(controls.plant, tasks)):
+            missed += said is None
+            print(f"{name}, {scenario.__name__}, {defect.__name__}: {said or 'NOT FOUND'}")
+    print(f"virtual board: {len(controls.PLANTS)} planted defects, {missed} not found")
+    return missed
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("builds", help="the folder of the images")
     parser.add_argument("world", help="the program of the motors")
     parser.add_argument("--only", help="part of PROGRAM:FAULT; the table is not compared then")
     parser.add_argument("--update", action="store_true", help="write the table")
+    parser.add_argument("--controls", action="store_true", help="plant defects, which the rows have to find")
     options = parser.parse_args()
+    if options.controls:
+        sys.exit(1 if run_controls(options.builds, options.world) else 0)
     keys = [(name, scenario.__name__) for name, program in PROGRAMS.items() for scenario in scenarios.of(program)]
     if options.only:
         keys = [key for key in keys if options.only in ":".join(key)]
