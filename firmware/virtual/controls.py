@@ -2,7 +2,8 @@
 import struct
 
 import scenarios
-from board.bxcan import TSR
+from board.bxcan import TSR, BxCan
+from board.fdcan import TXBCR
 from robots import FAULT_AT_US, PROGRAMS, Robot
 
 FEEDBACK_LOST_US, LATE_US = struct.pack("<I", 10_000), struct.pack("<I", 60_000)
@@ -19,7 +20,8 @@ def late_deadline(robot):
 def deaf_to_abort(robot):
     """The controller ignores requests to abort."""
     can, write = robot.chip.can, robot.chip.can.write
-    can.write = lambda offset, value: write(offset, value & ~0x80_8080 if offset == TSR else value)
+    deaf = {TSR: ~0x80_8080} if isinstance(can, BxCan) else {TXBCR: 0}
+    can.write = lambda offset, value: write(offset, value & deaf.get(offset, ~0))
 
 
 def holds_commands(robot):
@@ -63,6 +65,7 @@ PLANTS = (
     ("one-motor", scenarios.silent_motor, late_deadline),
     ("one-motor", scenarios.pulled_plug, deaf_to_abort),
     ("one-motor", scenarios.short_pull, deaf_to_abort),
+    ("dm-mc02-embassy", scenarios.pulled_plug, deaf_to_abort),
     ("one-motor", scenarios.silent_motor, holds_commands),
     ("c-board-embassy", scenarios.remote_cut, holds_commands),
     ("c-board-rtic", scenarios.dead_loop, no_watchdog),

@@ -1,5 +1,6 @@
 """The programs of firmware/boards on the virtual board: how each is armed and driven, and what is read off its pins."""
-from board.board import Board, Stm32f407
+from board.board import Board
+from board.chips import Stm32f407, Stm32h723
 from board.remote import MIDDLE, UP, Remote
 
 COMMAND = 0x200
@@ -23,6 +24,7 @@ PROGRAMS = {
         Program("one-motor", "c-board-embassy", Stm32f407, 1, key=("A", 0)),
         Program("c-board-embassy", "c-board-embassy", Stm32f407, 4, remote=3),
         Program("c-board-rtic", "c-board-rtic", Stm32f407, 4, remote=3, control=7),
+        Program("dm-mc02-embassy", "dm-mc02-embassy", Stm32h723, 4, remote=5),
     )
 }
 

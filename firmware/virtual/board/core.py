@@ -11,6 +11,7 @@ TRAP = 0x1FFE_0000
 RETURN, HANG = TRAP, TRAP + 0x10
 NEVER = 0xFFFF_FFFE
 PAINT = 0xA5
+IT_BITS = 0x0600_FC00
 # Taking an interrupt and returning from it take 12 cycles each on a Cortex-M4.
 ENTRY_CYCLES = 12
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, arm.UC_ARM_REG_LR)
@@ -91,6 +92,9 @@ class Core:
         if best is None or best[0] >= self.nvic.priority():
             return False
         if self.uc.reg_read(arm.UC_ARM_REG_PRIMASK) & 1:
+            return False
+        # Within an IT block the rest of it would be saved with the status; the interrupt waits for its end, three instructions.
+        if self.uc.reg_read(arm.UC_ARM_REG_XPSR) & IT_BITS:
             return False
         base = self.uc.reg_read(arm.UC_ARM_REG_BASEPRI) & 0xF0
         return not base or best[0] < base
