@@ -1,6 +1,7 @@
 """The programs of firmware/boards on the virtual board: how each is armed and driven, and what is read off its pins."""
 from board.board import Board
 from board.chips import Stm32f407, Stm32h723
+from board.imu import Imu
 from board.remote import MIDDLE, UP, Remote
 
 COMMAND = 0x200
@@ -37,6 +38,7 @@ class Robot(Board):
         self.held = program.held
         super().__init__(program.chip, f"{builds}/{program.name}", world, program.motors)
         self.remote = Remote(self, program.remote) if program.remote else None
+        self.imu = None
         self.at(ARM_AT_US, lambda: self.ask_to_arm(True))
         if self.remote:
             self.at(DRIVE_AT_US, lambda: self.stick(0.5))
@@ -54,6 +56,10 @@ class Robot(Board):
             self.at(at_us, lambda: self.stick(0.0))
             self.at(at_us + 200_000, lambda: self.stick(0.5))
         self.at(at_us + 150_000, lambda: self.ask_to_arm(True))
+
+    def with_imu(self):
+        """All boards have the IMU on USART1."""
+        self.imu = Imu(self, 1)
 
     def hang_control(self):
         self.core.hang(self.program.control)

@@ -130,6 +130,48 @@ def short_bus_off(robot):
     return {"zero_us": None, "stale": len(stale), "note": "goes on by itself"}
 
 
+def power_loss(robot):
+    """The first ESC has no supply for 300 ms while its motor turns, and starts afresh: no current until it is armed again."""
+    _driving(robot)
+    back = FAULT_AT_US + 300_000
+    robot.world.fault("power", 0, FAULT_AT_US, back)
+    robot.run(back + 200_000)
+    word = [frame for frame in robot.commands(FAULT_AT_US) if any(frame.data[:2])]
+    last = word[-1].us if word else FAULT_AT_US
+    zeros = [frame.us for frame in robot.commands(last) if not any(frame.data[:2])]
+    must(zeros, "its word never is zero")
+    zero = zeros[0] - FAULT_AT_US
+    must(zero < LOST_US, f"its word is zero after {zero:.0f} us only")
+    _drives_again(robot, back + 200_000)
+    return {"zero_us": zero, "stale": len(robot.stale()), "note": "rests when heard again; drives again when armed again"}
+
+
+def flood(robot):
+    """Another node fills the line with its most urgent frames for 150 ms: nobody else gets through."""
+    _driving(robot)
+    back = FAULT_AT_US + 150_000
+
+    def fill():
+        queue = robot.wire.others.get("foreign", ())
+        for _ in range(20 - len(queue)):
+            robot.wire.offer("foreign", 0x001, b"\xAA" * 8)
+        if robot.clock.us() < back:
+            robot.clock.after(robot.clock.cycles(CYCLE_US), fill)
+
+    fill()
+    robot.run(back + 100_000)
+    # One frame may have been on the wire already; the flood ends up to 20 frames later.
+    quiet = [frame for frame in robot.commands(FAULT_AT_US + 300, back)]
+    must(not quiet, f"{len(quiet)} frames of ours went before more urgent ones")
+    zero, stale = robot.zero_after(back), robot.stale(FAULT_AT_US)
+    must(zero is not None and zero < 20 * 140 + 2 * CYCLE_US, f"no zeros after {zero} us")
+    must(not stale, f"{len(stale)} stale frames")
+    must(not robot.driven(back, back + 100_000), "it drives after the flood, though nobody armed it again")
+    must(not robot.resets, "it was reset")
+    _drives_again(robot, back + 100_000)
+    return {"zero_us": zero, "stale": len(stale), "note": "from the end of the flood; drives again when armed again"}
+
+
 def bus_off(robot):
     """The line is held at one level for 150 ms: the controller goes bus-off, and is back by itself, with zeros."""
     _driving(robot)
@@ -243,8 +285,30 @@ def remote_noise(robot):
     return {"zero_us": zero, "stale": len(robot.stale()), "note": "at rest"}
 
 
-ALL = (start, pulled_plug, short_pull, silent_motor, bus_off, short_bus_off, overrun, esc_error, second_master, dead_loop, brown_out)
-WITH_REMOTE = (remote_cut, remote_noise)
+def imu_cut(robot):
+    """The line of the IMU is cut in the middle of a frame while a stick is held: the robot stops until the sticks are let go."""
+    robot.with_imu()
+    _driving(robot)
+    robot.imu.cut_after = 40
+    robot.run(FAULT_AT_US + 800_000)
+    speeds = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(speeds) < 5, f"the wheels turn with {speeds} rpm, though the IMU is lost")
+    # Heard again while the stick is still held: nothing moves before it is let go.
+    robot.imu.cut_after = None
+    robot.run(FAULT_AT_US + 1_200_000)
+    speeds = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(speeds) < 5, f"the wheels turn with {speeds} rpm before the stick is let go")
+    robot.stick(0.0)
+    robot.run(FAULT_AT_US + 1_300_000)
+    robot.stick(0.5)
+    robot.run(FAULT_AT_US + 1_600_000)
+    must(abs(robot.world.state(0)[0]) > 20, "it does not drive after the stick was let go and pushed again")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": None, "stale": len(robot.stale()), "note": "stands; drives when the stick is let go and pushed again"}
+
+
+ALL = (start, pulled_plug, short_pull, silent_motor, power_loss, bus_off, short_bus_off, flood, overrun, esc_error, second_master, dead_loop, brown_out)
+WITH_REMOTE = (remote_cut, remote_noise, imu_cut)
 
 
 def of(program):

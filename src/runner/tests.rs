@@ -431,7 +431,7 @@ fn pulled<P: Port>(
     port: impl Fn(Mailboxes) -> P,
     mailboxes: impl Fn(&mut P) -> &mut Mailboxes,
     out_ms: u64,
-) -> (Vec<u8>, Option<u64>) {
+) -> (Vec<i16>, Option<u64>) {
     let clock = ManualClock::new(Instant::START);
     let mut bus = Bus::new();
     let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
@@ -458,7 +458,8 @@ fn pulled<P: Port>(
     can.left.clear();
     can.is_plugged = true;
     can.run();
-    (can.left.iter().map(|frame| frame.bytes()[1]).collect(), down)
+    let word = |frame: &CanFrame| i16::from_be_bytes([frame.bytes()[0], frame.bytes()[1]]);
+    (can.left.iter().map(word).collect(), down)
 }
 
 #[test]
@@ -477,10 +478,8 @@ fn with_an_abort_what_leaves_after_a_pulled_plug_is_of_the_last_tick() {
         down.is_some_and(|ms| (100..=102).contains(&ms)),
         "a bus that sends nothing is down: {down:?}"
     );
-    // Shorter than it takes to lose the feedback: the current of the last tick, 2.5 A of 20 A in 16384.
-    let word = (2.5_f32 / 20.0 * 16384.0) as i16;
-    let (left, down) = pulled(NbAbort, |port| &mut port.0, 5);
-    assert_eq!((left, down), (std::vec![word.to_be_bytes()[1]], None));
+    // Shorter than it takes to lose the feedback: the current of the last tick, 2.5 A, of 20 A in 16384.
+    assert_eq!(pulled(NbAbort, |port| &mut port.0, 5), (std::vec![2048], None));
 }
 
 #[test]
