@@ -10,7 +10,7 @@
 //! Sending never loses a newest value: what the driver refuses, fails or evicts is offered again after the next
 //! update, first, with the values of that update. What already waits in the controller cannot be called back through
 //! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver that can abort
-//! them is reached with [`Runner::port_mut`].
+//! them implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
 //!
 //! # What it watches
 //! A bus that is down or silent, overruns and a clock that does not go on are latched as [`ConditionEdge`]s beside those of
@@ -19,6 +19,7 @@
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
+mod abort;
 mod edge;
 mod port;
 #[cfg(feature = "queue")]
@@ -29,6 +30,7 @@ mod stop;
 mod tests;
 mod watch;
 
+pub use abort::{AbortPending, NbAbort};
 pub use edge::BusCondition;
 pub use port::{BlockingTx, Nb, Port};
 #[cfg(feature = "queue")]
@@ -221,6 +223,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         if self.stop.is_some_and(EmergencyStop::is_set) {
             self.device.emergency_stop();
         }
+        self.call_back(tick.now(), &mut evicted);
         self.device.update(tick);
         limit(&mut self.device);
         self.turn = self.turn.wrapping_add(1);

@@ -9,7 +9,7 @@ use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Instant};
 use embedded_can::{Error, ErrorKind};
 
-/// What the runner needs of a CAN driver: implemented by [`Nb`] and [`BlockingTx`].
+/// What the runner needs of a CAN driver: implemented by [`Nb`], [`NbAbort`](super::NbAbort) and [`BlockingTx`].
 ///
 /// Several drivers implement both traits of `embedded-can`, whose methods have the same names, so the choice is a
 /// newtype. A driver with neither trait gets `embedded_can::nb::Can` by a newtype of its own.
@@ -23,6 +23,10 @@ pub trait Driver {
 
     /// Asks the driver for a received frame, and writes it over `frame`.
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received;
+
+    /// Calls back the frames that wait in the controller, if the driver can; `None` for one that is no classic CAN frame of at
+    /// most 8 bytes.
+    fn call_back(&mut self, _back: impl FnMut(Option<CanFrame>)) {}
 }
 
 /// What became of a frame that was offered to the driver.
@@ -62,27 +66,41 @@ pub struct Nb<C>(pub C);
 impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
 impl<C: embedded_can::nb::Can> Driver for Nb<C> {
-    // The length of the frame is known where it comes from: no loop copies its bytes then.
     #[inline(always)]
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
-        let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
-        match self.0.transmit(&frame) {
-            Ok(None) => Sent::Accepted,
-            Ok(Some(other)) if evicted.copy_from(&other) => Sent::Evicted,
-            Ok(Some(_)) => Sent::EvictedForeign,
-            Err(nb::Error::WouldBlock) => Sent::Full,
-            Err(nb::Error::Other(error)) => Sent::Failed(error.kind()),
-        }
+        send(&mut self.0, frame, evicted)
     }
 
     #[inline]
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
-        match self.0.receive() {
-            Ok(received) if frame.copy_from(&received) => Received::Frame,
-            Ok(_) => Received::Foreign,
-            Err(nb::Error::WouldBlock) => Received::Empty,
-            Err(nb::Error::Other(error)) => Received::Failed(error.kind()),
-        }
+        receive(&mut self.0, frame)
+    }
+}
+
+// The length of the frame is known where it comes from: no loop copies its bytes then.
+#[inline(always)]
+pub(super) fn send<C: embedded_can::nb::Can>(
+    driver: &mut C,
+    frame: &CanFrame,
+    evicted: &mut CanFrame,
+) -> Sent {
+    let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
+    match driver.transmit(&frame) {
+        Ok(None) => Sent::Accepted,
+        Ok(Some(other)) if evicted.copy_from(&other) => Sent::Evicted,
+        Ok(Some(_)) => Sent::EvictedForeign,
+        Err(nb::Error::WouldBlock) => Sent::Full,
+        Err(nb::Error::Other(error)) => Sent::Failed(error.kind()),
+    }
+}
+
+#[inline(always)]
+pub(super) fn receive<C: embedded_can::nb::Can>(driver: &mut C, frame: &mut CanFrame) -> Received {
+    match driver.receive() {
+        Ok(received) if frame.copy_from(&received) => Received::Frame,
+        Ok(_) => Received::Foreign,
+        Err(nb::Error::WouldBlock) => Received::Empty,
+        Err(nb::Error::Other(error)) => Received::Failed(error.kind()),
     }
 }
 

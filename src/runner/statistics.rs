@@ -31,7 +31,7 @@ pub struct Statistics {
     pub refused: u32,
     /// Errors of the driver when offered a frame. The frame is kept as well.
     pub send_errors: ErrorCounts,
-    /// Own frames that the driver gave back for others of higher priority. Kept as well.
+    /// Own frames that the driver gave back, for others of higher priority or because they were called back. Kept as well.
     pub evicted: u32,
     /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
     pub evicted_unrelated: u32,

@@ -100,6 +100,8 @@ struct Unsent {
     offered: Instant,
     /// The tick in which the driver took it, as long as it may come back.
     accepted: Option<Instant>,
+    /// Whether it was called back after it had waited for a whole tick: then it was not sent, though the driver takes it.
+    returns: bool,
     tries: u8,
 }
 
@@ -204,7 +206,7 @@ impl Watch {
         };
         if unsent.accepted.take().is_some() {
             // The frame of an earlier tick was taken and stayed.
-            unsent.since = now;
+            (unsent.since, unsent.returns) = (now, false);
         }
         unsent.offered = now;
         unsent.tries = unsent.tries.saturating_add(1);
@@ -219,9 +221,25 @@ impl Watch {
         }
     }
 
+    /// Notes a frame that was called back because it had waited in the controller for a whole tick.
+    #[cold]
+    pub(super) fn called_back(&mut self, header: u32, now: Instant) {
+        self.evicted(header, now);
+        if let Some(unsent) = self.unsent.iter_mut().flatten().find(|it| it.header == header) {
+            unsent.returns = true;
+        }
+    }
+
     fn begin(&mut self, header: u32, now: Instant) {
         if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
-            *place = Some(Unsent { header, since: now, offered: now, accepted: None, tries: 1 });
+            *place = Some(Unsent {
+                header,
+                since: now,
+                offered: now,
+                accepted: None,
+                returns: false,
+                tries: 1,
+            });
             self.has_unsent = true;
         }
     }
@@ -270,7 +288,7 @@ impl Watch {
             let stays_sent = unsent.accepted.is_some_and(|before| before != now);
             if stays_sent || now.since(unsent.offered) >= FORGOTTEN_AFTER {
                 *place = None;
-            } else if unsent.accepted.is_none() {
+            } else if unsent.accepted.is_none() || unsent.returns {
                 lost |= now.since(unsent.since) >= BUS_LOST_AFTER;
             }
         }

@@ -1,12 +1,12 @@
 //! What the programs for this board share: its clocks, its CAN, its watchdog.
 #![no_std]
 
-use drivetrain::runner::Nb;
+use drivetrain::runner::{AbortPending, NbAbort};
 use drivetrain::time::Instant;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, Can, filter::Mask32};
 use embassy_stm32::peripherals::{CAN1, PD0, PD1};
-use embassy_stm32::{Config, Peri, bind_interrupts, rcc, time::Hertz};
-use embedded_can::ErrorKind;
+use embassy_stm32::{Config, Peri, bind_interrupts, pac, rcc, time::Hertz};
+use embedded_can::{ErrorKind, StandardId};
 use static_cell::StaticCell;
 
 /// A loop that stands for so long is reset, and comes back disarmed. The watchdog's own oscillator is up to half off.
@@ -42,13 +42,39 @@ impl embedded_can::nb::Can for Halves {
     }
 }
 
+/// embassy's buffered halves have no such call, so it goes by the registers: TSR, and the mailboxes.
+impl AbortPending for Halves {
+    fn abort_pending(&mut self, mut back: impl FnMut(can::Frame)) {
+        // Twice: the interrupt fills a mailbox that is free from the queue, which holds one frame.
+        for _ in 0..2 {
+            for mailbox in 0..3 {
+                let status = pac::CAN1.tsr().read();
+                // One that is on the wire is free at the end of this attempt.
+                if status.tme(mailbox) || status.abrq(mailbox) {
+                    continue;
+                }
+                let held = pac::CAN1.tx(mailbox);
+                let id = StandardId::new(held.tir().read().stid()).unwrap_or(StandardId::MAX);
+                let length = held.tdtr().read().dlc();
+                let words = [held.tdlr().read().0, held.tdhr().read().0];
+                pac::CAN1.tsr().write(|status| status.set_abrq(mailbox, true));
+                let [[a, b, c, d], [e, f, g, h]] = words.map(u32::to_le_bytes);
+                let header = can::frame::Header::new(id.into(), length, false);
+                if let Ok(frame) = can::Frame::new(header, &[a, b, c, d, e, f, g, h]) {
+                    back(frame);
+                }
+            }
+        }
+    }
+}
+
 /// CAN1 with 1 Mbit/s. To be called once.
 pub async fn can1(
     can1: Peri<'static, CAN1>,
     receive: Peri<'static, PD0>,
     transmit: Peri<'static, PD1>,
-) -> Nb<Halves> {
-    // What waits here cannot be called back when the bus comes back, so it is short.
+) -> NbAbort<Halves> {
+    // What waits here is called back through the mailboxes, one frame a round, so it is short.
     static SENDING: StaticCell<can::TxBuf<1>> = StaticCell::new();
     static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
     let mut controller = Can::new(can1, receive, transmit, Interrupts);
@@ -62,7 +88,7 @@ pub async fn can1(
     let halves = Halves(buffered.writer(), buffered.reader());
     // Dropped, they would reset the controller and put it to sleep.
     core::mem::forget((controller, buffered));
-    Nb(halves)
+    NbAbort(halves)
 }
 
 /// Reads the time, for the runner.

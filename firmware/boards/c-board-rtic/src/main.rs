@@ -16,25 +16,48 @@
 #![no_std]
 #![no_main]
 
-use bxcan::{Frame, Tx};
+use bxcan::{Frame, Mailbox, Tx};
 use core::convert::Infallible;
 use defmt_rtt as _;
+use drivetrain::runner::AbortPending;
 use panic_probe as _;
 use stm32f4xx_hal::{can::Can, pac};
 
-/// The sending half of bxcan as a driver; frames are received in the interrupt.
-pub struct Sending(Tx<Can<pac::CAN1>>);
+/// The sending half of bxcan as a driver, with the frame that each mailbox was given; frames are received in the interrupt.
+pub struct Sending(Tx<Can<pac::CAN1>>, [Option<Frame>; 3]);
 
 impl embedded_can::nb::Can for Sending {
     type Frame = Frame;
     type Error = Infallible;
 
     fn transmit(&mut self, frame: &Frame) -> nb::Result<Option<Frame>, Infallible> {
-        self.0.transmit(frame).map(|status| status.dequeued_frame().cloned())
+        let status = self.0.transmit(frame)?;
+        let [first, second, third] = &mut self.1;
+        *match status.mailbox() {
+            Mailbox::Mailbox0 => first,
+            Mailbox::Mailbox1 => second,
+            Mailbox::Mailbox2 => third,
+        } = Some(frame.clone());
+        Ok(status.dequeued_frame().cloned())
     }
 
     fn receive(&mut self) -> nb::Result<Frame, Infallible> {
         Err(nb::Error::WouldBlock)
+    }
+}
+
+impl AbortPending for Sending {
+    fn abort_pending(&mut self, mut back: impl FnMut(Frame)) {
+        if self.0.is_idle() {
+            return;
+        }
+        let mailboxes = [Mailbox::Mailbox0, Mailbox::Mailbox1, Mailbox::Mailbox2];
+        for (mailbox, held) in mailboxes.into_iter().zip(&mut self.1) {
+            // Waits for the end of the attempt when the frame is on the wire: 0.15 ms at most.
+            if let Some(frame) = held.take_if(|_| self.0.abort(mailbox)) {
+                back(frame);
+            }
+        }
     }
 }
 
@@ -45,7 +68,7 @@ mod app {
     use bxcan::{Fifo, Interrupt, Rx0};
     use core::sync::atomic::{AtomicU32, Ordering};
     use drivetrain::dji::Bus;
-    use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, Runner};
+    use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, NbAbort, Runner};
     use drivetrain::time::{Instant, Tick};
     use pilot::{Pilot, Wish};
     use rtic_time::Monotonic;
@@ -56,7 +79,7 @@ mod app {
     use stm32f4xx_hal::{rcc, timer::MonoTimerUs, watchdog::IndependentWatchdog};
 
     type Micros = MonoTimerUs<TIM2>;
-    type Robot = Runner<Nb<Sending>, fn() -> Instant, Bus>;
+    type Robot = Runner<NbAbort<Sending>, fn() -> Instant, Bus>;
 
     /// Times that the controller's FIFO ran over.
     static OVERRUNS: AtomicU32 = AtomicU32::new(0);
@@ -107,7 +130,8 @@ mod app {
 
         let mut bus = Bus::new();
         let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
-        let runner = Runner::new(Nb(Sending(sending)), now as fn() -> Instant, bus);
+        let runner =
+            Runner::new(NbAbort(Sending(sending, [None, None, None])), now as fn() -> Instant, bus);
         let (into_queue, queue) = cx.local.frames.split();
         // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
         let mut watchdog = IndependentWatchdog::new(cx.device.IWDG);

@@ -16,13 +16,15 @@
 use core::cell::RefCell;
 use defmt_rtt as _;
 use drivetrain::dji::Bus;
+use drivetrain::frame::CanFrame;
 use drivetrain::motor::Devices;
 use drivetrain::time::{Duration, Instant, Tick};
 use embassy_executor::Spawner;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, CanConfigurator};
 use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, Parity};
-use embassy_stm32::{Config, Peri, bind_interrupts, peripherals, rcc, time::Hertz};
+use embassy_stm32::{Config, Peri, bind_interrupts, pac, peripherals, rcc, time::Hertz};
 use embassy_stm32::{peripherals::IWDG1, wdg::IndependentWatchdog};
 use embassy_sync::blocking_mutex::{Mutex, raw::ThreadModeRawMutex};
 use embedded_io_async::Read;
@@ -60,6 +62,23 @@ async fn receive(can: BufferedCanReceiver, robot: &'static Shared) {
     }
 }
 
+/// Calls back what waits in the controller and in the queue before it, so that no old command leaves when a bus is back. Tells
+/// whether there was anything. embassy's buffered halves have no such call.
+fn call_back() -> bool {
+    let mut is_any = false;
+    // Twice: the interrupt fills a buffer that is free from the queue, which holds one frame.
+    for _ in 0..2 {
+        let pending = pac::FDCAN1.txbrp().read();
+        if pending.0 != 0 {
+            is_any = true;
+            // A frame that is on the wire is free at the end of this attempt.
+            pac::FDCAN1.txbcr().write(|cancel| cancel.0 = pending.0);
+            interrupt::FDCAN1_IT0.pend();
+        }
+    }
+    is_any
+}
+
 #[embassy_executor::task]
 async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<'static, IWDG1>) {
     // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
@@ -69,6 +88,8 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
     let mut watchdog = IndependentWatchdog::new(iwdg, WATCHDOG_US);
     let mut refused_since: Option<Instant> = None;
     let mut was_down = false;
+    // The frames of a tick: a bus has five at most.
+    let mut taken: [Option<CanFrame>; 5] = [None; 5];
     let mut millisecond = embassy_time::Ticker::every(embassy_time::Duration::from_millis(1));
     let mut before = micros(embassy_time::Instant::now());
     watchdog.unleash();
@@ -95,14 +116,21 @@ async fn control(mut can: BufferedCanSender, robot: &'static Shared, iwdg: Peri<
             }
             pilot.drive(bus, tick);
             pilot.edges(tick.now(), |who, edge| defmt::warn!("{}: {}", who, edge));
+            // What did not leave within a period counts as refused, and is offered again with newer values.
+            let mut is_refused = call_back();
+            for frame in taken.iter_mut().filter_map(Option::take).filter(|_| is_refused) {
+                bus.requeue(&frame);
+            }
             bus.update(tick);
-            let mut is_refused = false;
+            let mut places = taken.iter_mut();
             while let Some(frame) = bus.next_frame() {
                 // No waiting here: a frame without a place goes with the next tick, with newer values.
                 let offered = frame.convert::<can::Frame>();
                 if offered.is_none_or(|offered| can.try_write(offered).is_err()) {
                     is_refused = true;
                     bus.requeue(&frame);
+                } else if let Some(place) = places.next() {
+                    *place = Some(frame);
                 }
             }
             refused_since = is_refused.then(|| refused_since.unwrap_or(tick.now()).min(tick.now()));
@@ -157,7 +185,7 @@ async fn main(spawner: Spawner) {
     static ROBOT: StaticCell<Shared> = StaticCell::new();
     let robot: &'static Shared = ROBOT.init(Mutex::new(RefCell::new(Robot { bus, pilot })));
 
-    // What waits here cannot be called back when the bus comes back, so it is short.
+    // What waits here is called back through the controller, one frame a round, so it is short.
     static SENDING: StaticCell<can::TxBuf<1>> = StaticCell::new();
     static RECEIVED: StaticCell<can::RxBuf<32>> = StaticCell::new();
     let mut can = CanConfigurator::new(board.FDCAN1, board.PD0, board.PD1, Interrupts);

@@ -1,0 +1,1 @@
+"""A virtual board: executes an unmodified release image and models the chip around the core."""

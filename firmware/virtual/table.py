@@ -1,0 +1,84 @@
+"""The table of docs/virtual-board.md: written by the run, and compared by it."""
+
+HEAD = """# The virtual board
+
+`firmware/virtual/run` executes the release images of `firmware/boards` on a virtual board, unmodified, and does to them what
+each row says. The run fails if a row differs from this table, which `firmware/virtual/run --update` writes.
+
+Instructions are executed by Unicorn, each in one cycle at the clock of the chip. The models of the chip and of the CAN line are
+in `firmware/virtual/board`; the motors are those of `drivetrain::sim`. No board was there: the model of a register is as right as
+our reading of the reference manual.
+
+* Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
+  other frame follows. For power-on it is the time from reset to the first frame. A dash: the robot goes on.
+* Stale: frames on the wire that are not zero and that the program had made more than a cycle before.
+
+| program | fault | zeros after, ms | stale | then |
+|---|---|--:|--:|---|
+"""
+MIDDLE = """
+At rest there is no fault: the program drives for 50 ms. The jitter is the largest difference between the distance of two commands
+and 1 ms. The stack is the deepest one over all rows.
+
+| program | jitter, us | instructions a cycle, mean | busiest | in interrupts, mean | deepest stack, B |
+|---|--:|--:|--:|--:|--:|
+"""
+FIGURES = ("jitter_us", "mean", "busiest", "interrupts")
+
+
+def rows(results):
+    """Each row as its key and its cells."""
+    for (program, fault), result in results.items():
+        zero = "-" if result["zero_us"] is None else f"{result['zero_us'] / 1000:.2f}"
+        yield (program, fault.replace("_", " ")), (zero, str(result["stale"]), result["note"])
+
+
+def costs(results):
+    deepest = {}
+    for (program, _), result in results.items():
+        deepest[program] = max(deepest.get(program, 0), result["stack"])
+    for (program, fault), result in results.items():
+        if fault == "start":
+            figures = [f"{result['figures'][name]:.0f}" for name in FIGURES]
+            yield (program,), (*figures, str(deepest[program]))
+
+
+def write(results):
+    line = lambda key, cells: f"| {' | '.join((*key, *cells))} |\n"
+    text = HEAD + "".join(line(*row) for row in rows(results))
+    return text + MIDDLE + "".join(line(*row) for row in costs(results))
+
+
+def read(text):
+    found = {}
+    for line in text.splitlines():
+        if line.startswith("| ") and not line.startswith("| program"):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            width = 2 if len(cells) == 5 else 1
+            found[tuple(cells[:width])] = tuple(cells[width:])
+    return found
+
+
+def agrees(known, seen):
+    """Equal texts; numbers with a point or above a hundred may move by a fifth: another compiler makes another image."""
+    if known == seen:
+        return True
+    try:
+        known_value, seen_value = float(known), float(seen)
+    except ValueError:
+        return False
+    if "." not in known and known_value < 100:
+        return False
+    return abs(known_value - seen_value) <= max(0.2 * abs(known_value), 0.3 if "." in known else 0)
+
+
+def differences(text, results):
+    known = read(text)
+    for key, cells in [*rows(results), *costs(results)]:
+        expected = known.pop(key, None)
+        if expected is None:
+            yield f"{', '.join(key)}: not in the table"
+        elif len(expected) != len(cells) or not all(map(agrees, expected, cells)):
+            yield f"{', '.join(key)}: the table has {expected}, seen {cells}"
+    for key in known:
+        yield f"{', '.join(key)}: in the table, not seen"

@@ -1,0 +1,112 @@
+//! Frames that wait in the controller for a whole tick are called back, so that no old command leaves later.
+
+use super::port::{Driver, Received, Sent, receive, send};
+use super::statistics::increment;
+use super::{Port, Runner};
+use crate::frame::CanFrame;
+use crate::motor::Devices;
+use crate::time::Instant;
+
+/// A CAN driver that can call back frames which wait in its controller: bxCAN, FDCAN and MCP2515 can.
+///
+/// `embedded-can` has no such call. Without it, a plug that was pulled while the motors were driven leaves a frame with the old
+/// currents in each mailbox, and they leave when it is back. Implement it for the newtype around the driver, and wrap that in
+/// [`NbAbort`] instead of [`Nb`](super::Nb).
+pub trait AbortPending: embedded_can::nb::Can {
+    /// Asks the controller not to send what waits in it, and hands each such frame to `back`. Does not wait.
+    ///
+    /// A frame that is on the wire at that moment may still arrive; it is handed over too if the controller cannot tell. What
+    /// waits in a queue of the driver counts as well.
+    fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
+}
+
+/// A driver that implements [`AbortPending`]: as [`Nb`](super::Nb), and no command older than one period waits in the controller.
+///
+/// Before each update, every frame that was not sent since the tick before is called back. Those of the device are offered
+/// again with the values of this update. Frames of others are given up: they go to the closure of
+/// [`Runner::tick_with`], as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
+/// refuses every frame.
+///
+/// # Examples
+/// The plug is out for 5 ms while the current changes: with `Nb`, each mailbox would send an old one afterwards.
+/// ```
+/// use drivetrain::dji::{Bus, Config, M3508};
+/// use drivetrain::frame::CanFrame;
+/// use drivetrain::runner::{AbortPending, NbAbort, Runner};
+/// use drivetrain::time::{Duration, Instant, ManualClock};
+/// # use embedded_can::ErrorKind;
+///
+/// /// A controller whose plug is out: nothing ever leaves.
+/// #[derive(Default)]
+/// struct Unplugged(Vec<CanFrame>);
+/// # impl embedded_can::nb::Can for Unplugged {
+/// #     type Frame = CanFrame;
+/// #     type Error = ErrorKind;
+/// #     fn transmit(&mut self, frame: &CanFrame) -> nb::Result<Option<CanFrame>, ErrorKind> {
+/// #         if self.0.len() == 3 { return Err(nb::Error::WouldBlock); }
+/// #         self.0.push(*frame);
+/// #         Ok(None)
+/// #     }
+/// #     fn receive(&mut self) -> nb::Result<CanFrame, ErrorKind> { Err(nb::Error::WouldBlock) }
+/// # }
+/// impl AbortPending for Unplugged {
+///     fn abort_pending(&mut self, back: impl FnMut(CanFrame)) {
+///         self.0.drain(..).for_each(back);
+///     }
+/// }
+///
+/// let clock = ManualClock::new(Instant::START);
+/// let mut bus = Bus::new();
+/// bus.attach(Config::<M3508>::new(1))?;
+/// let mut runner = Runner::new(NbAbort(Unplugged::default()), &clock, bus);
+/// for _ in 0..5 {
+///     clock.advance(Duration::from_millis(1));
+///     runner.poll(16);
+///     if let Some(tick) = runner.due() {
+///         runner.tick(tick);
+///     }
+/// }
+/// assert_eq!(runner.port_mut().0.0.len(), 1); // that of the last tick
+/// assert_eq!(runner.statistics().evicted, 4);
+/// # Ok::<(), drivetrain::dji::AttachError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct NbAbort<C>(pub C);
+
+impl<C: AbortPending> Port for NbAbort<C> {}
+
+impl<C: AbortPending> Driver for NbAbort<C> {
+    #[inline(always)]
+    fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
+        send(&mut self.0, frame, evicted)
+    }
+
+    #[inline]
+    fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
+        receive(&mut self.0, frame)
+    }
+
+    fn call_back(&mut self, mut back: impl FnMut(Option<CanFrame>)) {
+        self.0.abort_pending(|frame| back(CanFrame::copy_of(&frame)));
+    }
+}
+
+impl<P: Port, K, D: Devices> Runner<P, K, D> {
+    /// Calls back what was offered in the tick before and did not leave; hands frames of others to `others`.
+    pub(super) fn call_back(&mut self, now: Instant, others: &mut impl FnMut(&CanFrame)) {
+        let Self { port, device, statistics, meter, watch, .. } = self;
+        port.call_back(|frame| match frame {
+            Some(frame) if device.requeue(&frame) => {
+                increment(&mut statistics.evicted);
+                meter.discount(&frame);
+                watch.called_back(frame.header(), now);
+            }
+            frame => {
+                increment(&mut statistics.evicted_unrelated);
+                if let Some(frame) = frame {
+                    others(&frame);
+                }
+            }
+        });
+    }
+}
