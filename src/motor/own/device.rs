@@ -39,7 +39,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let was_on = self.power.is_on();
         self.switch(may_drive, tick.now());
         // Before the drive was on for certain, it was polled where rest would have disabled it.
-        self.rested = self.rested.filter(|_| !was_on || self.power.is_on());
+        self.rested.take_if(|_| was_on && !self.power.is_on());
         let inquiry = self.inquire(tick.now());
         let is_at_rest = !may_drive || !self.power.is_ready();
         let command = self.act(may_drive, step, left);
@@ -47,7 +47,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.rested.is_some() && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
+        self.rested = None;
+        if is_at_rest && !gives_way {
+            self.rested = command.filter(|frame| !frame.is_remote());
+        }
     }
 
     #[inline]
@@ -176,7 +179,7 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Unrelated;
         }
         if self.route.is_unknown() {
-            self.route = Route::of(self.motor.claims());
+            self.route = Route::of(|| self.motor.claims());
         }
         let (mut is_feedback, mut command) = (false, None);
         for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {

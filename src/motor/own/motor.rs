@@ -13,7 +13,7 @@ pub trait OwnMotor {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;
 
-    /// Lists the CAN ids of the motor's commands and of its feedback: any number of each.
+    /// Lists the CAN ids of the motor's commands and of its feedback: any number of each. The first feedback is found fastest.
     ///
     /// An id with the feedback of several motors is [shared](Claim::shared), and [`decode`](Self::decode) tells them apart.
     fn claims(&self) -> impl IntoIterator<Item = Claim>;
