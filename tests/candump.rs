@@ -218,6 +218,63 @@ fn motors_of_damiao_are_decoded_beside_others() {
     assert_eq!(csv.lines().nth(1).unwrap().split(',').nth(1), Some("DM-J4310 #2"));
 }
 
+/// Returns the log of a family, its rows of one frame each as lists of fields, and how many frames were another's. The numbers
+/// are worked out in `tests/data/candump/README.md`.
+fn family(motors: &str, log: &str) -> (Vec<Vec<String>>, usize) {
+    let (rows, complaints) = run(&format!("--csv --motors {motors}"), log);
+    let fields = |row: &str| row.split(',').map(str::to_owned).collect();
+    let others = complaints.split(" other frames").next().unwrap().parse().unwrap_or(0);
+    (rows.lines().skip(1).map(fields).collect(), others)
+}
+
+#[test]
+fn a_motor_of_lk_is_decoded_and_commands_with_its_id_are_not() {
+    let log = include_str!("data/candump/lk.log");
+    let (rows, others) = family("mg4005e-i10:1", log);
+    assert_eq!((rows.len(), others), (3, 3));
+    let name = "MG4005E-i10 #1";
+    // Three quarters of a rotor turn behind 10:1.
+    assert_eq!(rows[0], ["1.000250", name, "0.075000", "-8.333", "1.6113", "50", "", ""]);
+    assert_eq!(rows[2], ["1.002250", name, "0.093750", "-8.333", "1.6113", "50", "error 9", ""]);
+}
+
+#[test]
+fn a_motor_on_a_vesc_has_the_turns_of_its_tachometer_and_the_warmer_temperature() {
+    let log = include_str!("data/candump/vesc.log");
+    let (rows, others) = family("vesc7:23", log);
+    assert_eq!((rows.len(), others), (4, 1));
+    assert_eq!(rows[0][1..], ["VESC #23", "", "1714.286", "5.5000", "", "", ""]);
+    assert_eq!(rows[1][2], "-14.285714", "600 of 42 counts a turn");
+    assert_eq!(rows[3][1..], ["VESC #23", "-12.285714", "1714.286", "5.5000", "40", "", ""]);
+    // The turns since the first status 5, not since zero.
+    assert_eq!(row(&run("--motors vesc7:23", log).0, "VESC #23")[2], "2.0000");
+    assert_eq!(family("vesc1:23", log).0[0][3], "12000.000", "electrical");
+}
+
+#[test]
+fn a_motor_at_an_odrive_has_the_errors_of_its_firmware() {
+    let log = include_str!("data/candump/odrive.log");
+    let (rows, others) = family("odrive0.6:1", log);
+    assert_eq!((rows.len(), others), (3, 1));
+    assert_eq!(rows[1], ["1.010000", "ODrive #1", "12.250000", "-210.000", "", "", "", ""]);
+    assert_eq!(rows[2][2], "12.750000");
+    assert_eq!(family("odrive0.5:1", log).0[1][6], "error 34", "the encoder has failed");
+}
+
+#[test]
+fn a_robstride_and_a_cybergear_are_decoded_whoever_asked_them() {
+    let log = include_str!("data/candump/robstride.log");
+    let (rows, others) = family("rs00:127", log);
+    assert_eq!((rows.len(), others), (3, 1));
+    // Half a count more than half a turn, and (2 * 0xC000 / 65535 - 1) * 33 rad/s.
+    assert_eq!(rows[2][1..], ["RS00 #127", "0.500038", "157.571", "", "27", "", ""]);
+    let log = include_str!("data/candump/cybergear.log");
+    let (rows, others) = family("cybergear:44", log);
+    assert_eq!((rows.len(), others), (1, 0));
+    // Half a count of 8 pi and of 60 rad/s; under-voltage is the first of the faults.
+    assert_eq!(rows[0][1..], ["CyberGear #44", "0.000031", "0.004", "", "25", "error 16", ""]);
+}
+
 #[test]
 fn wrong_options_say_what_is_wrong() {
     for (arguments, message) in [
@@ -229,6 +286,10 @@ fn wrong_options_say_what_is_wrong() {
         ("--motors m3508:4-1", "4-1 is no id or range of ids"),
         ("--motors m3508", "not model:ids"),
         ("--motors servo:1", "no model servo"),
+        ("--motors vesc:1", "no model vesc"),
+        ("--motors vesc0:1", "pole_pairs is 0"),
+        ("--motors odrive0.6:63", "63"),
+        ("--motors mg4005e-i10:33", "33"),
         ("--motors", "--motors needs a value"),
         ("--gap soon", "not a number of milliseconds"),
         ("--gap 0", "not a number of milliseconds"),

@@ -1,19 +1,22 @@
 //! The motors of a log, of each family.
 
-use drivetrain::damiao;
 use drivetrain::dji::{AnyHandle, Bus, Config, Model};
+use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    CanDevice, Claim, ImpedanceControl, Ingest, MotorName, Own, OwnMotor, Role,
+    CanDevice, Claim, ImpedanceControl, Ingest, Malformed, MotorName, Own, OwnMotor, Role,
 };
 use drivetrain::time::Instant;
+use drivetrain::units::AngularVelocity;
+use drivetrain::{damiao, lk, odrive, robstride, vesc};
+use embedded_can::{Frame, StandardId};
 use std::fmt::{self, Debug};
 
 /// The state of a motor after a frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
-    /// Of the output shaft.
-    pub(crate) turns: f64,
+    /// Of the output shaft; `None` before a frame that tells them.
+    pub(crate) turns: Option<f64>,
     pub(crate) rpm: f32,
     pub(crate) amperes: Option<f32>,
     pub(crate) temperature_c: Option<i16>,
@@ -61,7 +64,7 @@ impl Listener for Dji {
     fn reading(&self) -> Option<Reading> {
         let state = self.bus.state(self.motor)?;
         Some(Reading {
-            turns: state.position.turns() as f64 + f64::from(state.position.angle().as_turns()),
+            turns: Some(all_turns(state.position)),
             rpm: state.velocity.as_rpm(),
             amperes: Some(state.current.as_amperes()),
             temperature_c: state.temperature_c,
@@ -88,7 +91,7 @@ impl<M: OwnMotor> Listener for Own<M> {
     fn reading(&self) -> Option<Reading> {
         let (motor, vitals) = (self.motor(), self.motor().vitals());
         Some(Reading {
-            turns: motor.angle().map_or(0.0, |angle| angle.as_turns().into()),
+            turns: motor.angle().map(|angle| angle.as_turns().into()),
             rpm: motor.velocity().as_rpm(),
             amperes: None,
             temperature_c: vitals.temperature_c,
@@ -103,28 +106,181 @@ impl<M: OwnMotor> Listener for Own<M> {
     }
 }
 
+/// A motor on a VESC, which reports its turns and its current beside the rest.
+struct Vesc(Own<vesc::Motor<vesc::Velocity>>);
+
+impl Listener for Vesc {
+    fn name(&self) -> MotorName {
+        self.0.motor().name()
+    }
+
+    fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        self.0.take(frame, now)
+    }
+
+    fn reading(&self) -> Option<Reading> {
+        let (motor, reading) = (self.0.motor(), self.0.reading()?);
+        let turns = motor.position().map(all_turns);
+        Some(Reading { turns, amperes: motor.feedback().current_a, ..reading })
+    }
+
+    fn feedback(&self) -> Vec<Claim> {
+        self.0.feedback()
+    }
+}
+
+/// A motor of LK-TECH in whatever control mode: commands and answers have one id and the same first bytes.
+struct Lk {
+    model: lk::Model,
+    id: u8,
+    drive: Option<lk::Feedback>,
+    state: Option<lk::State>,
+    /// In 1/65536 of a turn.
+    rotor: i64,
+}
+
+impl Lk {
+    /// Returns the angle of the rotor in 1/65536 of a turn; `None` if the encoder has fewer bits.
+    fn phase(&self, feedback: &lk::Feedback) -> Option<u16> {
+        let spare = 16 - u32::from(self.model.encoder_bits());
+        feedback.encoder.checked_mul(1 << spare)
+    }
+}
+
+impl Listener for Lk {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name(), self.id)
+    }
+
+    /// Byte 1 of a command is 0. It is a temperature of 0 °C in feedback, which so is left out at exactly 0 °C.
+    fn take(&mut self, frame: &CanFrame, _: Instant) -> Ingest {
+        if !frame.is_data_frame() || self.feedback().iter().all(|claim| !claim.covers(frame.id())) {
+            return Ingest::Unrelated;
+        }
+        if frame.length() != 8 {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let data = frame.bytes();
+        if let Some(state) = lk::State::decode(data) {
+            self.state = Some(state);
+            return Ingest::Taken;
+        }
+        let Some(feedback) = lk::Feedback::decode(data).filter(|_| data[1] != 0) else {
+            return Ingest::Unrelated;
+        };
+        let Some(phase) = self.phase(&feedback) else { return Ingest::Malformed(Malformed::Field) };
+        self.rotor = match self.drive.and_then(|before| self.phase(&before)) {
+            Some(before) => self.rotor + i64::from(phase.wrapping_sub(before).cast_signed()),
+            None => phase.into(),
+        };
+        self.drive = Some(feedback);
+        Ingest::Taken
+    }
+
+    /// `None` before the first feedback: a state says nothing of the shaft.
+    fn reading(&self) -> Option<Reading> {
+        let drive = self.drive?;
+        let errors = self.state.map_or(0, |state| state.errors);
+        Some(Reading {
+            turns: Some(self.rotor as f64 / 65_536.0 / f64::from(self.model.gear())),
+            rpm: AngularVelocity::from_rad_per_s(drive.velocity_rad_per_s(&self.model)).as_rpm(),
+            amperes: Some(f32::from(drive.current) * self.model.series().amperes_per_count()),
+            temperature_c: Some(drive.temperature_c.into()),
+            error: (errors != 0).then(|| format!("error {errors}")),
+            rotor_counts: None,
+            ambiguous_gaps: 0,
+        })
+    }
+
+    fn feedback(&self) -> Vec<Claim> {
+        let id = StandardId::new(0x140 + u16::from(self.id)).unwrap_or(StandardId::MAX);
+        vec![Claim::new(id, Role::Feedback, self.name())]
+    }
+}
+
 type Outcome = Result<Box<dyn Listener>, String>;
 
 pub(crate) fn dji<M: Model>(id: u8) -> Outcome {
     let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M>::new(id)).map_err(|error| error.to_string())?.erase();
+    let motor = bus.attach(Config::<M>::new(id)).map_err(text)?.erase();
     Ok(Box::new(Dji { bus, motor, name: MotorName::new(M::FACTS.name, id) }))
 }
 
-/// A motor of Damiao that answers to the master id 0x10 above its own.
-pub(crate) fn damiao(model: damiao::Model, id: u8) -> Outcome {
-    // Feedback is the same in each control mode.
-    let mode = ImpedanceControl::new(model.tmax_nm()).map_err(|error| error.to_string())?;
-    let motor = damiao::Motor::new(model, id, mode).map_err(|error| error.to_string())?;
-    Ok(Box::new(Own::new(motor)))
+/// Makes a motor of another family; `None` if no family has a model of this name.
+pub(crate) fn of_family(name: &str, id: u8) -> Option<Outcome> {
+    [damiao, lk, robstride, odrive, vesc].iter().find_map(|family| family(name, id))
 }
 
-/// Returns the model of Damiao with a name such as `damiao4310` or `damiaoh6215`.
-pub(crate) fn damiao_model(name: &str) -> Option<damiao::Model> {
+/// A motor of Damiao with a name such as `damiao4310` or `damiaoh6215`, that answers to the master id 0x10 above its own.
+fn damiao(name: &str, id: u8) -> Option<Outcome> {
     let number = name.strip_prefix("damiao")?.to_ascii_uppercase();
     let is_called = |model: &&damiao::Model| {
         let name = model.name().trim_start_matches("DM-");
         name == number || name.trim_start_matches('J') == number
     };
-    damiao::Model::ALL.iter().find(is_called).copied()
+    let model = *damiao::Model::ALL.iter().find(is_called)?;
+    // Feedback is the same in each control mode.
+    let mode = ImpedanceControl::new(model.tmax_nm()).map_err(text);
+    let motor = mode.and_then(|mode| damiao::Motor::new(model, id, mode).map_err(text));
+    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
+}
+
+/// A motor of LK-TECH by its name, such as `mg4005e-i10`.
+fn lk(name: &str, id: u8) -> Option<Outcome> {
+    let model = *lk::Model::ALL.iter().find(|model| model.name().eq_ignore_ascii_case(name))?;
+    // Refuses an id that is none.
+    let motor =
+        lk::Motor::new(model, id, lk::PositionVelocity::new(AngularVelocity::from_rpm(1.0)));
+    let listener = Lk { model, id, drive: None, state: None, rotor: 0 };
+    Some(motor.map(|_| Box::new(listener) as _).map_err(text))
+}
+
+/// A motor of RobStride, such as `rs02`, or `cybergear`, with the host id 0xFD.
+fn robstride(name: &str, id: u8) -> Option<Outcome> {
+    let models = robstride::Model::ALL.iter();
+    let model = *models.into_iter().find(|model| model.name().eq_ignore_ascii_case(name))?;
+    let mode = ImpedanceControl::new(model.tmax_nm()).map_err(text);
+    let motor = mode.and_then(|mode| robstride::Motor::new(model, id, mode).map_err(text));
+    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
+}
+
+/// A motor at an ODrive, `odrive0.5` or `odrive0.6`: the shaft is that of the motor.
+fn odrive(name: &str, id: u8) -> Option<Outcome> {
+    use odrive::{Firmware, Model, Motor, Velocity};
+    let firmware = match name {
+        "odrive0.5" => Firmware::V0_5,
+        "odrive0.6" => Firmware::V0_6,
+        _ => return None,
+    };
+    // The motor and its limits count for commands only.
+    let model = Model::new("ODrive", 100.0).map_err(text);
+    let fastest = AngularVelocity::from_rpm(1.0);
+    let motor = model.and_then(|model| {
+        Motor::new(model, firmware, id, fastest, Velocity::new(1.0)).map_err(text)
+    });
+    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
+}
+
+/// A motor on a VESC, by its pole pairs, as in `vesc7`: the shaft is that of the motor.
+fn vesc(name: &str, id: u8) -> Option<Outcome> {
+    let model = vesc::Model {
+        name: "VESC",
+        pole_pairs: name.strip_prefix("vesc")?.parse().ok()?,
+        gear: GearRatio::DIRECT,
+        // What follows counts for commands only.
+        torque_constant_nm_per_a: 1.0,
+        current_limit_a: 1.0,
+        max_velocity: AngularVelocity::from_rpm(1.0),
+        is_reversed: false,
+    };
+    let motor = vesc::Motor::new(model, id, vesc::Velocity::new()).map_err(text);
+    Some(motor.map(|motor| Box::new(Vesc(Own::new(motor))) as _))
+}
+
+fn all_turns(position: Position) -> f64 {
+    position.turns() as f64 + f64::from(position.angle().as_turns())
+}
+
+fn text(error: impl ToString) -> String {
+    error.to_string()
 }

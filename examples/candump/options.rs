@@ -8,11 +8,14 @@ use super::motor::{self, Listener};
 pub(crate) const HELP: &str = "\
 usage: candump [--motors LIST] [--interface NAME] [--gap MS] [--csv] [FILE]
 
-Reads what candump printed, from FILE or standard input, and decodes motors of DJI and of Damiao.
+Reads what candump printed, from FILE or standard input, and decodes motors of DJI, Damiao, LK-TECH and RobStride,
+and those at an ODrive or a VESC.
 
   --motors LIST     model:ids, for instance \"m3508:1-4,gm6020:1\"
                     models: m2006 or c610, m3508 or c620, gm6020, gm6020-current; damiao and the number of the model, as
-                    in damiao4310:1-4, whose master id is that of the motor and 0x10
+                    in damiao4310:1-4, whose master id is that of the motor and 0x10; mf9025-16t, mf9025-35t, mg4005e-i10,
+                    mg5010e-i10; rs00 to rs06, cybergear; odrive0.5, odrive0.6; vesc and the number of pole pairs, as in
+                    vesc7:23; the shaft of the two last is that of the motor
                     (default: m3508:1-8, those that are heard)
   --interface NAME  only frames of this interface (default: the first one in the log)
   --gap MS          a silence longer than this is a gap (default: 10)
@@ -108,9 +111,7 @@ fn motor(model: &str, id: u8) -> Result<Box<dyn Listener>, String> {
         "m3508" | "c620" => motor::dji::<M3508>(id),
         "gm6020" | "gm6020-voltage" => motor::dji::<Gm6020Voltage>(id),
         "gm6020-current" => motor::dji::<Gm6020Current>(id),
-        other => match motor::damiao_model(other) {
-            Some(model) => motor::damiao(model, id),
-            None => Err(format!("no model {other}; --help lists them")),
-        },
+        other => motor::of_family(other, id)
+            .unwrap_or_else(|| Err(format!("no model {other}; --help lists them"))),
     }
 }

@@ -15,14 +15,16 @@ pub(crate) struct Account {
     pub(crate) malformed: u64,
     pub(crate) first: Option<(Instant, Reading)>,
     pub(crate) latest: Option<(Instant, Reading)>,
+    /// The first turns that were told.
+    start: Option<f64>,
     pub(crate) gaps: u64,
     pub(crate) longest_silence: Duration,
 }
 
 impl Account {
-    /// Returns how far the output shaft turned since the first frame.
+    /// Returns how far the output shaft turned since the first frame that tells its turns.
     pub(crate) fn turns(&self) -> Option<f64> {
-        Some(self.latest.as_ref()?.1.turns - self.first.as_ref()?.1.turns)
+        Some(self.latest.as_ref()?.1.turns? - self.start?)
     }
 
     /// Returns frames per second, when the log has times.
@@ -83,6 +85,7 @@ impl Account {
             malformed: 0,
             first: None,
             latest: None,
+            start: None,
             gaps: 0,
             longest_silence: Duration::ZERO,
         }
@@ -116,5 +119,6 @@ impl Account {
         if self.first.is_none() {
             self.first.clone_from(&self.latest);
         }
+        self.start = self.start.or(self.latest.as_ref().and_then(|(_, reading)| reading.turns));
     }
 }

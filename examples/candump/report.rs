@@ -71,7 +71,8 @@ fn row_of_frame(output: &mut impl Write, account: &Account) -> io::Result<()> {
     let micros = now.as_micros();
     write!(output, "{}.{:06},{},", micros / 1_000_000, micros % 1_000_000, account.motor.name())?;
     let amperes = reading.amperes.map(|amperes| format!("{amperes:.4}"));
-    write!(output, "{:.6},{:.3},{},", reading.turns, reading.rpm, or_nothing(amperes))?;
+    let turns = or_nothing(reading.turns.map(|turns| format!("{turns:.6}")));
+    write!(output, "{turns},{:.3},{},", reading.rpm, or_nothing(amperes))?;
     let (temperature, error) = (or_nothing(reading.temperature_c), reading.error.as_deref());
     writeln!(output, "{temperature},{},{}", or_nothing(error), or_nothing(reading.rotor_counts))
 }
@@ -110,14 +111,14 @@ fn row_of_motor(
     let or_dash = |text: Option<String>| text.unwrap_or("-".to_owned());
     let temperature = or_dash(reading.temperature_c.map(|degrees| degrees.to_string()));
     let amperes = or_dash(reading.amperes.map(|amperes| format!("{amperes:.3}")));
+    let turns = or_dash(account.turns().map(|turns| format!("{turns:.4}")));
     let error = or_dash(reading.error.clone());
     writeln!(
         output,
-        "{:<20} {:>8} {:>8} {:>11.4} {:>8.2} {amperes:>8} {temperature:>4} {:>5} {:>10}  {error}",
+        "{:<20} {:>8} {:>8} {turns:>11} {:>8.2} {amperes:>8} {temperature:>4} {:>5} {:>10}  {error}",
         account.motor.name().to_string(),
         account.frames,
         timed(rate),
-        account.turns().unwrap_or(0.0),
         reading.rpm,
         timed(account.gaps.to_string()),
         timed(format!("{longest_ms:.3}")),

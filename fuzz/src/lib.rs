@@ -3,6 +3,7 @@
 mod alone;
 mod clock;
 mod controllers;
+mod drive;
 mod gesture;
 mod input;
 mod motors;
@@ -12,6 +13,7 @@ mod watched;
 pub use alone::words;
 pub use clock::Clock;
 pub use controllers::Observed;
+pub use drive::Drive;
 pub use gesture::Gesture;
 pub use input::Input;
 pub use motors::{COUNT, Target};

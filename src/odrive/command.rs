@@ -138,7 +138,7 @@ pub(super) const COMMANDS: [u8; 5] = [0x02, 0x07, 0x0B, 0x0F, 0x18];
 /// Returns the numbers of what a firmware sends a motor that listens: all, then those of 0.6.
 pub(super) const fn heard(firmware: Firmware) -> &'static [u8] {
     match firmware {
-        Firmware::V0_5 => &[HEARTBEAT, ESTIMATES],
-        Firmware::V0_6 => &[HEARTBEAT, ESTIMATES, ERRORS, ENDPOINT],
+        Firmware::V0_5 => &[ESTIMATES, HEARTBEAT],
+        Firmware::V0_6 => &[ESTIMATES, HEARTBEAT, ERRORS, ENDPOINT],
     }
 }

@@ -19,7 +19,7 @@ use crate::units::AngularVelocity;
 /// let fastest = AngularVelocity::from_rpm(300.0); // of the output shaft
 /// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Velocity::new(4.0))?.with_gear(8.0)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
-/// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x61"));
+/// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x69"));
 /// assert!(claims.contains(&"command of D6374 #3 on 0x6D".into()));
 /// # Ok::<(), drivetrain::odrive::ConfigError>(())
 /// ```

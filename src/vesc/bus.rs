@@ -186,7 +186,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             let answer = self.claim(HOST, (SHORT_MESSAGE, 0), Role::Feedback);
             [own((SHORT_MESSAGE, 0), Role::Command).shared(), answer.shared()]
         });
-        commands.into_iter().chain(questions.into_iter().flatten()).chain(statuses)
+        commands.into_iter().chain(statuses).chain(questions.into_iter().flatten())
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {

@@ -4,6 +4,7 @@
 
 mod bench;
 mod chaos;
+mod refused;
 mod vectors;
 
 use bench::{Bench, GEAR, motor, torque};

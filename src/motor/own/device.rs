@@ -6,8 +6,7 @@ use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
 use crate::motor::{
-    CanDevice, Claim, Devices, Edge, Ingest, Link, MotorName, Role, Severity, Visitor, Vitals,
-    WrongSetting,
+    CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, Severity, Vitals, WrongSetting,
 };
 use crate::time::{Duration, Instant, Tick};
 use crate::units::Angle;
@@ -37,7 +36,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let drives = self.guard.drives(tick.now());
         let may_drive = drives && !(step.is_hold() && self.held.is_none());
         self.has_posted = false;
+        let was_on = self.power.is_on();
         self.switch(may_drive, tick.now());
+        // Before the drive was on for certain, it was polled where rest would have disabled it.
+        self.rested.take_if(|_| was_on && !self.power.is_on());
         let inquiry = self.inquire(tick.now());
         let is_at_rest = !may_drive || !self.power.is_ready();
         let command = self.act(may_drive, step, left);
@@ -45,7 +47,10 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.rested.is_some() && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.rested = command.filter(|_| is_at_rest && !gives_way);
+        self.rested = None;
+        if is_at_rest && !gives_way {
+            self.rested = command.filter(|frame| !frame.is_remote());
+        }
     }
 
     #[inline]
@@ -174,7 +179,7 @@ impl<M: OwnMotor> Own<M> {
             return Ingest::Unrelated;
         }
         if self.route.is_unknown() {
-            self.route = Route::of(self.motor.claims());
+            self.route = Route::of(|| self.motor.claims());
         }
         let (mut is_feedback, mut command) = (false, None);
         for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
@@ -315,7 +320,7 @@ impl<M: OwnMotor> Own<M> {
             if is_enabling && self.rest_disables {
                 return self.motor.poll();
             }
-            return Some(self.motor.rest());
+            return Some(self.rest());
         }
         if step.is_hold() {
             return self.held.take();
@@ -369,8 +374,15 @@ impl<M: OwnMotor> Own<M> {
         if self.power.stop() {
             self.disable();
         }
-        let rest = self.motor.rest();
+        self.rested = None;
+        let rest = self.rest();
         self.offer(Some(rest));
+    }
+
+    /// Returns the frame of rest: no question unless rest was sent before.
+    fn rest(&mut self) -> CanFrame {
+        let frame = self.motor.rest();
+        if frame.is_remote() && self.rested.is_none() { self.motor.rest() } else { frame }
     }
 
     fn offer(&mut self, command: Option<CanFrame>) {
@@ -384,12 +396,5 @@ impl<M: OwnMotor> Own<M> {
     ) {
         let before = core::mem::replace(place(self), frame);
         self.superseded = self.superseded.wrapping_add(u32::from(before.is_some()));
-    }
-}
-
-impl<M: OwnMotor> Devices for Own<M> {
-    #[inline]
-    fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(self);
     }
 }

@@ -14,8 +14,8 @@ pub use order::{Order, Target};
 pub use settings::{Inquiry, Settings};
 
 use super::{
-    AngleDrive, Capabilities, Capability, Claim, Guard, Health, HealthConfig, Link, TargetError,
-    Timeouts, VelocityDrive, Watch,
+    AngleDrive, Capabilities, Capability, Claim, Devices, Guard, Health, HealthConfig, Link,
+    TargetError, Timeouts, VelocityDrive, Visitor, Watch,
 };
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
@@ -231,6 +231,13 @@ impl<M: OwnMotor> Own<M> {
 
     fn is_online(&self) -> bool {
         self.guard.link() == Link::Online
+    }
+}
+
+impl<M: OwnMotor> Devices for Own<M> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
     }
 }
 

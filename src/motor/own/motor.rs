@@ -13,7 +13,7 @@ pub trait OwnMotor {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;
 
-    /// Lists the CAN ids of the motor's commands and of its feedback: any number of each.
+    /// Lists the CAN ids of the motor's commands and of its feedback: any number of each. The first feedback is found fastest.
     ///
     /// An id with the feedback of several motors is [shared](Claim::shared), and [`decode`](Self::decode) tells them apart.
     fn claims(&self) -> impl IntoIterator<Item = Claim>;
@@ -37,6 +37,9 @@ pub trait OwnMotor {
     /// Each update in which the motor is not driven sends it. The manual of the drive says which frame it is: eight zero bytes
     /// are the full negative torque of a drive in MIT mode, and a velocity of zero is a brake. A drive without such a command
     /// rests when it is disabled: return that frame here, and `None` from [`disable`](Self::disable).
+    ///
+    /// A remote frame, which asks for feedback, may take its turn between frames of rest. If no rest was sent before,
+    /// [`Own`](super::Own) leaves the question out and calls this again.
     fn rest(&mut self) -> CanFrame;
 
     /// Runs the loop for one step and returns the command: a data frame of up to 8 bytes with an id of its commands.

@@ -8,25 +8,39 @@ use crate::motor::{Claim, Role};
 pub(super) struct Route {
     feedback: Pattern,
     command: Pattern,
+    /// The first claim of feedback; fits nothing where a command may have such an id too.
+    usual: Pattern,
 }
 
 impl Route {
     /// Before the claims are known, only they tell.
-    pub(super) const UNKNOWN: Self = Self { feedback: Pattern::ANY, command: Pattern::ANY };
+    pub(super) const UNKNOWN: Self =
+        Self { feedback: Pattern::ANY, command: Pattern::ANY, usual: Pattern::NONE };
 
     pub(super) const fn is_unknown(&self) -> bool {
         self.feedback.mask == 0
     }
 
     /// Takes the claims of the motor. A command with a shared id tells nothing: it may be for another drive.
-    pub(super) fn of(claims: impl IntoIterator<Item = Claim>) -> Self {
-        let mut route = Self { feedback: Pattern::NONE, command: Pattern::NONE };
-        for claim in claims {
+    pub(super) fn of<I: IntoIterator<Item = Claim>>(claims: impl Fn() -> I) -> Self {
+        let mut route =
+            Self { feedback: Pattern::NONE, command: Pattern::NONE, usual: Pattern::NONE };
+        for claim in claims() {
             match claim.role() {
+                Role::Feedback if route.usual.is_none() => {
+                    route.usual = Pattern::of(&claim);
+                    route.feedback.add(&claim);
+                }
                 Role::Feedback => route.feedback.add(&claim),
                 Role::Command if claim.is_shared() => {}
                 Role::Command => route.command.add(&claim),
             }
+        }
+        let mut commands = claims()
+            .into_iter()
+            .filter(|claim| claim.role() == Role::Command && !claim.is_shared());
+        if commands.any(|claim| Pattern::of(&claim).meets(&route.usual)) {
+            route.usual = Pattern::NONE;
         }
         route
     }
@@ -37,10 +51,10 @@ impl Route {
         self.feedback.fits(frame) || self.command.fits(frame)
     }
 
-    /// Tells whether a frame that [fits](Self::fits) is the motor's feedback for certain, and no command of another node.
+    /// Tells whether a frame is the motor's usual feedback for certain, and no command of another node.
     #[inline]
     pub(super) const fn is_feedback(&self, frame: &CanFrame) -> bool {
-        self.feedback.is_exact && self.feedback.fits(frame) && !self.command.fits(frame)
+        self.usual.fits(frame)
     }
 }
 
@@ -49,33 +63,41 @@ impl Route {
 struct Pattern {
     header: u32,
     mask: u32,
-    /// There is one claim, so an id that fits belongs to it.
-    is_exact: bool,
 }
 
 impl Pattern {
     /// Fits nothing: no header has all bits.
-    const NONE: Self = Self { header: u32::MAX, mask: u32::MAX, is_exact: false };
+    const NONE: Self = Self { header: u32::MAX, mask: u32::MAX };
 
-    const ANY: Self = Self { header: 0, mask: 0, is_exact: false };
+    const ANY: Self = Self { header: 0, mask: 0 };
+
+    fn of(claim: &Claim) -> Self {
+        let (header, mask) = claim.pattern();
+        Self { header: header & mask, mask }
+    }
 
     const fn is_none(&self) -> bool {
         self.header == u32::MAX
     }
 
     fn add(&mut self, claim: &Claim) {
-        let (header, mask) = claim.pattern();
+        let Self { header, mask } = Self::of(claim);
         *self = if self.is_none() {
-            Self { header, mask, is_exact: true }
+            Self { header, mask }
         } else {
             let mask = self.mask & mask & !(self.header ^ header);
-            Self { header: header & mask, mask, is_exact: false }
+            Self { header: header & mask, mask }
         };
     }
 
     #[inline]
     const fn fits(&self, frame: &CanFrame) -> bool {
         (frame.header() ^ self.header) & self.mask == 0
+    }
+
+    /// Tells whether some header fits both.
+    const fn meets(&self, other: &Self) -> bool {
+        (self.header ^ other.header) & self.mask & other.mask == 0
     }
 }
 
@@ -115,7 +137,7 @@ mod tests {
                     if below(4) == 0 { claim.shared() } else { claim }
                 })
                 .collect();
-            let route = Route::of(claims.iter().copied());
+            let route = Route::of(|| claims.iter().copied());
             for raw in 0x1F0..0x220 {
                 let ids = [Id::from(standard(raw)), ExtendedId::new(raw.into()).unwrap().into()];
                 for id in ids {

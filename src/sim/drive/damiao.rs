@@ -7,6 +7,7 @@
 )]
 
 use super::DriveShaft;
+use super::shaft::{float, within};
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -169,7 +170,7 @@ impl DamiaoDrive {
         }
         let most = self.value(TMAX);
         let wanted = if self.is_enabled { self.wanted_nm() } else { 0.0 };
-        self.shaft.step(wanted.clamp(-most, most), dt_s);
+        self.shaft.step(within(wanted, most), dt_s);
     }
 
     fn wanted_nm(&self) -> f64 {
@@ -182,8 +183,8 @@ impl DamiaoDrive {
                     + torque
             }
             Command::Position(position, most, limit) => {
-                let velocity = (5.0 * (position - shaft.angle_rad)).clamp(-most, most);
-                shaft.following_nm(velocity).clamp(-limit, limit)
+                let velocity = within(5.0 * (position - shaft.angle_rad), most);
+                within(shaft.following_nm(velocity), limit)
             }
             Command::Velocity(velocity) => shaft.following_nm(velocity),
         }
@@ -200,8 +201,8 @@ impl DamiaoDrive {
 
     fn read(&self, mode: u16, data: &[u8; 8]) -> Command {
         let [a, b, c, d, e, f, g, h] = *data;
-        let float = |bytes| f64::from(f32::from_le_bytes(bytes)).clamp(-1e6, 1e6);
-        let (first, second) = (float([a, b, c, d]), float([e, f, g, h]));
+        let (first, second) =
+            (float(u32::from_le_bytes([a, b, c, d])), float(u32::from_le_bytes([e, f, g, h])));
         match mode {
             1 => Command::Position(first, second.abs(), f64::MAX),
             2 => Command::Velocity(first),
@@ -231,7 +232,7 @@ impl DamiaoDrive {
     fn feedback(&self) -> CanFrame {
         let field = |value: f64, most: f64, width: u32| {
             let top = ((1_u64 << width) - 1) as f64;
-            ((value.clamp(-most, most) + most) * top / (2.0 * most)) as u64
+            ((within(value, most) + most) * top / (2.0 * most)) as u64
         };
         let status = if self.error > 0 { self.error } else { u8::from(self.is_enabled) };
         let bits = u64::from(status << 4 | self.id & 0xF) << 56

@@ -8,6 +8,7 @@
 )]
 
 use super::DriveShaft;
+use super::shaft::within;
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -204,11 +205,11 @@ impl LkDrive {
             Command::Torque(counts) => counts * self.torque_per_count,
             Command::Velocity(velocity, limit) => {
                 let most = if limit > 0.0 { limit * self.torque_per_count } else { f64::MAX };
-                self.shaft.following_nm(velocity * to_shaft).clamp(-most, most)
+                within(self.shaft.following_nm(velocity * to_shaft), most)
             }
             Command::Position(angle, limit) => {
                 let way = angle - (self.rotor_turns() - self.cleared) * 360.0;
-                self.shaft.following_nm((5.0 * way).clamp(-limit, limit) * to_shaft)
+                self.shaft.following_nm(within(5.0 * way, limit) * to_shaft)
             }
         }
     }

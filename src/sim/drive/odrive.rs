@@ -4,6 +4,7 @@
 #![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
 use super::DriveShaft;
+use super::shaft::{float, within};
 use crate::frame::CanFrame;
 use crate::math::sqrt;
 use core::f64::consts::TAU;
@@ -203,7 +204,6 @@ impl OdriveDrive {
         }
         let bits = u64::from_le_bytes(*frame.bytes());
         let (low, high) = (bits as u32, (bits >> 32) as u32);
-        let float = |word: u32| f64::from(f32::from_bits(word)).clamp(-1e6, 1e6);
         let milli = |shift: u32| f64::from(((bits >> shift) as u16).cast_signed()) / 1_000.0;
         match number {
             0x02 => self.fail(if self.is_0_6 { 0x0200_0000 } else { 0x4000 }),
@@ -250,7 +250,7 @@ impl OdriveDrive {
         }
         let most = self.current_limit * self.torque_constant * self.gear.abs();
         let wanted = if self.state == CLOSED_LOOP { self.wanted_nm(dt_s) } else { 0.0 };
-        self.shaft.step(wanted.clamp(-most, most), dt_s);
+        self.shaft.step(within(wanted, most), dt_s);
     }
 
     /// Returns the torque of the shaft that the loops ask for.
@@ -267,7 +267,7 @@ impl OdriveDrive {
             let (goal, feed) = self.followed(position, velocity, dt_s);
             feed + 20.0 * (goal - self.turns())
         };
-        direct + self.shaft.following_nm(wanted.clamp(-limit, limit) * TAU / self.gear)
+        direct + self.shaft.following_nm(within(wanted, limit) * TAU / self.gear)
     }
 
     /// Moves the setpoint to a position by the input mode; returns it with its velocity.
@@ -284,7 +284,7 @@ impl OdriveDrive {
                 let fastest = f64::from(sqrt((2.0 * self.acceleration * way.abs()) as f32));
                 let wanted = fastest.min(self.trajectory_velocity).copysign(way);
                 let change = self.acceleration * dt_s;
-                let speed = speed + (wanted - speed).clamp(-change, change);
+                let speed = speed + within(wanted - speed, change);
                 [at + dt_s * speed, speed]
             }
             _ => [position, velocity],

@@ -7,6 +7,7 @@
 )]
 
 use super::DriveShaft;
+use super::shaft::{float, within};
 use crate::frame::CanFrame;
 use embedded_can::{ExtendedId, Frame, Id};
 
@@ -229,7 +230,7 @@ impl RobStrideDrive {
     fn wanted_nm(&self) -> f64 {
         let [_, _, most, ..] = self.ranges;
         let shaft = &self.shaft;
-        let current = self.value(LIMIT_CUR).clamp(0.0, most);
+        let current = self.value(LIMIT_CUR).max(0.0).min(most);
         let torque = match self.value(RUN_MODE) as u8 {
             0 => {
                 let [position, velocity, kp, kd, torque] = self.operation;
@@ -237,16 +238,16 @@ impl RobStrideDrive {
                     + kd * (velocity - shaft.velocity_rad_per_s)
                     + torque
             }
-            2 => shaft.following_nm(self.value(SPD_REF)).clamp(-current, current),
+            2 => within(shaft.following_nm(self.value(SPD_REF)), current),
             3 => self.value(IQ_REF),
             _ => {
                 let limit = self.value(LIMIT_SPD).abs();
-                let velocity = (5.0 * (self.value(LOC_REF) - shaft.angle_rad)).clamp(-limit, limit);
-                shaft.following_nm(velocity).clamp(-current, current)
+                let velocity = within(5.0 * (self.value(LOC_REF) - shaft.angle_rad), limit);
+                within(shaft.following_nm(velocity), current)
             }
         };
-        let limit = self.value(LIMIT_TORQUE).clamp(0.0, most);
-        torque.clamp(-limit, limit)
+        let limit = self.value(LIMIT_TORQUE).max(0.0).min(most);
+        within(torque, limit)
     }
 
     /// The fields of an operation frame, whose torque is in the id.
@@ -273,9 +274,8 @@ impl RobStrideDrive {
 
     fn feedback(&self) -> CanFrame {
         let [pmax, vmax, tmax, ..] = self.ranges;
-        let field = |value: f64, most: f64| {
-            ((value.clamp(-most, most) + most) * 65_535.0 / (2.0 * most)) as u64
-        };
+        let field =
+            |value: f64, most: f64| ((within(value, most) + most) * 65_535.0 / (2.0 * most)) as u64;
         let angle = self.shaft.angle_rad;
         let is_beyond = angle.abs() > pmax && !self.is_cybergear;
         let angle = if is_beyond { rest_of(angle + pmax, 2.0 * pmax) - pmax } else { angle };
@@ -320,7 +320,7 @@ impl RobStrideDrive {
                 }
             }
             0x7028 => self.write(index, bits.into()),
-            _ => self.write(index, f64::from(f32::from_bits(bits)).clamp(-1e6, 1e6)),
+            _ => self.write(index, float(bits)),
         }
     }
 

@@ -84,3 +84,42 @@ impl DriveShaft {
         100.0 * self.inertia_kg_m2 * (velocity_rad_per_s - self.velocity_rad_per_s)
     }
 }
+
+/// Returns a value between a limit and its negative, whatever the sign of the limit.
+pub(super) const fn within(value: f64, limit: f64) -> f64 {
+    value.min(limit.abs()).max(-limit.abs())
+}
+
+/// Returns the value of the bits of a float in a frame: at most a million, and 0 for NaN, so that the shaft stays finite.
+pub(super) fn float(bits: u32) -> f64 {
+    let value = f64::from(f32::from_bits(bits));
+    if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::frame::CanFrame;
+    use crate::sim::{DamiaoDrive, OdriveDrive};
+
+    /// Found by fuzzing: a range of torques below zero, and limits that are no numbers, ended the simulation.
+    #[test]
+    fn a_register_or_a_limit_that_makes_no_sense_gives_a_finite_torque() {
+        let mut damiao = DamiaoDrive::new(1, 0x11, [12.5, 30.0, -10.0]);
+        let mut odrive = OdriveDrive::new(1, false, 0.05, 1.0);
+        for data in [[0xFF; 8], [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC], [0; 8]] {
+            let frame = CanFrame::standard(1, data).unwrap();
+            assert!(damiao.hear(&frame).is_some());
+            damiao.step(1e-3);
+            assert!(damiao.shaft().torque_nm().abs() <= 10.0);
+        }
+        for (number, data) in [(0x0B, [2, 0, 0, 0, 1, 0, 0, 0]), (0x07, [8, 0, 0, 0, 0, 0, 0, 0])] {
+            _ = odrive.hear(&CanFrame::standard(1 << 5 | number, data).unwrap());
+        }
+        // Limits and velocity of NaN.
+        for number in [0x0F, 0x0D] {
+            _ = odrive.hear(&CanFrame::standard(1 << 5 | number, [0xFF; 8]).unwrap());
+            odrive.step(1e-3);
+            assert_eq!((odrive.state(), odrive.shaft().torque_nm()), (8, 0.0));
+        }
+    }
+}

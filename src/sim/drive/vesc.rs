@@ -6,6 +6,7 @@
 )]
 
 use super::DriveShaft;
+use super::shaft::within;
 use crate::frame::CanFrame;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
@@ -219,7 +220,7 @@ impl VescDrive {
         }
         let current = self.wanted_nm() / self.nm_per_a();
         let most = self.motor.current_max_a;
-        self.shaft.step(current.clamp(-most, most) * self.nm_per_a(), dt_s);
+        self.shaft.step(within(current, most) * self.nm_per_a(), dt_s);
     }
 
     /// Returns a status frame, by its packet: 9, 14, 15, 16, 27 or 58; `None` for another.
@@ -271,12 +272,12 @@ impl VescDrive {
             Command::Current(current) => current * self.nm_per_a(),
             Command::Brake(current) => {
                 let most = current.abs() * self.nm_per_a();
-                shaft.following_nm(0.0).clamp(-most, most)
+                within(shaft.following_nm(0.0), most)
             }
             Command::Handbrake(current) => {
                 let most = current.abs() * self.nm_per_a();
                 let velocity = 20.0 * (self.held_rad - shaft.angle_rad);
-                shaft.following_nm(velocity).clamp(-most, most)
+                within(shaft.following_nm(velocity), most)
             }
             Command::Duty(duty) => shaft.following_nm(duty * self.motor.no_load_rad_per_s),
             Command::Speed(speed) if speed.abs() < LEAST_SPEED => 0.0,

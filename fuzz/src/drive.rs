@@ -1,0 +1,127 @@
+//! The simulated drives that judge own motors.
+
+use drivetrain::frame::CanFrame;
+use drivetrain::sim::{DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive};
+
+/// A simulated drive.
+pub trait Drive {
+    /// Takes a frame from the bus and returns the answer.
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
+
+    /// Moves on by a time in s.
+    fn step(&mut self, dt_s: f32);
+
+    /// Appends the frames that the drive sends by itself.
+    fn report(&mut self, frames: &mut Vec<CanFrame>) {
+        _ = frames;
+    }
+
+    fn shaft_mut(&mut self) -> &mut DriveShaft;
+
+    /// Has the drive fail, lose its supply, or refuse.
+    fn suffer(&mut self, kind: u8);
+}
+
+impl Drive for DamiaoDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 2 {
+            0 => self.fail(8 + kind % 7),
+            _ => self.lose_supply(),
+        }
+    }
+}
+
+impl Drive for LkDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 4 {
+            0 => self.fail(kind >> 2),
+            1 => self.set_reasons(kind >> 2),
+            2 => self.set_temperature(kind.cast_signed()),
+            _ => self.lose_supply(),
+        }
+    }
+}
+
+impl Drive for VescDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn report(&mut self, frames: &mut Vec<CanFrame>) {
+        frames.extend([27, 16, 9].into_iter().filter_map(|packet| Self::report(self, packet)));
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 4 {
+            0 => self.fail(kind >> 2),
+            1 => self.set_tachometer(i32::MAX - i32::from(kind)),
+            2 => self.set_temperatures(f32::from(kind), 30.0),
+            _ => self.lose_supply(),
+        }
+    }
+}
+
+impl Drive for OdriveDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn report(&mut self, frames: &mut Vec<CanFrame>) {
+        frames.extend(core::iter::from_fn(|| self.next_frame()));
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 4 {
+            0 => self.fail(1 << (kind >> 3)),
+            1 => self.refuse(kind >> 2 & 0xF),
+            // A calibration, say. Closed loop by USB would be another master.
+            2 => self.set_state(kind >> 2 & 7),
+            _ => self.lose_supply(),
+        }
+    }
+}
+
+impl Drive for RobStrideDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 3 {
+            0 => self.fail(1 << (kind >> 3)),
+            1 => self.calibrate(kind & 4 == 0),
+            _ => self.lose_supply(),
+        }
+    }
+}
