@@ -28,6 +28,7 @@ pub mod lk;
 pub mod odrive;
 #[cfg(feature = "hal")]
 pub mod pwm;
+pub mod rmd;
 pub mod robstride;
 #[cfg(feature = "sim")]
 pub mod sim;
