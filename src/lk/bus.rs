@@ -13,6 +13,9 @@ use crate::motor::{
 };
 use crate::units::{Angle, AngularVelocity};
 
+/// The ids of frames in both directions, without the id of the drive.
+const FRAMES: u16 = 0x140;
+
 /// The place of the question for the angle among 32 commands.
 const HALF_WAY: u8 = 16;
 
@@ -115,7 +118,7 @@ impl<M: Mode> Motor<M> {
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
-        CanFrame::of(id_of(self.id), command.encode())
+        CanFrame::of(id_of(FRAMES, self.id), command.encode())
     }
 
     /// Returns a value of the output shaft in the direction of the drive, or the other way round.
@@ -178,7 +181,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |role| Claim::new(id_of(self.id), role, self.name());
+        let claim = |role| Claim::new(id_of(FRAMES, self.id), role, self.name());
         [claim(Role::Command), claim(Role::Feedback)]
     }
 

@@ -87,7 +87,7 @@ pub(crate) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
         }
 }
 
-/// Returns the id of the frames of a drive, in both directions.
-pub(super) fn id_of(id: u8) -> Id {
-    StandardId::new(0x140 + u16::from(id)).unwrap_or(StandardId::MAX).into()
+/// Returns the id of the frames of a drive.
+pub(crate) fn id_of(ids: u16, id: u8) -> Id {
+    StandardId::new(ids + u16::from(id)).unwrap_or(StandardId::MAX).into()
 }

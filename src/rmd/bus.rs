@@ -1,10 +1,12 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
+use super::enabling::Enabling;
 use super::model::AMPERES_PER_COUNT;
+use super::track::Track;
 use super::{Command, ConfigError, Feedback, Mode, Model, State};
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
-use crate::lk::command::is_command;
+use crate::lk::command::{id_of, is_command};
 use crate::lk::config::sealed::{self, Goal};
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::lk::questions::Questions;
@@ -14,7 +16,6 @@ use crate::motor::{
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
-use embedded_can::{Id, StandardId};
 
 /// The ids of commands and of answers, without the id of the drive.
 const COMMANDS: u16 = 0x140;
@@ -33,7 +34,7 @@ const WRITES: u8 = 8;
 const EXPIRED: u8 = 0xF1;
 
 /// Half a turn, in 0.01°.
-const HALF_TURN: f32 = 18_000.0;
+const HALF_TURN: i64 = 18_000;
 
 /// A motor of this family, in the control mode `M`: see the [module](super).
 ///
@@ -68,12 +69,7 @@ pub struct Motor<M> {
     state: Option<State>,
     /// The angle was read since the settings were forgotten.
     has_angle: bool,
-    /// The drive is to be on.
-    is_wanted: bool,
-    /// The state was read since then.
-    is_sound: bool,
-    /// The brake was released, or the angle read, since then.
-    is_prepared: bool,
+    enabling: Enabling,
     /// How many commands were made since the last feedback or the last angle.
     silent: u8,
     questions: Questions<Command>,
@@ -82,28 +78,6 @@ pub struct Motor<M> {
     /// The program asks for a reset.
     resets: bool,
     asks_angle: bool,
-}
-
-/// The angle of the output shaft between two answers, in 0.01°.
-#[derive(Debug, Clone, Copy)]
-struct Track {
-    /// The last answer, and the angle of the feedback then, in °.
-    read: i32,
-    degrees: i16,
-    /// The way since, by the velocity.
-    way: f32,
-}
-
-impl Track {
-    /// Moves on by a way, within a degree of what feedback says.
-    fn advance(&mut self, way: f32, degrees: i16) {
-        let moved = 100.0 * f32::from(degrees.wrapping_sub(self.degrees));
-        self.way = (self.way + way).min(moved + 100.0).max(moved - 100.0);
-    }
-
-    fn counts(&self) -> i64 {
-        i64::from(self.read) + i64::from(whole(self.way))
-    }
 }
 
 impl<M: Mode> Motor<M> {
@@ -128,9 +102,7 @@ impl<M: Mode> Motor<M> {
             track: None,
             state: None,
             has_angle: false,
-            is_wanted: false,
-            is_sound: false,
-            is_prepared: false,
+            enabling: Enabling::default(),
             silent: 0,
             questions: Questions::new(Command::REST),
             last: Command::REST,
@@ -222,8 +194,8 @@ impl<M: Mode> Motor<M> {
     }
 
     /// The drive no longer follows, until it is enabled anew.
-    const fn doubt(&mut self) {
-        (self.is_wanted, self.is_sound, self.is_prepared) = (false, false, false);
+    fn doubt(&mut self) {
+        self.enabling = Enabling::default();
     }
 
     /// Takes the answer to the question for the angle; an answer of 0 elsewhere is a question that is sent back. A drive whose angle
@@ -234,13 +206,13 @@ impl<M: Mode> Motor<M> {
             self.doubt();
             return;
         }
-        let apart = |track: Track| (i64::from(angle) - track.counts()) as f32;
-        if self.has_angle && self.track.is_some_and(|track| apart(track).abs() > HALF_TURN) {
+        let is_other = |track: Track| (i64::from(angle) - track.counts()).abs() > HALF_TURN;
+        if self.has_angle && self.track.is_some_and(is_other) {
             self.doubt();
         } else {
-            self.is_prepared |= <M as sealed::Mode>::NEEDS_ANGLE;
+            self.enabling.is_prepared |= <M as sealed::Mode>::NEEDS_ANGLE;
         }
-        self.track = Some(Track { read: angle, degrees: drive.angle_deg, way: 0.0 });
+        self.track = Some(Track::new(angle, drive.angle_deg));
         (self.has_angle, self.silent) = (true, 0);
     }
 }
@@ -282,8 +254,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     /// Turns of the output shaft count, from the zero of the drive.
     fn angle(&self) -> Option<Angle> {
-        let track = self.track?;
-        Some(Angle::from_turns(self.turned((track.read as f32 + track.way) / 36_000.0)))
+        Some(Angle::from_turns(self.turned(self.track?.turns())))
     }
 
     fn rest(&mut self) -> CanFrame {
@@ -323,15 +294,15 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if sent == 0 {
             self.doubt();
         }
-        self.is_wanted = true;
+        self.enabling.is_wanted = true;
         let timeout = self.timeout.filter(|_| !self.has_timeout() && self.writes < WRITES);
         let command = match (timeout, Self::preparation()) {
-            _ if !self.is_sound => Command::ReadState,
+            _ if !self.enabling.is_sound => Command::ReadState,
             (Some(ms), _) => {
                 self.writes += 1;
                 Command::SetTimeout(ms)
             }
-            (None, Some(command)) if !self.is_prepared => command,
+            (None, Some(command)) if !self.enabling.is_prepared => command,
             _ => Command::ReadState,
         };
         Some(self.frame_of(command))
@@ -339,15 +310,14 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     /// Off, which counts as followed. A reset that was asked for goes after it.
     fn disable(&mut self) -> Option<CanFrame> {
-        let resets = self.resets && !self.is_wanted;
+        let resets = self.resets && !self.enabling.is_wanted;
         self.resets &= !resets;
         self.doubt();
         Some(self.frame_of(if resets { Command::Reset } else { Command::Off }))
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        let is_prepared = self.is_prepared || Self::preparation().is_none();
-        Some(self.is_wanted && self.is_sound && is_prepared && self.has_timeout())
+        Some(self.enabling.is_on)
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
@@ -365,19 +335,20 @@ impl<M: Mode> OwnMotor for Motor<M> {
         match code {
             EXPIRED => self.doubt(),
             0x9A => match State::decode(data) {
-                Some(state) => (self.state, self.is_sound) = (Some(state), true),
+                Some(state) => (self.state, self.enabling.is_sound) = (Some(state), true),
                 None => self.doubt(),
             },
             0x92 => {
                 Feedback::decode_angle(data).into_iter().for_each(|angle| self.take_angle(angle))
             }
-            0x77 => self.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
+            0x77 => self.enabling.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
             0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
             0x76 | 0x78 | 0x80 | 0x81 => {}
             // The first frame after the time-out of the drive is sent back, and not followed.
             _ if *data == self.last.encode() => self.doubt(),
             _ => return false,
         }
+        self.enabling.settle(Self::preparation().is_some(), self.has_timeout());
         true
     }
 
@@ -425,9 +396,4 @@ impl<M: Mode> OwnMotor for Motor<M> {
             current: self.turned(current / self.model.max_current_a()),
         }
     }
-}
-
-/// Returns the id of the frames of a drive, in one direction.
-fn id_of(ids: u16, id: u8) -> Id {
-    StandardId::new(ids + u16::from(id)).unwrap_or(StandardId::MAX).into()
 }

@@ -84,11 +84,13 @@
 mod bus;
 mod command;
 mod config;
+mod enabling;
 mod error;
 mod feedback;
 mod model;
 #[cfg(test)]
 mod tests;
+mod track;
 
 pub use bus::Motor;
 pub use command::Command;

@@ -205,6 +205,9 @@ fn nothing_heard_before_enables_the_drive() {
     // The time-out is in the memory of the drive already.
     assert_eq!(codes, [0x9A, 0x77]);
     assert_eq!(motor.is_enabled(), Some(true));
+    // Late feedback forgets the settings, and is no reset.
+    motor.forget_settings();
+    assert_eq!(motor.is_enabled(), Some(true));
     motor.disable();
     assert_eq!(motor.is_enabled(), Some(false));
 }
