@@ -44,7 +44,7 @@ fn data_of(code: u8, limit: u16, value: i32) -> Option<[u8; 8]> {
 
 /// For feedback temperature, current, velocity and encoder, for a state temperature, supply in 0.01 V and 0.01 A, whether it is on (1)
 /// in the low and the errors in the high byte, for an angle its `i64`.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded counts")]
+#[expect(clippy::cast_possible_truncation, reason = "rounded counts")]
 fn values_of(data: &[u8; 8]) -> Option<(u8, [i64; 4])> {
     if let Some(feedback) = Feedback::decode(data) {
         let Feedback { temperature_c, current, velocity_dps, encoder } = feedback;

@@ -18,8 +18,7 @@ use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 
 /// The ids of commands and of answers, without the id of the drive.
-const COMMANDS: u16 = 0x140;
-const ANSWERS: u16 = 0x240;
+const IDS: (u16, u16) = (0x140, 0x240);
 
 /// The places of the question for the angle among 32 commands.
 const ANGLES: [u8; 2] = [8, 24];
@@ -30,11 +29,8 @@ const TIMEOUT_MS: u32 = 100;
 /// So often the time-out is written before the drive counts as one that does not take it: its memory wears.
 const WRITES: u8 = 8;
 
-/// The first byte of the frame by which a drive tells that its time-out has expired.
+/// The first byte of a report that the time-out of the drive has expired.
 const EXPIRED: u8 = 0xF1;
-
-/// Half a turn, in 0.01°.
-const HALF_TURN: i64 = 18_000;
 
 /// A motor of this family, in the control mode `M`: see the [module](super).
 ///
@@ -62,10 +58,8 @@ pub struct Motor<M> {
     timeout_found: Option<u32>,
     /// How often it was written without an answer.
     writes: u8,
-    /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     track: Option<Track>,
-    /// The last state; `None` when it is not known.
     state: Option<State>,
     /// The angle was read since the settings were forgotten.
     has_angle: bool,
@@ -75,8 +69,9 @@ pub struct Motor<M> {
     questions: Questions<Command>,
     /// The last control command or rest.
     last: Command,
-    /// The program asks for a reset.
     resets: bool,
+    /// The holding brake was released, and has not been confirmed to be locked since.
+    is_open: bool,
     asks_angle: bool,
 }
 
@@ -107,6 +102,7 @@ impl<M: Mode> Motor<M> {
             questions: Questions::new(Command::REST),
             last: Command::REST,
             resets: false,
+            is_open: false,
             asks_angle: false,
         })
     }
@@ -153,10 +149,10 @@ impl<M: Mode> Motor<M> {
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
-        CanFrame::of(id_of(COMMANDS, self.id), command.encode())
+        CanFrame::of(id_of(IDS.0, self.id), command.encode())
     }
 
-    /// Returns a value of the output shaft in the direction of the drive, or the other way round.
+    /// Turns a value of the output shaft to the direction of the drive, or back.
     const fn turned(&self, value: f32) -> f32 {
         if self.is_reversed { -value } else { value }
     }
@@ -206,8 +202,7 @@ impl<M: Mode> Motor<M> {
             self.doubt();
             return;
         }
-        let is_other = |track: Track| (i64::from(angle) - track.counts()).abs() > HALF_TURN;
-        if self.has_angle && self.track.is_some_and(is_other) {
+        if self.has_angle && self.track.is_some_and(|track| track.is_far_from(angle)) {
             self.doubt();
         } else {
             self.enabling.is_prepared |= <M as sealed::Mode>::NEEDS_ANGLE;
@@ -224,7 +219,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let claim = |ids, role| Claim::new(id_of(ids, self.id), role, self.name());
-        [claim(COMMANDS, Role::Command), claim(ANSWERS, Role::Feedback)]
+        [claim(IDS.0, Role::Command), claim(IDS.1, Role::Feedback)]
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
@@ -232,8 +227,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             return Ingest::Malformed(Malformed::Length(frame.length()));
         }
         let data = frame.bytes();
-        let [code, ..] = *data;
-        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&code);
+        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&data[0]);
         if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
             return Ingest::Unrelated;
         }
@@ -272,8 +266,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let shaft = (self.angle(), self.velocity());
         let goal = self.mode.goal(order, shaft, &self.model.scale());
         self.last = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
-        let needs_angle = <M as sealed::Mode>::NEEDS_ANGLE;
-        self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };
+        self.silent = self.silent.saturating_add(<M as sealed::Mode>::NEEDS_ANGLE.into());
         if self.silent > SILENT {
             return self.frame_of(Command::ReadAngle);
         }
@@ -302,18 +295,24 @@ impl<M: Mode> OwnMotor for Motor<M> {
                 self.writes += 1;
                 Command::SetTimeout(ms)
             }
-            (None, Some(command)) if !self.enabling.is_prepared => command,
+            (None, Some(command)) if !self.enabling.is_prepared => {
+                self.is_open |= command == Command::ReleaseBrake;
+                command
+            }
             _ => Command::ReadState,
         };
         Some(self.frame_of(command))
     }
 
-    /// Off, which counts as followed. A reset that was asked for goes after it.
+    /// Off, which counts as followed. A reset that was asked for goes after it, and the lock of a brake that was released.
     fn disable(&mut self) -> Option<CanFrame> {
-        let resets = self.resets && !self.enabling.is_wanted;
-        self.resets &= !resets;
+        let command = match self.enabling.is_wanted {
+            false if core::mem::take(&mut self.resets) => Command::Reset,
+            false if self.is_open => Command::LockBrake,
+            _ => Command::Off,
+        };
         self.doubt();
-        Some(self.frame_of(if resets { Command::Reset } else { Command::Off }))
+        Some(self.frame_of(command))
     }
 
     fn is_enabled(&self) -> Option<bool> {
@@ -343,7 +342,8 @@ impl<M: Mode> OwnMotor for Motor<M> {
             }
             0x77 => self.enabling.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
             0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
-            0x76 | 0x78 | 0x80 | 0x81 => {}
+            0x78 => self.is_open = false,
+            0x80 => {}
             // The first frame after the time-out of the drive is sent back, and not followed.
             _ if *data == self.last.encode() => self.doubt(),
             _ => return false,
@@ -356,11 +356,12 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let wrong = |setting, expected, found| {
             Some(WrongSetting { motor: self.name(), setting, expected, found })
         };
-        let has_given_up = self.writes >= WRITES;
         match (self.timeout, self.timeout_found) {
             _ if self.state.is_none() => wrong("errorState", 0.0, None),
             _ if !self.has_angle => wrong("motorAngle", 0.0, None),
-            (Some(expected), found) if found.map_or(has_given_up, |found| found != expected) => {
+            (Some(expected), found)
+                if found.map_or(self.writes >= WRITES, |found| found != expected) =>
+            {
                 let found = found.unwrap_or(0) as f32;
                 wrong("CanRecvTime_MS", expected as f32, Some(found))
             }
@@ -385,7 +386,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let (errors, supply_v) =
             self.state.map_or((0, 0.0), |state| (state.errors, state.supply_v));
         let current = f32::from(drive.current) * AMPERES_PER_COUNT;
-        // The speed without load is estimated from the torque constant.
+        // Of an estimated speed without load.
         let speed = self.velocity().as_rad_per_s() * self.model.torque_constant();
         Vitals {
             temperature_c: Some(drive.temperature_c.into()),

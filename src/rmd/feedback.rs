@@ -114,14 +114,14 @@ pub struct State {
 }
 
 impl State {
-    /// Reads a state frame; `None` for any other frame. A frame without a voltage is a question that is sent back.
+    /// Reads a state frame; `None` for any other frame. A frame of zeros is a question that is sent back.
     #[must_use]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
-        let [0x9A, temperature, _, brake, a, b, c, d] = *data else { return None };
-        let supply = u16::from_le_bytes([a, b]);
-        if supply == 0 {
+        let [0x9A, temperature, spare, brake, a, b, c, d] = *data else { return None };
+        if let [0, 0, 0, 0, 0, 0, 0] = [temperature, spare, brake, a, b, c, d] {
             return None;
         }
+        let supply = u16::from_le_bytes([a, b]);
         Some(Self {
             temperature_c: temperature.cast_signed(),
             is_brake_open: brake != 0,

@@ -6,6 +6,7 @@
 //! byte 0  command                1   2 .. 3                4 .. 7                     answer
 //! 0x80    off                    0   0                     0                          the same
 //! 0x77    release the brake      0   0                     0                          the same
+//! 0x78    lock the brake         0   0                     0                          the same
 //! 0xA1    torque                 0   0                     0.01 A i16, 0, 0           feedback
 //! 0xA2    velocity               0   0                     0.01 °/s i32               feedback
 //! 0xA4    position               0   velocity limit °/s u16 0.01 ° i32                feedback
@@ -32,13 +33,15 @@
 //!
 //! **Before a motor is armed** its state and its angle are read. **Before it is driven** its state is read again, and the drive has to
 //! confirm its time-out; then a torque motor has its holding brake released, which a torque does not do, and a position motor its angle
-//! read. The brake opens before the output does: a loaded joint sinks for the 0.2 s of [`with_opening`](crate::motor::Own::with_opening). A
-//! velocity or a position releases the brake by itself.
+//! read. The brake opens before the output does: a loaded joint sinks for the 0.2 s of [`with_opening`](crate::motor::Own::with_opening).
+//! When the motor is at rest again, the brake that it released is locked 0.1 s after "off". The manual says of torques alone that they do not
+//! release the brake, so with a velocity or a position the drive is left to do it.
 //!
 //! **When the program stops, the drive does**: after [`Motor::with_timeout`], 100 ms at first, it switches itself off and locks its
 //! brake. The drive keeps this time in its flash memory, and no frame reads it. So it is written when the drive is to be enabled and has been
 //! away since the last time, at most 8 times in a row. A drive that answers with another time, or not at all, is not driven, and `arm` says so;
-//! [`Motor::without_timeout`] is for such a drive. Seen by a user, not in the manual: a drive whose time has expired sends a frame that begins with
+//! that until the drive has
+//! been away; [`Motor::without_timeout`] is for such a drive. Seen by a user, not in the manual: a drive whose time has expired sends a frame that begins with
 //! 0xF1, each second, and sends the next command back in the place of an answer, without following it. Both trip the motor.
 //!
 //! **The angle** of feedback is in whole degrees. Each 16th command gives way to a question for the angle in 0.01°; in between

@@ -23,6 +23,11 @@ impl Track {
         self.way = (self.way + way).min(moved + 100.0).max(moved - 100.0);
     }
 
+    /// Tells whether an angle is more than half a turn away.
+    pub(super) fn is_far_from(&self, angle: i32) -> bool {
+        (i64::from(angle) - self.counts()).abs() > 18_000
+    }
+
     pub(super) fn counts(&self) -> i64 {
         i64::from(self.read) + i64::from(whole(self.way))
     }

@@ -60,7 +60,7 @@ impl<M: Mode> Subject for Wheel<M> {
         let mut drive = self.drive.borrow_mut();
         let answer = drive.hear(command);
         let [code, ..] = *command.bytes();
-        if [0x77, 0x80, 0x92, 0x9A, 0xB3].contains(&code) {
+        if [0x77, 0x78, 0x80, 0x92, 0x9A, 0xB3].contains(&code) {
             self.answer.set(answer);
             return code != 0x77;
         }

@@ -195,6 +195,38 @@ fn a_torque_motor_is_driven_when_its_brake_is_open() {
     assert!((position.drive.shaft().angle_rad() - 1.0).abs() < 0.01);
 }
 
+/// Whether "off" locks the brake is not public: what the motor released, it locks.
+#[test]
+fn a_brake_that_the_motor_released_is_locked_after_off() {
+    for lost_ms in [0, 80] {
+        let mut bench = Bench::new(MODEL, torque());
+        bench.drive = bench.drive.with_brake().keeping_brake();
+        bench.steps(100, |_| {});
+        bench.own.arm(bench.now()).unwrap();
+        bench.steps(400, |bench| bench.own.set_torque(0.5).unwrap());
+        assert!(!bench.drive.is_locked());
+        bench.own.disarm();
+        bench.is_cut = true;
+        bench.steps(lost_ms, |_| {});
+        bench.is_cut = false;
+        let (mut locked_us, mut sent) = (None, 0);
+        bench.steps(1_000, |bench| {
+            if bench.drive.is_locked() && locked_us.is_none() {
+                locked_us = Some(bench.now_us);
+            }
+            sent += bench.frames.iter().filter(|frame| frame.bytes()[0] == 0x78).count();
+        });
+        assert!(locked_us.is_some() && sent == 1, "{locked_us:?}, {sent} frames");
+    }
+    // A motor that released no brake locks none.
+    let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    bench.steps(300, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
+    bench.own.disarm();
+    bench.steps(500, |bench| {
+        assert!(bench.frames.iter().all(|frame| frame.bytes()[0] != 0x78));
+    });
+}
+
 #[test]
 fn a_drive_that_does_not_take_its_timeout_is_not_driven_and_the_error_names_it() {
     let mut bench = Bench::new(MODEL, Velocity::new(rad_s(20.0)));
@@ -359,7 +391,7 @@ fn lost_feedback_switches_the_drive_off_and_it_goes_on_when_it_is_heard() {
         }
         bench.drive.step(0.001);
     }
-    assert_eq!(bench.drive.shaft().torque_nm(), 0.0);
+    assert!(bench.drive.shaft().torque_nm() == 0.0);
     bench.steps(500, |bench| _ = bench.own.set_velocity((), rad_s(6.0)));
     assert!(bench.drive.is_on(), "late, not lost: it goes on with the target that is set anew");
 }

@@ -2,10 +2,10 @@
 
 use super::*;
 
-/// What a motor at rest may send, read by the manual alone: off, questions, and a torque without current.
+/// What a motor at rest may send, read by the manual alone: off, the lock of the brake, questions, and a torque without current.
 fn is_rest(frame: &CanFrame) -> bool {
     let [code, rest @ ..] = *frame.bytes();
-    [0x80, 0x92, 0x9A, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
+    [0x78, 0x80, 0x92, 0x9A, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,7 +154,7 @@ fn a_question_that_is_sent_back_is_no_answer() {
         let echo = answer([code, 0, 0, 0, 0, 0, 0, 0]);
         _ = Devices::ingest(&mut bench.own, &echo, now);
         assert_eq!(bench.own.angle(()), Some(there), "{code:X}");
-        assert!(bench.own.motor().state().is_some_and(|state| state.supply_v > 40.0));
+        assert!(bench.own.motor().state().is_some_and(|state| state.supply_v > 40.0), "{code:X}");
     }
     bench.steps(2, |bench| _ = bench.own.set_angle((), rad(30.0)));
     assert!(!Devices::is_armed(&mut bench.own), "the drive has timed out, or begun anew");

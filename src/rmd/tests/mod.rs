@@ -54,6 +54,8 @@ fn answers_are_read_as_the_manual_says() {
     assert_eq!(Feedback::decode_angle(&[0x9A; 8]), None);
     assert_eq!(State::decode(&[0x9A, 0, 0, 0, 0, 0, 0, 0]), None, "a question");
     assert_eq!(State::decode(&[0x9B, 0x32, 0, 1, 0xE5, 1, 4, 0]), None);
+    let unpowered = State::decode(&[0x9A, 20, 0, 0, 0, 0, 4, 0]).unwrap();
+    assert_eq!((unpowered.supply_v, unpowered.errors), (0.0, 4));
     let cold = State::decode(&[0x9A, 0xF6, 0, 0, 0xE5, 1, 0, 0x30]).unwrap();
     assert_eq!((cold.temperature_c, cold.is_brake_open, cold.errors), (-10, false, 0x3000));
 }

@@ -74,6 +74,7 @@ pub struct RmdDrive {
     unreported_s: f64,
     /// There is a holding brake, and the time until it is open; `None` while it is locked.
     has_brake: bool,
+    off_locks: bool,
     opening_s: Option<f64>,
     /// The time until the program runs.
     starting_s: f64,
@@ -110,6 +111,7 @@ impl RmdDrive {
             is_expired: false,
             unreported_s: 0.0,
             has_brake: false,
+            off_locks: true,
             opening_s: Some(0.0),
             starting_s: 0.0,
             takes_timeout: true,
@@ -127,6 +129,12 @@ impl RmdDrive {
     #[must_use]
     pub const fn with_brake(self) -> Self {
         Self { has_brake: true, opening_s: None, ..self }
+    }
+
+    /// Has "off" leave the holding brake as it is: the manual does not say which is so.
+    #[must_use]
+    pub const fn keeping_brake(self) -> Self {
+        Self { off_locks: false, ..self }
     }
 
     /// Has the drive answer a time-out with zeros, and not take it.
@@ -173,6 +181,7 @@ impl RmdDrive {
             zero_deg: self.zero_deg + 360.0 * turns,
             timeout_ms: self.timeout_ms,
             has_brake: self.has_brake,
+            off_locks: self.off_locks,
             opening_s: (!self.has_brake).then_some(0.0),
             starting_s: STARTING_S,
             takes_timeout: self.takes_timeout,
@@ -238,7 +247,8 @@ impl RmdDrive {
                 self.lose_supply();
                 return None;
             }
-            OFF | LOCK => self.lock(),
+            OFF if self.off_locks => self.lock(),
+            LOCK => self.lock(),
             RELEASE | VELOCITY | POSITION => {
                 self.opening_s = Some(self.opening_s.unwrap_or(OPENING_S));
             }
