@@ -39,10 +39,10 @@
 //!
 //! **When the program stops, the drive does**: after [`Motor::with_timeout`], 100 ms at first, it switches itself off and locks its
 //! brake. The drive keeps this time in its flash memory, and no frame reads it. So it is written when the drive is to be enabled and has been
-//! away since the last time, at most 8 times in a row. A drive that answers with another time, or not at all, is not driven, and `arm` says so;
-//! that until the drive has
-//! been away; [`Motor::without_timeout`] is for such a drive. Seen by a user, not in the manual: a drive whose time has expired sends a frame that begins with
-//! 0xF1, each second, and sends the next command back in the place of an answer, without following it. Both trip the motor.
+//! away since the last time, at most 8 times in a row. A drive that answers with another time, or not at all, is not driven, and `arm` says so
+//! until the drive has been away; [`Motor::without_timeout`] is for such a drive. Seen by a user, not in the manual: a drive whose time has
+//! expired sends a frame that begins with 0xF1, each second, and sends the next command back in the place of an answer, without following it.
+//! Both trip the motor.
 //!
 //! **The angle** of feedback is in whole degrees. Each 16th command gives way to a question for the angle in 0.01°; in between
 //! the angle moves on by the velocity, within a degree of the feedback. A question for the state takes the place of each 32nd. Their answers
@@ -70,10 +70,10 @@
 //! ```
 //!
 //! **Not for drives with protocol V1 or V2**: they answer on 0x140 + id, so that such a drive is never heard; some are those of
-//! [`lk`](crate::lk). The impedance frames on 0x400 + id are not used, since V4.4 changed their ranges without a frame that tells; nor
-//! are replies at fixed times (0xB6) nor the frame for all drives (0x280).
+//! [`lk`](crate::lk). The impedance frames on 0x400 + id are not used, since V4.4 changed their ranges, which only the date of a drive's
+//! program tells; nor are replies at fixed times (0xB6) nor the frame for all drives (0x280).
 //!
-//! Sources: "Motor Motion Protocol" V4.2 of the vendor (February 2025): frames, scales, ids, errors, time-out, all examples. The drivers
+//! Sources: "Motor Motion Protocol" V4.2 of the vendor (May 2024): frames, scales, ids, errors, time-out, all examples. The drivers
 //! `myactuator_rmd` (protocol V3.8) and `axol`: ids and frames of V3, bits 0x0800 and 0x4000 of the errors, which errors V4.4 keeps until a reset,
 //! that a reset takes 1.1 s and releasing the brake up to 0.15 s. Behaviour after the time-out: pull request 4 of `myactuator_rmd_ros`. The table
 //! of the models: see [`Model`].
