@@ -306,9 +306,9 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     /// Off, which counts as followed. A reset that was asked for goes after it, and the lock of a brake that was released.
     fn disable(&mut self) -> Option<CanFrame> {
-        let command = match self.enabling.is_wanted {
-            false if core::mem::take(&mut self.resets) => Command::Reset,
-            false if self.is_open => Command::LockBrake,
+        let command = match self.enabling.is_off {
+            true if core::mem::take(&mut self.resets) => Command::Reset,
+            true if self.is_open => Command::LockBrake,
             _ => Command::Off,
         };
         self.doubt();
@@ -343,7 +343,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             0x77 => self.enabling.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
             0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
             0x78 => self.is_open = false,
-            0x80 => {}
+            0x80 => self.enabling.is_off = !self.enabling.is_wanted,
             // The first frame after the time-out of the drive is sent back, and not followed.
             _ if *data == self.last.encode() => self.doubt(),
             _ => return false,

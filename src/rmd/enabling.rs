@@ -11,6 +11,8 @@ pub(super) struct Enabling {
     pub(super) is_prepared: bool,
     /// All of this has been so, and nothing told otherwise since.
     pub(super) is_on: bool,
+    /// The drive is not to be driven, and has confirmed that it is off.
+    pub(super) is_off: bool,
 }
 
 impl Enabling {

@@ -185,6 +185,32 @@ fn a_command_that_is_sent_back_is_never_feedback() {
     heard(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
 }
 
+/// Two frames may be made before one is sent: a drive that is not known to be off is sent nothing else.
+#[test]
+fn off_goes_before_the_reset_and_the_lock_of_the_brake() {
+    let mut motor = Motor::new(MODEL, 1, torque()).unwrap();
+    let echo = |code| answer([code, 0, 0, 0, 0, 0, 0, 0]);
+    let sound = answer([0x9A, 30, 0, 1, 0xE0, 1, 0, 0]);
+    let confirmed = answer([0xB3, 0, 0, 0, 100, 0, 0, 0]);
+    for (sent, answered) in [sound, confirmed, echo(0x77)].iter().enumerate() {
+        motor.enable(u8::try_from(sent).unwrap());
+        assert!(motor.decode_answer(answered));
+    }
+    assert_eq!(motor.is_enabled(), Some(true));
+    // From before it was enabled.
+    assert!(motor.decode_answer(&echo(0x80)));
+    motor.reset_drive();
+    let mut codes = Vec::new();
+    for is_heard in [false, true, true, true, true, true] {
+        let frame = motor.disable().unwrap();
+        codes.push(frame.bytes()[0]);
+        if is_heard && frame.bytes()[0] != 0x76 {
+            assert!(motor.decode_answer(&answer(*frame.bytes())));
+        }
+    }
+    assert_eq!(codes, [0x80, 0x80, 0x76, 0x80, 0x78, 0x80]);
+}
+
 /// A state and a confirmation from before the drive was switched off do not enable it.
 #[test]
 fn nothing_heard_before_enables_the_drive() {
