@@ -166,6 +166,8 @@ MASTERS = {judge.name: judge for judge in (PyLkMotor, NekoRmd)}
 
 
 class Trial:
+    explained = EXPLAINED
+
     def __init__(self, judge, path, defect=None, count=1_000_000, seed=1):
         self.judge, self.count = judge, count
         self.program = Program(path, defect)
@@ -177,7 +179,7 @@ class Trial:
 
     def finish(self, part, what, count):
         seen = {note for note, times in self.notes.items() if times}
-        explained = EXPLAINED[self.judge.name, part]
+        explained = self.explained[self.judge.name, part]
         require(seen <= explained, f"not explained: {seen - explained}")
         require(self.count < 100_000 or seen == explained, f"no longer there: {explained - seen}")
         self.note(what, count)
@@ -373,28 +375,28 @@ class Trial:
         self.near(judge.telemetry.read_system_errors(), 2_400, 0, "supply")
 
 
-def main():
+def main(masters, trials):
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
-    parser.add_argument("judge", choices=MASTERS)
+    parser.add_argument("judge", choices=masters)
     parser.add_argument("--count", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=[*DEFECTS, "mit", "feedback", "modes"])
     arguments = parser.parse_args()
-    judge = MASTERS[arguments.judge]()
+    judge = masters[arguments.judge]()
     for part, defects in DEFECTS.items():
         if arguments.only not in (None, part):
             continue
         begin = time.monotonic()
         for defect in defects:
-            trial = Trial(judge, arguments.program, defect, count=20_000, seed=arguments.seed)
+            trial = trials(judge, arguments.program, defect, count=20_000, seed=arguments.seed)
             try:
                 getattr(trial, part)()
             except Difference as found:
                 print(f"{judge.name}, {part}: finds the planted defect {defect}: {found}")
             else:
                 sys.exit(f"{judge.name}, {part}: does not find the planted defect {defect}")
-        trial = Trial(judge, arguments.program, count=arguments.count, seed=arguments.seed)
+        trial = trials(judge, arguments.program, count=arguments.count, seed=arguments.seed)
         try:
             getattr(trial, part)()
         except Difference as found:
@@ -406,4 +408,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    main(MASTERS, Trial)

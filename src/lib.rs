@@ -37,6 +37,7 @@ pub mod lk;
 pub mod odrive;
 #[cfg(feature = "hal")]
 pub mod pwm;
+pub mod rmd;
 pub mod robstride;
 #[cfg(feature = "sim")]
 pub mod sim;

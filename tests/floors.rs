@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 19] = [
+const FLOORS: [(&str, u32); 20] = [
     ("units", 1),
     ("time", 0),
     ("math", 0),
@@ -21,6 +21,7 @@ const FLOORS: [(&str, u32); 19] = [
     ("dji", 30),
     ("lk", 30),
     ("odrive", 30),
+    ("rmd", 31),
     ("robstride", 30),
     ("snake", 30),
     ("vesc", 30),
@@ -272,7 +273,7 @@ fn the_decisions_are_numbered_in_their_order() {
 }
 
 /// The device families on CAN.
-const FAMILIES: [&str; 7] = ["damiao", "dji", "lk", "odrive", "robstride", "snake", "vesc"];
+const FAMILIES: [&str; 8] = ["damiao", "dji", "lk", "odrive", "rmd", "robstride", "snake", "vesc"];
 
 /// The first column of each table row of a text that begins with a path.
 fn paths(text: &str) -> impl Iterator<Item = &str> {
@@ -305,8 +306,11 @@ fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
             assert!(text_of(&root.join(path)).contains(family), "{path} does not name {family}");
         }
     }
-    let floor: Vec<&str> =
-        FLOORS.iter().filter(|(_, floor)| *floor == 30).map(|(name, _)| *name).collect();
+    let floor: Vec<&str> = FLOORS
+        .iter()
+        .filter(|(_, floor)| [30, 31].contains(floor))
+        .map(|(name, _)| *name)
+        .collect();
     let on_pins = |name: &&&str| **name != "pwm";
     assert_eq!(floor.iter().filter(on_pins).copied().collect::<Vec<_>>(), FAMILIES);
 }
@@ -334,7 +338,7 @@ fn own_rules(text: &str) -> Vec<String> {
 fn no_family_has_a_safety_rule_of_its_own() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for family in
-        ["damiao", "dji", "lk", "odrive", "robstride", "snake", "vesc", "pwm", "motor/own"]
+        ["damiao", "dji", "lk", "odrive", "rmd", "robstride", "snake", "vesc", "pwm", "motor/own"]
     {
         let files = rust_files(&src.join(family));
         for file in

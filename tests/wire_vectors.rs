@@ -413,6 +413,43 @@ fn lk_feedback() {
 }
 
 #[test]
+fn rmd_commands() {
+    use drivetrain::rmd::Command;
+    for (id, command) in [
+        ("rmd.a1", Command::Torque(100)),
+        ("rmd.a1.neg", Command::Torque(-100)),
+        ("rmd.a2.neg", Command::Velocity(-10_000)),
+        ("rmd.a4.neg", Command::Position(-36_000, 500)),
+        ("rmd.b3", Command::SetTimeout(1_000)),
+    ] {
+        let vector = vector(id);
+        assert_eq!(command.encode()[..], hex(&vector["expect"]["data"])[..], "{id}");
+    }
+}
+
+#[test]
+fn rmd_feedback() {
+    use drivetrain::rmd::{Feedback, State};
+    let data = |id: &str| -> [u8; 8] { hex(&vector(id)["input"]["data"]).try_into().unwrap() };
+    for id in ["rmd.fb.9C", "rmd.fb.A4.neg"] {
+        let feedback = Feedback::decode(&data(id)).unwrap();
+        let expect = &vector(id)["expect"];
+        assert_eq!(expect["temperature_c"], i64::from(feedback.temperature_c), "{id}");
+        assert_eq!(expect["speed_dps"], i64::from(feedback.velocity_dps), "{id}");
+        assert_eq!(expect["angle_deg"], i64::from(feedback.angle_deg), "{id}");
+        close(&[f32::from(feedback.current) / 100.0], &expect["iq_a"], 1e-6);
+    }
+    let state = State::decode(&data("rmd.fb.9A")).unwrap();
+    let expect = &vector("rmd.fb.9A")["expect"];
+    assert_eq!(expect["temperature_c"], i64::from(state.temperature_c));
+    assert_eq!(expect["errors"], i64::from(state.errors));
+    assert_eq!(expect["brake_open"], state.is_brake_open);
+    close(&[state.supply_v], &expect["bus_v"], 1e-4);
+    let angle = Feedback::decode_angle(&data("rmd.fb.92")).unwrap();
+    close(&[angle as f32 / 100.0], &vector("rmd.fb.92")["expect"]["angle_deg"], 1e-4);
+}
+
+#[test]
 fn f62_dbus_frames_with_impossible_values_are_refused() {
     for id in ["dbus.out_of_range", "dbus.switch_zero"] {
         let mut dbus = Dbus::new();

@@ -43,6 +43,10 @@ mod receive;
 mod registration;
 #[path = "../../tests/faults/rig.rs"]
 mod rig;
+#[path = "../../tests/faults/rmd.rs"]
+mod rmd;
+#[path = "../../tests/rmd/bench.rs"]
+mod rmd_bench;
 #[path = "../../tests/faults/robstride.rs"]
 mod robstride;
 #[path = "../../tests/robstride/bench.rs"]

@@ -8,9 +8,9 @@
 
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
-use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, PositionVelocity, State, Velocity};
-use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
-use drivetrain::sim::LkDrive;
+use drivetrain::lk::{Command, Feedback, Model, Motor, PositionVelocity, State, Velocity};
+use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive};
+use drivetrain::sim::{DriveShaft, LkDrive};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::fmt::Write as _;
@@ -19,16 +19,58 @@ use std::io::{BufRead, Read, Write};
 pub fn run(arguments: &[&str], defect: Defect, output: &mut impl Write) -> Outcome<()> {
     let input = std::io::stdin().lock();
     match arguments {
-        ["encode"] => encode(defect, input, output),
-        ["decode"] => decode(defect, input, output),
-        ["serve"] => serve(defect, input, output),
+        ["encode"] => encode(data_of, defect, input, output),
+        ["decode"] => decode(values_of, defect, input, output),
+        ["serve"] => serve(&mut drive_of(1), frames_of, defect, input, output),
         _ => Err("see the head of judges/src/lk.rs for the arguments".into()),
     }
 }
 
+fn data_of(code: u8, limit: u16, value: i32) -> Option<[u8; 8]> {
+    let command = match code {
+        0x80 => Command::Off,
+        0x88 => Command::Run,
+        0x92 => Command::ReadAngle,
+        0x9A => Command::ReadState,
+        0x9B => Command::ClearErrors,
+        0x9C => Command::ReadFeedback,
+        0xA1 => Command::Torque(i16::try_from(value).unwrap_or(i16::MAX)),
+        0xA2 => Command::Velocity(value, limit),
+        0xA4 => Command::Position(value, limit),
+        _ => return None,
+    };
+    Some(command.encode())
+}
+
+/// For feedback temperature, current, velocity and encoder, for a state temperature, supply in 0.01 V and 0.01 A, whether it is on (1)
+/// in the low and the errors in the high byte, for an angle its `i64`.
+#[expect(clippy::cast_possible_truncation, reason = "rounded counts")]
+fn values_of(data: &[u8; 8]) -> Option<(u8, [i64; 4])> {
+    if let Some(feedback) = Feedback::decode(data) {
+        let Feedback { temperature_c, current, velocity_dps, encoder } = feedback;
+        return Some((
+            1,
+            [temperature_c.into(), current.into(), velocity_dps.into(), encoder.into()],
+        ));
+    }
+    if let Some(state) = State::decode(data) {
+        let hundredths = |value: f32| (value * 100.0).round() as i64;
+        let last = i64::from(state.is_on) | i64::from(state.errors) << 8;
+        let (volts, amperes) = (hundredths(state.supply_v), hundredths(state.supply_a));
+        return Some((2, [state.temperature_c.into(), volts, amperes, last]));
+    }
+    let angle = Feedback::decode_angle(data)?;
+    Some((3, [angle, angle >> 16, angle >> 32, angle >> 48]))
+}
+
 /// Reads commands of eight bytes, the low one first: the first byte of the frame, a 0, a `u16` (the limit) and an `i32` (current,
 /// velocity or angle). Writes the data of their frames.
-fn encode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outcome<()> {
+pub fn encode(
+    data_of: impl Fn(u8, u16, i32) -> Option<[u8; 8]>,
+    defect: Defect,
+    mut input: impl Read,
+    output: &mut impl Write,
+) -> Outcome<()> {
     let mut commands = Vec::new();
     input.read_to_end(&mut commands)?;
     let (commands, []) = commands.as_chunks::<8>() else { return Err("half a command".into()) };
@@ -38,19 +80,8 @@ fn encode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outc
         if defect == Defect::Scale {
             value = value.wrapping_mul(100);
         }
-        let command = match code {
-            0x80 => Command::Off,
-            0x88 => Command::Run,
-            0x92 => Command::ReadAngle,
-            0x9A => Command::ReadState,
-            0x9B => Command::ClearErrors,
-            0x9C => Command::ReadFeedback,
-            0xA1 => Command::Torque(i16::try_from(value).unwrap_or(i16::MAX)),
-            0xA2 => Command::Velocity(value, limit),
-            0xA4 => Command::Position(value, limit),
-            _ => return Err(format!("no command {code:X}").into()),
-        };
-        let mut data = command.encode();
+        let mut data =
+            data_of(*code, limit, value).ok_or_else(|| format!("no command {code:X}"))?;
         if defect == Defect::Nibbles {
             data.swap(4, 5);
         }
@@ -60,10 +91,14 @@ fn encode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outc
 }
 
 /// Reads the data of answers and writes 16 bytes for each, the low one first: what it is (0 nothing, 1 feedback, 2 state, 3 angle) and
-/// three zeros; then for feedback temperature, current, velocity and encoder as `i16`, for a state temperature, supply in 0.01 V and
-/// 0.01 A, whether it is on (1) in the low and the errors in the high byte, for an angle its `i64`; zeros follow.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded counts")]
-fn decode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outcome<()> {
+/// three zeros; then its four values of 16 bits each; zeros follow.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits")]
+pub fn decode(
+    values_of: impl Fn(&[u8; 8]) -> Option<(u8, [i64; 4])>,
+    defect: Defect,
+    mut input: impl Read,
+    output: &mut impl Write,
+) -> Outcome<()> {
     let mut frames = Vec::new();
     input.read_to_end(&mut frames)?;
     let (frames, []) = frames.as_chunks::<8>() else { return Err("half a frame".into()) };
@@ -73,27 +108,38 @@ fn decode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outc
             data.swap(4, 5);
         }
         let mut found = [0; 16];
-        let mut tell = |kind: u8, values: [i64; 4]| {
+        if let Some((kind, values)) = values_of(&data) {
             found[0] = kind;
             for (place, value) in found[4..12].chunks_exact_mut(2).zip(values) {
                 place.copy_from_slice(&(value as u16).to_le_bytes());
             }
-        };
-        if let Some(feedback) = Feedback::decode(&data) {
-            let Feedback { temperature_c, current, velocity_dps, encoder } = feedback;
-            tell(1, [temperature_c.into(), current.into(), velocity_dps.into(), encoder.into()]);
-        } else if let Some(state) = State::decode(&data) {
-            let hundredths = |value: f32| (value * 100.0).round() as i64;
-            let last = i64::from(state.is_on) | i64::from(state.errors) << 8;
-            let (volts, amperes) = (hundredths(state.supply_v), hundredths(state.supply_a));
-            tell(2, [state.temperature_c.into(), volts, amperes, last]);
-        } else if let Some(angle) = Feedback::decode_angle(&data) {
-            found[0] = 3;
-            found[4..12].copy_from_slice(&angle.to_le_bytes());
         }
         output.write_all(&found)?;
     }
     Ok(())
+}
+
+/// A simulated drive that is served.
+pub trait Served {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
+    fn step(&mut self, dt_s: f32);
+    fn fail(&mut self, errors: u16);
+    fn shaft(&self) -> (DriveShaft, bool, u16);
+}
+
+impl Served for LkDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        self.hear(frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        self.step(dt_s);
+    }
+    fn fail(&mut self, errors: u16) {
+        self.fail(errors.to_le_bytes()[0]);
+    }
+    fn shaft(&self) -> (DriveShaft, bool, u16) {
+        (*self.shaft(), self.is_on(), self.errors().into())
+    }
 }
 
 /// ```text
@@ -104,8 +150,13 @@ fn decode(defect: Defect, mut input: impl Read, output: &mut impl Write) -> Outc
 /// session ID MODE    a motor and a drive: arms, drives, loses the drive to an error, disarms; the frames that are no control
 ///                    command, each once                         ID DATA ...
 /// ```
-fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
-    let mut drive = drive_of(1);
+pub fn serve(
+    drive: &mut impl Served,
+    frames_of: impl Fn(u8, &str) -> Outcome<Vec<CanFrame>>,
+    defect: Defect,
+    input: impl BufRead,
+    output: &mut impl Write,
+) -> Outcome<()> {
     for line in input.lines() {
         let line = line?;
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -138,24 +189,17 @@ fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Outcom
                 answer.push_str("ok");
             }
             ["shaft"] => {
-                let shaft = drive.shaft();
+                let (shaft, on, errors) = drive.shaft();
                 let (angle, velocity) = (shaft.angle_rad(), shaft.velocity_rad_per_s());
-                let (torque, on) = (shaft.torque_nm(), u8::from(drive.is_on()));
-                write!(answer, "{angle} {velocity} {torque} {on} {}", drive.errors())?;
+                write!(
+                    answer,
+                    "{angle} {velocity} {} {} {errors}",
+                    shaft.torque_nm(),
+                    u8::from(on)
+                )?;
             }
             ["session", id, mode] => {
-                let (id, quick) = (id.parse()?, AngularVelocity::from_rad_per_s(10.0));
-                let torque = ImpedanceControl::new(2.0)?.with_gains(5.0, 0.2)?;
-                let sent = match *mode {
-                    "torque" => session(id, torque, |own| _ = own.set_torque(1.0))?,
-                    "velocity" => {
-                        session(id, Velocity::new(quick), |own| _ = own.set_velocity((), quick))?
-                    }
-                    _ => session(id, PositionVelocity::new(quick), |own| {
-                        _ = own.set_angle((), Angle::from_radians(1.0));
-                    })?,
-                };
-                for frame in sent {
+                for frame in frames_of(id.parse()?, mode)? {
                     let (mut header, data) = (u16::try_from(frame.header())?, *frame.bytes());
                     header += u16::from(defect == Defect::Id);
                     tell(&mut answer, &CanFrame::standard(header, data).ok_or("no id")?);
@@ -178,9 +222,21 @@ fn drive_of(id: u8) -> LkDrive {
     LkDrive::new(id, 33.0 / 4096.0, 0.32, 1.0, 16)
 }
 
-fn session<M: Mode>(id: u8, mode: M, set: impl Fn(&mut Own<Motor<M>>)) -> Outcome<Vec<CanFrame>> {
-    let mut own = Own::new(Motor::new(Model::MF9025_16T, id, mode)?);
-    let (mut drive, mut seen) = (drive_of(id), Vec::new());
+fn frames_of(id: u8, mode: &str) -> Outcome<Vec<CanFrame>> {
+    let quick = AngularVelocity::from_rad_per_s(10.0);
+    let torque = ImpedanceControl::new(2.0)?.with_gains(5.0, 0.2)?;
+    let model = Model::MF9025_16T;
+    match mode {
+        "torque" => session(Motor::new(model, id, torque)?, drive_of(id)),
+        "velocity" => session(Motor::new(model, id, Velocity::new(quick))?, drive_of(id)),
+        _ => session(Motor::new(model, id, PositionVelocity::new(quick))?, drive_of(id)),
+    }
+}
+
+/// Arms a motor, drives it, loses the drive to an error and disarms; returns the frames that are no control command, each once.
+pub fn session<M: OwnMotor>(motor: M, mut drive: impl Served) -> Outcome<Vec<CanFrame>> {
+    let mut own = Own::new(motor);
+    let mut seen = Vec::new();
     for ms in 1..1_000_u64 {
         let now = Instant::from_micros(ms * 1_000);
         match ms {
@@ -189,7 +245,9 @@ fn session<M: Mode>(id: u8, mode: M, set: impl Fn(&mut Own<Motor<M>>)) -> Outcom
             _ => {}
         }
         if ms > 100 {
-            set(&mut own);
+            _ = own.set_torque(1.0);
+            _ = own.set_velocity((), AngularVelocity::from_rad_per_s(10.0));
+            _ = own.set_angle((), Angle::from_radians(1.0));
         }
         own.update(Tick::new(now, 0.001));
         while let Some(frame) = own.next_frame(0) {

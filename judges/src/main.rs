@@ -8,6 +8,7 @@
 //! drivetrain-judges robstride ...         the family `robstride`: see `robstride`
 //! drivetrain-judges serve                 text, a line in and a line out: see `serve`
 //! drivetrain-judges lk ...                the same of motors of LK-TECH: see `lk`
+//! drivetrain-judges rmd ...               the same of motors of MyActuator: see `rmd`
 //! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
 //! drivetrain-judges odrive VERB           see `odrive`
 //! ```
@@ -17,6 +18,7 @@ mod codec;
 mod defect;
 mod lk;
 mod odrive;
+mod rmd;
 mod robstride;
 mod serve;
 mod vesc;
@@ -121,6 +123,7 @@ fn run(arguments: &[&str]) -> Outcome<()> {
             codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
         }
         ["lk", rest @ ..] => lk::run(rest, defect, &mut output)?,
+        ["rmd", rest @ ..] => rmd::run(rest, defect, &mut output)?,
         ["robstride", rest @ ..] => {
             robstride::run(rest, defect, io::stdin().lock(), &mut output)?;
         }

@@ -4,6 +4,7 @@ use super::command::{id_of, is_command};
 use super::config::sealed::Goal;
 use super::config::{Mode, sealed};
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
+use super::questions::Questions;
 use super::{Command, ConfigError, Feedback, Model, State};
 use crate::frame::CanFrame;
 use crate::motor::{
@@ -12,14 +13,14 @@ use crate::motor::{
 };
 use crate::units::{Angle, AngularVelocity};
 
-/// Each so many commands one is a question for the state: 32 ms at 1 kHz.
-const QUESTION: u8 = 32;
+/// The ids of frames in both directions, without the id of the drive.
+const FRAMES: u16 = 0x140;
 
-/// The place of the question for the angle among them.
-const HALF_WAY: u8 = QUESTION / 2;
+/// The place of the question for the angle among 32 commands.
+const HALF_WAY: u8 = 16;
 
 /// After so many commands without feedback the drive may have lost its supply. One of them may be a question.
-const SILENT: u8 = 4;
+pub(crate) const SILENT: u8 = 4;
 
 /// A turn of the rotor in the unit of the drive, 0.01°.
 const TURN: i64 = 36_000;
@@ -66,11 +67,7 @@ pub struct Motor<M> {
     is_wanted: bool,
     /// How many echoes of off and run are due.
     echoes: u8,
-    commands: u8,
-    /// The last command that was no question.
-    last: Command,
-    /// A question has waited for a new command.
-    has_waited: bool,
+    questions: Questions<Command>,
     clears: bool,
 }
 
@@ -83,7 +80,7 @@ impl<M: Mode> Motor<M> {
         if !matches!(id, 1..=32) {
             return Err(ConfigError::Id(id));
         }
-        mode.check(&model)?;
+        mode.check(&model.scale())?;
         Ok(Self {
             model,
             id,
@@ -97,9 +94,7 @@ impl<M: Mode> Motor<M> {
             silent: 0,
             is_wanted: false,
             echoes: 0,
-            commands: 0,
-            last: Command::REST,
-            has_waited: false,
+            questions: Questions::new(Command::REST),
             clears: false,
         })
     }
@@ -123,7 +118,7 @@ impl<M: Mode> Motor<M> {
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
-        CanFrame::of(id_of(self.id), command.encode())
+        CanFrame::of(id_of(FRAMES, self.id), command.encode())
     }
 
     /// Returns a value of the output shaft in the direction of the drive, or the other way round.
@@ -186,7 +181,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |role| Claim::new(id_of(self.id), role, self.name());
+        let claim = |role| Claim::new(id_of(FRAMES, self.id), role, self.name());
         [claim(Role::Command), claim(Role::Feedback)]
     }
 
@@ -197,7 +192,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let data = frame.bytes();
         let [code, ..] = *data;
         let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&code);
-        if !is_answer || is_command(data, self.mode.limit(&self.model)) {
+        if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
@@ -234,31 +229,24 @@ impl<M: Mode> OwnMotor for Motor<M> {
     fn control(&mut self, order: Order) -> CanFrame {
         let needs_angle = <M as sealed::Mode>::NEEDS_ANGLE;
         let shaft = (self.angle(), self.velocity());
-        let goal = self.mode.goal(order, shaft, &self.model);
+        let goal = self.mode.goal(order, shaft, &self.model.scale());
         let command = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
-        let due = match self.commands {
-            0 => Some(Command::ReadState),
-            // Not beside the other question, so that no more than one answer in a row is no feedback.
-            HALF_WAY if needs_angle => Some(Command::ReadAngle),
-            _ => None,
-        };
-        let question = due.filter(|_| self.has_waited || command == self.last);
-        self.has_waited = question.is_none() && due.is_some();
-        if !self.has_waited {
-            self.commands = (self.commands + 1) % QUESTION;
-        }
         self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };
         if self.silent > SILENT {
             return self.frame_of(Command::ReadAngle);
         }
-        self.last = question.map_or(command, |_| self.last);
-        self.frame_of(question.unwrap_or(command))
+        let next = self.questions.next(command, |place| match place {
+            0 => Some(Command::ReadState),
+            // Not beside the other question, so that no more than one answer in a row is no feedback.
+            HALF_WAY if needs_angle => Some(Command::ReadAngle),
+            _ => None,
+        });
+        self.frame_of(next)
     }
 
     fn reset(&mut self) {
         self.mode.reset();
-        (self.commands, self.silent) = (1, 0);
-        (self.last, self.has_waited) = (Command::REST, false);
+        (self.questions, self.silent) = (Questions::new(Command::REST), 0);
     }
 
     /// Run and the question for the state in turn, then the question for the angle if commands count from it.
@@ -357,6 +345,6 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
 /// Truncates, so that a limit holds; NaN is zero.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-const fn whole(value: f32) -> i32 {
+pub(crate) const fn whole(value: f32) -> i32 {
     value as i32
 }

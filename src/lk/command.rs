@@ -45,10 +45,7 @@ impl Command {
         let (code, limit, value) = match self {
             Self::Off => (0x80, 0, 0),
             Self::Run => (0x88, 0, 0),
-            Self::Torque(current) => {
-                let [a, b] = within(current).to_le_bytes();
-                return [0xA1, 0, 0, 0, a, b, 0, 0];
-            }
+            Self::Torque(current) => (0xA1, 0, within(current).cast_unsigned() as i32),
             Self::Velocity(velocity, limit) => (0xA2, limit, velocity),
             Self::Position(angle, limit) => (0xA4, limit, angle),
             Self::ReadAngle => (0x92, 0, 0),
@@ -56,9 +53,14 @@ impl Command {
             Self::ClearErrors => (0x9B, 0, 0),
             Self::ReadFeedback => (0x9C, 0, 0),
         };
-        let ([a, b], [c, d, e, f]) = (limit.to_le_bytes(), value.to_le_bytes());
-        [code, 0, a, b, c, d, e, f]
+        data_of(code, limit, value)
     }
+}
+
+/// Writes a first byte, a limit and a value.
+pub(crate) const fn data_of(code: u8, limit: u16, value: i32) -> [u8; 8] {
+    let ([a, b], [c, d, e, f]) = (limit.to_le_bytes(), value.to_le_bytes());
+    [code, 0, a, b, c, d, e, f]
 }
 
 const fn within(current: i16) -> i16 {
@@ -75,7 +77,7 @@ const fn within(current: i16) -> i16 {
 /// writes to bytes 2 and 3.
 ///
 /// Byte 1 of a command is 0, which is a temperature of 0 °C in an answer.
-pub(super) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
+pub(crate) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
     let [code, first, a, b, c, d, e, f] = *data;
     first == 0
         && match code {
@@ -85,7 +87,7 @@ pub(super) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
         }
 }
 
-/// Returns the id of the frames of a drive, in both directions.
-pub(super) fn id_of(id: u8) -> Id {
-    StandardId::new(0x140 + u16::from(id)).unwrap_or(StandardId::MAX).into()
+/// Returns the id of the frames of a drive.
+pub(crate) fn id_of(ids: u16, id: u8) -> Id {
+    StandardId::new(ids + u16::from(id)).unwrap_or(StandardId::MAX).into()
 }

@@ -1,7 +1,7 @@
 //! The control modes, with what a user chooses for each.
 
-use super::model::RAD_PER_DEGREE;
-use super::{ConfigError, Model};
+use super::ConfigError;
+use super::model::{RAD_PER_DEGREE, Scale};
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::{Angle, AngularVelocity};
@@ -11,11 +11,11 @@ pub trait Mode: sealed::Mode {}
 
 impl<M: sealed::Mode> Mode for M {}
 
-pub(super) mod sealed {
-    use super::{Angle, AngularVelocity, Capabilities, ConfigError, Model, Order};
+pub(crate) mod sealed {
+    use super::{Angle, AngularVelocity, Capabilities, ConfigError, Order, Scale};
 
     /// Angle and velocity of the output shaft.
-    pub(in crate::lk) type Shaft = (Option<Angle>, AngularVelocity);
+    pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
 
     /// A goal of the output shaft.
     #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +24,7 @@ pub(super) mod sealed {
         Torque(f32),
         /// A velocity in rad/s, with the largest current in counts, 0 for none.
         Velocity(f32, u16),
-        /// An angle so many rad away, with the largest velocity of the rotor in °/s.
+        /// An angle so many rad away, with the largest velocity in °/s of the wire.
         Way(f32, u16),
     }
 
@@ -36,18 +36,18 @@ pub(super) mod sealed {
 
         /// # Errors
         /// A limit that is not within the ranges of the model.
-        fn check(&self, model: &Model) -> Result<(), ConfigError>;
+        fn check(&self, scale: &Scale) -> Result<(), ConfigError>;
 
         fn capabilities(&self) -> Capabilities;
 
         /// Returns the largest value of bytes 2 and 3 of a command.
-        fn limit(&self, model: &Model) -> u16 {
-            _ = model;
+        fn limit(&self, scale: &Scale) -> u16 {
+            _ = scale;
             0
         }
 
         /// Returns the goal of a step; `None` to rest.
-        fn goal(&mut self, order: Order, shaft: Shaft, model: &Model) -> Option<Goal>;
+        fn goal(&mut self, order: Order, shaft: Shaft, scale: &Scale) -> Option<Goal>;
 
         /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
         fn effort(&self) -> f32 {
@@ -67,18 +67,18 @@ const UNLIMITED: f32 = 1e9;
 impl sealed::Mode for ImpedanceControl {
     const CODE: u8 = 0xA1;
 
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        torque_limit(self.torque_limit_nm(), model)
+    fn check(&self, scale: &Scale) -> Result<(), ConfigError> {
+        torque_limit(self.torque_limit_nm(), scale)
     }
 
     fn capabilities(&self) -> Capabilities {
         Self::capabilities(self)
     }
 
-    fn goal(&mut self, order: Order, shaft: Shaft, model: &Model) -> Option<Goal> {
+    fn goal(&mut self, order: Order, shaft: Shaft, scale: &Scale) -> Option<Goal> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
-            velocity: AngularVelocity::from_rad_per_s(model.max_velocity()),
+            velocity: AngularVelocity::from_rad_per_s(scale.max_velocity),
             stiffness: UNLIMITED,
             damping: UNLIMITED,
             torque_nm: self.torque_limit_nm(),
@@ -103,7 +103,8 @@ pub struct PositionVelocity {
 }
 
 impl PositionVelocity {
-    /// Limits the velocity: above 0 and at most what feedback tells, 572 rad/s at the rotor.
+    /// Limits the velocity: above 0 and at most what feedback tells: 572 rad/s, of the rotor of `lk` and of the output
+    /// shaft of `rmd`.
     #[must_use]
     pub const fn new(velocity_limit: AngularVelocity) -> Self {
         Self { velocity_limit }
@@ -114,22 +115,22 @@ impl sealed::Mode for PositionVelocity {
     const CODE: u8 = 0xA4;
     const NEEDS_ANGLE: bool = true;
 
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)
+    fn check(&self, scale: &Scale) -> Result<(), ConfigError> {
+        velocity_limit(self.velocity_limit, scale)
     }
 
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Angle])
     }
 
-    fn limit(&self, model: &Model) -> u16 {
-        rotor_dps(self.velocity_limit.as_rad_per_s(), model)
+    fn limit(&self, scale: &Scale) -> u16 {
+        rotor_dps(self.velocity_limit.as_rad_per_s(), scale)
     }
 
-    fn goal(&mut self, order: Order, (angle, _): Shaft, model: &Model) -> Option<Goal> {
+    fn goal(&mut self, order: Order, (angle, _): Shaft, scale: &Scale) -> Option<Goal> {
         let Target::Angle(target) = order.target else { return None };
         let way = wrap_pi((target - angle?).as_radians());
-        let limit = rotor_dps(self.velocity_limit.as_rad_per_s() * order.share, model);
+        let limit = rotor_dps(self.velocity_limit.as_rad_per_s() * order.share, scale);
         Some(Goal::Way(way, limit))
     }
 }
@@ -142,51 +143,55 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    /// Limits the velocity: above 0 and at most what feedback tells, 572 rad/s at the rotor.
+    /// Limits the velocity: above 0 and at most what feedback tells: 572 rad/s, of the rotor of `lk` and of the output
+    /// shaft of `rmd`.
     #[must_use]
     pub const fn new(velocity_limit: AngularVelocity) -> Self {
         Self { velocity_limit, torque_limit_nm: None }
     }
 
-    /// Limits the torque too, in Nm, on drives that read the limit: protocol V2.35 has no field for it, and such a drive keeps to its
-    /// own setting. The [share](Order::share) of an order lowers it.
+    /// Limits the torque too, in Nm, on drives that read the limit: protocol V2.35 of `lk` has no field for it, and such a drive keeps
+    /// to its own setting. Motors of `rmd` refuse it. The [share](Order::share) of an order lowers it.
     #[must_use]
     pub const fn with_torque_limit(self, limit_nm: f32) -> Self {
         Self { torque_limit_nm: Some(limit_nm), ..self }
     }
 
-    fn counts(&self, share: f32, model: &Model) -> u16 {
-        self.torque_limit_nm
-            .map_or(0, |limit| at_least_one(limit * share / model.torque_per_count()))
+    fn counts(&self, share: f32, scale: &Scale) -> u16 {
+        self.torque_limit_nm.map_or(0, |limit| at_least_one(limit * share / scale.torque_per_count))
     }
 }
 
 impl sealed::Mode for Velocity {
     const CODE: u8 = 0xA2;
 
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)?;
-        self.torque_limit_nm.map_or(Ok(()), |limit| torque_limit(limit, model))
+    fn check(&self, scale: &Scale) -> Result<(), ConfigError> {
+        velocity_limit(self.velocity_limit, scale)?;
+        match self.torque_limit_nm {
+            Some(_) if !scale.limits_torque => Err(ConfigError::NoTorqueLimit),
+            Some(limit) => torque_limit(limit, scale),
+            None => Ok(()),
+        }
     }
 
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Velocity])
     }
 
-    fn limit(&self, model: &Model) -> u16 {
-        self.counts(1.0, model)
+    fn limit(&self, scale: &Scale) -> u16 {
+        self.counts(1.0, scale)
     }
 
-    fn goal(&mut self, order: Order, _: Shaft, model: &Model) -> Option<Goal> {
+    fn goal(&mut self, order: Order, _: Shaft, scale: &Scale) -> Option<Goal> {
         let Target::Velocity(velocity) = order.target else { return None };
         let limit = self.velocity_limit.as_rad_per_s();
         let velocity = velocity.as_rad_per_s().min(limit).max(-limit);
-        Some(Goal::Velocity(velocity, self.counts(order.share, model)))
+        Some(Goal::Velocity(velocity, self.counts(order.share, scale)))
     }
 }
 
-fn rotor_dps(rad_per_s: f32, model: &Model) -> u16 {
-    at_least_one(rad_per_s * model.gear() / RAD_PER_DEGREE)
+fn rotor_dps(rad_per_s: f32, scale: &Scale) -> u16 {
+    at_least_one(rad_per_s * scale.gear / RAD_PER_DEGREE)
 }
 
 /// Truncates to a limit of the wire: 0 would be none.
@@ -195,14 +200,14 @@ fn at_least_one(value: f32) -> u16 {
     (value as u16).max(1)
 }
 
-fn torque_limit(limit_nm: f32, model: &Model) -> Result<(), ConfigError> {
-    let (least, most) = (model.torque_per_count(), model.max_torque_nm());
+fn torque_limit(limit_nm: f32, scale: &Scale) -> Result<(), ConfigError> {
+    let (least, most) = (scale.torque_per_count, scale.max_torque_nm);
     let is_valid = limit_nm >= least && limit_nm <= most;
     if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit_nm, least, most)) }
 }
 
-fn velocity_limit(limit: AngularVelocity, model: &Model) -> Result<(), ConfigError> {
-    let (limit, most) = (limit.as_rad_per_s(), model.max_velocity());
+fn velocity_limit(limit: AngularVelocity, scale: &Scale) -> Result<(), ConfigError> {
+    let (limit, most) = (limit.as_rad_per_s(), scale.max_velocity);
     let is_valid = limit > 0.0 && limit <= most;
     if is_valid { Ok(()) } else { Err(ConfigError::VelocityLimit(limit, most)) }
 }

@@ -1,4 +1,6 @@
-//! Errors of the configuration.
+//! Errors of the configuration: those of `rmd` too.
+
+use crate::time::Duration;
 
 /// A configuration that no drive has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +19,12 @@ pub enum ConfigError {
     TorqueLimit(f32, f32, f32),
     /// A velocity limit that is not above zero and at most what feedback tells: the limit, and the end, in rad/s.
     VelocityLimit(f32, f32),
+    /// A torque limit of a velocity, which the commands of the drive have no field for.
+    NoTorqueLimit,
+    /// A largest current of a model that is not between 0.01 and 327 A.
+    Current(f32),
+    /// A time-out of the drive that is not between 10 ms and 60 s.
+    Timeout(Duration),
 }
 
 impl core::fmt::Display for ConfigError {
@@ -33,6 +41,18 @@ impl core::fmt::Display for ConfigError {
             }
             Self::VelocityLimit(limit, most) => {
                 write!(f, "velocity limit {limit} rad/s: above 0 and at most {most} rad/s")
+            }
+            Self::NoTorqueLimit => {
+                write!(
+                    f,
+                    "torque limit of a velocity: the commands of this drive have no field for it"
+                )
+            }
+            Self::Current(current) => {
+                write!(f, "largest current {current} A: 0.01 to 327 A are allowed")
+            }
+            Self::Timeout(time) => {
+                write!(f, "time-out of {} us: 10 ms to 60 s are allowed", time.as_micros())
             }
         }
     }

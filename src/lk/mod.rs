@@ -63,21 +63,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **Not for MyActuator's RMD-X** with protocol V3 or V4: its frames have the same first bytes, another scale of the current (0.01 A) and
-//! an angle in degrees where the encoder stands here, and answers on 0x240 + id, so that such a drive is never heard. Nor for the series
-//! MS, which has no torque frame. A holding brake (0x8C) is neither released nor applied.
+//! **Not for MyActuator's RMD-X** with protocol V3 or V4, which is the family [`rmd`](crate::rmd): its frames have the same first bytes,
+//! another scale of the current, and answers on 0x240 + id, so that such a drive is never heard. Nor for the series MS, which has no
+//! torque frame. A holding brake (0x8C) is neither released nor applied.
 //!
 //! Sources: "Motor CAN bus communication protocol" V2.35 of the vendor, as public programs quote it: frames, ids, scales, what off and
 //! run do, two of the error bits. The other six bits, and the current limit in bytes 2 and 3 of 0xA2, as pylkmotor 1.0.6 has them; with
 //! V2.35 these two bytes are 0. Not known: from which side the manual sees its positive direction, which it calls clockwise: angles
 //! and torques have the sign of the drive, and [`Motor::reversed`] turns it round. Whether a drive counts turns while it is off.
 
-mod bus;
-mod command;
-mod config;
+pub(crate) mod bus;
+pub(crate) mod command;
+pub(crate) mod config;
 mod error;
 mod feedback;
-mod model;
+pub(crate) mod model;
+pub(crate) mod questions;
 #[cfg(test)]
 mod tests;
 

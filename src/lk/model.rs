@@ -156,9 +156,9 @@ impl Model {
         self.series.amperes_per_count() * self.torque_constant
     }
 
-    /// Returns the largest velocity that feedback tells, in rad/s.
-    pub(super) const fn max_velocity(&self) -> f32 {
-        32_767.0 * RAD_PER_DEGREE / self.gear
+    /// Returns the numbers that the control modes need.
+    pub(super) const fn scale(&self) -> Scale {
+        Scale::new(self.torque_per_count(), self.max_torque_nm(), self.gear, true)
     }
 
     /// Returns a share of the speed without load, which is estimated from the torque constant.
@@ -167,4 +167,31 @@ impl Model {
     }
 }
 
-pub(super) const RAD_PER_DEGREE: f32 = core::f32::consts::PI / 180.0;
+pub(crate) const RAD_PER_DEGREE: f32 = core::f32::consts::PI / 180.0;
+
+/// The numbers of a model that the control modes need: those of `rmd` too.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
+    /// The torque of a count of current, in Nm.
+    pub torque_per_count: f32,
+    /// The largest torque, in Nm.
+    pub max_torque_nm: f32,
+    /// The largest velocity of the output shaft that feedback tells, in rad/s.
+    pub max_velocity: f32,
+    /// The turns on the wire for one of the output shaft.
+    pub gear: f32,
+    /// A velocity command has a field for the largest current.
+    pub limits_torque: bool,
+}
+
+impl Scale {
+    pub(crate) const fn new(
+        torque_per_count: f32,
+        max_torque_nm: f32,
+        gear: f32,
+        limits_torque: bool,
+    ) -> Self {
+        let max_velocity = 32_767.0 * RAD_PER_DEGREE / gear;
+        Self { torque_per_count, max_torque_nm, max_velocity, gear, limits_torque }
+    }
+}

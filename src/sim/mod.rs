@@ -92,7 +92,7 @@ pub use bits::{INTERMISSION_BITS, frame_bits, nominal_bits, worst_case_bits};
 pub use chassis::{ChassisConfig, ChassisState};
 pub use controller::Controller;
 pub use drive::{
-    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive, VescMotor,
+    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
 };
 pub use error::SimError;
 pub use fault::Fault;

@@ -12,6 +12,7 @@ mod mit;
 mod odrive;
 #[cfg(feature = "hal")]
 mod pins;
+mod rmd;
 mod robstride;
 mod vesc;
 

@@ -2,11 +2,11 @@
 
 use crate::case::Case;
 use crate::{
-    arming, clocks, commands, drives, health, odrive, plausibility, receive, registration,
+    arming, clocks, commands, drives, health, odrive, plausibility, receive, registration, rmd,
     robstride, timing, transmit,
 };
 
-pub(crate) const CATALOGUE: [&[Case]; 12] = [
+pub(crate) const CATALOGUE: [&[Case]; 13] = [
     receive::CASES,
     plausibility::CASES,
     timing::CASES,
@@ -19,4 +19,5 @@ pub(crate) const CATALOGUE: [&[Case]; 12] = [
     drives::CASES,
     odrive::CASES,
     robstride::CASES,
+    rmd::CASES,
 ];

@@ -23,6 +23,9 @@ mod plausibility;
 mod receive;
 mod registration;
 mod rig;
+mod rmd;
+#[path = "../rmd/bench.rs"]
+mod rmd_bench;
 mod robstride;
 #[path = "../robstride/bench.rs"]
 mod robstride_bench;

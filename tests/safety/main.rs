@@ -16,7 +16,7 @@ use clock::{Clock, Random};
 use drivetrain::motor::{ArmError, Link, TargetError};
 use drivetrain::time::{Instant, Tick};
 use reference::{Reference, Refusal, Rules};
-use subjects::{Both, Damiao, Lk, RobStride, Snake, Subject, Vesc, Wheel};
+use subjects::{Both, Damiao, Lk, Rmd, RobStride, Snake, Subject, Vesc, Wheel};
 
 #[expect(dead_code, reason = "the example's own main and simulation")]
 #[path = "../../examples/custom_motor.rs"]
@@ -250,6 +250,9 @@ fn every_device(clocks: u64) {
     run("lk, torque", clocks, Lk::torque);
     run("lk, velocity", clocks, Lk::velocity);
     run("lk, position", clocks, Lk::position);
+    run("rmd, torque", clocks, Rmd::torque);
+    run("rmd, velocity", clocks, Rmd::velocity);
+    run("rmd, position", clocks, Rmd::position);
     run("vesc", clocks, Vesc::new);
     run("odrive, torque", clocks, odrive::Odrive::torque);
     run("odrive, position", clocks, odrive::Odrive::position);

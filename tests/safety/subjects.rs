@@ -11,8 +11,9 @@ use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
     Reaction, Recovery, TargetError, VelocityDrive,
 };
+use drivetrain::rmd;
 use drivetrain::robstride;
-use drivetrain::sim::{DamiaoDrive, LkDrive, RobStrideDrive};
+use drivetrain::sim::{DamiaoDrive, LkDrive, RmdDrive, RobStrideDrive};
 use drivetrain::snake::{self, Command, Joint, Joints, Register, Reply};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity, Current};
@@ -321,6 +322,85 @@ impl<M: lk::Mode> Subject<1> for Lk<M> {
             let mut turned = self.drive;
             turned.step(1e-6);
             is_driven |= turned.is_on() && turned.shaft().torque_nm() != 0.0;
+        }
+        [is_driven]
+    }
+}
+
+/// A drive that is asked for its state, confirms its time-out, and releases its brake or tells its angle, before it is driven.
+pub(super) struct Rmd<M: rmd::Mode> {
+    motor: Own<rmd::Motor<M>>,
+    drive: RmdDrive,
+    set: fn(&mut Own<rmd::Motor<M>>, f32) -> Result<(), TargetError>,
+}
+
+impl Rmd<ImpedanceControl> {
+    pub(super) fn torque() -> Self {
+        let mode = ImpedanceControl::new(2.0).unwrap();
+        Self::new(mode, |motor, value| motor.set_torque(2.0 * value))
+    }
+}
+
+impl Rmd<rmd::Velocity> {
+    pub(super) fn velocity() -> Self {
+        let mode = rmd::Velocity::new(AngularVelocity::from_rad_per_s(10.0));
+        Self::new(mode, |motor, value| {
+            motor.set_velocity((), AngularVelocity::from_rad_per_s(5.0 * value))
+        })
+    }
+}
+
+impl Rmd<rmd::PositionVelocity> {
+    pub(super) fn position() -> Self {
+        let mode = rmd::PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        Self::new(mode, |motor, value| motor.set_angle((), Angle::from_radians(value)))
+    }
+}
+
+impl<M: rmd::Mode> Rmd<M> {
+    fn new(mode: M, set: fn(&mut Own<rmd::Motor<M>>, f32) -> Result<(), TargetError>) -> Self {
+        let motor = Own::new(rmd::Motor::new(rmd::Model::X8_120, 1, mode).unwrap());
+        let drive = RmdDrive::new(1, 2.4);
+        let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
+        Self { motor, drive, set }
+    }
+}
+
+impl<M: rmd::Mode> Subject<1> for Rmd<M> {
+    const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
+
+    stops!(self => self.motor);
+
+    fn hear(&mut self, now: Instant) {
+        let question = CanFrame::standard(0x141, [0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        let feedback = self.drive.hear(&question).unwrap();
+        _ = Devices::ingest(&mut self.motor, &feedback, now);
+    }
+    fn link(&self) -> [Link; 1] {
+        [self.motor.guard().link()]
+    }
+    fn is_armed(&self) -> [bool; 1] {
+        [self.motor.guard().is_armed()]
+    }
+    fn set(&mut self, value: f32) -> [Result<(), TargetError>; 1] {
+        [(self.set)(&mut self.motor, value)]
+    }
+    fn relax(&mut self) -> [bool; 1] {
+        [false]
+    }
+    /// The drive takes each frame, and the motor each answer that is no feedback; it is driven by one that leaves it with a torque.
+    fn drives(&mut self, tick: Tick) -> [bool; 1] {
+        Devices::update(&mut self.motor, tick);
+        let mut is_driven = false;
+        while let Some(frame) = Devices::next_frame(&mut self.motor, 0) {
+            let answer = self.drive.hear(&frame);
+            let is_feedback = matches!(frame.bytes()[0], 0xA1 | 0xA2 | 0xA4);
+            if let Some(answer) = answer.filter(|_| !is_feedback) {
+                self.motor.motor_mut().decode_answer(&answer);
+            }
+            let mut turned = self.drive;
+            turned.step(1e-6);
+            is_driven |= turned.shaft().torque_nm() != 0.0;
         }
         [is_driven]
     }

@@ -43,6 +43,7 @@ pub fn call_all() {
     crate::lk::call_all();
     crate::vesc::call_all();
     crate::odrive::call_all();
+    crate::rmd::call_all();
     crate::robstride::call_all();
     crate::snake::call_all();
     crate::shaping::call_all();

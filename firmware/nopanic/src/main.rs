@@ -16,6 +16,7 @@ mod lk;
 mod odrive;
 mod opaque;
 mod pwm;
+mod rmd;
 mod robstride;
 mod shaping;
 mod snake;

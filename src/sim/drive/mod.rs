@@ -3,6 +3,7 @@
 mod damiao;
 mod lk;
 mod odrive;
+mod rmd;
 mod robstride;
 mod shaft;
 mod vesc;
@@ -10,6 +11,7 @@ mod vesc;
 pub use damiao::DamiaoDrive;
 pub use lk::LkDrive;
 pub use odrive::OdriveDrive;
+pub use rmd::RmdDrive;
 pub use robstride::RobStrideDrive;
 pub use shaft::DriveShaft;
 pub use vesc::{VescDrive, VescMotor};

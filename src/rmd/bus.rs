@@ -1,0 +1,400 @@
+//! The motor as an own motor: its claims, its frames, and their order.
+
+use super::enabling::Enabling;
+use super::model::AMPERES_PER_COUNT;
+use super::track::Track;
+use super::{Command, ConfigError, Feedback, Mode, Model, State};
+use crate::frame::CanFrame;
+use crate::lk::bus::{SILENT, whole};
+use crate::lk::command::{id_of, is_command};
+use crate::lk::config::sealed::{self, Goal};
+use crate::lk::model::RAD_PER_DEGREE;
+use crate::lk::questions::Questions;
+use crate::motor::{
+    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
+    Vitals, WrongSetting,
+};
+use crate::time::Duration;
+use crate::units::{Angle, AngularVelocity};
+
+/// The ids of commands and of answers, without the id of the drive.
+const IDS: (u16, u16) = (0x140, 0x240);
+
+/// The places of the question for the angle among 32 commands.
+const ANGLES: [u8; 2] = [8, 24];
+
+/// The time-out of the drive, in ms, unless the program sets another one.
+const TIMEOUT_MS: u32 = 100;
+
+/// So often the time-out is written before the drive counts as one that does not take it: its memory wears.
+const WRITES: u8 = 8;
+
+/// The first byte of a report that the time-out of the drive has expired.
+const EXPIRED: u8 = 0xF1;
+
+/// A motor of this family, in the control mode `M`: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::rmd::{Model, Motor, Velocity};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let motor = Motor::new(Model::X8_120, 3, mode)?;
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims, ["command of RMD-X8-120 #3 on 0x143", "feedback of RMD-X8-120 #3 on 0x243"]);
+/// # Ok::<(), drivetrain::rmd::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor<M> {
+    model: Model,
+    id: u8,
+    is_reversed: bool,
+    mode: M,
+    /// In ms; `None` to leave the drive's as it is.
+    timeout: Option<u32>,
+    /// The time-out that the drive answered.
+    timeout_found: Option<u32>,
+    /// How often it was written without an answer.
+    writes: u8,
+    drive: Option<Feedback>,
+    track: Option<Track>,
+    state: Option<State>,
+    /// The angle was read since the settings were forgotten.
+    has_angle: bool,
+    enabling: Enabling,
+    /// How many commands were made since the last feedback or the last angle.
+    silent: u8,
+    questions: Questions<Command>,
+    /// The last control command or rest.
+    last: Command,
+    resets: bool,
+    /// The holding brake was released, and has not been confirmed to be locked since.
+    is_open: bool,
+    asks_angle: bool,
+}
+
+impl<M: Mode> Motor<M> {
+    /// Takes the model, the id of the drive, 1 to 32, and the control mode.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed: [`ConfigError::NoTorqueLimit`] for a [`Velocity`](super::Velocity) with a torque limit.
+    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+        if !matches!(id, 1..=32) {
+            return Err(ConfigError::Id(id));
+        }
+        mode.check(&model.scale())?;
+        Ok(Self {
+            model,
+            id,
+            is_reversed: false,
+            mode,
+            timeout: Some(TIMEOUT_MS),
+            timeout_found: None,
+            writes: 0,
+            drive: None,
+            track: None,
+            state: None,
+            has_angle: false,
+            enabling: Enabling::default(),
+            silent: 0,
+            questions: Questions::new(Command::REST),
+            last: Command::REST,
+            resets: false,
+            is_open: false,
+            asks_angle: false,
+        })
+    }
+
+    /// Turns the positive direction round: angle, velocity and torque.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self { is_reversed: !self.is_reversed, ..self }
+    }
+
+    /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
+    ///
+    /// # Errors
+    /// [`ConfigError::Timeout`] for another time.
+    pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
+        match u32::try_from(timeout.as_micros() / 1_000) {
+            Ok(ms @ 10..=60_000) => Ok(Self { timeout: Some(ms), ..self }),
+            _ => Err(ConfigError::Timeout(timeout)),
+        }
+    }
+
+    /// Leaves the time-out of the drive as it is: a drive without one goes on with its last command when the cable is cut.
+    #[must_use]
+    pub const fn without_timeout(self) -> Self {
+        Self { timeout: None, ..self }
+    }
+
+    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the last state of the drive; `None` before the first, and after its feedback was lost.
+    #[must_use]
+    pub const fn state(&self) -> Option<&State> {
+        self.state.as_ref()
+    }
+
+    /// Asks the drive to start anew, once, when it has been switched off: some errors go away by that alone. It is silent for more
+    /// than a second then, and may count its angle from another zero. A holding brake is locked meanwhile.
+    pub const fn reset_drive(&mut self) {
+        self.resets = true;
+    }
+
+    fn frame_of(&self, command: Command) -> CanFrame {
+        CanFrame::of(id_of(IDS.0, self.id), command.encode())
+    }
+
+    /// Turns a value of the output shaft to the direction of the drive, or back.
+    const fn turned(&self, value: f32) -> f32 {
+        if self.is_reversed { -value } else { value }
+    }
+
+    /// Returns the command for a goal; `None` if the drive cannot be told.
+    fn command(&self, goal: Goal) -> Option<Command> {
+        let counts = 100.0 / RAD_PER_DEGREE;
+        match goal {
+            Goal::Torque(torque_nm) => {
+                let counts = self.turned(torque_nm) / self.model.scale().torque_per_count;
+                Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
+            }
+            Goal::Velocity(velocity, _) => {
+                Some(Command::Velocity(whole(self.turned(velocity) * counts)))
+            }
+            Goal::Way(way, limit) => {
+                let angle = self.track?.counts() + i64::from(whole(self.turned(way) * counts));
+                Some(Command::Position(i32::try_from(angle).ok()?, limit))
+            }
+        }
+    }
+
+    /// The frame that has to be answered before the drive may be driven: a torque does not release the holding brake, and a
+    /// position counts from the angle.
+    const fn preparation() -> Option<Command> {
+        match <M as sealed::Mode>::CODE {
+            0xA1 => Some(Command::ReleaseBrake),
+            0xA4 => Some(Command::ReadAngle),
+            _ => None,
+        }
+    }
+
+    fn has_timeout(&self) -> bool {
+        self.timeout.is_none() || self.timeout == self.timeout_found
+    }
+
+    /// The drive no longer follows, until it is enabled anew.
+    fn doubt(&mut self) {
+        self.enabling = Enabling::default();
+    }
+
+    /// Takes the answer to the question for the angle; an answer of 0 elsewhere is a question that is sent back. A drive whose angle
+    /// differs from the last by more than half a turn has begun to count anew.
+    fn take_angle(&mut self, angle: i32) {
+        let Some(drive) = self.drive else { return };
+        if angle == 0 && drive.angle_deg.unsigned_abs() > 2 {
+            self.doubt();
+            return;
+        }
+        if self.has_angle && self.track.is_some_and(|track| track.is_far_from(angle)) {
+            self.doubt();
+        } else {
+            self.enabling.is_prepared |= <M as sealed::Mode>::NEEDS_ANGLE;
+        }
+        self.track = Some(Track::new(angle, drive.angle_deg));
+        (self.has_angle, self.silent) = (true, 0);
+    }
+}
+
+impl<M: Mode> OwnMotor for Motor<M> {
+    fn name(&self) -> MotorName {
+        MotorName::new(self.model.name(), self.id)
+    }
+
+    fn claims(&self) -> impl IntoIterator<Item = Claim> {
+        let claim = |ids, role| Claim::new(id_of(ids, self.id), role, self.name());
+        [claim(IDS.0, Role::Command), claim(IDS.1, Role::Feedback)]
+    }
+
+    fn decode(&mut self, frame: &CanFrame) -> Ingest {
+        if frame.length() != 8 {
+            return Ingest::Malformed(Malformed::Length(frame.length()));
+        }
+        let data = frame.bytes();
+        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&data[0]);
+        if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
+            return Ingest::Unrelated;
+        }
+        let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
+        if let Some(track) = &mut self.track {
+            track.advance(0.0, feedback.angle_deg);
+        }
+        self.drive = Some(feedback);
+        // An angle alone ends a silence that was long.
+        self.silent = if self.silent < SILENT { 0 } else { SILENT };
+        Ingest::Taken
+    }
+
+    fn velocity(&self) -> AngularVelocity {
+        let velocity = self.drive.map_or(0.0, |drive| f32::from(drive.velocity_dps));
+        AngularVelocity::from_rad_per_s(self.turned(velocity * RAD_PER_DEGREE))
+    }
+
+    /// Turns of the output shaft count, from the zero of the drive.
+    fn angle(&self) -> Option<Angle> {
+        Some(Angle::from_turns(self.turned(self.track?.turns())))
+    }
+
+    fn rest(&mut self) -> CanFrame {
+        self.last = Command::REST;
+        self.frame_of(self.last)
+    }
+
+    /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
+    /// from the angle until that has been read again.
+    fn control(&mut self, order: Order) -> CanFrame {
+        if let (Some(track), Some(drive)) = (&mut self.track, &self.drive) {
+            let way = 100.0 * f32::from(drive.velocity_dps) * order.step.dt_s();
+            track.advance(way, drive.angle_deg);
+        }
+        let shaft = (self.angle(), self.velocity());
+        let goal = self.mode.goal(order, shaft, &self.model.scale());
+        self.last = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
+        self.silent = self.silent.saturating_add(<M as sealed::Mode>::NEEDS_ANGLE.into());
+        if self.silent > SILENT {
+            return self.frame_of(Command::ReadAngle);
+        }
+        let next = self.questions.next(self.last, |place| match place {
+            0 => Some(Command::ReadState),
+            place => ANGLES.contains(&place).then_some(Command::ReadAngle),
+        });
+        self.frame_of(next)
+    }
+
+    fn reset(&mut self) {
+        self.mode.reset();
+        (self.questions, self.silent) = (Questions::new(Command::REST), 0);
+    }
+
+    /// The question for the state, the time-out if the drive has not confirmed it, and what the mode needs.
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        if sent == 0 {
+            self.doubt();
+        }
+        self.enabling.is_wanted = true;
+        let timeout = self.timeout.filter(|_| !self.has_timeout() && self.writes < WRITES);
+        let command = match (timeout, Self::preparation()) {
+            _ if !self.enabling.is_sound => Command::ReadState,
+            (Some(ms), _) => {
+                self.writes += 1;
+                Command::SetTimeout(ms)
+            }
+            (None, Some(command)) if !self.enabling.is_prepared => {
+                self.is_open |= command == Command::ReleaseBrake;
+                command
+            }
+            _ => Command::ReadState,
+        };
+        Some(self.frame_of(command))
+    }
+
+    /// Off, which counts as followed. A reset that was asked for goes after it, and the lock of a brake that was released.
+    fn disable(&mut self) -> Option<CanFrame> {
+        let command = match self.enabling.is_off {
+            true if core::mem::take(&mut self.resets) => Command::Reset,
+            true if self.is_open => Command::LockBrake,
+            _ => Command::Off,
+        };
+        self.doubt();
+        Some(self.frame_of(command))
+    }
+
+    fn is_enabled(&self) -> Option<bool> {
+        Some(self.enabling.is_on)
+    }
+
+    fn inquire(&mut self) -> Option<CanFrame> {
+        self.asks_angle = !self.asks_angle;
+        let question = if self.asks_angle { Command::ReadAngle } else { Command::ReadState };
+        Some(self.frame_of(question))
+    }
+
+    fn decode_answer(&mut self, frame: &CanFrame) -> bool {
+        let data = frame.bytes();
+        let [code, _, _, _, a, b, c, d] = *data;
+        if frame.length() != 8 && code != EXPIRED {
+            return false;
+        }
+        match code {
+            EXPIRED => self.doubt(),
+            0x9A => match State::decode(data) {
+                Some(state) => (self.state, self.enabling.is_sound) = (Some(state), true),
+                None => self.doubt(),
+            },
+            0x92 => {
+                Feedback::decode_angle(data).into_iter().for_each(|angle| self.take_angle(angle))
+            }
+            0x77 => self.enabling.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
+            0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
+            0x78 => self.is_open = false,
+            0x80 => self.enabling.is_off = !self.enabling.is_wanted,
+            // The first frame after the time-out of the drive is sent back, and not followed.
+            _ if *data == self.last.encode() => self.doubt(),
+            _ => return false,
+        }
+        self.enabling.settle(Self::preparation().is_some(), self.has_timeout());
+        true
+    }
+
+    fn wrong_setting(&self) -> Option<WrongSetting> {
+        let wrong = |setting, expected, found| {
+            Some(WrongSetting { motor: self.name(), setting, expected, found })
+        };
+        match (self.timeout, self.timeout_found) {
+            _ if self.state.is_none() => wrong("errorState", 0.0, None),
+            _ if !self.has_angle => wrong("motorAngle", 0.0, None),
+            (Some(expected), found)
+                if found.map_or(self.writes >= WRITES, |found| found != expected) =>
+            {
+                let found = found.unwrap_or(0) as f32;
+                wrong("CanRecvTime_MS", expected as f32, Some(found))
+            }
+            _ => None,
+        }
+    }
+
+    fn forget_settings(&mut self) {
+        (self.state, self.has_angle) = (None, false);
+        (self.timeout_found, self.writes) = (None, 0);
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let capabilities = self.mode.capabilities();
+        let known = capabilities.with(Capability::Feedback).with(Capability::Temperature);
+        known.with(Capability::ErrorCodes)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "16 bits")]
+    fn vitals(&self) -> Vitals {
+        let Some(drive) = self.drive else { return Vitals::default() };
+        let (errors, supply_v) =
+            self.state.map_or((0, 0.0), |state| (state.errors, state.supply_v));
+        let current = f32::from(drive.current) * AMPERES_PER_COUNT;
+        // Of an estimated speed without load.
+        let speed = self.velocity().as_rad_per_s() * self.model.torque_constant();
+        Vitals {
+            temperature_c: Some(drive.temperature_c.into()),
+            error: (errors != 0).then_some(Severity::Fault),
+            error_code: if errors == 0 { 0 } else { errors.trailing_zeros() as u8 + 1 },
+            effort: self.mode.effort(),
+            speed: if supply_v > 0.0 { speed / supply_v } else { 0.0 },
+            current: self.turned(current / self.model.max_current_a()),
+        }
+    }
+}

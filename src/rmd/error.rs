@@ -1,0 +1,3 @@
+//! Errors of the configuration: those of `lk`.
+
+pub use crate::lk::ConfigError;

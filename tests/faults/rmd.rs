@@ -1,0 +1,92 @@
+//! F89 to F91: drives whose time-out, echoes and holding brake are their own, by the example of MyActuator's.
+
+use crate::case::{Case, cases, saw};
+use crate::rmd_bench::{Bench, torque};
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Devices, Own, VelocityDrive};
+use drivetrain::rmd::{Model, Velocity};
+use drivetrain::time::Tick;
+use drivetrain::units::AngularVelocity;
+
+/// The cases of this file.
+pub(crate) const CASES: &[Case] = cases![
+    f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_trips,
+    f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven,
+    f91_no_torque_is_sent_against_a_holding_brake,
+];
+
+fn rad_s(value: f32) -> AngularVelocity {
+    AngularVelocity::from_rad_per_s(value)
+}
+
+#[cfg_attr(test, test)]
+fn f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_trips() {
+    let mut bench = Bench::armed(Model::X8_120, Velocity::new(rad_s(20.0)));
+    bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
+    let before = *bench.own.motor().feedback().unwrap();
+    bench.own.set_velocity((), rad_s(6.0)).unwrap();
+    bench.now_us += 1_000;
+    let now = bench.now();
+    Devices::update(&mut bench.own, Tick::new(now, 0.001));
+    while let Some(sent) = Devices::next_frame(&mut bench.own, 0) {
+        let back = CanFrame::standard(0x241, *sent.bytes()).unwrap();
+        _ = Devices::ingest(&mut bench.own, &back, now);
+    }
+    assert_eq!(bench.own.motor().feedback(), Some(&before));
+    let mut after_ms = 0;
+    while Devices::is_armed(&mut bench.own) {
+        _ = bench.own.set_velocity((), rad_s(6.0));
+        bench.step();
+        after_ms += 1;
+        assert!(after_ms <= 3);
+    }
+    bench.steps(300, |bench| {
+        assert!(bench.own.set_velocity((), rad_s(6.0)).is_err());
+        assert!(bench.drive.shaft().torque_nm() == 0.0);
+    });
+    saw(format_args!("tripped {after_ms} ms after the echo"));
+}
+
+#[cfg_attr(test, test)]
+fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
+    let mut bench = Bench::new(Model::X8_120, Velocity::new(rad_s(20.0)));
+    bench.drive = bench.drive.refusing_timeouts();
+    bench.steps(100, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    bench.steps(500, |bench| {
+        _ = bench.own.set_velocity((), rad_s(6.0));
+        assert!(bench.drive.shaft().torque_nm() == 0.0);
+    });
+    assert!(!Devices::is_armed(&mut bench.own));
+    let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
+    assert!(refused.contains("CanRecvTime_MS 0, the program needs 100"), "{refused}");
+    saw(refused);
+    // It is the program that may do without.
+    bench.own = Own::new(bench.own.motor().without_timeout());
+    bench.steps(100, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
+    assert!(bench.drive.shaft().velocity_rad_per_s() > 5.5);
+}
+
+#[cfg_attr(test, test)]
+fn f91_no_torque_is_sent_against_a_holding_brake() {
+    let mut bench = Bench::new(Model::X8_120, torque());
+    bench.drive = bench.drive.with_brake();
+    bench.steps(100, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let mut opened_ms = None;
+    for ms in 0..500 {
+        bench.own.set_torque(2.0).unwrap();
+        bench.step();
+        assert!(bench.drive.shaft().torque_nm() == 0.0 || !bench.drive.is_locked(), "{ms} ms");
+        if opened_ms.is_none() && !bench.drive.is_locked() {
+            opened_ms = Some(ms);
+        }
+    }
+    assert!((bench.drive.shaft().torque_nm() - 2.0).abs() < 0.03);
+    bench.own.disarm();
+    bench.steps(3, |_| {});
+    assert!(bench.drive.is_locked());
+    saw(format_args!("driven when the brake was open, {opened_ms:?} ms after the first target"));
+}

@@ -1,0 +1,239 @@
+//! What could hurt: frames that drive after the motor was told to rest, at every moment of its life, and frames that are drawn.
+
+use super::*;
+
+/// What a motor at rest may send, read by the manual alone: off, the lock of the brake, questions, and a torque without current.
+fn is_rest(frame: &CanFrame) -> bool {
+    let [code, rest @ ..] = *frame.bytes();
+    [0x78, 0x80, 0x92, 0x9A, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Event {
+    Disarm,
+    EmergencyStop,
+    NoTarget,
+    NoFeedback,
+    BadSteps,
+    ClockBack,
+}
+
+const EVENTS: [Event; 6] = [
+    Event::Disarm,
+    Event::EmergencyStop,
+    Event::NoTarget,
+    Event::NoFeedback,
+    Event::BadSteps,
+    Event::ClockBack,
+];
+
+/// Lets an event come at a moment after arming; each frame from then on, or from its limit on, is one of rest.
+fn rests_after<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), event: Event, moment_ms: u32) {
+    let mut bench = Bench::armed(MODEL, mode);
+    bench.steps(moment_ms, |bench| set(&mut bench.own));
+    let allowed_ms = match event {
+        Event::NoTarget => 101,
+        Event::NoFeedback => 11,
+        Event::BadSteps => 1,
+        _ => 0,
+    };
+    match event {
+        Event::Disarm => bench.own.disarm(),
+        Event::EmergencyStop => bench.own.emergency_stop(),
+        Event::NoFeedback => bench.is_cut = true,
+        Event::ClockBack => bench.now_us -= 5_000,
+        Event::NoTarget | Event::BadSteps => {}
+    }
+    for ms in 0..150 {
+        if event != Event::NoTarget {
+            set(&mut bench.own);
+        }
+        let dt_s = if event == Event::BadSteps { f32::NAN } else { 0.001 };
+        // The clock goes back once, and on from there.
+        bench.now_us += if event == Event::ClockBack && ms == 0 { 0 } else { 1_000 };
+        let now = bench.now();
+        bench.own.update(Tick::new(now, dt_s));
+        while let Some(frame) = bench.own.next_frame(0) {
+            let is_safe = is_rest(&frame) || ms < allowed_ms;
+            assert!(is_safe, "{mode:?}, {event:?} after {moment_ms} ms, {ms} ms later: {frame:?}");
+            if !bench.is_cut
+                && let Some(answer) = bench.drive.hear(&frame)
+            {
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_frame_after_an_event_is_one_of_rest_at_every_moment() {
+    for event in EVENTS {
+        // Through the state, the time-out, the brake or the angle, opening, and the places of the questions.
+        for moment_ms in (0..80).chain([150, 223, 301]) {
+            rests_after(torque(), |own| _ = own.set_torque(1.0), event, moment_ms);
+            let velocity = Velocity::new(rad_s(20.0));
+            rests_after(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), event, moment_ms);
+            let position = PositionVelocity::new(rad_s(8.0));
+            rests_after(position, |own| _ = own.set_angle((), rad(2.0)), event, moment_ms);
+        }
+    }
+}
+
+/// Frames that are drawn, on the id of the drive, while it drives and while it rests: a disarmed motor sends frames of rest alone, and
+/// a driven one no current beyond its limit.
+#[test]
+fn drawn_frames_drive_nothing() {
+    let mut state = 0x2545_F491_4F6C_DD1D_u64;
+    let mut draw = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let codes = [0x77, 0x80, 0x92, 0x9A, 0x9C, 0xA1, 0xA2, 0xA4, 0xA8, 0xB3, 0xF1, 0x00];
+    let limit = 4.0 / MODEL.torque_constant() * 100.0;
+    for is_armed in [false, true] {
+        let mut bench = Bench::new(MODEL, torque());
+        bench.steps(100, |_| {});
+        for _ in 0..20_000 {
+            let mut data = draw().to_le_bytes();
+            data[0] = codes[usize::from(data[0]) % codes.len()];
+            if draw() % 4 == 0 {
+                data = [data[0], 0, 0, 0, 0, 0, 0, 0];
+            }
+            let now = bench.now();
+            _ = Devices::ingest(&mut bench.own, &answer(data), now);
+            if is_armed {
+                _ = bench.own.arm(bench.now());
+                _ = bench.own.set_angle((), rad(1.0));
+            }
+            bench.now_us += 1_000;
+            let now = bench.now();
+            bench.own.update(Tick::new(now, 0.001));
+            while let Some(sent) = bench.own.next_frame(0) {
+                let [code, _, _, _, a, b, _, _] = *sent.bytes();
+                let current = f32::from(i16::from_le_bytes([a, b]));
+                assert!(is_armed || is_rest(&sent), "{sent:?}");
+                assert!(code != 0xA1 || current.abs() <= limit, "{sent:?}");
+                if let Some(answer) = bench.drive.hear(&sent) {
+                    _ = Devices::ingest(&mut bench.own, &answer, now);
+                }
+            }
+        }
+    }
+}
+
+/// 0 in the field of the limit stands for none, and the share of the output is 0 right after arming.
+#[test]
+fn a_limit_is_never_sent_as_none() {
+    for (limit, most) in [(8.0, 458), (0.05, 2)] {
+        let mut bench = Bench::armed(MODEL, PositionVelocity::new(rad_s(limit)));
+        let mut limits = Vec::new();
+        bench.steps(600, |bench| {
+            bench.own.set_angle((), rad(2.0)).unwrap();
+            let data = bench.frames.iter().map(|frame| *frame.bytes());
+            let commands = data.filter(|data| data[0] == 0xA4);
+            limits.extend(commands.map(|data| u16::from_le_bytes([data[2], data[3]])));
+        });
+        assert!(limits.iter().all(|limit| (1..=most).contains(limit)), "{limits:?}");
+        assert!(limits.len() > 300 && limits.contains(&most), "{limits:?}");
+    }
+}
+
+/// The echo of a question reads like an angle of 0, with which a position motor would go round by all of its turns.
+#[test]
+fn a_question_that_is_sent_back_is_no_answer() {
+    let mut bench = Bench::armed(MODEL, PositionVelocity::new(rad_s(8.0)));
+    bench.drive.shaft_mut().set_angle(30.0);
+    bench.steps(200, |_| {});
+    _ = bench.own.arm(bench.now());
+    bench.steps(500, |bench| bench.own.set_angle((), rad(30.0)).unwrap());
+    let there = bench.own.angle(()).unwrap();
+    let now = bench.now();
+    for code in [0x92, 0x9A, 0x9C, 0xA1, 0xA4] {
+        let echo = answer([code, 0, 0, 0, 0, 0, 0, 0]);
+        _ = Devices::ingest(&mut bench.own, &echo, now);
+        assert_eq!(bench.own.angle(()), Some(there), "{code:X}");
+        assert!(bench.own.motor().state().is_some_and(|state| state.supply_v > 40.0), "{code:X}");
+    }
+    bench.steps(2, |bench| _ = bench.own.set_angle((), rad(30.0)));
+    assert!(!Devices::is_armed(&mut bench.own), "the drive has timed out, or begun anew");
+}
+
+/// Each mode, and each command of it that could be sent back by a drive whose time is over.
+#[test]
+fn a_command_that_is_sent_back_is_never_feedback() {
+    fn heard<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) {
+        let mut bench = Bench::armed(MODEL, mode);
+        bench.steps(400, |bench| set(&mut bench.own));
+        let before = *bench.own.motor().feedback().unwrap();
+        let mut sent_back = 0;
+        for _ in 0..40 {
+            set(&mut bench.own);
+            bench.now_us += 1_000;
+            let now = bench.now();
+            bench.own.update(Tick::new(now, 0.001));
+            while let Some(sent) = bench.own.next_frame(0) {
+                _ = Devices::ingest(&mut bench.own, &answer(*sent.bytes()), now);
+                sent_back += 1;
+            }
+        }
+        assert!(sent_back >= 40 && bench.own.motor().feedback() == Some(&before), "{mode:?}");
+    }
+    heard(torque(), |own| _ = own.set_torque(0.5));
+    heard(Velocity::new(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(6.0)));
+    heard(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
+}
+
+/// Two frames may be made before one is sent: a drive that is not known to be off is sent nothing else.
+#[test]
+fn off_goes_before_the_reset_and_the_lock_of_the_brake() {
+    let mut motor = Motor::new(MODEL, 1, torque()).unwrap();
+    let echo = |code| answer([code, 0, 0, 0, 0, 0, 0, 0]);
+    let sound = answer([0x9A, 30, 0, 1, 0xE0, 1, 0, 0]);
+    let confirmed = answer([0xB3, 0, 0, 0, 100, 0, 0, 0]);
+    for (sent, answered) in [sound, confirmed, echo(0x77)].iter().enumerate() {
+        motor.enable(u8::try_from(sent).unwrap());
+        assert!(motor.decode_answer(answered));
+    }
+    assert_eq!(motor.is_enabled(), Some(true));
+    // From before it was enabled.
+    assert!(motor.decode_answer(&echo(0x80)));
+    motor.reset_drive();
+    let mut codes = Vec::new();
+    for is_heard in [false, true, true, true, true, true] {
+        let frame = motor.disable().unwrap();
+        codes.push(frame.bytes()[0]);
+        if is_heard && frame.bytes()[0] != 0x76 {
+            assert!(motor.decode_answer(&answer(*frame.bytes())));
+        }
+    }
+    assert_eq!(codes, [0x80, 0x80, 0x76, 0x80, 0x78, 0x80]);
+}
+
+/// A state and a confirmation from before the drive was switched off do not enable it.
+#[test]
+fn nothing_heard_before_enables_the_drive() {
+    let mut motor = Motor::new(MODEL, 1, torque()).unwrap();
+    let sound = answer([0x9A, 30, 0, 1, 0xE0, 1, 0, 0]);
+    let confirmed = answer([0xB3, 0, 0, 0, 100, 0, 0, 0]);
+    let released = answer([0x77, 0, 0, 0, 0, 0, 0, 0]);
+    for early in [sound, confirmed, released] {
+        assert!(motor.decode_answer(&early));
+    }
+    assert_eq!(motor.is_enabled(), Some(false));
+    let mut codes = Vec::new();
+    for (sent, answered) in [(0, &sound), (1, &released)] {
+        codes.push(motor.enable(sent).unwrap().bytes()[0]);
+        assert_eq!(motor.is_enabled(), Some(false));
+        assert!(motor.decode_answer(answered));
+    }
+    // The time-out is in the memory of the drive already.
+    assert_eq!(codes, [0x9A, 0x77]);
+    assert_eq!(motor.is_enabled(), Some(true));
+    // Late feedback forgets the settings, and is no reset.
+    motor.forget_settings();
+    assert_eq!(motor.is_enabled(), Some(true));
+    motor.disable();
+    assert_eq!(motor.is_enabled(), Some(false));
+}
