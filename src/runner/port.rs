@@ -157,6 +157,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// many came.
     ///
     /// Never waits, goes on after errors, and ends: an error counts against the budget as well.
+    /// The clock is read for each 16 frames: the time of a frame is that of the first of them.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
