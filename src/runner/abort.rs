@@ -21,7 +21,7 @@ pub trait AbortPending: embedded_can::nb::Can {
 ///
 /// Before each update, every frame that was not sent since the tick before is called back. Those of the device are offered
 /// again with the values of this update. Frames of others are given up: they go to the closure of
-/// [`Runner::tick_with`], as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
+/// [`Runner::tick_with`](super::Runner::tick_with), as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
 /// refuses every frame.
 ///
 /// # Examples
