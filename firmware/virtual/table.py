@@ -9,6 +9,10 @@ Instructions are executed by Unicorn, each in one cycle at the clock of the chip
 in `firmware/virtual/board`; the motors are those of `drivetrain::sim`. No board was there: the model of a register is as right as
 our reading of the reference manual.
 
+Not modelled: DMA, wait states and caches, the clock before the PLL runs, the receive error counter, retransmission by the motors,
+dominant bits of an error-passive node. A command reaches the motors up to 0.1 ms late. The driver's loop-back and DMA examples
+were not run.
+
 * Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
   other frame follows. For power-on it is the time from reset to the first frame. A dash: the robot goes on.
 * Stale: frames on the wire that are not zero and that the program had made more than a cycle before.

@@ -1,17 +1,14 @@
-//! Frames that wait in the controller for a whole tick are called back, so that no old command leaves later.
+//! A driver that can call back what waits in its controller.
 
-use super::port::{Driver, Received, Sent, receive, send};
-use super::statistics::increment;
-use super::{Port, Runner};
+use super::port::{Driver, Received, Sent};
+use super::{Nb, Port};
 use crate::frame::CanFrame;
-use crate::motor::Devices;
-use crate::time::Instant;
 
 /// A CAN driver that can call back frames which wait in its controller: bxCAN, FDCAN and MCP2515 can.
 ///
 /// `embedded-can` has no such call. Without it, a plug that was pulled while the motors were driven leaves a frame with the old
-/// currents in each mailbox, and they leave when it is back. Implement it for the newtype around the driver, and wrap that in
-/// [`NbAbort`] instead of [`Nb`](super::Nb).
+/// currents in each mailbox, and they leave when it is back. Implement it for the newtype around the driver, and give the
+/// runner `NbAbort(Nb(driver))`.
 pub trait AbortPending: embedded_can::nb::Can {
     /// Asks the controller not to send what waits in it, and hands each such frame to `back`. Does not wait.
     ///
@@ -20,11 +17,11 @@ pub trait AbortPending: embedded_can::nb::Can {
     fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
 }
 
-/// A driver that implements [`AbortPending`]: as [`Nb`](super::Nb), and no command older than one period waits in the controller.
+/// A driver that implements [`AbortPending`]: as [`Nb`], and no command older than one period waits in the controller.
 ///
 /// Before each update, every frame that was not sent since the tick before is called back. Those of the device are offered
 /// again with the values of this update. Frames of others are given up: they go to the closure of
-/// [`Runner::tick_with`], as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
+/// [`Runner::tick_with`](super::Runner::tick_with), as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
 /// refuses every frame.
 ///
 /// # Examples
@@ -32,7 +29,7 @@ pub trait AbortPending: embedded_can::nb::Can {
 /// ```
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::frame::CanFrame;
-/// use drivetrain::runner::{AbortPending, NbAbort, Runner};
+/// use drivetrain::runner::{AbortPending, Nb, NbAbort, Runner};
 /// use drivetrain::time::{Duration, Instant, ManualClock};
 /// # use embedded_can::ErrorKind;
 ///
@@ -58,7 +55,7 @@ pub trait AbortPending: embedded_can::nb::Can {
 /// let clock = ManualClock::new(Instant::START);
 /// let mut bus = Bus::new();
 /// bus.attach(Config::<M3508>::new(1))?;
-/// let mut runner = Runner::new(NbAbort(Unplugged::default()), &clock, bus);
+/// let mut runner = Runner::new(NbAbort(Nb(Unplugged::default())), &clock, bus);
 /// for _ in 0..5 {
 ///     clock.advance(Duration::from_millis(1));
 ///     runner.poll(16);
@@ -66,47 +63,27 @@ pub trait AbortPending: embedded_can::nb::Can {
 ///         runner.tick(tick);
 ///     }
 /// }
-/// assert_eq!(runner.port_mut().0.0.len(), 1); // that of the last tick
+/// assert_eq!(runner.port_mut().0.0.0.len(), 1); // that of the last tick
 /// assert_eq!(runner.statistics().evicted, 4);
 /// # Ok::<(), drivetrain::dji::AttachError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct NbAbort<C>(pub C);
+pub struct NbAbort<C>(pub Nb<C>);
 
 impl<C: AbortPending> Port for NbAbort<C> {}
 
 impl<C: AbortPending> Driver for NbAbort<C> {
     #[inline(always)]
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
-        send(&mut self.0, frame, evicted)
+        self.0.try_send(frame, evicted)
     }
 
     #[inline]
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
-        receive(&mut self.0, frame)
+        self.0.try_receive(frame)
     }
 
     fn call_back(&mut self, mut back: impl FnMut(Option<CanFrame>)) {
-        self.0.abort_pending(|frame| back(CanFrame::copy_of(&frame)));
-    }
-}
-
-impl<P: Port, K, D: Devices> Runner<P, K, D> {
-    /// Calls back what was offered in the tick before and did not leave; hands frames of others to `others`.
-    pub(super) fn call_back(&mut self, now: Instant, others: &mut impl FnMut(&CanFrame)) {
-        let Self { port, device, statistics, meter, watch, .. } = self;
-        port.call_back(|frame| match frame {
-            Some(frame) if device.requeue(&frame) => {
-                increment(&mut statistics.evicted);
-                meter.discount(&frame);
-                watch.called_back(frame.header(), now);
-            }
-            frame => {
-                increment(&mut statistics.evicted_unrelated);
-                if let Some(frame) = frame {
-                    others(&frame);
-                }
-            }
-        });
+        self.0.0.abort_pending(|frame| back(CanFrame::copy_of(&frame)));
     }
 }

@@ -40,7 +40,7 @@ pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
 use crate::motor::{ArmError, Ask, Devices};
-use crate::time::{Clock, ConditionEdge, Duration, Tick, Ticker};
+use crate::time::{Clock, ConditionEdge, Duration, Instant, Tick, Ticker};
 use statistics::{Meter, increment};
 use watch::Watch;
 
@@ -233,6 +233,29 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             increment(&mut self.statistics.bus_losses);
             self.device.trip();
         }
+    }
+
+    /// Calls back what was offered in the tick before and did not leave; hands frames of others to `others`.
+    fn call_back(&mut self, now: Instant, others: &mut impl FnMut(&CanFrame)) {
+        let Self { port, device, statistics, meter, watch, .. } = self;
+        port.call_back(|frame| match frame {
+            Some(frame) if device.requeue(&frame) => {
+                increment(&mut statistics.evicted);
+                meter.discount(&frame);
+                watch.called_back(frame.header(), now);
+            }
+            frame => {
+                increment(&mut statistics.evicted_unrelated);
+                if let Some(frame) = frame {
+                    others(&frame);
+                }
+            }
+        });
+    }
+
+    fn count_sent(&mut self, frame: &CanFrame) {
+        increment(&mut self.statistics.sent);
+        self.meter.count(frame);
     }
 
     /// Returns what was counted.

@@ -24,8 +24,7 @@ pub trait Driver {
     /// Asks the driver for a received frame, and writes it over `frame`.
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received;
 
-    /// Calls back the frames that wait in the controller, if the driver can; `None` for one that is no classic CAN frame of at
-    /// most 8 bytes.
+    /// Calls back the frames that wait in the controller, if the driver can; `None` for one that is no classic CAN frame.
     fn call_back(&mut self, _back: impl FnMut(Option<CanFrame>)) {}
 }
 
@@ -66,41 +65,27 @@ pub struct Nb<C>(pub C);
 impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
 impl<C: embedded_can::nb::Can> Driver for Nb<C> {
+    // The length of the frame is known where it comes from: no loop copies its bytes then.
     #[inline(always)]
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
-        send(&mut self.0, frame, evicted)
+        let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
+        match self.0.transmit(&frame) {
+            Ok(None) => Sent::Accepted,
+            Ok(Some(other)) if evicted.copy_from(&other) => Sent::Evicted,
+            Ok(Some(_)) => Sent::EvictedForeign,
+            Err(nb::Error::WouldBlock) => Sent::Full,
+            Err(nb::Error::Other(error)) => Sent::Failed(error.kind()),
+        }
     }
 
     #[inline]
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received {
-        receive(&mut self.0, frame)
-    }
-}
-
-// The length of the frame is known where it comes from: no loop copies its bytes then.
-#[inline(always)]
-pub(super) fn send<C: embedded_can::nb::Can>(
-    driver: &mut C,
-    frame: &CanFrame,
-    evicted: &mut CanFrame,
-) -> Sent {
-    let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
-    match driver.transmit(&frame) {
-        Ok(None) => Sent::Accepted,
-        Ok(Some(other)) if evicted.copy_from(&other) => Sent::Evicted,
-        Ok(Some(_)) => Sent::EvictedForeign,
-        Err(nb::Error::WouldBlock) => Sent::Full,
-        Err(nb::Error::Other(error)) => Sent::Failed(error.kind()),
-    }
-}
-
-#[inline(always)]
-pub(super) fn receive<C: embedded_can::nb::Can>(driver: &mut C, frame: &mut CanFrame) -> Received {
-    match driver.receive() {
-        Ok(received) if frame.copy_from(&received) => Received::Frame,
-        Ok(_) => Received::Foreign,
-        Err(nb::Error::WouldBlock) => Received::Empty,
-        Err(nb::Error::Other(error)) => Received::Failed(error.kind()),
+        match self.0.receive() {
+            Ok(received) if frame.copy_from(&received) => Received::Frame,
+            Ok(_) => Received::Foreign,
+            Err(nb::Error::WouldBlock) => Received::Empty,
+            Err(nb::Error::Other(error)) => Received::Failed(error.kind()),
+        }
     }
 }
 
@@ -304,7 +289,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 }
 
-impl<P: Port, K, D: Devices> Runner<P, K, D> {
+impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Offers the frames of one tick to the driver; hands frames of others that it evicts to `evicted`.
     pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
         if self.yields.is_some() {
@@ -409,11 +394,6 @@ impl<P: Port, K, D: Devices> Runner<P, K, D> {
     fn note_accepted(&mut self, frame: &CanFrame, now: Instant) {
         self.count_sent(frame);
         self.watch.accepted(frame.header(), now);
-    }
-
-    fn count_sent(&mut self, frame: &CanFrame) {
-        increment(&mut self.statistics.sent);
-        self.meter.count(frame);
     }
 }
 

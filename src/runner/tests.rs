@@ -472,21 +472,21 @@ fn without_an_abort_a_pulled_plug_leaves_a_stale_frame_a_mailbox() {
 
 #[test]
 fn with_an_abort_what_leaves_after_a_pulled_plug_is_of_the_last_tick() {
-    let (left, down) = pulled(NbAbort, |port| &mut port.0, 150);
+    let (left, down) = pulled(|can| NbAbort(Nb(can)), |port| &mut port.0.0, 150);
     assert_eq!(left, [0], "zeros, once");
     assert!(
         down.is_some_and(|ms| (100..=102).contains(&ms)),
         "a bus that sends nothing is down: {down:?}"
     );
     // Shorter than it takes to lose the feedback: the current of the last tick, 2.5 A, of 20 A in 16384.
-    assert_eq!(pulled(NbAbort, |port| &mut port.0, 5), (std::vec![2048], None));
+    assert_eq!(pulled(|can| NbAbort(Nb(can)), |port| &mut port.0.0, 5), (std::vec![2048], None));
 }
 
 #[test]
 fn frames_of_others_that_are_called_back_are_handed_over() {
     let clock = ManualClock::new(Instant::START);
-    let mut runner = Runner::new(NbAbort(Mailboxes::default()), &clock, Bus::new());
-    embedded_can::nb::Can::transmit(&mut runner.port_mut().0, &frame(0x123, [7; 8])).unwrap();
+    let mut runner = Runner::new(NbAbort(Nb(Mailboxes::default())), &clock, Bus::new());
+    embedded_can::nb::Can::transmit(&mut runner.port_mut().0.0, &frame(0x123, [7; 8])).unwrap();
     let mut others = Vec::new();
     runner.tick_with(Tick::new(Instant::from_micros(1_000), 0.001), |frame| others.push(*frame));
     assert_eq!(others, [frame(0x123, [7; 8])]);

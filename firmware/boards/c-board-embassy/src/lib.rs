@@ -1,7 +1,7 @@
 //! What the programs for this board share: its clocks, its CAN, its watchdog.
 #![no_std]
 
-use drivetrain::runner::{AbortPending, NbAbort};
+use drivetrain::runner::{AbortPending, Nb, NbAbort};
 use drivetrain::time::Instant;
 use embassy_stm32::can::{self, BufferedCanReceiver, BufferedCanSender, Can, filter::Mask32};
 use embassy_stm32::peripherals::{CAN1, PD0, PD1};
@@ -88,7 +88,7 @@ pub async fn can1(
     let halves = Halves(buffered.writer(), buffered.reader());
     // Dropped, they would reset the controller and put it to sleep.
     core::mem::forget((controller, buffered));
-    NbAbort(halves)
+    NbAbort(Nb(halves))
 }
 
 /// Reads the time, for the runner.

@@ -68,7 +68,7 @@ mod app {
     use bxcan::{Fifo, Interrupt, Rx0};
     use core::sync::atomic::{AtomicU32, Ordering};
     use drivetrain::dji::Bus;
-    use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, NbAbort, Runner};
+    use drivetrain::runner::{FrameQueue, FrameReceiver, FrameSender, Nb, NbAbort, Runner};
     use drivetrain::time::{Instant, Tick};
     use pilot::{Pilot, Wish};
     use rtic_time::Monotonic;
@@ -130,8 +130,11 @@ mod app {
 
         let mut bus = Bus::new();
         let Ok(pilot) = Pilot::new(&mut bus) else { panic!("the wheels do not fit") };
-        let runner =
-            Runner::new(NbAbort(Sending(sending, [None, None, None])), now as fn() -> Instant, bus);
+        let runner = Runner::new(
+            NbAbort(Nb(Sending(sending, [None, None, None]))),
+            now as fn() -> Instant,
+            bus,
+        );
         let (into_queue, queue) = cx.local.frames.split();
         // A loop that stands for so long is reset, and comes back disarmed. Its oscillator is up to half off.
         let mut watchdog = IndependentWatchdog::new(cx.device.IWDG);
