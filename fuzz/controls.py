@@ -73,7 +73,7 @@ DEFECTS = [
     ("runner", "errors do not count against the budget", "src/runner/port.rs",
      "for _ in 0..budget {\n            match", "while frames < budget {\n            match"),
     ("runner", "the emergency stop is not looked at", "src/runner/mod.rs",
-     "self.device.emergency_stop();\n        }\n        self.device.update(tick);", "}\n        self.device.update(tick);"),
+     "self.device.emergency_stop();\n        }\n        self.call_back", "}\n        self.call_back"),
     ("runner", "holds the command of a motor at rest", "src/dji/deadlines.rs",
      "filter(|slot| slot.has_rested())", "filter(|_| false)"),
     ("runner", "a clock that goes back gives no step", "src/time/ticker.rs",
