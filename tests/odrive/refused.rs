@@ -33,7 +33,7 @@ fn rests_when_the_bus_is_free<M: Mode>(mode: M, firmware: Firmware, set: fn(&mut
         }
         bench.drive.step(1e-4);
         let torque_nm = bench.drive.shaft().torque_nm();
-        assert_eq!(torque_nm, 0.0, "{firmware:?} {mode:?}, {refused} updates refused");
+        assert!(torque_nm == 0.0, "{firmware:?} {mode:?}, {refused} updates refused");
     }
 }
 
@@ -68,7 +68,7 @@ fn a_drive_that_was_just_enabled_gets_rest_with_the_first_frame_after_its_target
             bench.drive.hear(&frame);
         }
         bench.drive.step(1e-4);
-        assert_eq!(bench.drive.shaft().torque_nm(), 0.0, "after {until} updates");
+        assert!(bench.drive.shaft().torque_nm() == 0.0, "after {until} updates");
     }
     assert!(torques > 10, "{torques}");
 }

@@ -12,6 +12,7 @@ mod closed_loop;
 mod constant_time;
 mod controllers;
 mod cycle;
+mod drives;
 mod joints;
 mod meter;
 mod rows;
@@ -31,6 +32,7 @@ fn main() -> ! {
         cycle::rows();
         calls::rows();
         joints::rows();
+        drives::rows();
         rows::control();
         controllers::rows();
         rows::math();

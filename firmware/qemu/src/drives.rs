@@ -1,0 +1,257 @@
+//! Eight own motors of each other family, as a program drives them: with our speed loop, by torque or current.
+
+use crate::meter::instructions;
+use crate::row;
+use core::fmt::Debug;
+use core::hint::black_box;
+use drivetrain::control::PidConfig;
+use drivetrain::encoder::GearRatio;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
+use drivetrain::sim::{DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive, VescMotor};
+use drivetrain::time::{Duration, Instant, Tick};
+use drivetrain::units::AngularVelocity;
+use drivetrain::{lk, odrive, robstride, vesc};
+
+const MOTORS: usize = 8;
+const SPEED: AngularVelocity = AngularVelocity::from_rad_per_s(1.0);
+const SPEED_LOOP: PidConfig = PidConfig::new(0.8, 4.0, 0.001);
+
+/// A simulated drive.
+trait Drive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame>;
+    fn step(&mut self, dt_s: f32);
+    fn shaft(&self) -> &DriveShaft;
+    /// Returns a frame that the drive sends by itself, the last of a cycle being its feedback.
+    fn report(&mut self) -> Option<CanFrame> {
+        None
+    }
+    /// Tells whether a frame is the feedback of the shaft.
+    fn is_feedback(frame: &CanFrame) -> bool;
+}
+
+impl Drive for LkDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft(&self) -> &DriveShaft {
+        Self::shaft(self)
+    }
+    fn is_feedback(frame: &CanFrame) -> bool {
+        frame.bytes()[0] == 0xA1
+    }
+}
+
+impl Drive for RobStrideDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft(&self) -> &DriveShaft {
+        Self::shaft(self)
+    }
+    fn is_feedback(frame: &CanFrame) -> bool {
+        frame.header() >> 24 & 0x1F == 2
+    }
+}
+
+impl Drive for OdriveDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft(&self) -> &DriveShaft {
+        Self::shaft(self)
+    }
+    fn report(&mut self) -> Option<CanFrame> {
+        self.next_frame()
+    }
+    fn is_feedback(frame: &CanFrame) -> bool {
+        frame.header() & 0x1F == 0x09
+    }
+}
+
+/// A VESC and whether it has reported in this cycle.
+struct Vesc(VescDrive, bool);
+
+impl Drive for Vesc {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        self.0.hear(frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        self.0.step(dt_s);
+        self.1 = false;
+    }
+    fn shaft(&self) -> &DriveShaft {
+        self.0.shaft()
+    }
+    fn report(&mut self) -> Option<CanFrame> {
+        let is_due = !core::mem::replace(&mut self.1, true);
+        self.0.report(9).filter(|_| is_due)
+    }
+    fn is_feedback(frame: &CanFrame) -> bool {
+        frame.header() >> 8 & 0xFF == 9
+    }
+}
+
+/// Eight motors that are driven, and what their drives sent last.
+struct Group<M, D> {
+    motors: [Own<M>; MOTORS],
+    drives: [D; MOTORS],
+    feedback: [Option<CanFrame>; MOTORS],
+    /// The last frame of each drive that is no feedback.
+    others: [Option<CanFrame>; MOTORS],
+    now: Instant,
+}
+
+impl<M: OwnMotor + Debug, D: Drive> Group<M, D> {
+    fn new(motors: [M; MOTORS], drives: [D; MOTORS]) -> Self {
+        let motors = motors.map(|motor| Own::new(motor).with_opening(Duration::ZERO));
+        let (feedback, others) = ([None; MOTORS], [None; MOTORS]);
+        let now = Instant::from_micros(1_000);
+        let mut group = Self { motors, drives, feedback, others, now };
+        for cycle in 0..1_200 {
+            group.cycle();
+            if cycle == 300 {
+                group.motors.arm(group.now).unwrap();
+            }
+        }
+        for drive in &group.drives {
+            let speed = drive.shaft().velocity_rad_per_s();
+            assert!((speed - 1.0).abs() < 0.2, "{speed} rad/s");
+        }
+        group
+    }
+
+    fn cycle(&mut self) {
+        self.now = self.now + Duration::from_millis(1);
+        for motor in &mut self.motors {
+            _ = motor.set_velocity((), SPEED);
+        }
+        self.motors.update(Tick::new(self.now, 0.001));
+        while let Some(frame) = self.motors.next_frame(0) {
+            for index in 0..MOTORS {
+                let answer = self.drives[index].hear(&frame);
+                self.take(index, answer);
+            }
+        }
+        for index in 0..MOTORS {
+            self.drives[index].step(0.001);
+            while let Some(frame) = self.drives[index].report() {
+                self.take(index, Some(frame));
+            }
+        }
+    }
+
+    fn take(&mut self, index: usize, frame: Option<CanFrame>) {
+        let Some(frame) = frame else { return };
+        assert_eq!(self.motors.ingest(&frame, self.now), Ingest::Taken);
+        let place = if D::is_feedback(&frame) { &mut self.feedback } else { &mut self.others };
+        place[index] = Some(frame);
+    }
+}
+
+/// The whole tick: feedback in, loops, commands out.
+#[inline(never)]
+fn whole<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTORS], tick: Tick) {
+    for frame in feedback {
+        _ = motors.ingest(frame, tick.now());
+    }
+    motors.update(tick);
+    while let Some(frame) = motors.next_frame(0) {
+        black_box(&frame);
+    }
+}
+
+#[inline(never)]
+fn ingest<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTORS], now: Instant) {
+    for frame in feedback {
+        _ = motors.ingest(frame, now);
+    }
+}
+
+/// Prints the tick, and a frame of the feedback. Commands do not arrive here, so the drives send what they had; what is no feedback
+/// comes each 100 ms, and does not count.
+fn measure<M: OwnMotor + Debug, D: Drive>(names: [&str; 2], group: Group<M, D>) {
+    let Group { mut motors, feedback, others, mut now, .. } = group;
+    let feedback = feedback.map(Option::unwrap);
+    let function = ingest as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Instant);
+    let frames = instructions(function, |ingest, _| ingest(&mut motors, &feedback, now));
+    let function = whole as fn(&mut [Own<M>; MOTORS], &[CanFrame; MOTORS], Tick);
+    let figure = instructions(function, |whole, call| {
+        now = now + Duration::from_millis(1);
+        if call % 100 == 0 {
+            for frame in others.iter().flatten() {
+                _ = motors.ingest(frame, now);
+            }
+        }
+        for motor in &mut motors {
+            _ = motor.set_velocity((), SPEED);
+        }
+        whole(&mut motors, &feedback, Tick::new(now, 0.001));
+    });
+    assert!(motors.iter().all(|motor| motor.guard().has_target()));
+    row(names[0], &[figure]);
+    row(names[1], &[frames / MOTORS as u32]);
+}
+
+fn ids() -> [u8; MOTORS] {
+    core::array::from_fn(|index| black_box(index as u8 + 1))
+}
+
+/// 3 Nm at most.
+fn torque() -> ImpedanceControl {
+    let mode = ImpedanceControl::new(3.0).unwrap();
+    mode.with_loops(PidConfig::new(10.0, 0.0, 0.0), SPEED_LOOP).unwrap()
+}
+
+pub fn rows() {
+    let model = lk::Model::MF9025_16T;
+    let amperes = model.series().amperes_per_count();
+    let motors = ids().map(|id| lk::Motor::new(model, id, torque()).unwrap());
+    let drives = ids().map(|id| LkDrive::new(id, amperes, model.torque_constant(), 1.0, 16));
+    measure(["lk_tick", "lk_ingest"], Group::new(motors, drives));
+
+    let model = robstride::Model::RS02;
+    let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
+    let motors = ids().map(|id| robstride::Motor::new(model, id, torque()).unwrap());
+    let drives = ids().map(|id| RobStrideDrive::new(id, ranges));
+    measure(["robstride_tick", "robstride_ingest"], Group::new(motors, drives));
+
+    let (model, firmware) = (odrive::Model::D6374, odrive::Firmware::V0_6);
+    let fastest = AngularVelocity::from_rad_per_s(20.0);
+    let motors =
+        ids().map(|id| odrive::Motor::new(model, firmware, id, fastest, torque()).unwrap());
+    let drives = ids().map(|id| {
+        OdriveDrive::new(id, true, model.torque_constant(), 1.0).with_periods(0.1, 0.001)
+    });
+    measure(["odrive_tick", "odrive_ingest"], Group::new(motors, drives));
+
+    let model = vesc::Model {
+        name: "hub",
+        pole_pairs: 15,
+        gear: GearRatio::DIRECT,
+        torque_constant_nm_per_a: 0.5,
+        current_limit_a: 20.0,
+        max_velocity: AngularVelocity::from_rpm(500.0),
+        is_reversed: false,
+    };
+    let motor = VescMotor {
+        pole_pairs: 15,
+        gear: 1.0,
+        torque_constant_nm_per_a: 0.5,
+        current_max_a: 40.0,
+        no_load_rad_per_s: 60.0,
+    };
+    let mode = vesc::CurrentControl::new().with_speed_loop(SPEED_LOOP).unwrap();
+    let motors = ids().map(|id| vesc::Motor::new(model, id, mode).unwrap());
+    let drives = ids().map(|id| Vesc(VescDrive::new(id, motor), false));
+    measure(["vesc_tick", "vesc_ingest"], Group::new(motors, drives));
+}
