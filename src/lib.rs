@@ -6,6 +6,7 @@
 extern crate std;
 
 // F0: vocabulary
+pub mod error;
 pub mod frame;
 pub mod math;
 pub mod time;

@@ -36,7 +36,7 @@
 //! let speed = PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 //! let mut wheel = Pid::new(speed)?;
 //! assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0); // A for rad/s: 2 times 4
-//! # Ok::<(), drivetrain::control::ConfigError>(())
+//! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 
 mod actuator;
@@ -51,7 +51,6 @@ mod tuning;
 
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
-pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};
 pub(crate) use number::limited;
 

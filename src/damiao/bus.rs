@@ -3,7 +3,8 @@
 use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
 use super::config::{Mode, sealed};
 use super::feedback::{is_answer, value};
-use super::{ConfigError, Feedback, Model, Register, Status};
+use super::{Feedback, Model, Register, Status};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
@@ -47,7 +48,7 @@ const CHECKED: [Register; 4] = [
 ///     "command of DM-H6215 #2 on 0x7FF", // registers: shared by all drives
 ///     "feedback of DM-H6215 #2 on 0x10",
 /// ]);
-/// # Ok::<(), drivetrain::damiao::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Motor<M> {
@@ -71,9 +72,7 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=15) {
-            return Err(ConfigError::Id(id.into()));
-        }
+        ConfigError::check_range("id", id.into(), 1.0, 15.0)?;
         mode.check(&model)?;
         Ok(Self {
             model,
@@ -91,10 +90,11 @@ impl<M: Mode> Motor<M> {
     /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which may be that of other drives too.
     ///
     /// # Errors
-    /// [`ConfigError::MasterId`] for another id, and for that of the motor's own commands.
+    /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for that of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
-        if master_id > 0x7FE || [self.command_id(), self.id.into()].contains(&master_id) {
-            return Err(ConfigError::MasterId(master_id));
+        ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
+        if [self.command_id(), self.id.into()].contains(&master_id) {
+            return Err(ConfigError::Conflict("master id"));
         }
         Ok(Self { master_id, ..self })
     }
@@ -102,14 +102,10 @@ impl<M: Mode> Motor<M> {
     /// Sets the time without a command after which the drive disables itself: 1 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Timeout`] for another time.
+    /// [`ConfigError::Range`] for another time.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        match u32::try_from(timeout.as_micros()) {
-            Ok(micros @ 1_000..=60_000_000) => {
-                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
-            }
-            _ => Err(ConfigError::Timeout(timeout)),
-        }
+        let micros = ConfigError::check_micros("time-out in us", timeout, 1_000, 60_000_000)?;
+        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -127,11 +123,9 @@ impl<M: Mode> Motor<M> {
     /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read).
     ///
     /// # Errors
-    /// [`ConfigError::Register`] if the register is read only, or cannot hold the value.
+    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the register.
     pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        if !register.is_writable() || !register.holds(value) {
-            return Err(ConfigError::Register(register, value));
-        }
+        register.check(value)?;
         self.settings.request(Inquiry::Write(register, value));
         Ok(())
     }

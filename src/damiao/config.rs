@@ -1,7 +1,8 @@
 //! The control modes, with what a user chooses for each.
 
 use super::command::{Command, MOST_VELOCITY};
-use super::{ConfigError, Feedback, Model};
+use super::{Feedback, Model};
+use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::AngularVelocity;
@@ -13,7 +14,8 @@ pub trait Mode: sealed::Mode {}
 impl<M: sealed::Mode> Mode for M {}
 
 pub(super) mod sealed {
-    use super::{Capabilities, Command, ConfigError, Feedback, Model, Order};
+    use super::{Capabilities, Command, Feedback, Model, Order};
+    use crate::error::ConfigError;
 
     pub trait Mode: core::fmt::Debug + Copy {
         /// The value of the register `CTRL_MODE`.
@@ -144,11 +146,8 @@ impl sealed::Mode for ForcePosition {
     const REST: Option<Command> = None;
 
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)?;
-        if self.velocity_limit.as_rad_per_s() > MOST_VELOCITY {
-            let limit = self.velocity_limit.as_rad_per_s();
-            return Err(ConfigError::VelocityLimit(limit, MOST_VELOCITY));
-        }
+        let most = model.vmax_rad_per_s().min(MOST_VELOCITY);
+        ConfigError::check_limit(VELOCITY, self.velocity_limit.as_rad_per_s(), most)?;
         torque_limit(self.torque_limit_nm, model)
     }
 
@@ -219,13 +218,12 @@ impl sealed::Mode for Velocity {
     }
 }
 
+const VELOCITY: &str = "velocity limit in rad/s";
+
 fn torque_limit(limit_nm: f32, model: &Model) -> Result<(), ConfigError> {
-    let is_valid = limit_nm > 0.0 && limit_nm <= model.tmax_nm();
-    if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit_nm, model.tmax_nm())) }
+    ConfigError::check_limit("torque limit in Nm", limit_nm, model.tmax_nm())
 }
 
 fn velocity_limit(limit: AngularVelocity, model: &Model) -> Result<(), ConfigError> {
-    let (limit, most) = (limit.as_rad_per_s(), model.vmax_rad_per_s());
-    let is_valid = limit > 0.0 && limit <= most;
-    if is_valid { Ok(()) } else { Err(ConfigError::VelocityLimit(limit, most)) }
+    ConfigError::check_limit(VELOCITY, limit.as_rad_per_s(), model.vmax_rad_per_s())
 }

@@ -51,7 +51,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod register;
@@ -61,7 +60,6 @@ mod tests;
 pub use bus::Motor;
 pub use command::Command;
 pub use config::{ForcePosition, Mode, PositionVelocity, Velocity};
-pub use error::ConfigError;
 pub use feedback::{Feedback, Status};
 pub use model::Model;
 pub use register::Register;

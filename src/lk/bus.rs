@@ -4,7 +4,8 @@ use super::command::{id_of, is_command};
 use super::config::sealed::Goal;
 use super::config::{Mode, sealed};
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
-use super::{Command, ConfigError, Feedback, Model, State};
+use super::{Command, Feedback, Model, State};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
@@ -42,7 +43,7 @@ const ECHOES: u8 = 3;
 /// let motor = Motor::new(Model::MG5010E_I10, 3, mode)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, ["command of MG5010E-i10 #3 on 0x143", "feedback of MG5010E-i10 #3 on 0x143"]);
-/// # Ok::<(), drivetrain::lk::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Motor<M> {
@@ -80,9 +81,7 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=32) {
-            return Err(ConfigError::Id(id));
-        }
+        ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
         mode.check(&model)?;
         Ok(Self {
             model,

@@ -1,7 +1,8 @@
 //! The control modes, with what a user chooses for each.
 
+use super::Model;
 use super::model::RAD_PER_DEGREE;
-use super::{ConfigError, Model};
+use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::{Angle, AngularVelocity};
@@ -12,7 +13,8 @@ pub trait Mode: sealed::Mode {}
 impl<M: sealed::Mode> Mode for M {}
 
 pub(super) mod sealed {
-    use super::{Angle, AngularVelocity, Capabilities, ConfigError, Model, Order};
+    use super::{Angle, AngularVelocity, Capabilities, Model, Order};
+    use crate::error::ConfigError;
 
     /// Angle and velocity of the output shaft.
     pub(in crate::lk) type Shaft = (Option<Angle>, AngularVelocity);
@@ -197,12 +199,10 @@ fn at_least_one(value: f32) -> u16 {
 
 fn torque_limit(limit_nm: f32, model: &Model) -> Result<(), ConfigError> {
     let (least, most) = (model.torque_per_count(), model.max_torque_nm());
-    let is_valid = limit_nm >= least && limit_nm <= most;
-    if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit_nm, least, most)) }
+    ConfigError::check_range("torque limit in Nm", limit_nm, least, most)
 }
 
 fn velocity_limit(limit: AngularVelocity, model: &Model) -> Result<(), ConfigError> {
-    let (limit, most) = (limit.as_rad_per_s(), model.max_velocity());
-    let is_valid = limit > 0.0 && limit <= most;
-    if is_valid { Ok(()) } else { Err(ConfigError::VelocityLimit(limit, most)) }
+    let most = model.max_velocity();
+    ConfigError::check_limit("velocity limit in rad/s", limit.as_rad_per_s(), most)
 }

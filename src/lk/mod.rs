@@ -75,7 +75,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 #[cfg(test)]
@@ -84,6 +83,5 @@ mod tests;
 pub use bus::Motor;
 pub use command::Command;
 pub use config::{Mode, PositionVelocity, Velocity};
-pub use error::ConfigError;
 pub use feedback::{Feedback, State};
 pub use model::{Model, Series};

@@ -1,6 +1,5 @@
 //! The control modes and the endpoints, with what a user chooses for each.
 
-use super::ConfigError;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::{Angle, AngularVelocity};
 
@@ -10,7 +9,8 @@ pub trait Mode: sealed::Mode {}
 impl<M: sealed::Mode> Mode for M {}
 
 pub(super) mod sealed {
-    use super::{Angle, AngularVelocity, Capabilities, ConfigError, Order};
+    use super::{Angle, AngularVelocity, Capabilities, Order};
+    use crate::error::ConfigError;
 
     /// A command in units of the output shaft: Nm, rad/s, or rad.
     #[derive(Debug, Clone, Copy)]
@@ -40,8 +40,7 @@ pub(super) mod sealed {
         /// A limit that is not above zero and finite.
         fn check(&self) -> Result<(), ConfigError> {
             let limit = self.torque_limit_nm();
-            let is_valid = limit > 0.0 && limit.is_finite();
-            if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit)) }
+            ConfigError::check_limit("torque limit in Nm", limit, f32::MAX)
         }
 
         fn capabilities(&self) -> Capabilities;

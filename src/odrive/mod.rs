@@ -78,7 +78,6 @@ mod bus;
 mod command;
 mod config;
 mod enabling;
-mod error;
 mod feedback;
 mod model;
 mod motor;
@@ -87,7 +86,6 @@ mod tests;
 
 pub use command::Command;
 pub use config::{Endpoints, Mode, Position, Velocity};
-pub use error::ConfigError;
 pub use feedback::{Feedback, Firmware, Heartbeat};
 pub use model::Model;
 pub use motor::Motor;

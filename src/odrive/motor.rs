@@ -2,7 +2,8 @@
 
 use super::config::{Endpoints, Mode, Setting};
 use super::enabling::Phase;
-use super::{ConfigError, Feedback, Firmware, Heartbeat, Model};
+use super::{Feedback, Firmware, Heartbeat, Model};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::Settings;
 use crate::time::Duration;
@@ -21,7 +22,7 @@ use crate::units::AngularVelocity;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x61"));
 /// assert!(claims.contains(&"command of D6374 #3 on 0x6D".into()));
-/// # Ok::<(), drivetrain::odrive::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Motor<M> {
@@ -76,16 +77,12 @@ impl<M: Mode> Motor<M> {
         velocity_limit: AngularVelocity,
         mode: M,
     ) -> Result<Self, ConfigError> {
-        if node > 62 {
-            return Err(ConfigError::Node(node));
-        }
+        ConfigError::check_range("node id", node.into(), 0.0, 62.0)?;
         mode.check()?;
         let limit = velocity_limit.as_rad_per_s();
-        if !(limit > 0.0 && limit.is_finite()) {
-            return Err(ConfigError::VelocityLimit(limit));
-        }
-        if let Some(limit) = mode.acceleration().filter(|it| !(*it > 0.0 && it.is_finite())) {
-            return Err(ConfigError::Acceleration(limit));
+        ConfigError::check_limit("velocity limit in rad/s", limit, f32::MAX)?;
+        if let Some(limit) = mode.acceleration() {
+            ConfigError::check_limit("acceleration in rad/s^2", limit, f32::MAX)?;
         }
         Ok(Self {
             model,
@@ -116,11 +113,10 @@ impl<M: Mode> Motor<M> {
     /// Sets the turns of the motor for one of the output shaft.
     ///
     /// # Errors
-    /// [`ConfigError::GearRatio`] for a ratio that is not between 0.001 and 100000.
+    /// [`ConfigError::Range`] for a ratio that is not between 0.001 and 100000.
     pub fn with_gear(self, ratio: f32) -> Result<Self, ConfigError> {
-        let is_valid = (0.001..=100_000.0).contains(&ratio);
-        let gear = ratio.copysign(self.gear);
-        if is_valid { Ok(Self { gear, ..self }) } else { Err(ConfigError::GearRatio(ratio)) }
+        ConfigError::check_range("gear ratio", ratio, 0.001, 100_000.0)?;
+        Ok(Self { gear: ratio.copysign(self.gear), ..self })
     }
 
     /// Has the output shaft turn clockwise when the position of the drive rises.
@@ -133,21 +129,17 @@ impl<M: Mode> Motor<M> {
     /// after `watchdog` without a frame, 10 ms to 10 s.
     ///
     /// # Errors
-    /// [`ConfigError::Endpoints`] for firmware 0.5; [`ConfigError::Watchdog`] for another time.
+    /// [`ConfigError::Unsupported`] for firmware 0.5, whose watchdog is set by USB; [`ConfigError::Range`] for another time.
     pub fn with_endpoints(
         self,
         endpoints: Endpoints,
         watchdog: Duration,
     ) -> Result<Self, ConfigError> {
         if self.firmware == Firmware::V0_5 {
-            return Err(ConfigError::Endpoints);
+            return Err(ConfigError::Unsupported("endpoints over CAN"));
         }
-        match u32::try_from(watchdog.as_micros()) {
-            Ok(micros @ 10_000..=10_000_000) => {
-                Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
-            }
-            _ => Err(ConfigError::Watchdog(watchdog)),
-        }
+        let micros = ConfigError::check_micros("watchdog in us", watchdog, 10_000, 10_000_000)?;
+        Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
     }
 
     /// Returns the last encoder estimates; `None` before the first.

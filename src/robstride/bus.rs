@@ -4,7 +4,8 @@ use super::command::{Command, extended};
 use super::config::{Mode, sealed};
 use super::feedback::{Answer, answer, laps, register, report_code};
 use super::setup::Setup;
-use super::{ConfigError, Feedback, Model, Register, Status};
+use super::{Feedback, Model, Register, Status};
+use crate::error::{ConfigError, check};
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
@@ -71,9 +72,7 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=127) {
-            return Err(ConfigError::Id(id));
-        }
+        ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
         mode.check(&model)?;
         let last = if model.has_timeout() { Register::Timeout } else { Register::RunMode };
         Ok(Self {
@@ -94,25 +93,24 @@ impl<M: Mode> Motor<M> {
     /// Sets the id of the host: any but that of a motor.
     ///
     /// # Errors
-    /// [`ConfigError::HostId`] for the id of this motor. That of another one is found where both are attached.
+    /// [`ConfigError::Conflict`] for the id of this motor. That of another one is found where both are attached.
     pub fn with_host_id(self, host: u8) -> Result<Self, ConfigError> {
-        if host == self.id { Err(ConfigError::HostId(host)) } else { Ok(Self { host, ..self }) }
+        if host == self.id {
+            return Err(ConfigError::Conflict("host id"));
+        }
+        Ok(Self { host, ..self })
     }
 
     /// Sets the time without a command after which the drive disables itself: 1 ms to 5 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Timeout`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
+    /// [`ConfigError::Range`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
         if !self.model.has_timeout() {
             return Err(ConfigError::Unsupported("time-out"));
         }
-        match u32::try_from(timeout.as_micros()) {
-            Ok(micros @ 1_000..=5_000_000) => {
-                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
-            }
-            _ => Err(ConfigError::Timeout(timeout)),
-        }
+        let micros = ConfigError::check_micros("time-out in us", timeout, 1_000, 5_000_000)?;
+        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -137,11 +135,9 @@ impl<M: Mode> Motor<M> {
     /// [`read`](Self::read).
     ///
     /// # Errors
-    /// [`ConfigError::Register`] if the parameter is read only, or cannot hold the value.
+    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the parameter.
     pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        if !register.is_writable() || !register.holds(value) {
-            return Err(ConfigError::Register(register, value));
-        }
+        register.check(value)?;
         self.setup.settings.request(Inquiry::Write(register, value));
         Ok(())
     }
@@ -169,10 +165,11 @@ impl<M: Mode> Motor<M> {
     /// of it: make another one.
     ///
     /// # Errors
-    /// [`ConfigError::Id`] for another id, and for that of the host.
+    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for that of the host.
     pub const fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
-        if !matches!(id, 1..=127) || id == self.host {
-            return Err(ConfigError::Id(id));
+        check!(ConfigError::check_range("id", id as f32, 1.0, 127.0));
+        if id == self.host {
+            return Err(ConfigError::Conflict("id"));
         }
         self.setup.once = Some(Command::SetId(id));
         Ok(())

@@ -1,7 +1,8 @@
 //! The run modes, with what a user chooses for each.
 
 use super::command::Command;
-use super::{ConfigError, Feedback, Model, Register};
+use super::{Feedback, Model, Register};
+use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::{Angle, AngularVelocity};
@@ -15,7 +16,8 @@ impl<M: sealed::Mode> Mode for M {}
 use sealed::Seen;
 
 pub(super) mod sealed {
-    use super::{Angle, Capabilities, Command, ConfigError, Feedback, Model, Order, Register};
+    use super::{Angle, Capabilities, Command, Feedback, Model, Order, Register};
+    use crate::error::ConfigError;
 
     /// The angle of the shaft, where it has one, and the last feedback.
     pub(super) type Seen<'a> = (Option<Angle>, &'a Feedback);
@@ -62,8 +64,7 @@ impl sealed::Mode for ImpedanceControl {
     }
 
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        let (limit, most) = (self.torque_limit_nm(), model.tmax_nm());
-        if limit <= most { Ok(()) } else { Err(ConfigError::TorqueLimit(limit, most)) }
+        ConfigError::check_limit("torque limit in Nm", self.torque_limit_nm(), model.tmax_nm())
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -124,9 +125,7 @@ impl Follower {
 
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
         let (limit, most) = (self.velocity_limit.as_rad_per_s(), model.vmax_rad_per_s());
-        if !(limit > 0.0 && limit <= most) {
-            return Err(ConfigError::VelocityLimit(limit, most));
-        }
+        ConfigError::check_limit("velocity limit in rad/s", limit, most)?;
         current_limit(self.current_limit_a, model)
     }
 
@@ -278,7 +277,7 @@ impl sealed::Mode for Current {
 
     fn check(&self, model: &Model) -> Result<(), ConfigError> {
         if !(self.nm_per_ampere > 1e-6 && self.nm_per_ampere.is_finite()) {
-            return Err(ConfigError::TorqueConstant(self.nm_per_ampere));
+            return Err(ConfigError::NotPositive("nm_per_ampere"));
         }
         current_limit(self.limit_a, model)
     }
@@ -313,6 +312,5 @@ impl sealed::Mode for Current {
 }
 
 fn current_limit(limit_a: f32, model: &Model) -> Result<(), ConfigError> {
-    let is_valid = limit_a > 0.0 && limit_a <= model.current_a();
-    if is_valid { Ok(()) } else { Err(ConfigError::CurrentLimit(limit_a, model.current_a())) }
+    ConfigError::check_limit("current limit in A", limit_a, model.current_a())
 }

@@ -80,7 +80,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod register;
@@ -91,7 +90,6 @@ mod tests;
 pub use bus::Motor;
 pub use command::Command;
 pub use config::{Current, Mode, Position, Velocity};
-pub use error::ConfigError;
 pub use feedback::{Feedback, Status};
 pub use model::Model;
 pub use register::Register;

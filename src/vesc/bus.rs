@@ -4,8 +4,9 @@ use super::command::{HOST, SHORT_MESSAGE, extended, question};
 use super::config::{At, Mode, Rest, sealed};
 use super::feedback::fault;
 use super::tachometer::Tachometer;
-use super::{ConfigError, Feedback, Model};
+use super::{Feedback, Model};
 use crate::encoder;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
@@ -49,7 +50,7 @@ const ORDERS: u8 = 50;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000101 [4] 00 00 00 00"); // current 0
 /// let mut wheel = wheel.with_rest(Rest::Brake(4.0))?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000201 [4] 00 00 0F A0"); // brake 4000 mA
-/// # Ok::<(), drivetrain::vesc::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Motor<M> {
@@ -77,9 +78,7 @@ impl<M: Mode> Motor<M> {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if id >= HOST {
-            return Err(ConfigError::Id(id));
-        }
+        ConfigError::check_range("id", id.into(), 0.0, f32::from(HOST - 1))?;
         model.check()?;
         mode.check(&model)?;
         Ok(Self {
@@ -101,7 +100,7 @@ impl<M: Mode> Motor<M> {
     /// Sets the command of a motor that is not driven: [`Rest::Release`] at first.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a current that is not above 0 and within the limit of the model.
+    /// [`ConfigError::Limit`] for a current that is not above 0 and within the limit of the model.
     pub fn with_rest(self, rest: Rest) -> Result<Self, ConfigError> {
         rest.check(&self.model)?;
         Ok(Self { rest, ..self })

@@ -1,9 +1,9 @@
 //! The control modes, with what a user chooses for each.
 
+use super::Model;
 use super::command::Command;
-use super::error::within_range;
-use super::{ConfigError, Model};
-use crate::control::{Cascade, ConfigError as LoopError, Pid, PidConfig};
+use crate::control::{Cascade, Pid, PidConfig};
+use crate::error::ConfigError;
 use crate::math::{wrap_pi, wrap_tau};
 use crate::motor::{Capabilities, Capability, Order, Target};
 use crate::units::{Angle, AngularVelocity};
@@ -23,7 +23,8 @@ pub struct At<'a> {
 }
 
 pub(super) mod sealed {
-    use super::{At, Capabilities, Command, ConfigError, Model, Order};
+    use super::{At, Capabilities, Command, Model, Order};
+    use crate::error::ConfigError;
 
     pub trait Mode: core::fmt::Debug + Copy {
         /// The drive itself controls the position, so its angle is that of status 4.
@@ -75,7 +76,7 @@ impl Rest {
 
     pub(super) fn check(self, model: &Model) -> Result<(), ConfigError> {
         let (Self::Brake(current) | Self::Handbrake(current)) = self else { return Ok(()) };
-        within_range("current of rest in A", current, model.current_limit_a)
+        ConfigError::check_limit("current of rest in A", current, model.current_limit_a)
     }
 }
 
@@ -90,7 +91,7 @@ impl Rest {
 /// let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0); // rad to rad/s
 /// let wheel = CurrentControl::new().with_speed_loop(speed)?;
 /// let joint = CurrentControl::new().with_loops(position, speed)?;
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy)]
 pub struct CurrentControl {
@@ -109,7 +110,7 @@ impl CurrentControl {
     ///
     /// # Errors
     /// As [`Cascade::new`].
-    pub fn with_speed_loop(self, speed: PidConfig) -> Result<Self, LoopError> {
+    pub fn with_speed_loop(self, speed: PidConfig) -> Result<Self, ConfigError> {
         let position = PidConfig::new(0.0, 0.0, 0.0);
         Ok(Self { loops: Some(Cascade::new(position, speed)?), ..self })
     }
@@ -119,7 +120,7 @@ impl CurrentControl {
     ///
     /// # Errors
     /// As [`Cascade::new`].
-    pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, LoopError> {
+    pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         Ok(Self { loops: Some(Cascade::new(position, speed)?), has_angle: true })
     }
 }
@@ -186,7 +187,7 @@ impl Duty {
     /// # Errors
     /// Names the value that is not allowed.
     pub fn new(limit: f32, speed: PidConfig) -> Result<Self, ConfigError> {
-        within_range("duty limit", limit, 1.0)?;
+        ConfigError::check_limit("duty limit", limit, 1.0)?;
         Ok(Self { limit, speed: Pid::new(speed)? })
     }
 }

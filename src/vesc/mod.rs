@@ -79,7 +79,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod tachometer;
@@ -89,6 +88,5 @@ mod tests;
 pub use bus::Motor;
 pub use command::Command;
 pub use config::{CurrentControl, Duty, Mode, Position, Rest, Velocity};
-pub use error::ConfigError;
 pub use feedback::Feedback;
 pub use model::Model;

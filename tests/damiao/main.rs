@@ -14,9 +14,8 @@ mod review;
 
 use bench::{Bench, J4310, mit};
 use drivetrain::control::PidConfig;
-use drivetrain::damiao::{
-    ConfigError, ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Velocity,
-};
+use drivetrain::damiao::{ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Velocity};
+use drivetrain::error::ConfigError;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
@@ -221,11 +220,13 @@ fn bad_configurations_are_refused_with_the_limit() {
         "id 16: 1 to 15 are allowed"
     );
     let motor = |limit| {
-        let mode =
-            ImpedanceControl::new(limit).map_err(|_| ConfigError::Timeout(Duration::ZERO))?;
+        let mode = ImpedanceControl::new(limit)?;
         Motor::new(Model::J4310, 1, mode)
     };
-    assert!(text(motor(10.001)).ends_with("above 0 and at most TMAX, 10 Nm"));
+    assert!(
+        text(motor(10.001))
+            .ends_with("torque limit in Nm 10.001: above 0 and at most 10 is allowed")
+    );
     for limit in [0.0, -1.0, f32::INFINITY, f32::NAN] {
         assert!(ImpedanceControl::new(limit).is_err(), "{limit}");
     }

@@ -8,10 +8,11 @@ mod vectors;
 
 use bench::{Bench, GEAR, motor, torque};
 use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive};
 use drivetrain::odrive::{
-    ConfigError, Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor, Position, Velocity,
+    Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor, Position, Velocity,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Duration, Tick};
@@ -499,25 +500,40 @@ fn bad_configurations_are_refused_with_the_limit() {
         Motor::new(Model::D5065, Firmware::V0_5, node, fastest, Velocity::new(limit))
     };
     assert_eq!(text(made(63, fastest, 1.0)), "node id 63: 0 to 62 are allowed");
-    assert_eq!(text(made(0, velocity(0.0), 1.0)), "velocity limit 0 rad/s: above 0 and finite");
+    assert_eq!(
+        text(made(0, velocity(0.0), 1.0)),
+        "velocity limit in rad/s 0: must be above 0 and finite"
+    );
     for limit in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(made(0, fastest, limit), Err(ConfigError::TorqueLimit(_))), "{limit}");
+        assert!(
+            matches!(
+                made(0, fastest, limit),
+                Err(ConfigError::Limit { parameter: "torque limit in Nm", .. })
+            ),
+            "{limit}"
+        );
         assert!(made(0, velocity(limit), 1.0).is_err());
         let mode = Position::new(1.0).with_trajectory(limit);
         let made = Motor::new(Model::D5065, Firmware::V0_5, 0, fastest, mode);
-        assert!(matches!(made, Err(ConfigError::Acceleration(_))));
+        assert!(matches!(
+            made,
+            Err(ConfigError::Limit { parameter: "acceleration in rad/s^2", .. })
+        ));
     }
     for ratio in [0.0, -5.0, f32::NAN, f32::INFINITY] {
         assert!(matches!(
             made(0, fastest, 1.0).unwrap().with_gear(ratio),
-            Err(ConfigError::GearRatio(_))
+            Err(ConfigError::Range { parameter: "gear ratio", .. })
         ));
     }
     let refused = made(0, fastest, 1.0).unwrap().with_endpoints(ENDPOINTS, Duration::from_secs(1));
-    assert_eq!(refused.unwrap_err(), ConfigError::Endpoints);
+    assert_eq!(refused.unwrap_err(), ConfigError::Unsupported("endpoints over CAN"));
     let pro = Motor::new(Model::D5065, Firmware::V0_6, 0, fastest, Velocity::new(1.0)).unwrap();
     for time in [Duration::ZERO, Duration::from_secs(11)] {
-        assert_eq!(pro.with_endpoints(ENDPOINTS, time).unwrap_err(), ConfigError::Watchdog(time));
+        let value = time.as_micros() as f32;
+        let refused =
+            ConfigError::Range { parameter: "watchdog in us", value, least: 1e4, most: 1e7 };
+        assert_eq!(pro.with_endpoints(ENDPOINTS, time).unwrap_err(), refused);
     }
 }
 

@@ -10,14 +10,13 @@ mod rest;
 
 use bench::{Bench, operation};
 use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, ArmError, Devices, Edge, Impedance, ImpedanceControl, Own, TargetError,
     VelocityDrive,
 };
-use drivetrain::robstride::{
-    ConfigError, Current, Mode, Model, Motor, Position, Register, Status, Velocity,
-};
+use drivetrain::robstride::{Current, Mode, Model, Motor, Position, Register, Status, Velocity};
 use drivetrain::sim::{DriveShaft, RobStrideDrive};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -469,13 +468,13 @@ fn bad_configurations_are_refused_with_the_limit() {
     let text = |outcome: Result<(), ConfigError>| outcome.unwrap_err().to_string();
     let made = |id| Motor::new(Model::RS02, id, operation());
     for id in [0, 128, 255] {
-        assert_eq!(
-            text(made(id).map(|_| ())),
-            format!("id {id}: 1 to 127 are allowed, but for the id of the host")
-        );
+        assert_eq!(text(made(id).map(|_| ())), format!("id {id}: 1 to 127 are allowed"));
     }
     let torque = |limit| Motor::new(Model::RS02, 1, ImpedanceControl::new(limit).unwrap());
-    assert_eq!(text(torque(17.01).map(|_| ())), "torque limit 17.01 Nm: above 0 and at most 17 Nm");
+    assert_eq!(
+        text(torque(17.01).map(|_| ())),
+        "torque limit in Nm 17.01: above 0 and at most 17 is allowed"
+    );
     for current in [0.0, -1.0, 16.1, f32::NAN] {
         assert!(Motor::new(Model::RS02, 1, Current::new(current, 1.0)).is_err(), "{current}");
         assert!(Motor::new(Model::RS02, 1, Velocity::new(rad_per_s(1.0), current)).is_err());
@@ -494,7 +493,7 @@ fn bad_configurations_are_refused_with_the_limit() {
     }
     let cybergear = Motor::new(Model::CYBERGEAR, 1, operation()).unwrap();
     let refused = cybergear.with_timeout(Duration::from_millis(50)).map(|_| ());
-    assert_eq!(text(refused), "a CyberGear has no time-out");
+    assert_eq!(text(refused), "time-out: this model, or its firmware, has none");
     let mut motor = motor;
     assert_eq!(
         text(motor.write(Register::SupplyVoltage, 10.0)),

@@ -8,6 +8,7 @@ mod bench;
 use bench::{Bench, MODEL, SPEED, drive, looped};
 use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Condition, Devices, Ingest, Own, TargetError, Timeouts, VelocityDrive,
@@ -16,8 +17,7 @@ use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use drivetrain::vesc::{
-    Command, ConfigError, CurrentControl, Duty, Feedback, Mode, Model, Motor, Position, Rest,
-    Velocity,
+    Command, CurrentControl, Duty, Feedback, Mode, Model, Motor, Position, Rest, Velocity,
 };
 use embedded_can::{ExtendedId, Frame, Id};
 use serde_json::Value;
@@ -556,7 +556,7 @@ fn bad_configurations_are_refused_with_the_limit() {
         "id 254: 0 to 253 are allowed"
     );
     assert!(Motor::new(MODEL, 0, Position).is_ok() && Motor::new(MODEL, 253, Position).is_ok());
-    assert!(refused(Model { pole_pairs: 0, ..MODEL }).starts_with("pole_pairs is 0"));
+    assert!(refused(Model { pole_pairs: 0, ..MODEL }).starts_with("pole_pairs 0"));
     for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert!(
             refused(Model { torque_constant_nm_per_a: wrong, ..MODEL }).contains("torque_constant")
@@ -579,10 +579,13 @@ fn bad_configurations_are_refused_with_the_limit() {
     assert!(refused(Model { max_velocity: rad_s(1e7), ..MODEL }).contains("16777216"));
     let motor = Motor::new(MODEL, 1, Position).unwrap();
     let beyond = motor.with_rest(Rest::Brake(20.001)).unwrap_err();
-    assert_eq!(beyond, ConfigError::Range("current of rest in A", 20.001, 20.0));
+    assert_eq!(
+        beyond,
+        ConfigError::Limit { parameter: "current of rest in A", value: 20.001, most: 20.0 }
+    );
     assert!(matches!(
         Duty::new(0.5, PidConfig::new(f32::NAN, 0.0, 0.0)),
-        Err(ConfigError::Loop(_))
+        Err(ConfigError::Negative("kp"))
     ));
 }
 

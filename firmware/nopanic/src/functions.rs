@@ -2,14 +2,13 @@
 
 use crate::opaque::{Function, any};
 use core::hint::black_box;
-use drivetrain::control::{
-    ConfigError, Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan,
-};
+use drivetrain::control::{Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{

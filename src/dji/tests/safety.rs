@@ -275,17 +275,17 @@ fn timeouts_that_would_drive_blindly_are_refused() {
     assert_eq!(timeouts.with_command(ms(1_000)).unwrap().command(), ms(1_000));
     assert_eq!(timeouts.with_measured(us(1_999)).unwrap().measured(), ms(1));
     let refused =
-        |late, offline| Timeouts::new().with_feedback(late, offline).unwrap_err().parameter;
-    assert_eq!(refused(ms(10_000), ms(1)), "late");
-    assert_eq!(refused(us(1_000_001), ms(10_000)), "late");
-    assert_eq!(refused(us(0), ms(100)), "late");
-    assert_eq!(refused(ms(20), us(19_999)), "offline");
-    assert_eq!(refused(ms(20), us(10_000_001)), "offline");
+        |late, offline| Timeouts::new().with_feedback(late, offline).unwrap_err().parameter();
+    assert_eq!(refused(ms(10_000), ms(1)), "late in us");
+    assert_eq!(refused(us(1_000_001), ms(10_000)), "late in us");
+    assert_eq!(refused(us(0), ms(100)), "late in us");
+    assert_eq!(refused(ms(20), us(19_999)), "offline in us");
+    assert_eq!(refused(ms(20), us(10_000_001)), "offline in us");
     for command in [us(0), us(1_000_001), ms(u64::MAX / 1_000)] {
-        assert_eq!(timeouts.with_command(command).unwrap_err().parameter, "command");
+        assert_eq!(timeouts.with_command(command).unwrap_err().parameter(), "command in us");
     }
     for measured in [us(999), us(1_000_001)] {
-        assert_eq!(timeouts.with_measured(measured).unwrap_err().parameter, "measurement");
+        assert_eq!(timeouts.with_measured(measured).unwrap_err().parameter(), "measurement in us");
     }
 }
 
