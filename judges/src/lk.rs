@@ -8,7 +8,7 @@
 
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
-use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, PositionVelocity, State, Velocity};
+use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, State};
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
 use drivetrain::sim::LkDrive;
 use drivetrain::time::{Instant, Tick};
@@ -149,9 +149,9 @@ fn serve(defect: Defect, input: impl BufRead, output: &mut impl Write) -> Outcom
                 let sent = match *mode {
                     "torque" => session(id, torque, |own| _ = own.set_torque(1.0))?,
                     "velocity" => {
-                        session(id, Velocity::new(quick), |own| _ = own.set_velocity((), quick))?
+                        session(id, Mode::velocity(quick), |own| _ = own.set_velocity((), quick))?
                     }
-                    _ => session(id, PositionVelocity::new(quick), |own| {
+                    _ => session(id, Mode::position_velocity(quick), |own| {
                         _ = own.set_angle((), Angle::from_radians(1.0));
                     })?,
                 };
@@ -178,7 +178,7 @@ fn drive_of(id: u8) -> LkDrive {
     LkDrive::new(id, 33.0 / 4096.0, 0.32, 1.0, 16)
 }
 
-fn session<M: Mode>(id: u8, mode: M, set: impl Fn(&mut Own<Motor<M>>)) -> Outcome<Vec<CanFrame>> {
+fn session(id: u8, mode: impl Into<Mode>, set: impl Fn(&mut Own<Motor>)) -> Outcome<Vec<CanFrame>> {
     let mut own = Own::new(Motor::new(Model::MF9025_16T, id, mode)?);
     let (mut drive, mut seen) = (drive_of(id), Vec::new());
     for ms in 1..1_000_u64 {

@@ -1,7 +1,7 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
-use super::config::{Mode, sealed};
+use super::config::Mode;
 use super::feedback::{is_answer, value};
 use super::{Feedback, Model, Register, Status};
 use crate::error::ConfigError;
@@ -31,15 +31,15 @@ const CHECKED: [Register; 4] = [
     Register::TorqueRange,
 ];
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
-/// use drivetrain::damiao::{Model, Motor, Velocity};
+/// use drivetrain::damiao::{Mode, Model, Motor};
 /// use drivetrain::motor::{Claim, OwnMotor};
 /// use drivetrain::units::AngularVelocity;
 ///
-/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
 /// let motor = Motor::new(Model::H6215, 2, mode)?.with_master_id(0x010)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, [
@@ -51,12 +51,12 @@ const CHECKED: [Register; 4] = [
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     master_id: u16,
     timeout_units: u32,
-    mode: M,
+    mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     settings: Settings<Register, { CHECKED.len() }>,
@@ -66,13 +66,14 @@ pub struct Motor<M> {
     timeout: Confirmation,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 15, and the control mode. The master id is `id + 0x10`, as the manual advises.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 15.0)?;
+        let mode = mode.into();
         mode.check(&model)?;
         Ok(Self {
             model,
@@ -143,7 +144,7 @@ impl<M: Mode> Motor<M> {
     }
 
     const fn command_id(&self) -> u16 {
-        <M as sealed::Mode>::BASE + self.id as u16
+        self.mode.base() + self.id as u16
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
@@ -157,7 +158,7 @@ impl<M: Mode> Motor<M> {
             Register::VelocityRange => self.model.vmax_rad_per_s(),
             Register::TorqueRange => self.model.tmax_nm(),
             Register::Timeout => self.timeout_units as f32,
-            _ => <M as sealed::Mode>::NUMBER.into(),
+            _ => self.mode.number().into(),
         }
     }
 
@@ -168,7 +169,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -176,7 +177,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     /// All drives of the family share the id of the registers.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let claim = |id, role| Claim::new(standard(id), role, self.name());
-        let bare = (<M as sealed::Mode>::BASE > 0).then(|| claim(self.id.into(), Role::Command));
+        let bare = (self.mode.base() > 0).then(|| claim(self.id.into(), Role::Command));
         let shared = [
             claim(REGISTERS, Role::Command).shared(),
             claim(self.master_id, Role::Feedback).shared(),
@@ -210,7 +211,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn rest(&mut self) -> CanFrame {
-        match <M as sealed::Mode>::REST {
+        match self.mode.rest() {
             Some(command) => self.frame_of(command),
             None => self.off(),
         }
@@ -249,7 +250,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.timeout = Confirmation::None;
-        <M as sealed::Mode>::REST.is_some().then(|| self.off())
+        self.mode.rest().is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
@@ -323,7 +324,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Disables the drive; where it reports an error, clears that in turn, which leaves it disabled.
     fn off(&mut self) -> CanFrame {
         let has_error = self.drive.is_some_and(|drive| drive.status.is_error());

@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use drivetrain::control::{Pid, PidConfig};
-//! use drivetrain::damiao::{Model, Motor, Velocity};
+//! use drivetrain::damiao::{Mode, Model, Motor};
 //! use drivetrain::encoder::GearRatio;
 //! use drivetrain::error::ConfigError;
 //! use drivetrain::units::AngularVelocity;
@@ -13,7 +13,7 @@
 //! fn wire() -> Result<(), ConfigError> {
 //!     let _speed = Pid::new(PidConfig::new(0.02, 0.2, 0.0))?;
 //!     let _gear = GearRatio::new(36, 1)?;
-//!     let mode = Velocity::new(AngularVelocity::from_rad_per_s(60.0));
+//!     let mode = Mode::velocity(AngularVelocity::from_rad_per_s(60.0));
 //!     let _wheel = Motor::new(Model::H6215, 2, mode)?; // its largest velocity is 45 rad/s
 //!     Ok(())
 //! }

@@ -9,30 +9,30 @@ use crate::motor::Settings;
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
 /// use drivetrain::motor::{Claim, OwnMotor};
-/// use drivetrain::odrive::{Firmware, Model, Motor, Velocity};
+/// use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 /// use drivetrain::units::AngularVelocity;
 ///
 /// let fastest = AngularVelocity::from_rpm(300.0); // of the output shaft
-/// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Velocity::new(4.0))?.with_gear(8.0)?;
+/// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Mode::velocity(4.0))?.with_gear(8.0)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x61"));
 /// assert!(claims.contains(&"command of D6374 #3 on 0x6D".into()));
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     pub(super) model: Model,
     pub(super) firmware: Firmware,
     pub(super) node: u8,
     pub(super) velocity_limit: AngularVelocity,
     /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
     pub(super) gear: f32,
-    pub(super) mode: M,
+    pub(super) mode: Mode,
     /// The endpoints, and the watchdog in s.
     pub(super) endpoints: Option<(Endpoints, f32)>,
     pub(super) settings: Settings<Setting, { Setting::ALL.len() }>,
@@ -64,7 +64,7 @@ pub struct Motor<M> {
     pub(super) stops: bool,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the firmware and the node id of the drive, 0 to 62, the velocity limit of the output shaft, and the control mode
     /// with the torque limit. The output shaft is that of the motor.
     ///
@@ -75,15 +75,13 @@ impl<M: Mode> Motor<M> {
         firmware: Firmware,
         node: u8,
         velocity_limit: AngularVelocity,
-        mode: M,
+        mode: impl Into<Mode>,
     ) -> Result<Self, ConfigError> {
         ConfigError::check_range("node id", node.into(), 0.0, 62.0)?;
+        let mode = mode.into();
         mode.check()?;
         let limit = velocity_limit.as_rad_per_s();
         ConfigError::check_limit("velocity limit in rad/s", limit, f32::MAX)?;
-        if let Some(limit) = mode.acceleration() {
-            ConfigError::check_limit("acceleration in rad/s^2", limit, f32::MAX)?;
-        }
         Ok(Self {
             model,
             firmware,

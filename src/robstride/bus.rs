@@ -1,7 +1,7 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{Command, extended};
-use super::config::{Mode, sealed};
+use super::config::Mode;
 use super::feedback::{Answer, answer, laps, register, report_code};
 use super::setup::Setup;
 use super::{Feedback, Model, Register, Status};
@@ -28,7 +28,7 @@ const CALIBRATION_CODE: u8 = 1;
 const COMMANDS: [(u32, u32); 3] =
     [(0x0100_0000, 0x0D00_00FF), (0x0400_0000, 0x1C00_00FF), (0x1200_0000, 0x1B00_00FF)];
 
-/// A motor of this family, in the run mode `M`: see the [module](super).
+/// A motor of this family in one of the run modes: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -47,12 +47,12 @@ const COMMANDS: [(u32, u32); 3] =
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     host: u8,
     timeout_units: u32,
-    mode: M,
+    mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     /// How many times the range of the feedback the shaft is away from the turns that it can report.
@@ -66,13 +66,14 @@ pub struct Motor<M> {
     turn: u8,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 127, and the run mode. The id of the host is 0xFD.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
+        let mode = mode.into();
         mode.check(&model)?;
         let last = if model.has_timeout() { Register::Timeout } else { Register::RunMode };
         Ok(Self {
@@ -207,7 +208,7 @@ impl<M: Mode> Motor<M> {
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
             Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
-            Register::MechanicalPosition if <M as sealed::Mode>::NEEDS_ANGLE => {
+            Register::MechanicalPosition if self.mode.needs_angle() => {
                 found.abs() < self.model.pmax_rad()
             }
             _ => found.is_finite(),
@@ -237,7 +238,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -284,7 +285,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn rest(&mut self) -> CanFrame {
-        match <M as sealed::Mode>::REST {
+        match self.mode.rest() {
             Some(command) => self.frame_of(command),
             None => self.off(),
         }
@@ -316,7 +317,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.setup.prepare_anew();
-        <M as sealed::Mode>::REST.is_some().then(|| self.off())
+        self.mode.rest().is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {

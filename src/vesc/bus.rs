@@ -1,7 +1,7 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{HOST, SHORT_MESSAGE, extended, question};
-use super::config::{At, Mode, Rest, sealed};
+use super::config::{At, Mode, Rest};
 use super::feedback::fault;
 use super::tachometer::Tachometer;
 use super::{Feedback, Model};
@@ -27,7 +27,7 @@ const STATUSES: [(u8, u8); 5] = [(MOTION, 0), (14, 1), (TEMPERATURES, 0), (TACHO
 /// Commands for one question.
 const ORDERS: u8 = 50;
 
-/// A motor on a VESC, in the control mode `M`: see the [module](super).
+/// A motor on a VESC, in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -53,10 +53,10 @@ const ORDERS: u8 = 50;
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
-    mode: M,
+    mode: Mode,
     rest: Rest,
     has_encoder: bool,
     has_fault_code: bool,
@@ -72,12 +72,12 @@ pub struct Motor<M> {
     effort: Option<f32>,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the motor, the id of the drive, 0 to 253, and the control mode.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
+    pub fn new(model: Model, id: u8, mode: Mode) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 0.0, f32::from(HOST - 1))?;
         model.check()?;
         mode.check(&model)?;
@@ -87,7 +87,7 @@ impl<M: Mode> Motor<M> {
             id,
             mode,
             rest: Rest::Release,
-            has_encoder: <M as sealed::Mode>::HAS_POSITION,
+            has_encoder: mode.has_position(),
             has_fault_code: true,
             feedback: Feedback::default(),
             angle_age: u8::MAX,
@@ -107,7 +107,7 @@ impl<M: Mode> Motor<M> {
     }
 
     /// Takes the angle from status 4, the position of the drive's encoder, instead of the tachometer in status 5. In the mode
-    /// [`Position`](super::Position) it always does.
+    /// [`Mode::position`](super::Mode::position) it always does.
     ///
     /// It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio. Without an encoder,
     /// status 4 has the electrical angle.
@@ -171,7 +171,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name, self.id)
     }

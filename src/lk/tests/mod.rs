@@ -101,12 +101,12 @@ fn bad_configurations_are_refused_with_the_limit() {
     assert!(torque(1, 0.002).is_some(), "less than a count");
     for limit in [0.0, -1.0, 58.0, f32::NAN, f32::INFINITY] {
         let limit = AngularVelocity::from_rad_per_s(limit);
-        assert!(Motor::new(Model::MG5010E_I10, 1, Velocity::new(limit)).is_err(), "{limit:?}");
-        assert!(Motor::new(Model::MG5010E_I10, 1, PositionVelocity::new(limit)).is_err());
+        assert!(Motor::new(Model::MG5010E_I10, 1, Mode::velocity(limit)).is_err(), "{limit:?}");
+        assert!(Motor::new(Model::MG5010E_I10, 1, Mode::position_velocity(limit)).is_err());
     }
     let slow = AngularVelocity::from_rad_per_s(1.0);
     for limit in [0.0, -1.0, 34.0, f32::NAN] {
-        let mode = Velocity::new(slow).with_torque_limit(limit);
+        let mode = Mode::velocity_with_torque_limit(slow, limit);
         assert!(Motor::new(Model::MG5010E_I10, 1, mode).is_err(), "{limit}");
     }
 }
