@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
 const FLOORS: [(&str, u32); 20] = [
-    ("units", 0),
-    ("time", 0),
-    ("math", 0),
-    ("frame", 0),
-    ("error", 1),
+    ("error", 0),
+    ("units", 1),
+    ("time", 1),
+    ("math", 1),
+    ("frame", 1),
     ("encoder", 10),
     ("control", 10),
     ("geometry", 10),

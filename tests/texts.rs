@@ -4,7 +4,7 @@
 
 use drivetrain::chassis::{ChassisLimits, Mecanum, ModeConfig, Modes, PowerBuffer, PowerModel};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Gm6020Current, LoopError, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::Vec2;
 use drivetrain::motor::{Claim, MotorName, Role};
@@ -55,7 +55,7 @@ fn loop_errors_say_what_is_missing() {
     let pid = PidConfig::new(1.0, 0.0, 0.0);
     let error = bus.set_speed_loop(wheel, pid).unwrap_err();
     says(&error, &["without this loop"]);
-    says(&LoopError::Parameter("kp"), &["kp is not usable"]);
+    says(&ConfigError::Unusable("kp"), &["kp is not usable"]);
     bus.detach(wheel);
     says(&bus.set_position_loop(wheel, pid).unwrap_err(), &["detached"]);
 }

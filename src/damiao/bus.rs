@@ -105,7 +105,8 @@ impl Motor {
     /// # Errors
     /// [`ConfigError::Range`] for another time.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        let micros = ConfigError::check_micros("time-out in us", timeout, 1_000, 60_000_000)?;
+        let micros =
+            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 60_000_000)?;
         Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 

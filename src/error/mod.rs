@@ -21,7 +21,6 @@
 //! assert_eq!(text, Err("velocity limit in rad/s 60: above 0 and at most 45 is allowed".into()));
 //! ```
 
-use crate::time::Duration;
 use core::fmt;
 
 /// A parameter that cannot work, by its name; with the value and its limits where they are numbers.
@@ -153,14 +152,13 @@ impl ConfigError {
         if is_valid { Ok(()) } else { Err(Self::Range { parameter, value, least, most }) }
     }
 
-    /// Returns the microseconds of a time from `least` to `most`, both in microseconds.
+    /// Returns the microseconds of a time from `least` to `most`, both in microseconds; `None` is longer than any.
     pub(crate) const fn check_micros(
         parameter: &'static str,
-        time: Duration,
+        micros: Option<u32>,
         least: u32,
         most: u32,
     ) -> Result<u32, Self> {
-        let micros = time.micros_u32();
         match micros {
             Some(micros) if micros >= least && micros <= most => return Ok(micros),
             _ => {}

@@ -83,11 +83,13 @@ impl Timeouts {
         late: Duration,
         offline: Duration,
     ) -> Result<Self, ConfigError> {
-        let late_us = match ConfigError::check_micros("late in us", late, 1, BLIND_US) {
+        let late_us = match ConfigError::check_micros("late in us", late.micros_u32(), 1, BLIND_US)
+        {
             Ok(micros) => micros,
             Err(error) => return Err(error),
         };
-        match ConfigError::check_micros("offline in us", offline, late_us, LONGEST_US) {
+        match ConfigError::check_micros("offline in us", offline.micros_u32(), late_us, LONGEST_US)
+        {
             Ok(offline_us) => Ok(Self { late_us, offline_us, ..self }),
             Err(error) => Err(error),
         }
@@ -99,7 +101,7 @@ impl Timeouts {
     /// # Errors
     /// The age is zero or longer than 1 s.
     pub const fn with_command(self, command: Duration) -> Result<Self, ConfigError> {
-        match ConfigError::check_micros("command in us", command, 1, BLIND_US) {
+        match ConfigError::check_micros("command in us", command.micros_u32(), 1, BLIND_US) {
             Ok(command_us) => Ok(Self { command_us, ..self }),
             Err(error) => Err(error),
         }
@@ -111,7 +113,8 @@ impl Timeouts {
     /// # Errors
     /// The age is out of that range.
     pub const fn with_measured(self, measured: Duration) -> Result<Self, ConfigError> {
-        match ConfigError::check_micros("measurement in us", measured, 1_000, BLIND_US) {
+        match ConfigError::check_micros("measurement in us", measured.micros_u32(), 1_000, BLIND_US)
+        {
             #[expect(clippy::cast_possible_truncation, reason = "at most 1000")]
             Ok(micros) => Ok(Self { measured_ms: (micros / 1_000) as u16, ..self }),
             Err(error) => Err(error),
@@ -182,14 +185,3 @@ const BLIND_US: u32 = 1_000_000;
 
 /// Far below the 71 minutes after which a 32-bit stamp repeats.
 const LONGEST_US: u32 = 10_000_000;
-
-/// What an armed motor does when it is heard again after being offline.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Recovery {
-    /// It stays relaxed until it is armed again.
-    #[default]
-    Rearm,
-    /// It takes targets again; its output range opens from zero as after arming.
-    Resume,
-}

@@ -136,7 +136,8 @@ impl Motor {
         if self.firmware == Firmware::V0_5 {
             return Err(ConfigError::Unsupported("endpoints over CAN"));
         }
-        let micros = ConfigError::check_micros("watchdog in us", watchdog, 10_000, 10_000_000)?;
+        let micros =
+            ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;
         Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
     }
 

@@ -110,7 +110,8 @@ impl Motor {
         if !self.model.has_timeout() {
             return Err(ConfigError::Unsupported("time-out"));
         }
-        let micros = ConfigError::check_micros("time-out in us", timeout, 1_000, 5_000_000)?;
+        let micros =
+            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 5_000_000)?;
         Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 

@@ -384,7 +384,10 @@ fn a_parameter_that_the_drive_does_not_have_reads_as_no_number() {
 fn a_cybergear_is_never_told_to_store() {
     let mut bench = Bench::of(Model::CYBERGEAR, operation());
     let refused = bench.own.motor_mut().store().unwrap_err();
-    assert_eq!(refused.to_string(), "a CyberGear has no frame to store parameters");
+    assert_eq!(
+        refused.to_string(),
+        "frame to store parameters: this model, or its firmware, has none"
+    );
     bench.steps(200, |bench| assert!(bench.frames.iter().all(|frame| kind(frame) != 22)));
     bench.own.arm(bench.now()).unwrap();
     bench.steps(300, |bench| {

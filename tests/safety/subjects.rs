@@ -9,7 +9,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::lk;
 use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
-    Reaction, Recovery, TargetError, VelocityDrive,
+    Reaction, TargetError, VelocityDrive,
 };
 use drivetrain::robstride;
 use drivetrain::sim::{DamiaoDrive, LkDrive, RobStrideDrive};
@@ -77,11 +77,8 @@ pub(super) struct Wheel<const RESUMES: bool>(Bus, Handle<M3508>);
 
 impl<const RESUMES: bool> Wheel<RESUMES> {
     pub(super) fn new() -> Self {
-        let recovery = if RESUMES { Recovery::Resume } else { Recovery::Rearm };
-        let config = Config::<M3508>::new(1)
-            .with_recovery(recovery)
-            .with_health(&STANDS)
-            .with_opening(Duration::ZERO);
+        let config = Config::<M3508>::new(1).with_health(&STANDS).with_opening(Duration::ZERO);
+        let config = if RESUMES { config.with_resume() } else { config };
         let mut bus = Bus::new();
         let wheel = bus.attach(config).unwrap();
         Self(bus, wheel)

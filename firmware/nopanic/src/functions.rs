@@ -391,7 +391,7 @@ fn dji() {
     Config::<M3508>::position_loop.call();
     Config::<M3508>::with_gear.call();
     Config::<M3508>::with_torque_constant.call();
-    Config::<M3508>::with_recovery.call();
+    Config::<M3508>::with_resume.call();
     Config::<M3508>::with_opening.call();
     Config::<M3508>::id.call();
     Config::<M2006>::with_current_limit.call();

@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::ConfigError;
 
 #[test]
 fn one_ampere_is_the_raw_value_of_each_model() {
@@ -143,7 +144,10 @@ fn a_target_without_its_loop_is_an_error() {
     let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::NoLoop));
     assert_eq!(bus.set_position(wheel, Position::ZERO), Err(TargetError::NoLoop));
-    assert_eq!(bus.set_speed_loop(wheel, SPEED), Err(LoopError::NoLoop));
+    assert_eq!(
+        bus.set_speed_loop(wheel, SPEED),
+        Err(ConfigError::Unusable("handle of a motor without this loop"))
+    );
 }
 
 #[test]
@@ -154,7 +158,7 @@ fn gains_change_while_running() {
     assert_eq!(sent(&mut bus), [(0x200, [3277, 0, 0, 0])]);
     bus.set_speed_loop(wheel, PidConfig::new(2.0, 0.0, 0.0)).unwrap();
     let error = bus.set_speed_loop(wheel, PidConfig::new(1.0, f32::NAN, 0.0)).unwrap_err();
-    assert_eq!(error, LoopError::Parameter("ki"));
+    assert_eq!(error, ConfigError::Negative("ki"));
     bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();
     for ms in 3..50 {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);

@@ -149,7 +149,7 @@ fn an_offline_motor_is_latched_until_it_is_armed_again() {
 fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
     let config = Config::<M3508>::at_once(1)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
-        .with_recovery(Recovery::Resume)
+        .with_resume()
         .with_opening(Duration::from_millis(100));
     let (mut bus, [wheel]) = armed([config]);
     for ms in 2..150 {
@@ -172,7 +172,7 @@ fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
 #[test]
 fn a_motor_that_one_frame_brings_back_comes_from_zero_as_well() {
     let opening = Duration::from_millis(100);
-    let config = Config::<M3508>::new(1).with_recovery(Recovery::Resume).with_opening(opening);
+    let config = Config::<M3508>::new(1).with_resume().with_opening(opening);
     let (bus, [wheel]) = armed([config]);
     let mut bus = bus.with_timeouts(Timeouts::new().with_good_frames(1));
     for ms in 2..150 {
