@@ -13,7 +13,6 @@ use crate::units::{Angle, AngularVelocity};
 pub struct Mode(Kind);
 
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "without a heap, a motor has room for any mode")]
 enum Kind {
     Torque(ImpedanceControl),
     /// With the limit of the torque in Nm, where there is one.

@@ -13,7 +13,6 @@ use crate::wire::mit;
 pub struct Mode(Kind);
 
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "without a heap, a motor has room for any mode")]
 enum Kind {
     Operation(ImpedanceControl),
     Position(Follower),

@@ -27,7 +27,6 @@ use crate::units::{Angle, AngularVelocity};
 pub struct Mode(Kind);
 
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "without a heap, a motor has room for any mode")]
 enum Kind {
     Current(CurrentControl),
     Duty(DutyControl),
