@@ -24,8 +24,8 @@
 //!   very long one does is said at each type; for the controllers see [`TimeStep`].
 //! * A setpoint or measurement that is NaN or infinite: the last output is returned and the sample is counted. The next good one
 //!   works as if the bad one had not been, but that the D of a controller rests in it, since the time between is not one step.
-//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`] names the one that cannot work. What
-//!   needs arithmetic only is `const`, so that a bad constant does not compile.
+//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`](crate::error::ConfigError) names the one that
+//!   cannot work. What needs arithmetic only is `const`, so that a bad constant does not compile.
 //! * Nothing panics, and what is stored is finite.
 //!
 //! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.

@@ -81,6 +81,11 @@ pub enum ConfigError {
     ReadOnly(&'static str),
     /// A register, and the value that it cannot hold.
     CannotHold(&'static str, f32),
+    /// A counter whose frequency has no ratio to 1 MHz that fits 32 bits.
+    Ratio {
+        /// The frequency that was given, in Hz.
+        ticks_per_second: u32,
+    },
     /// A value that is not from `least` to `most`.
     Range {
         /// The name of the parameter, with its unit.
@@ -108,6 +113,7 @@ impl ConfigError {
     #[must_use]
     pub const fn parameter(&self) -> &'static str {
         match *self {
+            Self::Ratio { .. } => "ticks_per_second",
             Self::Negative(parameter)
             | Self::NotPositive(parameter)
             | Self::NotAboveZero(parameter)
@@ -183,6 +189,12 @@ impl fmt::Display for ConfigError {
             }
             Self::Limit { value, most, .. } => {
                 return write!(f, "{parameter} {value}: above 0 and at most {most} is allowed");
+            }
+            Self::Ratio { ticks_per_second } => {
+                return write!(
+                    f,
+                    "a counter of {ticks_per_second} Hz has no exact ratio to 1 MHz that fits 32 bits: use a rounder frequency"
+                );
             }
             Self::CannotHold(_, value) => return write!(f, "{parameter} cannot hold {value}"),
             Self::Loop(name, _) => return write!(f, "{name}: {parameter} is not usable"),

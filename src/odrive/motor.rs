@@ -134,7 +134,7 @@ impl Motor {
         watchdog: Duration,
     ) -> Result<Self, ConfigError> {
         if self.firmware == Firmware::V0_5 {
-            return Err(ConfigError::Unsupported("endpoints over CAN"));
+            return Err(ConfigError::Unsupported("endpoints over CAN (set the watchdog by USB)"));
         }
         let micros =
             ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;

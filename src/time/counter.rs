@@ -30,9 +30,6 @@ pub struct ExtendedCounter {
     denominator: NonZeroU32,
 }
 
-/// The fault of a frequency that could lose ticks: take a rounder one.
-const NO_RATIO: &str = "ticks_per_second without an exact ratio to 1 MHz that fits 32 bits";
-
 impl ExtendedCounter {
     /// In ticks a second: 10 ms to a wrap. A loop at 1 kHz may then miss nine periods, and feedback counts as late by then.
     const FASTEST_16_BIT: u32 = 0x1_0000 * 100;
@@ -46,7 +43,7 @@ impl ExtendedCounter {
     pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, ConfigError> {
         let (value, most) = (ticks_per_second as f32, Self::FASTEST_16_BIT as f32);
         if ticks_per_second > Self::FASTEST_16_BIT {
-            let parameter = "ticks_per_second of a 16-bit counter";
+            let parameter = "ticks_per_second of a counter of 16 bits without a prescaler";
             return Err(ConfigError::Range { parameter, value, least: 1.0, most });
         }
         Self::new(ticks_per_second, 0xFFFF)
@@ -61,7 +58,7 @@ impl ExtendedCounter {
     }
 
     const fn new(ticks_per_second: u32, mask: u32) -> Result<Self, ConfigError> {
-        let error = ConfigError::Unusable(NO_RATIO);
+        let error = ConfigError::Ratio { ticks_per_second };
         let (mut divisor, mut rest) = (ticks_per_second, 1_000_000);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
@@ -103,11 +100,11 @@ mod tests {
         for ticks_per_second in [0, 4_294_967_291, 8_388_593, 268_435_250] {
             assert_eq!(
                 ExtendedCounter::new_32_bit(ticks_per_second).err(),
-                Some(ConfigError::Unusable(NO_RATIO))
+                Some(ConfigError::Ratio { ticks_per_second })
             );
         }
         let refused = ExtendedCounter::new_32_bit(8_388_593).unwrap_err().to_string();
-        assert!(refused.starts_with("ticks_per_second without an exact ratio"), "{refused}");
+        assert!(refused.starts_with("a counter of 8388593 Hz has no exact ratio"), "{refused}");
     }
 
     #[test]
@@ -115,13 +112,16 @@ mod tests {
         for ticks_per_second in [6_553_601, 84_000_000, u32::MAX] {
             let refused = ExtendedCounter::new_16_bit(ticks_per_second).err();
             let (value, most) = (ticks_per_second as f32, 6_553_600.0);
-            let parameter = "ticks_per_second of a 16-bit counter";
+            let parameter = "ticks_per_second of a counter of 16 bits without a prescaler";
             assert_eq!(refused, Some(ConfigError::Range { parameter, value, least: 1.0, most }));
         }
         assert!(ExtendedCounter::new_16_bit(6_553_600).is_ok());
         assert!(ExtendedCounter::new_32_bit(84_000_000).is_ok());
         let refused = ExtendedCounter::new_16_bit(84_000_000).unwrap_err().to_string();
-        assert!(refused.ends_with("counter 84000000: 1 to 6553600 are allowed"), "{refused}");
+        assert!(
+            refused.ends_with("without a prescaler 84000000: 1 to 6553600 are allowed"),
+            "{refused}"
+        );
     }
 
     #[test]

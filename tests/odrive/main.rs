@@ -525,7 +525,10 @@ fn bad_configurations_are_refused_with_the_limit() {
         ));
     }
     let refused = made(0, fastest, 1.0).unwrap().with_endpoints(ENDPOINTS, Duration::from_secs(1));
-    assert_eq!(refused.unwrap_err(), ConfigError::Unsupported("endpoints over CAN"));
+    assert_eq!(
+        refused.unwrap_err(),
+        ConfigError::Unsupported("endpoints over CAN (set the watchdog by USB)")
+    );
     let pro = Motor::new(Model::D5065, Firmware::V0_6, 0, fastest, Mode::velocity(1.0)).unwrap();
     for time in [Duration::ZERO, Duration::from_secs(11)] {
         let value = time.as_micros() as f32;

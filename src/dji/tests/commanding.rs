@@ -250,7 +250,7 @@ fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     let loops = |kp| PidConfig::new(kp, 0.0, 0.0);
     let (mut bus, [joint]) = armed([Config::<M3508>::at_once(1).position_loop(loops(1.0), SPEED)]);
     let wrong = bus.set_position_loop(joint, loops(f32::NAN)).unwrap_err();
-    assert_eq!(wrong.to_string(), "kp is not usable");
+    assert_eq!(wrong.to_string(), "kp: must be zero or more, and finite");
     bus.set_position(joint, Position::from_turns(1)).unwrap();
     step(&mut bus, 2);
     let before = sent(&mut bus)[0].1[0];
@@ -262,8 +262,8 @@ fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     assert!((after - 2 * before).abs() <= 1, "{before}, then {after}");
     bus.detach(joint);
     let detached = bus.set_position_loop(joint, loops(1.0)).unwrap_err();
-    assert_eq!(detached.to_string(), "the motor was detached");
+    assert_eq!(detached.to_string(), "handle of a detached motor is not usable");
     let wheel = bus.attach(Config::<M3508>::at_once(2).speed_loop(SPEED)).unwrap();
     let without = bus.set_position_loop(wheel, loops(1.0)).unwrap_err();
-    assert_eq!(without.to_string(), "the motor was attached without this loop");
+    assert_eq!(without.to_string(), "handle of a motor without this loop is not usable");
 }
