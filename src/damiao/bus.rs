@@ -212,9 +212,10 @@ impl OwnMotor for Motor {
     }
 
     fn rest(&mut self) -> CanFrame {
-        match self.mode.rest() {
-            Some(command) => self.frame_of(command),
-            None => self.off(),
+        if self.mode.has_rest() {
+            self.frame_of(Command::Mit(mit::Command::REST))
+        } else {
+            self.off()
         }
     }
 
@@ -251,7 +252,7 @@ impl OwnMotor for Motor {
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.timeout = Confirmation::None;
-        self.mode.rest().is_some().then(|| self.off())
+        self.mode.has_rest().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {

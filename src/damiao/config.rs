@@ -78,12 +78,9 @@ impl Mode {
         (self.number() as u16 - 1) << 8
     }
 
-    /// What the drive reads as rest; `None` for a drive that only rests when it is disabled.
-    pub(super) const fn rest(&self) -> Option<Command> {
-        match self.0 {
-            Kind::Impedance(_) => Some(Command::Mit(mit::Command::REST)),
-            _ => None,
-        }
+    /// Tells whether a command of no gains and no torque is rest; a drive in another mode only rests when it is disabled.
+    pub(super) const fn has_rest(&self) -> bool {
+        matches!(self.0, Kind::Impedance(_))
     }
 
     /// # Errors

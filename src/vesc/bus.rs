@@ -35,7 +35,7 @@ const ORDERS: u8 = 50;
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::OwnMotor;
 /// use drivetrain::units::AngularVelocity;
-/// use drivetrain::vesc::{Model, Motor, Rest, Velocity};
+/// use drivetrain::vesc::{Mode, Model, Motor, Rest};
 ///
 /// const WHEEL: Model = Model {
 ///     name: "hub",
@@ -46,7 +46,7 @@ const ORDERS: u8 = 50;
 ///     max_velocity: AngularVelocity::from_rpm(500.0),
 ///     is_reversed: false,
 /// };
-/// let mut wheel = Motor::new(WHEEL, 1, Velocity::new())?;
+/// let mut wheel = Motor::new(WHEEL, 1, Mode::velocity())?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000101 [4] 00 00 00 00"); // current 0
 /// let mut wheel = wheel.with_rest(Rest::Brake(4.0))?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000201 [4] 00 00 0F A0"); // brake 4000 mA
