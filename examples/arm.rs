@@ -63,7 +63,7 @@ const TURNED: u64 = 3_500;
 const STOPPED: u64 = 5_000;
 const END: u64 = 5_300;
 
-type Joint = Own<Motor<ImpedanceControl>>;
+type Joint = Own<Motor>;
 
 fn joint(part: Part) -> Result<Joint, Box<dyn Error>> {
     let mode = ImpedanceControl::new(part.limit_nm)?;

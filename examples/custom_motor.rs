@@ -30,7 +30,7 @@ pub(crate) struct MyMotor {
 }
 
 impl MyMotor {
-    pub(crate) fn new(id: u8) -> Result<Self, drivetrain::control::ConfigError> {
+    pub(crate) fn new(id: u8) -> Result<Self, drivetrain::error::ConfigError> {
         Ok(Self { id, rotor_rpm: 0, temperature_c: 0, effort: 0.0, speed: Pid::new(SPEED)? })
     }
 

@@ -64,7 +64,7 @@ const END: u64 = 5_500;
 type Wheels = MecanumWheels<Handle<M3508>>;
 
 /// What the second bus has.
-type Turret = (Own<damiao::Motor<ImpedanceControl>>, Own<vesc::Motor<vesc::CurrentControl>>);
+type Turret = (Own<damiao::Motor>, Own<vesc::Motor>);
 
 fn chassis_bus() -> Result<(Bus, Wheels), Box<dyn Error>> {
     let mut bus = Bus::new();
@@ -80,7 +80,7 @@ fn chassis_bus() -> Result<(Bus, Wheels), Box<dyn Error>> {
 
 fn turret() -> Result<Turret, Box<dyn Error>> {
     let pitch = damiao::Motor::new(damiao::Model::J4310, 1, ImpedanceControl::new(4.0)?)?;
-    let shooter = vesc::CurrentControl::new().with_speed_loop(SPIN)?;
+    let shooter = vesc::Mode::current_with_speed_loop(SPIN)?;
     Ok((Own::new(pitch), Own::new(vesc::Motor::new(SHOOTER, 23, shooter)?)))
 }
 

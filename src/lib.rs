@@ -15,6 +15,7 @@ mod coming_from {
 }
 
 // F0: vocabulary
+pub mod error;
 pub mod frame;
 pub mod math;
 pub mod time;

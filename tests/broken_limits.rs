@@ -7,11 +7,12 @@
 mod own;
 
 use drivetrain::chassis::{
-    Chassis, ChassisError, ChassisLimits, Differential, Kinematics, ModeConfig, Modes, Omni,
-    PowerBuffer, PowerFit, PowerModel, Swerve, WheelLoad,
+    Chassis, ChassisLimits, Differential, Kinematics, ModeConfig, Modes, Omni, PowerBuffer,
+    PowerFit, PowerModel, Swerve, WheelLoad,
 };
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, LoopError, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508};
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Twist, Vec2};
 use drivetrain::motor::{HealthConfig, Ingest, TargetError};
@@ -88,7 +89,7 @@ fn a_power_buffer_allows_with_a_limit_that_is_none_what_it_allows_with_zero() {
 #[test]
 fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     let gains = PidConfig::new(2.0, 0.0, 0.0);
-    let refused = |name| Err(ChassisError::Negative(name));
+    let refused = |name| Err(ConfigError::Negative(name));
     for bad in NOT_FINITE.into_iter().chain([-0.1]) {
         assert_eq!(PowerBuffer::new(bad, gains), refused("reserve_j"), "{bad}");
         let buffer = PowerBuffer::new(20.0, gains).unwrap();
@@ -96,12 +97,12 @@ fn a_power_buffer_refuses_a_reserve_and_a_share_that_are_none() {
     }
     for bad in NOT_FINITE {
         let limited = PowerBuffer::new(20.0, gains.with_output_limit(bad));
-        assert!(matches!(limited, Err(ChassisError::Loop(_, _))), "{bad}");
+        assert!(matches!(limited, Err(ConfigError::Loop(_, _))), "{bad}");
         for parameter in 0..4 {
             let [mut k0, mut k1, mut k2, mut k3] = [1.0; 4];
             *[&mut k0, &mut k1, &mut k2, &mut k3][parameter] = bad;
             let name = ["k0", "k1", "k2", "k3"][parameter];
-            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(ChassisError::Negative(name)), "{bad}");
+            assert_eq!(PowerModel::new(k0, k1, k2, k3), Err(ConfigError::Negative(name)), "{bad}");
         }
     }
 }
@@ -161,14 +162,15 @@ fn limits_of_a_chassis_that_are_none_are_refused_and_those_before_hold() {
             (limits.with_wheel_speed(speed(bad)), "wheel speed"),
             (limits.with_command_timeout(bad), "command timeout"),
         ] {
-            assert_eq!(limits.validate(), Err(ChassisError::NotAboveZero(name)), "{bad}");
-            assert_eq!(chassis.set_limits(limits), Err(ChassisError::NotAboveZero(name)), "{bad}");
+            assert_eq!(limits.validate(), Err(ConfigError::NotAboveZero(name)), "{bad}");
+            assert_eq!(chassis.set_limits(limits), Err(ConfigError::NotAboveZero(name)), "{bad}");
         }
     }
     // For ever, or as good as that: a dead program would drive on.
     for too_long_s in [f32::INFINITY, f32::MAX, 3_600.0, 1.000_001] {
         let limits = limits.with_command_timeout(too_long_s);
-        let refused = ChassisError::TooLong("command timeout");
+        let refused =
+            ConfigError::Limit { parameter: "command timeout in s", value: too_long_s, most: 1.0 };
         assert_eq!(limits.validate(), Err(refused), "{too_long_s}");
         assert_eq!(chassis.set_limits(limits), Err(refused), "{too_long_s}");
     }
@@ -196,10 +198,10 @@ fn modes_refuse_what_is_none() {
             (config.with_gimbal_timeout(bad), "the gimbal's timeout"),
             (config.with_transition(bad), "the transition"),
         ] {
-            assert_eq!(Modes::new(config).err(), Some(ChassisError::Negative(name)), "{bad}");
+            assert_eq!(Modes::new(config).err(), Some(ConfigError::Negative(name)), "{bad}");
         }
         let limited = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(bad));
-        assert!(matches!(Modes::new(limited), Err(ChassisError::Loop(_, _))), "{bad}");
+        assert!(matches!(Modes::new(limited), Err(ConfigError::Loop(_, _))), "{bad}");
     }
 }
 
@@ -228,7 +230,8 @@ fn a_motor_with_a_limit_that_is_none_is_not_attached() {
         // While it runs too: the loop stays as it was.
         let wheel = bus.attach(Config::<M3508>::new(1).speed_loop(speed)).unwrap();
         let outcome = bus.set_speed_loop(wheel, speed.with_output_limit(bad));
-        assert!(matches!(outcome, Err(LoopError::Parameter(_))), "{bad}: {outcome:?}");
+        let name = outcome.map_err(|error| error.parameter());
+        assert!(name.is_err_and(|name| name.starts_with("output_")), "{bad}: {outcome:?}");
         assert_eq!(bus.motors().count(), 1);
     }
 }

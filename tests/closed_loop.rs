@@ -5,7 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508, Model};
 use drivetrain::encoder::{Homing, Position};
-use drivetrain::motor::{Devices, Link, Recovery, TargetError};
+use drivetrain::motor::{Devices, Link, TargetError};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Controller, Fault, Line, MotorConfig, MotorKey, Sender, Simulation, Transmission,
@@ -258,10 +258,7 @@ fn a_motor_silent_for_50_ms_comes_back_by_itself() {
 fn a_motor_with_a_ramp_is_driven_again_after_150_ms_of_silence() {
     let opening = Duration::from_millis(200);
     let (sent, _, armed) = silence(150, |id| {
-        Config::new(id)
-            .speed_loop(WHEEL_SPEED)
-            .with_recovery(Recovery::Resume)
-            .with_opening(opening)
+        Config::new(id).speed_loop(WHEEL_SPEED).with_resume().with_opening(opening)
     });
     let back = sent.iter().find(|(at, words)| *at > 650_000 && words[0] != 0).unwrap();
     assert!((655_000..680_000).contains(&back.0), "driven again at {} us", back.0);

@@ -4,6 +4,7 @@
 #![expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 
 use drivetrain::control::*;
+use drivetrain::error::ConfigError;
 use proptest::prelude::*;
 use std::fmt::Debug;
 

@@ -7,7 +7,7 @@ use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M3508, 
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction, Recovery,
+    ArmError, CanDevice, Condition, Edge, HealthConfig, Ingest, Link, Measured, Reaction,
     TargetError,
 };
 use drivetrain::runner::{EmergencyStop, Nb, Runner};
@@ -104,7 +104,7 @@ fn the_emergency_stop_reaches_every_part_also_when_one_is_stopped_already() {
 fn a_ramp_starts_at_zero_also_when_frames_are_stamped_after_the_tick() {
     let config = Config::<M3508>::new(1)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
-        .with_recovery(Recovery::Resume)
+        .with_resume()
         .with_opening(Duration::from_secs(2));
     let (mut bus, motor) = armed(config);
     for ms in 2..150 {
@@ -123,7 +123,7 @@ fn a_ramp_starts_at_zero_also_when_frames_are_stamped_after_the_tick() {
 fn a_speed_loop_does_not_wind_up_behind_the_limit_of_a_ramp() {
     let config = Config::<M3508>::new(1)
         .speed_loop(PidConfig::new(0.1, 50.0, 0.0))
-        .with_recovery(Recovery::Resume)
+        .with_resume()
         .with_opening(Duration::from_secs(2));
     let (mut bus, motor) = armed(config);
     for ms in 2..150 {

@@ -2,11 +2,10 @@
 
 #![cfg(test)]
 
-use drivetrain::chassis::{
-    ChassisError, ChassisLimits, Mecanum, ModeConfig, Modes, PowerBuffer, PowerModel,
-};
+use drivetrain::chassis::{ChassisLimits, Mecanum, ModeConfig, Modes, PowerBuffer, PowerModel};
 use drivetrain::control::PidConfig;
-use drivetrain::dji::{Bus, Config, Gm6020Current, LoopError, M3508};
+use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
+use drivetrain::error::ConfigError;
 use drivetrain::geometry::Vec2;
 use drivetrain::motor::{Claim, MotorName, Role};
 use drivetrain::runner::FrameQueue;
@@ -26,9 +25,9 @@ fn chassis_errors_name_the_value() {
     says(&drivetrain::chassis::Differential::new(f32::NAN, 0.2).unwrap_err(), &["wheel_radius_m"]);
     says(&PowerModel::new(1.0, 1.0, -1.0, 0.0).unwrap_err(), &["k2", "zero or more"]);
     let limits = ChassisLimits::new().with_command_timeout(0.0);
-    says(&limits.validate().unwrap_err(), &["command timeout", "above zero"]);
+    says(&limits.validate().unwrap_err(), &["command timeout", "more than zero"]);
     let limits = ChassisLimits::new().with_command_timeout(f32::INFINITY);
-    says(&limits.validate().unwrap_err(), &["command timeout", "at most 1 s"]);
+    says(&limits.validate().unwrap_err(), &["command timeout in s", "at most 1 is"]);
     let swing = ModeConfig::new(PidConfig::new(1.0, 0.0, 0.0)).with_rotor(1.0, 2.0, 1.0);
     says(&Modes::new(swing).unwrap_err(), &["swing", "base"]);
     let spoilt = ModeConfig::new(PidConfig::new(f32::NAN, 0.0, 0.0));
@@ -41,7 +40,7 @@ fn the_power_buffer_names_its_loop_or_its_value() {
     says(&PowerBuffer::new(-1.0, pid).unwrap_err(), &["reserve_j"]);
     let buffer = PowerBuffer::new(20.0, pid).unwrap();
     let error = buffer.with_blind_share(f32::NAN).unwrap_err();
-    assert!(matches!(error, ChassisError::Negative(_)));
+    assert!(matches!(error, ConfigError::Negative(_)));
     says(&error, &["blind_share"]);
     let spoilt = PowerBuffer::new(20.0, PidConfig::new(-1.0, 0.0, 0.0)).unwrap_err();
     says(&spoilt, &["buffer's loop", "kp"]);
@@ -56,7 +55,7 @@ fn loop_errors_say_what_is_missing() {
     let pid = PidConfig::new(1.0, 0.0, 0.0);
     let error = bus.set_speed_loop(wheel, pid).unwrap_err();
     says(&error, &["without this loop"]);
-    says(&LoopError::Parameter("kp"), &["kp is not usable"]);
+    says(&ConfigError::Unusable("kp"), &["kp is not usable"]);
     bus.detach(wheel);
     says(&bus.set_position_loop(wheel, pid).unwrap_err(), &["detached"]);
 }

@@ -2,6 +2,7 @@
 
 #![cfg(test)]
 
+use drivetrain::error::ConfigError;
 use drivetrain::wire::feetech::{self, Goal, Present, ServoId, Status};
 use drivetrain::wire::host_link::{
     COMMAND_LENGTH, HostCommand, JointTarget, Reset, TELEMETRY_LENGTH, Telemetry, TelemetryFormat,
@@ -229,7 +230,7 @@ fn a_full_command_in_mit_mode_is_no_special_frame() {
 #[test]
 fn a_range_that_no_drive_has_is_named() {
     for wrong in [0.0, -12.5, 9e-4, 1.1e6, f32::NAN, f32::INFINITY] {
-        let named = |outcome: Result<mit::Ranges, mit::RangeError>| {
+        let named = |outcome: Result<mit::Ranges, ConfigError>| {
             let error = outcome.unwrap_err().to_string();
             error.split(' ').next().unwrap().to_string()
         };

@@ -107,7 +107,7 @@ impl<M: OwnMotor> Listener for Own<M> {
 }
 
 /// A motor on a VESC, which reports its turns and its current beside the rest.
-struct Vesc(Own<vesc::Motor<vesc::Velocity>>);
+struct Vesc(Own<vesc::Motor>);
 
 impl Listener for Vesc {
     fn name(&self) -> MotorName {
@@ -230,7 +230,7 @@ fn lk(name: &str, id: u8) -> Option<Outcome> {
     let model = *lk::Model::ALL.iter().find(|model| model.name().eq_ignore_ascii_case(name))?;
     // Refuses an id that is none.
     let motor =
-        lk::Motor::new(model, id, lk::PositionVelocity::new(AngularVelocity::from_rpm(1.0)));
+        lk::Motor::new(model, id, lk::Mode::position_velocity(AngularVelocity::from_rpm(1.0)));
     let listener = Lk { model, id, drive: None, state: None, rotor: 0 };
     Some(motor.map(|_| Box::new(listener) as _).map_err(text))
 }
@@ -246,7 +246,7 @@ fn robstride(name: &str, id: u8) -> Option<Outcome> {
 
 /// A motor at an ODrive, `odrive0.5` or `odrive0.6`: the shaft is that of the motor.
 fn odrive(name: &str, id: u8) -> Option<Outcome> {
-    use odrive::{Firmware, Model, Motor, Velocity};
+    use odrive::{Firmware, Mode, Model, Motor};
     let firmware = match name {
         "odrive0.5" => Firmware::V0_5,
         "odrive0.6" => Firmware::V0_6,
@@ -256,7 +256,7 @@ fn odrive(name: &str, id: u8) -> Option<Outcome> {
     let model = Model::new("ODrive", 100.0).map_err(text);
     let fastest = AngularVelocity::from_rpm(1.0);
     let motor = model.and_then(|model| {
-        Motor::new(model, firmware, id, fastest, Velocity::new(1.0)).map_err(text)
+        Motor::new(model, firmware, id, fastest, Mode::velocity(1.0)).map_err(text)
     });
     Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
 }
@@ -273,7 +273,7 @@ fn vesc(name: &str, id: u8) -> Option<Outcome> {
         max_velocity: AngularVelocity::from_rpm(1.0),
         is_reversed: false,
     };
-    let motor = vesc::Motor::new(model, id, vesc::Velocity::new()).map_err(text);
+    let motor = vesc::Motor::new(model, id, vesc::Mode::velocity()).map_err(text);
     Some(motor.map(|motor| Box::new(Vesc(Own::new(motor))) as _))
 }
 

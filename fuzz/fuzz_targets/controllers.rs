@@ -2,9 +2,10 @@
 #![no_main]
 
 use drivetrain::control::{
-    Biquad, ConfigError, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator,
-    Profile, RelayTuner, SlewLimiter, SpeedActuator, StepResponse, TimeStep, Window,
+    Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator, Profile,
+    RelayTuner, SlewLimiter, SpeedActuator, StepResponse, TimeStep, Window,
 };
+use drivetrain::error::ConfigError;
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
 

@@ -67,7 +67,7 @@ impl Limits {
 }
 
 fn damiao_of(kind: u8, input: &mut Input) {
-    fn bench<M: damiao::Mode>(mode: M, number: f32, input: &mut Input) {
+    fn bench(mode: impl Into<damiao::Mode>, number: f32, input: &mut Input) {
         let motor = damiao::Motor::new(damiao::Model::J4310, 1, mode).unwrap();
         let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
         let limits = Limits { rest_nm: 10.0 / 4095.0, ..Limits::REST };
@@ -91,13 +91,13 @@ fn damiao_of(kind: u8, input: &mut Input) {
     match kind % 4 {
         0 => bench(torque(), 1.0, input),
         1 => bench(gains(), 1.0, input),
-        2 => bench(damiao::PositionVelocity::new(speed()), 2.0, input),
-        _ => bench(damiao::Velocity::new(speed()), 3.0, input),
+        2 => bench(damiao::Mode::position_velocity(speed()), 2.0, input),
+        _ => bench(damiao::Mode::velocity(speed()), 3.0, input),
     }
 }
 
 fn lk_of(kind: u8, input: &mut Input) {
-    fn bench<M: lk::Mode>(mode: M, limits: Limits, input: &mut Input) {
+    fn bench(mode: impl Into<lk::Mode>, limits: Limits, input: &mut Input) {
         let model = lk::Model::MG4005E_I10;
         let amperes = model.series().amperes_per_count();
         let (constant, gear) = (model.torque_constant(), model.gear());
@@ -109,8 +109,8 @@ fn lk_of(kind: u8, input: &mut Input) {
     match kind % 4 {
         0 => bench(torque(), rest.most(3.0), input),
         1 => bench(gains(), rest.most(3.0), input),
-        2 => bench(lk::Velocity::new(speed()).with_torque_limit(2.0), rest.most(2.0), input),
-        _ => bench(lk::PositionVelocity::new(speed()), rest, input),
+        2 => bench(lk::Mode::velocity_with_torque_limit(speed(), 2.0), rest.most(2.0), input),
+        _ => bench(lk::Mode::position_velocity(speed()), rest, input),
     }
 }
 
@@ -124,7 +124,7 @@ fn vesc_of(kind: u8, input: &mut Input) {
         max_velocity: AngularVelocity::from_rad_per_s(300.0),
         is_reversed: false,
     };
-    fn bench<M: vesc::Mode>(mode: M, limits: Limits, input: &mut Input) {
+    fn bench(mode: vesc::Mode, limits: Limits, input: &mut Input) {
         let motor = VescMotor {
             pole_pairs: 7,
             gear: 1.0,
@@ -138,15 +138,15 @@ fn vesc_of(kind: u8, input: &mut Input) {
     let rest = Limits::REST;
     match kind % 4 {
         0 => {
-            let loops = vesc::CurrentControl::new().with_loops(POSITION_LOOP, SPEED_LOOP).unwrap();
+            let loops = vesc::Mode::current_with_loops(POSITION_LOOP, SPEED_LOOP).unwrap();
             bench(loops, rest.most(1.0), input);
         }
-        1 => bench(vesc::Duty::new(0.5, SPEED_LOOP).unwrap(), rest, input),
+        1 => bench(vesc::Mode::duty(0.5, SPEED_LOOP).unwrap(), rest, input),
         2 => {
             let brake = vesc::Rest::Brake(5.0);
-            bench(vesc::Velocity::new().with_standstill(brake), rest, input);
+            bench(vesc::Mode::velocity_with_standstill(brake), rest, input);
         }
-        _ => bench(vesc::Position, rest, input),
+        _ => bench(vesc::Mode::position(), rest, input),
     }
 }
 
@@ -159,7 +159,7 @@ fn odrive_of(kind: u8, input: &mut Input) {
         watchdog_timeout: 3,
         enable_watchdog: 4,
     };
-    fn bench<M: odrive::Mode>(firmware: Firmware, mode: M, limits: Limits, input: &mut Input) {
+    fn bench(firmware: Firmware, mode: impl Into<odrive::Mode>, limits: Limits, input: &mut Input) {
         let model = odrive::Model::D6374;
         let motor = odrive::Motor::new(model, firmware, 3, speed(), mode).unwrap();
         let mut motor = motor.with_gear(GEAR).unwrap();
@@ -176,13 +176,18 @@ fn odrive_of(kind: u8, input: &mut Input) {
     match kind % 4 {
         0 => bench(V0_5, torque(), rest.most(3.0), input),
         1 => bench(V0_6, gains(), rest.most(3.0), input),
-        2 => bench(V0_5, odrive::Velocity::new(2.0), rest, input),
-        _ => bench(V0_6, odrive::Position::new(2.0).with_trajectory(20.0), rest, input),
+        2 => bench(V0_5, odrive::Mode::velocity(2.0), rest, input),
+        _ => bench(V0_6, odrive::Mode::position_with_trajectory(2.0, 20.0), rest, input),
     }
 }
 
 fn robstride_of(kind: u8, input: &mut Input) {
-    fn bench<M: robstride::Mode>(model: robstride::Model, mode: M, number: f32, input: &mut Input) {
+    fn bench(
+        model: robstride::Model,
+        mode: impl Into<robstride::Mode>,
+        number: f32,
+        input: &mut Input,
+    ) {
         let (kp, kd) = (500.0, 5.0);
         let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), kp, kd];
         let drive = match model.has_timeout() {
@@ -213,9 +218,9 @@ fn robstride_of(kind: u8, input: &mut Input) {
     match kind % 4 {
         0 if input.coin() => bench(Model::CYBERGEAR, gains(), 0.0, input),
         0 => bench(Model::RS02, gains(), 0.0, input),
-        1 => bench(Model::RS02, robstride::Current::new(3.0, 1.0), 3.0, input),
-        2 => bench(Model::RS02, robstride::Velocity::new(speed(), 3.0), 2.0, input),
-        _ => bench(Model::RS02, robstride::Position::new(speed(), 3.0), 5.0, input),
+        1 => bench(Model::RS02, robstride::Mode::current(3.0, 1.0), 3.0, input),
+        2 => bench(Model::RS02, robstride::Mode::velocity(speed(), 3.0), 2.0, input),
+        _ => bench(Model::RS02, robstride::Mode::position(speed(), 3.0), 5.0, input),
     }
 }
 

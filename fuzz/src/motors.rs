@@ -5,7 +5,7 @@ use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, Handle, M2006, M3508,
 };
 use drivetrain::encoder::Position;
-use drivetrain::motor::{Recovery, TargetError};
+use drivetrain::motor::TargetError;
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 
@@ -62,7 +62,7 @@ impl Motor {
                 bus.attach(Config::new(1).speed_loop(speed).with_opening(opening)).map(Self::M3508)
             }
             1 => {
-                let config = Config::new(2).reversed().with_recovery(Recovery::Resume);
+                let config = Config::new(2).reversed().with_resume();
                 bus.attach(config.with_opening(opening)).map(Self::M2006)
             }
             INTEGRATOR => {

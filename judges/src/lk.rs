@@ -8,7 +8,7 @@
 
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
-use drivetrain::lk::{Command, Feedback, Model, Motor, PositionVelocity, State, Velocity};
+use drivetrain::lk::{Command, Feedback, Mode, Model, Motor, State};
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, OwnMotor, VelocityDrive};
 use drivetrain::sim::{DriveShaft, LkDrive};
 use drivetrain::time::{Instant, Tick};
@@ -225,12 +225,12 @@ fn drive_of(id: u8) -> LkDrive {
 fn frames_of(id: u8, mode: &str) -> Outcome<Vec<CanFrame>> {
     let quick = AngularVelocity::from_rad_per_s(10.0);
     let torque = ImpedanceControl::new(2.0)?.with_gains(5.0, 0.2)?;
-    let model = Model::MF9025_16T;
-    match mode {
-        "torque" => session(Motor::new(model, id, torque)?, drive_of(id)),
-        "velocity" => session(Motor::new(model, id, Velocity::new(quick))?, drive_of(id)),
-        _ => session(Motor::new(model, id, PositionVelocity::new(quick))?, drive_of(id)),
-    }
+    let mode = match mode {
+        "torque" => torque.into(),
+        "velocity" => Mode::velocity(quick),
+        _ => Mode::position_velocity(quick),
+    };
+    session(Motor::new(Model::MF9025_16T, id, mode)?, drive_of(id))
 }
 
 /// Arms a motor, drives it, loses the drive to an error and disarms; returns the frames that are no control command, each once.

@@ -16,9 +16,7 @@
 use crate::Outcome;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
-use drivetrain::odrive::{
-    Command, Feedback, Firmware, Heartbeat, Mode, Model, Motor, Position, Velocity,
-};
+use drivetrain::odrive::{Command, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::OdriveDrive;
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -222,11 +220,11 @@ fn session(mode: &str, digit: u8, end: &str, defect: Defect) -> Outcome<String> 
         "impedance" => bench(gains, digit, end, defect, |own| _ = own.set_angle((), ANGLE)),
         "velocity" => {
             let velocity = AngularVelocity::from_rad_per_s(6.0);
-            let mode = Velocity::new(2.0);
+            let mode = Mode::velocity(2.0);
             bench(mode, digit, end, defect, move |own| _ = own.set_velocity((), velocity))
         }
         "position" => {
-            let mode = Position::new(2.0).with_trajectory(20.0);
+            let mode = Mode::position_with_trajectory(2.0, 20.0);
             bench(mode, digit, end, defect, |own| _ = own.set_angle((), ANGLE))
         }
         _ => Err(format!("no mode {mode}").into()),
@@ -235,12 +233,12 @@ fn session(mode: &str, digit: u8, end: &str, defect: Defect) -> Outcome<String> 
 
 const ANGLE: Angle = Angle::from_radians(1.0);
 
-fn bench<M: Mode>(
-    mode: M,
+fn bench(
+    mode: impl Into<Mode>,
     digit: u8,
     end: &str,
     defect: Defect,
-    set: impl Fn(&mut Own<Motor<M>>),
+    set: impl Fn(&mut Own<Motor>),
 ) -> Outcome<String> {
     let fastest = AngularVelocity::from_rad_per_s(20.0);
     let model = Model::D6374;

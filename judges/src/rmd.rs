@@ -4,7 +4,7 @@ use crate::lk::{Served, decode, encode, serve, session};
 use crate::{Defect, Outcome};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::ImpedanceControl;
-use drivetrain::rmd::{Command, Feedback, Model, Motor, PositionVelocity, State, Velocity};
+use drivetrain::rmd::{Command, Feedback, Mode, Model, Motor, State};
 use drivetrain::sim::{DriveShaft, RmdDrive};
 use drivetrain::units::AngularVelocity;
 use std::io::Write;
@@ -72,7 +72,7 @@ fn frames_of(id: u8, mode: &str) -> Outcome<Vec<CanFrame>> {
     let torque = ImpedanceControl::new(2.0)?.with_gains(5.0, 0.2)?;
     match mode {
         "torque" => session(Motor::new(MODEL, id, torque)?, drive_of(id)),
-        "velocity" => session(Motor::new(MODEL, id, Velocity::new(quick))?, drive_of(id)),
-        _ => session(Motor::new(MODEL, id, PositionVelocity::new(quick))?, drive_of(id)),
+        "velocity" => session(Motor::new(MODEL, id, Mode::velocity(quick))?, drive_of(id)),
+        _ => session(Motor::new(MODEL, id, Mode::position_velocity(quick))?, drive_of(id)),
     }
 }

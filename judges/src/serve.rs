@@ -17,7 +17,7 @@
 //! Ids and data are hexadecimal, but for the ids of motors and drives.
 
 use crate::{Defect, Outcome, model_named, register_of};
-use drivetrain::damiao::{ForcePosition, Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
 use drivetrain::sim::DamiaoDrive;
@@ -156,25 +156,30 @@ fn station(model: &Model, id: u8, mode: &str) -> Outcome<Box<dyn Station>> {
             1,
             ImpedanceControl::new(model.tmax_nm())?.with_gains(20.0, 1.0)?,
         )?,
-        "position-velocity" => Bench::boxed(model, id, 2, PositionVelocity::new(velocity))?,
-        "velocity" => Bench::boxed(model, id, 3, Velocity::new(velocity))?,
+        "position-velocity" => Bench::boxed(model, id, 2, Mode::position_velocity(velocity))?,
+        "velocity" => Bench::boxed(model, id, 3, Mode::velocity(velocity))?,
         "force-position" => {
-            Bench::boxed(model, id, 4, ForcePosition::new(velocity, model.tmax_nm()))?
+            Bench::boxed(model, id, 4, Mode::force_position(velocity, model.tmax_nm()))?
         }
         _ => return Err(format!("no mode {mode}").into()),
     })
 }
 
-struct Bench<M: Mode> {
-    own: Own<Motor<M>>,
+struct Bench {
+    own: Own<Motor>,
     drive: DamiaoDrive,
     now_us: u64,
     /// What the motor has sent in the last step.
     sent: Vec<CanFrame>,
 }
 
-impl<M: Mode + 'static> Bench<M> {
-    fn boxed(model: &Model, id: u8, number: u8, mode: M) -> Outcome<Box<dyn Station>> {
+impl Bench {
+    fn boxed(
+        model: &Model,
+        id: u8,
+        number: u8,
+        mode: impl Into<Mode>,
+    ) -> Outcome<Box<dyn Station>> {
         let own = Own::new(Motor::new(*model, id, mode)?);
         let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
         let drive =
@@ -201,7 +206,7 @@ impl<M: Mode + 'static> Bench<M> {
     }
 }
 
-impl<M: Mode + 'static> Station for Bench<M> {
+impl Station for Bench {
     fn request(&mut self, verb: &str, arguments: &[&str]) -> Outcome<CanFrame> {
         let motor = self.own.motor_mut();
         let (code, number) = match (verb, arguments) {

@@ -20,7 +20,7 @@ use drivetrain::motor::{CanDevice, Ingest, Own, OwnMotor};
 use drivetrain::sim::{VescDrive, VescMotor};
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
-use drivetrain::vesc::{Command, CurrentControl, Feedback, Model, Motor};
+use drivetrain::vesc::{Command, Feedback, Mode, Model, Motor};
 use embedded_can::{ExtendedId, Frame};
 use std::io::{BufRead, Read, Write};
 
@@ -112,7 +112,7 @@ fn other(kind: &str, value: f32) -> Outcome<[u8; 4]> {
 
 fn frames(kind: &str, value: f32, defect: &str, output: &mut impl Write) -> Outcome<()> {
     for id in 0..=253_u8 {
-        let own = Motor::new(MODEL, id, CurrentControl::new())?;
+        let own = Motor::new(MODEL, id, Mode::current())?;
         let question = { own }.inquire().ok_or("no question")?;
         for frame in [command(kind, value)?.frame(id), question] {
             let mut raw = frame.header() & 0x1FFF_FFFF;
@@ -254,7 +254,7 @@ fn faults(id: u8, input: &mut impl Read, output: &mut impl Write) -> Outcome<()>
     let (answers, []) = data.as_chunks::<8>() else { return Err("half an answer".into()) };
     let answered = ExtendedId::new(8 << 8 | 254).ok_or("no id")?;
     for answer in answers {
-        let mut own = Own::new(Motor::new(MODEL, id, CurrentControl::new())?);
+        let mut own = Own::new(Motor::new(MODEL, id, Mode::current())?);
         let frame = CanFrame::new(answered, answer).ok_or("no frame")?;
         let outcome = own.ingest(&frame, Instant::from_micros(1));
         let fault = own.motor().feedback().fault;

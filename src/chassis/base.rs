@@ -1,8 +1,7 @@
 use super::clock::DeadClock;
 use super::kinematics::{Fastest, slowed};
-use super::{
-    ChassisError, ChassisLimits, ChassisStatus, Kinematics, Odometry, WheelDrive, WheelSpeed,
-};
+use super::{ChassisLimits, ChassisStatus, Kinematics, Odometry, WheelDrive, WheelSpeed};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Heading, Pose2, Twist, World};
 use crate::time::Tick;
 use crate::units::Angle;
@@ -35,7 +34,7 @@ use crate::units::Angle;
 /// let targets = chassis.update(measured, Tick::new(Instant::from_micros(1_000), 0.001));
 /// assert!((targets.front_left.as_rad_per_s() - 10.0).abs() < 1e-5);
 /// assert!((chassis.pose().x_m - 0.001).abs() < 1e-9);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chassis<K: Kinematics> {
@@ -98,7 +97,7 @@ impl<K: Kinematics> Chassis<K> {
     ///
     /// # Errors
     /// Names the value that is not above zero, or too long. The limits then stay as they were.
-    pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), ChassisError> {
+    pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), ConfigError> {
         limits.validate()?;
         self.limits = limits;
         Ok(())

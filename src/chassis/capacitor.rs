@@ -1,5 +1,5 @@
-use super::ChassisError;
 use super::error::not_negative;
+use crate::error::ConfigError;
 
 /// The charge nears the reserve with a time constant of 1 / this, in 1/s.
 const RATE_PER_S: f32 = 2.0;
@@ -28,7 +28,7 @@ const CHARGING_SHARE: f32 = 0.1;
 /// assert_eq!(plan.allowance_w(80.0, Some(0.25), true), 72.0); // below it: 8 W to charge
 /// assert_eq!(plan.allowance_w(80.0, Some(0.9), false), 80.0); // no burst
 /// assert_eq!(plan.allowance_w(80.0, None, true), 80.0); // switched off, in error, or not heard
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -43,7 +43,7 @@ impl CapacitorPlan {
     ///
     /// # Errors
     /// Names the value that is negative or not finite.
-    pub fn new(full_j: f32, reserve_j: f32) -> Result<Self, ChassisError> {
+    pub fn new(full_j: f32, reserve_j: f32) -> Result<Self, ConfigError> {
         Ok(Self {
             full_j: not_negative(full_j, "full_j")?,
             reserve_j: not_negative(reserve_j, "reserve_j")?,
@@ -54,8 +54,8 @@ impl CapacitorPlan {
     /// Sets the most power in W that the capacitor is asked for.
     ///
     /// # Errors
-    /// [`ChassisError::Negative`] when it is negative or not finite.
-    pub fn with_most_w(self, most_w: f32) -> Result<Self, ChassisError> {
+    /// [`ConfigError::Negative`] when it is negative or not finite.
+    pub fn with_most_w(self, most_w: f32) -> Result<Self, ConfigError> {
         Ok(Self { most_w: not_negative(most_w, "most_w")?, ..self })
     }
 
@@ -82,10 +82,10 @@ mod tests {
     #[test]
     fn values_that_cannot_work_are_named() {
         for bad in [-1.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(CapacitorPlan::new(bad, 1.0), Err(ChassisError::Negative("full_j")));
-            assert_eq!(CapacitorPlan::new(1.0, bad), Err(ChassisError::Negative("reserve_j")));
+            assert_eq!(CapacitorPlan::new(bad, 1.0), Err(ConfigError::Negative("full_j")));
+            assert_eq!(CapacitorPlan::new(1.0, bad), Err(ConfigError::Negative("reserve_j")));
             let plan = CapacitorPlan::new(1.0, 1.0).unwrap();
-            assert_eq!(plan.with_most_w(bad), Err(ChassisError::Negative("most_w")));
+            assert_eq!(plan.with_most_w(bad), Err(ConfigError::Negative("most_w")));
         }
     }
 

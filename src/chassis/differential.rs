@@ -1,5 +1,6 @@
+use super::Kinematics;
 use super::error::positive;
-use super::{ChassisError, Kinematics};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 
@@ -20,7 +21,7 @@ use crate::units::AngularVelocity;
 /// let [left, right] = Differential::new(0.1, 0.25)?.inverse(Twist::new(1.0, 0.0, 2.0)); // ahead and to the left
 /// assert!((left.as_rad_per_s() - 5.0).abs() < 1e-5);
 /// assert!((right.as_rad_per_s() - 15.0).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -38,7 +39,7 @@ impl Differential {
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(wheel_radius_m: f32, half_track_m: f32) -> Result<Self, ChassisError> {
+    pub const fn new(wheel_radius_m: f32, half_track_m: f32) -> Result<Self, ConfigError> {
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
         }
@@ -142,6 +143,6 @@ mod tests {
     #[test]
     fn a_length_of_zero_is_named() {
         let flat = Differential::new(0.5, 0.0);
-        assert_eq!(flat, Err(ChassisError::NotPositive("half_track_m")));
+        assert_eq!(flat, Err(ConfigError::NotPositive("half_track_m")));
     }
 }

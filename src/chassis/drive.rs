@@ -32,7 +32,7 @@ use crate::units::{Angle, AngularVelocity};
 /// let tick = Tick::new(Instant::from_micros(1_000), 0.001);
 /// chassis.drive(&mut motors, [0, 1], tick);
 /// assert!((motors.0[1].as_rad_per_s() - 10.0).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 pub trait WheelDrive<H: Copy, S> {
     /// Returns the measured speed of the wheel; `None` without fresh feedback.

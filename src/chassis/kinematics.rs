@@ -9,7 +9,8 @@ use core::fmt::Debug;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::chassis::{ChassisError, Kinematics, Omni};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::chassis::{Kinematics, Omni};
 /// use drivetrain::geometry::{Body, Twist};
 ///
 /// /// How far the motion that is read back is from the one that was asked for, in m/s.
@@ -20,7 +21,7 @@ use core::fmt::Debug;
 /// let motion = Twist::new(1.0, -0.5, 2.0);
 /// assert!(error_m_s(Omni::three(0.05, 0.2)?, motion) < 1e-5);
 /// assert!(error_m_s(Omni::four(0.05, 0.2)?, motion) < 1e-5);
-/// # Ok::<(), ChassisError>(())
+/// # Ok::<(), ConfigError>(())
 /// ```
 pub trait Kinematics {
     /// One `T` for each wheel, under the wheel's name.

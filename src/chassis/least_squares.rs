@@ -140,12 +140,13 @@ pub(super) fn fit(measured: impl Iterator<Item = (Row, f32)> + Clone) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chassis::{ChassisError, Omni, Swerve};
+    use crate::chassis::{Omni, Swerve};
+    use crate::error::ConfigError;
     use crate::geometry::Pose2;
     use crate::units::Angle;
 
     /// Three wheels at 0.2 m from a centre that lies `ahead_m` before the origin of the body.
-    fn three(ahead_m: f32) -> Result<Omni<3>, ChassisError> {
+    fn three(ahead_m: f32) -> Result<Omni<3>, ConfigError> {
         let wheel = |degrees| {
             let wheel = Pose2::<Body>::tangential(Angle::from_degrees(degrees), 0.2);
             Pose2::new(wheel.x_m + ahead_m, wheel.y_m, wheel.angle)
@@ -157,11 +158,11 @@ mod tests {
     #[test]
     fn wheels_whose_centre_is_ten_metres_off_are_refused() {
         assert!(three(0.0).is_ok() && three(0.5).is_ok() && three(3.0).is_ok());
-        assert_eq!(three(10.0), Err(ChassisError::Singular("every motion")));
+        assert_eq!(three(10.0), Err(ConfigError::Singular("every motion")));
         let far = |y| Vec2::new(10.0, y);
         assert!(Swerve::new(0.05, [far(3.0), far(-3.0)]).is_ok());
         let near = Swerve::new(0.05, [far(0.3), far(-0.3)]);
-        assert_eq!(near, Err(ChassisError::Singular("the rotation")));
+        assert_eq!(near, Err(ConfigError::Singular("the rotation")));
     }
 
     #[test]

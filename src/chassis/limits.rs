@@ -1,4 +1,4 @@
-use super::ChassisError;
+use crate::error::ConfigError;
 use crate::geometry::{Twist, World};
 use crate::units::AngularVelocity;
 
@@ -63,7 +63,7 @@ impl ChassisLimits {
     /// # Errors
     /// Names the first value that is not above zero, or a command timeout above 1 s: with an infinite one, a chassis whose
     /// program is dead drives on for ever.
-    pub fn validate(&self) -> Result<(), ChassisError> {
+    pub fn validate(&self) -> Result<(), ConfigError> {
         let named = [
             (self.linear_m_s2, "linear_m_s2"),
             (self.angular_rad_s2, "angular_rad_s2"),
@@ -72,13 +72,11 @@ impl ChassisLimits {
         ];
         for (value, name) in named {
             if value.is_nan() || value <= 0.0 {
-                return Err(ChassisError::NotAboveZero(name));
+                return Err(ConfigError::NotAboveZero(name));
             }
         }
-        if self.command_timeout_s > MAX_COMMAND_TIMEOUT_S {
-            return Err(ChassisError::TooLong("command timeout"));
-        }
-        Ok(())
+        let timeout_s = self.command_timeout_s;
+        ConfigError::check_limit("command timeout in s", timeout_s, MAX_COMMAND_TIMEOUT_S)
     }
 
     pub(super) const fn wheel_speed(&self) -> AngularVelocity {

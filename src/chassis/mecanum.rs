@@ -1,6 +1,7 @@
 use super::error::positive;
 use super::least_squares::MAX_CONDITION;
-use super::{ChassisError, Kinematics, MecanumWheels};
+use super::{Kinematics, MecanumWheels};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Twist, Vec2};
 use crate::units::AngularVelocity;
 use core::f32::consts::SQRT_2;
@@ -36,7 +37,7 @@ use core::f32::consts::SQRT_2;
 /// let wheels = mecanum.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((wheels.front_left.as_rad_per_s() - (1.0 - 0.5 - 0.5 * 2.0) / 0.1).abs() < 1e-4);
 /// assert!((wheels.front_right.as_rad_per_s() - (1.0 + 0.5 + 0.5 * 2.0) / 0.1).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -59,7 +60,7 @@ impl Mecanum {
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
-    pub const fn new(wheel_radius_m: f32, front_left_m: Vec2) -> Result<Self, ChassisError> {
+    pub const fn new(wheel_radius_m: f32, front_left_m: Vec2) -> Result<Self, ConfigError> {
         Self::with_rollers(wheel_radius_m, front_left_m)
     }
 }
@@ -74,7 +75,7 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     /// Takes the dimensions as [`new`](Mecanum::new) does, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`ChassisError::Singular`] for `'X'` when half track and
+    /// Names the length that is not above zero and finite. [`ConfigError::Singular`] for `'X'` when half track and
     /// half wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
     ///
     /// # Examples
@@ -84,12 +85,12 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     ///
     /// let wheels = Mecanum::<'X'>::with_rollers(0.1, Vec2::new(0.1, 0.3))?.inverse(Twist::new(0.0, 1.0, 0.0));
     /// assert!((wheels.front_left.as_rad_per_s() - 10.0).abs() < 1e-5); // to the left, the other way round
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn with_rollers(
         wheel_radius_m: f32,
         front_left_m: Vec2,
-    ) -> Result<Self, ChassisError> {
+    ) -> Result<Self, ConfigError> {
         let Vec2 { x: half_wheelbase_m, y: half_track_m } = front_left_m;
         if let Err(error) = positive(wheel_radius_m, "wheel_radius_m") {
             return Err(error);
@@ -104,7 +105,7 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
         // The condition number of its normal equations, of which translation has two parts.
         let reach_m2 = half_track_m * half_track_m + half_wheelbase_m * half_wheelbase_m;
         if arm_m * arm_m * MAX_CONDITION < SQRT_2 * reach_m2 {
-            return Err(ChassisError::Singular("rotation: the chassis is square"));
+            return Err(ConfigError::Singular("rotation: the chassis is square"));
         }
         Ok(Self {
             per_linear: 1.0 / wheel_radius_m,
@@ -262,16 +263,16 @@ mod tests {
     #[test]
     fn with_the_other_rollers_a_square_chassis_is_refused() {
         let error = Mecanum::<'X'>::with_rollers(RADIUS_M, SQUARE);
-        assert!(matches!(error, Err(ChassisError::Singular(_))));
+        assert!(matches!(error, Err(ConfigError::Singular(_))));
     }
 
     #[test]
     fn a_length_of_zero_nan_or_infinity_is_named() {
         for bad in [0.0, -0.1, f32::NAN, f32::INFINITY] {
             let radius = Mecanum::new(bad, SQUARE);
-            assert_eq!(radius, Err(ChassisError::NotPositive("wheel_radius_m")));
+            assert_eq!(radius, Err(ConfigError::NotPositive("wheel_radius_m")));
             let track = Mecanum::new(RADIUS_M, Vec2 { y: bad, ..SQUARE });
-            assert_eq!(track, Err(ChassisError::NotPositive("front_left_m.y")));
+            assert_eq!(track, Err(ConfigError::NotPositive("front_left_m.y")));
         }
     }
 

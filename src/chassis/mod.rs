@@ -11,7 +11,7 @@
 //! | [`Differential`] | an array: left, right | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
-//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ChassisError`].
+//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ConfigError`](crate::error::ConfigError).
 //! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
 //! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
 //!
@@ -71,7 +71,6 @@ pub use base::Chassis;
 pub use capacitor::CapacitorPlan;
 pub use differential::Differential;
 pub use drive::{ModuleMotors, WheelDrive};
-pub use error::ChassisError;
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::ChassisLimits;
 pub use mecanum::Mecanum;

@@ -1,6 +1,6 @@
-use super::ChassisError;
 use super::clock::DeadClock;
 use crate::control::{Pid, PidConfig, TimeStep};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
 use crate::units::Angle;
@@ -155,7 +155,7 @@ impl Modes {
     ///
     /// # Errors
     /// Names the value that cannot be used.
-    pub fn new(config: ModeConfig) -> Result<Self, ChassisError> {
+    pub fn new(config: ModeConfig) -> Result<Self, ConfigError> {
         let named = [
             (config.rotor_rad_s, "the rotor's base"),
             (config.swing_rad_s, "the rotor's swing"),
@@ -165,16 +165,15 @@ impl Modes {
         ];
         for (value, name) in named {
             if !value.is_finite() || value < 0.0 {
-                return Err(ChassisError::Negative(name));
+                return Err(ConfigError::Negative(name));
             }
         }
-        if config.swing_rad_s > config.rotor_rad_s {
-            return Err(ChassisError::SwingAboveBase);
-        }
+        let (swing, base) = (config.swing_rad_s, config.rotor_rad_s);
+        ConfigError::check_range("rotor's swing around its base in rad/s", swing, 0.0, base)?;
         Ok(Self {
             config,
             follow: Pid::new(config.follow.with_period(TAU))
-                .map_err(|error| ChassisError::Loop("the follow loop", error))?,
+                .map_err(|error| ConfigError::Loop("the follow loop", error.parameter()))?,
             mode: Mode::Relax,
             acting: Mode::Relax,
             yaw: None,
@@ -545,10 +544,14 @@ mod tests {
     #[test]
     fn configurations_that_cannot_work_are_named() {
         let swing = config().with_rotor(1.0, 2.0, 1.0);
-        assert_eq!(Modes::new(swing), Err(ChassisError::SwingAboveBase));
+        let parameter = "rotor's swing around its base in rad/s";
+        let refused = Modes::new(swing).err();
+        assert!(
+            matches!(refused, Some(ConfigError::Range { parameter: name, .. }) if name == parameter)
+        );
         let nan = config().with_transition(f32::NAN);
-        assert_eq!(Modes::new(nan), Err(ChassisError::Negative("the transition")));
+        assert_eq!(Modes::new(nan), Err(ConfigError::Negative("the transition")));
         let gains = ModeConfig::new(PidConfig::new(f32::NAN, 0.0, 0.0));
-        assert!(matches!(Modes::new(gains), Err(ChassisError::Loop(_, _))));
+        assert!(matches!(Modes::new(gains), Err(ConfigError::Loop(_, _))));
     }
 }

@@ -1,6 +1,7 @@
+use super::Kinematics;
 use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
-use super::{ChassisError, Kinematics};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Pose2, Rotation2, Twist, Vec2};
 use crate::units::{Angle, AngularVelocity};
 
@@ -25,7 +26,7 @@ use crate::units::{Angle, AngularVelocity};
 /// let five = Omni::new(0.05, [0.0, 72.0, 144.0, 216.0, 288.0].map(wheel))?;
 /// let [front, ..] = five.inverse(Twist::new(1.0, 0.5, 2.0));
 /// assert!((front.as_rad_per_s() - (0.5 + 0.2 * 2.0) / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Omni<const N: usize> {
@@ -40,32 +41,28 @@ impl<const N: usize> Omni<N> {
     /// for a positive velocity, counter-clockwise from forward.
     ///
     /// # Errors
-    /// Names the value that is not finite or not above zero. [`ChassisError::Singular`] when the wheels leave some
+    /// Names the value that is not finite or not above zero. [`ConfigError::Singular`] when the wheels leave some
     /// motion undetermined, or nearly: fewer than three, all parallel, all pointing at one centre, or all so far on one
     /// side of the origin that a turn looks like a straight way (some 20 times their distance from their centre).
-    pub fn new(wheel_radius_m: f32, wheels: [Pose2<Body>; N]) -> Result<Self, ChassisError> {
+    pub fn new(wheel_radius_m: f32, wheels: [Pose2<Body>; N]) -> Result<Self, ConfigError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !wheels.iter().all(|wheel| wheel.position().to_vec().is_finite()) {
-            return Err(ChassisError::NotFinite("position_m"));
+            return Err(ConfigError::NotFinite("position_m"));
         }
         if !wheels.iter().all(|wheel| wheel.angle.is_finite()) {
-            return Err(ChassisError::NotFinite("direction"));
+            return Err(ConfigError::NotFinite("direction"));
         }
         let rows = wheels.map(|wheel| {
             let direction = Rotation2::new(wheel.angle).apply(Vec2::new(1.0, 0.0));
             Row::new(direction, wheel.position().to_vec())
         });
-        let inverse = Normal::of(rows).inverse().ok_or(ChassisError::Singular("every motion"))?;
+        let inverse = Normal::of(rows).inverse().ok_or(ConfigError::Singular("every motion"))?;
         let shares = rows.map(|row| inverse.share(row) * wheel_radius_m);
         Ok(Self { rows, shares, wheel_radius_m, per_radius: 1.0 / wheel_radius_m })
     }
 
     /// Wheels at these angles, at one distance from the centre.
-    fn round(
-        wheel_radius_m: f32,
-        distance_m: f32,
-        degrees: [f32; N],
-    ) -> Result<Self, ChassisError> {
+    fn round(wheel_radius_m: f32, distance_m: f32, degrees: [f32; N]) -> Result<Self, ConfigError> {
         let distance_m = positive(distance_m, "distance_m")?;
         let wheel = |degrees| Pose2::tangential(Angle::from_degrees(degrees), distance_m);
         Self::new(wheel_radius_m, degrees.map(wheel))
@@ -109,9 +106,9 @@ impl Omni<3> {
     /// let [front_left, _, rear] = Omni::three(0.05, 0.2)?.inverse(Twist::new(0.0, 1.0, 0.0)); // to the left
     /// assert!((rear.as_rad_per_s() + 20.0).abs() < 1e-4);
     /// assert!((front_left.as_rad_per_s() - 10.0).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    pub fn three(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ChassisError> {
+    pub fn three(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ConfigError> {
         Self::round(wheel_radius_m, distance_m, [60.0, -60.0, 180.0])
     }
 }
@@ -133,9 +130,9 @@ impl Omni<4> {
     /// let slow = core::f32::consts::FRAC_1_SQRT_2 / 0.05; // the rollers take the rest
     /// assert!((front_left.as_rad_per_s() + slow).abs() < 1e-4);
     /// assert!((front_right.as_rad_per_s() - slow).abs() < 1e-4);
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
-    pub fn four(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ChassisError> {
+    pub fn four(wheel_radius_m: f32, distance_m: f32) -> Result<Self, ConfigError> {
         Self::round(wheel_radius_m, distance_m, [45.0, -45.0, 135.0, -135.0])
     }
 }
@@ -229,17 +226,17 @@ mod tests {
     #[test]
     fn wheels_that_leave_a_motion_undetermined_are_refused() {
         let wheel = |x, y, degrees| Pose2::new(x, y, Angle::from_degrees(degrees));
-        let singular = Err(ChassisError::Singular("every motion"));
+        let singular = Err(ConfigError::Singular("every motion"));
         let parallel = [wheel(0.2, 0.2, 0.0), wheel(0.2, -0.2, 0.0), wheel(-0.2, 0.2, 180.0)];
         assert_eq!(Omni::new(0.05, parallel), singular);
         let radial = [wheel(0.2, 0.0, 0.0), wheel(0.0, 0.2, 90.0), wheel(-0.2, 0.0, 180.0)];
         assert_eq!(Omni::new(0.05, radial), singular);
         let two = [wheel(0.2, 0.0, 90.0), wheel(0.0, 0.2, 180.0)];
-        assert_eq!(Omni::new(0.05, two), Err(ChassisError::Singular("every motion")));
+        assert_eq!(Omni::new(0.05, two), Err(ConfigError::Singular("every motion")));
         let nan = [wheel(f32::NAN, 0.0, 90.0), wheel(0.0, 0.2, 180.0), wheel(0.0, 0.3, 30.0)];
-        assert_eq!(Omni::new(0.05, nan), Err(ChassisError::NotFinite("position_m")));
-        assert_eq!(Omni::three(0.0, 0.2), Err(ChassisError::NotPositive("wheel_radius_m")));
-        assert_eq!(Omni::three(0.05, -0.2), Err(ChassisError::NotPositive("distance_m")));
+        assert_eq!(Omni::new(0.05, nan), Err(ConfigError::NotFinite("position_m")));
+        assert_eq!(Omni::three(0.0, 0.2), Err(ConfigError::NotPositive("wheel_radius_m")));
+        assert_eq!(Omni::three(0.05, -0.2), Err(ConfigError::NotPositive("distance_m")));
     }
 
     #[test]

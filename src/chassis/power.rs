@@ -1,5 +1,5 @@
-use super::ChassisError;
 use super::error::not_negative;
+use crate::error::ConfigError;
 use crate::math::sqrt;
 
 /// What one wheel is asked for: torque at its shaft, and the speed it turns at.
@@ -11,7 +11,7 @@ use crate::math::sqrt;
 /// let mechanical = PowerModel::new(0.0, 1.0, 0.0, 0.0)?;
 /// let braking = WheelLoad { torque: -2.0, speed_rad_s: 30.0 };
 /// assert_eq!(mechanical.power_w(braking), -60.0); // fed back
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -36,7 +36,7 @@ pub struct WheelLoad {
 /// let model = PowerModel::new(1.0, 1.0, 2.0, 0.001)?;
 /// let load = WheelLoad { torque: 2.0, speed_rad_s: 10.0 };
 /// assert!((model.power_w(load) - (1.0 + 20.0 + 8.0 + 0.1)).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -62,9 +62,9 @@ struct Stored {
 
 #[cfg(feature = "serde")]
 impl TryFrom<Stored> for PowerModel {
-    type Error = ChassisError;
+    type Error = ConfigError;
 
-    fn try_from(Stored { k0, k1, k2, k3 }: Stored) -> Result<Self, ChassisError> {
+    fn try_from(Stored { k0, k1, k2, k3 }: Stored) -> Result<Self, ConfigError> {
         Self::new(k0, k1, k2, k3)
     }
 }
@@ -79,7 +79,7 @@ impl TryFrom<Stored> for PowerModel {
 /// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
 /// let cut = model.cut([stalled; 4], 10.0); // the electronics alone take 20 W
 /// assert_eq!((cut.scale, cut.power_w, cut.within), (0.0, 20.0, false));
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -97,7 +97,7 @@ impl PowerModel {
     ///
     /// # Errors
     /// Names the coefficient that is not finite and zero or more.
-    pub fn new(k0: f32, k1: f32, k2: f32, k3: f32) -> Result<Self, ChassisError> {
+    pub fn new(k0: f32, k1: f32, k2: f32, k3: f32) -> Result<Self, ConfigError> {
         Ok(Self {
             k0: not_negative(k0, "k0")?,
             k1: not_negative(k1, "k1")?,
@@ -130,7 +130,7 @@ impl PowerModel {
     /// let wheel = WheelLoad { torque: 2.0, speed_rad_s: 6.0 }; // 12 W and 8 W of heat
     /// let cut = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
     /// assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within);
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
     pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> PowerCut {
@@ -268,8 +268,8 @@ mod tests {
 
     #[test]
     fn a_coefficient_that_is_negative_or_nan_is_named() {
-        assert_eq!(PowerModel::new(0.0, 1.0, -1.0, 0.0), Err(ChassisError::Negative("k2")));
-        assert_eq!(PowerModel::new(f32::NAN, 1.0, 1.0, 0.0), Err(ChassisError::Negative("k0")));
+        assert_eq!(PowerModel::new(0.0, 1.0, -1.0, 0.0), Err(ConfigError::Negative("k2")));
+        assert_eq!(PowerModel::new(f32::NAN, 1.0, 1.0, 0.0), Err(ConfigError::Negative("k0")));
     }
 
     proptest! {

@@ -1,7 +1,7 @@
-use super::ChassisError;
 use super::clock::DeadClock;
 use super::error::not_negative;
 use crate::control::{Pid, PidConfig, TimeStep};
+use crate::error::ConfigError;
 
 /// Spends an energy buffer down to a reserve, and lets it fill up again: the power to allow from its charge.
 ///
@@ -20,7 +20,7 @@ use crate::control::{Pid, PidConfig, TimeStep};
 /// assert_eq!(buffer.allowance_w(80.0, Some(20.0), 0.01), 80.0); // at the reserve
 /// assert_eq!(buffer.allowance_w(80.0, Some(0.0), 0.01), 40.0); // to fill up
 /// assert_eq!(buffer.allowance_w(80.0, None, 0.01), 72.0);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PowerBuffer {
@@ -35,9 +35,10 @@ impl PowerBuffer {
     ///
     /// # Errors
     /// Names the value that cannot be used.
-    pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, ChassisError> {
+    pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, ConfigError> {
         Ok(Self {
-            pid: Pid::new(pid).map_err(|error| ChassisError::Loop("the buffer's loop", error))?,
+            pid: Pid::new(pid)
+                .map_err(|error| ConfigError::Loop("the buffer's loop", error.parameter()))?,
             clock: DeadClock::new(),
             reserve_j: not_negative(reserve_j, "reserve_j")?,
             blind_share: 0.9,
@@ -47,8 +48,8 @@ impl PowerBuffer {
     /// Sets the share of the limit that is allowed without a reading: zero or more.
     ///
     /// # Errors
-    /// [`ChassisError::Negative`] when it is negative or not finite.
-    pub fn with_blind_share(self, share: f32) -> Result<Self, ChassisError> {
+    /// [`ConfigError::Negative`] when it is negative or not finite.
+    pub fn with_blind_share(self, share: f32) -> Result<Self, ConfigError> {
         let blind_share = not_negative(share, "blind_share")?;
         Ok(Self { blind_share, ..self })
     }
@@ -180,10 +181,10 @@ mod tests {
     #[test]
     fn values_that_cannot_work_are_named() {
         let reserve = PowerBuffer::new(-1.0, PidConfig::new(1.0, 0.0, 0.0));
-        assert_eq!(reserve, Err(ChassisError::Negative("reserve_j")));
+        assert_eq!(reserve, Err(ConfigError::Negative("reserve_j")));
         assert!(matches!(
             PowerBuffer::new(1.0, PidConfig::new(f32::NAN, 0.0, 0.0)),
-            Err(ChassisError::Loop(_, _))
+            Err(ConfigError::Loop(_, _))
         ));
     }
 }

@@ -18,7 +18,7 @@ use super::{PowerModel, WheelLoad};
 /// }
 /// let load = WheelLoad { torque: 3.0, speed_rad_s: 25.0 };
 /// assert!((fit.model().power_w(load) - truth.power_w(load)).abs() < 0.05);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PowerFit {

@@ -12,7 +12,7 @@ use crate::motor::TargetError;
 /// let status = chassis.status();
 /// assert_eq!((status.motion_known, status.lost_wheels), (false, 3));
 /// assert_eq!(status.blind_s, 0.001);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

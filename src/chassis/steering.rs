@@ -35,7 +35,7 @@ impl<const N: usize> Swerve<N> {
     /// let left = swerve.inverse(Twist::new(-0.1763, 1.0, 0.0)); // 100 degrees
     /// let [front, _] = swerve.steer(&mut SwerveSteering::new(), left, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() - 100.0).abs() < 0.3); // and not -80 with the drive reversed
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
     pub const fn with_hysteresis(mut self, hysteresis: Angle) -> Self {
@@ -78,7 +78,7 @@ const fn size(value: f32) -> f32 {
 /// let [front, rear] = swerve.steer(&mut steering, [ModuleState::default(); 2], measured);
 /// assert!((front.angle.as_degrees() - 70.0).abs() < 1e-4); // told to stand, each holds its angle
 /// assert!((rear.angle.as_degrees() + 20.0).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwerveSteering<const N: usize>([Module; N]);
@@ -128,7 +128,7 @@ impl<const N: usize> Swerve<N> {
     /// let [front, _] = swerve.steer(&mut steering, back, [Some(Angle::ZERO); 2]);
     /// assert!((front.angle.as_degrees() + 10.0).abs() < 0.3); // 10 degrees to the right, drive reversed
     /// assert!((front.velocity.as_rad_per_s() + 10.0).abs() < 0.01); // 10.15 rad/s times cos(10 degrees)
-    /// # Ok::<(), drivetrain::chassis::ChassisError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub fn steer(
         &self,

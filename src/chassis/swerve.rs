@@ -2,7 +2,8 @@ use super::error::positive;
 use super::least_squares::{Normal, Row, fit};
 use super::omni::zip_arrays;
 use super::steering::Steering;
-use super::{ChassisError, Kinematics, SwerveSteering, WheelSpeed};
+use super::{Kinematics, SwerveSteering, WheelSpeed};
+use crate::error::ConfigError;
 use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
 use crate::units::{Angle, AngularVelocity};
@@ -16,7 +17,7 @@ use crate::units::{Angle, AngularVelocity};
 /// let to_the_left = ModuleState::new(AngularVelocity::from_rad_per_s(10.0), Angle::from_degrees(90.0));
 /// let swerve = Swerve::new(0.1, [Vec2::new(0.3, 0.0), Vec2::new(-0.3, 0.0)])?;
 /// assert!((swerve.forward([to_the_left; 2]).vy_m_s - 1.0).abs() < 1e-5);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -81,7 +82,7 @@ impl WheelSpeed for ModuleState {
 /// let [front_left, ..] = swerve.inverse(Twist::new(0.0, 0.0, 2.0)); // turning left in place
 /// assert!((front_left.angle.as_degrees() - 135.0).abs() < 0.3);
 /// assert!((front_left.velocity.as_rad_per_s() - 0.3 * 2.0_f32.sqrt() * 2.0 / 0.05).abs() < 1e-4);
-/// # Ok::<(), drivetrain::chassis::ChassisError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swerve<const N: usize> {
@@ -101,17 +102,17 @@ impl<const N: usize> Swerve<N> {
     /// Takes the radius of the wheels and the places of the modules from the origin of the body, in m.
     ///
     /// # Errors
-    /// Names the value that is not finite or not above zero. [`ChassisError::Singular`] when there are fewer than two
+    /// Names the value that is not finite or not above zero. [`ConfigError::Singular`] when there are fewer than two
     /// modules, or all stand in one place, or nearly, as seen from the origin (two modules: when it is 8 times as far
     /// off as they are from each other).
-    pub fn new(wheel_radius_m: f32, positions_m: [Vec2; N]) -> Result<Self, ChassisError> {
+    pub fn new(wheel_radius_m: f32, positions_m: [Vec2; N]) -> Result<Self, ConfigError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !positions_m.iter().all(|position| position.is_finite()) {
-            return Err(ChassisError::NotFinite("positions_m"));
+            return Err(ConfigError::NotFinite("positions_m"));
         }
         let inverse = Normal::of(positions_m.into_iter().flat_map(rows))
             .inverse()
-            .ok_or(ChassisError::Singular("the rotation"))?;
+            .ok_or(ConfigError::Singular("the rotation"))?;
         let shares = positions_m
             .map(|position| rows(position).map(|row| inverse.share(row) * wheel_radius_m));
         let (per_radius, steering) = (1.0 / wheel_radius_m, Steering::new());
@@ -236,13 +237,13 @@ mod tests {
     #[test]
     fn modules_in_one_place_are_refused() {
         let one = Swerve::new(0.05, [Vec2::new(0.1, 0.2)]);
-        assert_eq!(one, Err(ChassisError::Singular("the rotation")));
+        assert_eq!(one, Err(ConfigError::Singular("the rotation")));
         let twin = Swerve::new(0.05, [Vec2::new(0.1, 0.2); 2]);
-        assert_eq!(twin, Err(ChassisError::Singular("the rotation")));
+        assert_eq!(twin, Err(ConfigError::Singular("the rotation")));
         let nan = Swerve::new(0.05, [Vec2::ZERO, Vec2::new(f32::NAN, 0.0)]);
-        assert_eq!(nan, Err(ChassisError::NotFinite("positions_m")));
+        assert_eq!(nan, Err(ConfigError::NotFinite("positions_m")));
         let flat = Swerve::new(-0.05, CORNERS);
-        assert_eq!(flat, Err(ChassisError::NotPositive("wheel_radius_m")));
+        assert_eq!(flat, Err(ConfigError::NotPositive("wheel_radius_m")));
     }
 
     #[test]

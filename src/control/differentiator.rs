@@ -1,6 +1,7 @@
-use super::error::{ConfigError, check, positive};
+use super::error::{check, positive};
 use super::number::{Sum, finite};
 use super::step::TimeStep;
+use crate::error::ConfigError;
 use crate::math;
 
 /// A tracking differentiator: follows a signal and gives its rate of change, by a linear or a time-optimal law.
@@ -41,7 +42,7 @@ use crate::math;
 ///     follow.update(1.0, 0.001);
 /// }
 /// assert!((follow.value() - 0.5).abs() < 0.01 && (follow.rate() - 2.0).abs() < 0.02);
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -24,8 +24,8 @@
 //!   very long one does is said at each type; for the controllers see [`TimeStep`].
 //! * A setpoint or measurement that is NaN or infinite: the last output is returned and the sample is counted. The next good one
 //!   works as if the bad one had not been, but that the D of a controller rests in it, since the time between is not one step.
-//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`] names the one that cannot work. What
-//!   needs arithmetic only is `const`, so that a bad constant does not compile.
+//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`](crate::error::ConfigError) names the one that
+//!   cannot work. What needs arithmetic only is `const`, so that a bad constant does not compile.
 //! * Nothing panics, and what is stored is finite.
 //!
 //! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.
@@ -36,7 +36,7 @@
 //! let speed = PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 //! let mut wheel = Pid::new(speed)?;
 //! assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0); // A for rad/s: 2 times 4
-//! # Ok::<(), drivetrain::control::ConfigError>(())
+//! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 
 mod actuator;
@@ -51,7 +51,6 @@ mod tuning;
 
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
-pub use error::ConfigError;
 pub use filter::{Biquad, LowPass, Window};
 pub(crate) use number::limited;
 

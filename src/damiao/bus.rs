@@ -1,9 +1,10 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
-use super::config::{Mode, sealed};
+use super::config::Mode;
 use super::feedback::{is_answer, value};
-use super::{ConfigError, Feedback, Model, Register, Status};
+use super::{Feedback, Model, Register, Status};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
@@ -30,15 +31,15 @@ const CHECKED: [Register; 4] = [
     Register::TorqueRange,
 ];
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
-/// use drivetrain::damiao::{Model, Motor, Velocity};
+/// use drivetrain::damiao::{Mode, Model, Motor};
 /// use drivetrain::motor::{Claim, OwnMotor};
 /// use drivetrain::units::AngularVelocity;
 ///
-/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
 /// let motor = Motor::new(Model::H6215, 2, mode)?.with_master_id(0x010)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, [
@@ -47,15 +48,15 @@ const CHECKED: [Register; 4] = [
 ///     "command of DM-H6215 #2 on 0x7FF", // registers: shared by all drives
 ///     "feedback of DM-H6215 #2 on 0x10",
 /// ]);
-/// # Ok::<(), drivetrain::damiao::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     master_id: u16,
     timeout_units: u32,
-    mode: M,
+    mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     settings: Settings<Register, { CHECKED.len() }>,
@@ -65,15 +66,14 @@ pub struct Motor<M> {
     timeout: Confirmation,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 15, and the control mode. The master id is `id + 0x10`, as the manual advises.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=15) {
-            return Err(ConfigError::Id(id.into()));
-        }
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 15.0)?;
+        let mode = mode.into();
         mode.check(&model)?;
         Ok(Self {
             model,
@@ -91,10 +91,11 @@ impl<M: Mode> Motor<M> {
     /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which may be that of other drives too.
     ///
     /// # Errors
-    /// [`ConfigError::MasterId`] for another id, and for that of the motor's own commands.
+    /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for that of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
-        if master_id > 0x7FE || [self.command_id(), self.id.into()].contains(&master_id) {
-            return Err(ConfigError::MasterId(master_id));
+        ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
+        if [self.command_id(), self.id.into()].contains(&master_id) {
+            return Err(ConfigError::Conflict("master id"));
         }
         Ok(Self { master_id, ..self })
     }
@@ -102,14 +103,11 @@ impl<M: Mode> Motor<M> {
     /// Sets the time without a command after which the drive disables itself: 1 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Timeout`] for another time.
+    /// [`ConfigError::Range`] for another time.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        match u32::try_from(timeout.as_micros()) {
-            Ok(micros @ 1_000..=60_000_000) => {
-                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
-            }
-            _ => Err(ConfigError::Timeout(timeout)),
-        }
+        let micros =
+            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 60_000_000)?;
+        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -127,11 +125,9 @@ impl<M: Mode> Motor<M> {
     /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read).
     ///
     /// # Errors
-    /// [`ConfigError::Register`] if the register is read only, or cannot hold the value.
+    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the register.
     pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        if !register.is_writable() || !register.holds(value) {
-            return Err(ConfigError::Register(register, value));
-        }
+        register.check(value)?;
         self.settings.request(Inquiry::Write(register, value));
         Ok(())
     }
@@ -149,7 +145,7 @@ impl<M: Mode> Motor<M> {
     }
 
     const fn command_id(&self) -> u16 {
-        <M as sealed::Mode>::BASE + self.id as u16
+        self.mode.base() + self.id as u16
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
@@ -163,7 +159,7 @@ impl<M: Mode> Motor<M> {
             Register::VelocityRange => self.model.vmax_rad_per_s(),
             Register::TorqueRange => self.model.tmax_nm(),
             Register::Timeout => self.timeout_units as f32,
-            _ => <M as sealed::Mode>::NUMBER.into(),
+            _ => self.mode.number().into(),
         }
     }
 
@@ -174,7 +170,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -182,7 +178,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     /// All drives of the family share the id of the registers.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let claim = |id, role| Claim::new(standard(id), role, self.name());
-        let bare = (<M as sealed::Mode>::BASE > 0).then(|| claim(self.id.into(), Role::Command));
+        let bare = (self.mode.base() > 0).then(|| claim(self.id.into(), Role::Command));
         let shared = [
             claim(REGISTERS, Role::Command).shared(),
             claim(self.master_id, Role::Feedback).shared(),
@@ -216,9 +212,10 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn rest(&mut self) -> CanFrame {
-        match <M as sealed::Mode>::REST {
-            Some(command) => self.frame_of(command),
-            None => self.off(),
+        if self.mode.has_rest() {
+            self.frame_of(Command::Mit(mit::Command::REST))
+        } else {
+            self.off()
         }
     }
 
@@ -255,7 +252,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.timeout = Confirmation::None;
-        <M as sealed::Mode>::REST.is_some().then(|| self.off())
+        self.mode.has_rest().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
@@ -329,7 +326,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Disables the drive; where it reports an error, clears that in turn, which leaves it disabled.
     fn off(&mut self) -> CanFrame {
         let has_error = self.drive.is_some_and(|drive| drive.status.is_error());

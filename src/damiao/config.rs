@@ -1,170 +1,174 @@
-//! The control modes, with what a user chooses for each.
+//! The control mode, with what a user chooses for it.
 
 use super::command::{Command, MOST_VELOCITY};
-use super::{ConfigError, Feedback, Model};
+use super::{Feedback, Model};
+use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::AngularVelocity;
 use crate::wire::mit;
 
-/// A control mode of the drive: [`ImpedanceControl`] for MIT, [`PositionVelocity`], [`Velocity`] or [`ForcePosition`].
-pub trait Mode: sealed::Mode {}
-
-impl<M: sealed::Mode> Mode for M {}
-
-pub(super) mod sealed {
-    use super::{Capabilities, Command, ConfigError, Feedback, Model, Order};
-
-    pub trait Mode: core::fmt::Debug + Copy {
-        /// The value of the register `CTRL_MODE`.
-        const NUMBER: u8;
-        /// What is added to the id of the drive.
-        const BASE: u16;
-        /// What the drive reads as rest; `None` for a drive that only rests when it is disabled.
-        const REST: Option<Command>;
-
-        /// # Errors
-        /// A limit that is not within the ranges of the model.
-        fn check(&self, model: &Model) -> Result<(), ConfigError>;
-
-        fn capabilities(&self) -> Capabilities;
-
-        /// Returns what the drive is told and the share of its largest effort; `None` to rest.
-        fn command(&mut self, order: Order, drive: &Feedback, model: &Model) -> Option<Command>;
-
-        /// Returns a target where the shaft is, for before the drive is enabled.
-        fn stay(&self, drive: &Feedback) -> Option<Command>;
-
-        /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
-        fn effort(&self) -> f32 {
-            0.0
-        }
-
-        fn reset(&mut self) {}
-    }
-}
-
-/// MIT mode: the drive follows an impedance.
-impl sealed::Mode for ImpedanceControl {
-    const NUMBER: u8 = 1;
-    const BASE: u16 = 0x000;
-    const REST: Option<Command> = Some(Command::Mit(mit::Command::REST));
-
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        torque_limit(self.torque_limit_nm(), model)
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Self::capabilities(self)
-    }
-
-    fn command(&mut self, order: Order, drive: &Feedback, model: &Model) -> Option<Command> {
-        let velocity = AngularVelocity::from_rad_per_s(drive.measured.velocity_rad_per_s);
-        let Impedance { angle, velocity, stiffness, damping, torque_nm } =
-            self.step(order, drive.angle(), velocity, &model.most(), &model.count())?;
-        Some(Command::Mit(mit::Command {
-            position_rad: angle.as_radians(),
-            velocity_rad_per_s: velocity.as_rad_per_s(),
-            kp: stiffness,
-            kd: damping,
-            torque_nm,
-        }))
-    }
-
-    /// A drive in MIT mode that is enabled follows the last command, which was rest.
-    fn stay(&self, _drive: &Feedback) -> Option<Command> {
-        None
-    }
-
-    fn effort(&self) -> f32 {
-        Self::effort(self)
-    }
-
-    fn reset(&mut self) {
-        Self::reset(self);
-    }
-}
-
-/// Position-velocity mode: the drive's own loops go to an angle, at most so fast.
+/// A control mode of the drive. An [`ImpedanceControl`] is one too: MIT mode, in which the drive follows an impedance.
+///
+/// # Examples
+/// ```
+/// use drivetrain::damiao::{Mode, Model, Motor};
+/// use drivetrain::motor::ImpedanceControl;
+/// use drivetrain::units::AngularVelocity;
+///
+/// // Motors in different modes have one type.
+/// let fastest = AngularVelocity::from_rpm(60.0);
+/// let motors = [
+///     Motor::new(Model::J4310, 1, ImpedanceControl::new(3.0)?.with_gains(20.0, 0.6)?)?,
+///     Motor::new(Model::J4310, 2, Mode::force_position(fastest, 3.0))?,
+///     Motor::new(Model::H6215, 3, Mode::velocity(fastest))?,
+/// ];
+/// # let _ = motors;
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
-pub struct PositionVelocity {
-    velocity_limit: AngularVelocity,
-}
+pub struct Mode(Kind);
 
-impl PositionVelocity {
-    /// Limits the velocity: above 0 and at most VMAX.
-    #[must_use]
-    pub const fn new(velocity_limit: AngularVelocity) -> Self {
-        Self { velocity_limit }
-    }
-}
-
-impl sealed::Mode for PositionVelocity {
-    const NUMBER: u8 = 2;
-    const BASE: u16 = 0x100;
-    const REST: Option<Command> = None;
-
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Angle])
-    }
-
-    fn command(&mut self, order: Order, drive: &Feedback, model: &Model) -> Option<Command> {
-        let position = position_of(&order, drive, model)?;
-        let velocity = self.velocity_limit.as_rad_per_s() * order.share;
-        Some(Command::PositionVelocity(position, velocity))
-    }
-
-    fn stay(&self, drive: &Feedback) -> Option<Command> {
-        Some(Command::PositionVelocity(drive.measured.position_rad, 0.0))
-    }
-}
-
-/// Force-position mode: the drive's own loops go to an angle, at most so fast, with a limited torque.
 #[derive(Debug, Clone, Copy)]
-pub struct ForcePosition {
-    velocity_limit: AngularVelocity,
-    torque_limit_nm: f32,
+enum Kind {
+    Impedance(ImpedanceControl),
+    PositionVelocity(AngularVelocity),
+    Velocity(AngularVelocity),
+    ForcePosition(AngularVelocity, f32),
 }
 
-impl ForcePosition {
-    /// Limits the velocity, above 0 and at most VMAX and 100 rad/s, and the torque in Nm, above 0 and at most TMAX.
+impl From<ImpedanceControl> for Mode {
+    fn from(control: ImpedanceControl) -> Self {
+        Self(Kind::Impedance(control))
+    }
+}
+
+impl Mode {
+    /// Position-velocity mode: the drive's own loops go to an angle, at most so fast: above 0 and at most VMAX.
     #[must_use]
-    pub const fn new(velocity_limit: AngularVelocity, torque_limit_nm: f32) -> Self {
-        Self { velocity_limit, torque_limit_nm }
+    pub const fn position_velocity(velocity_limit: AngularVelocity) -> Self {
+        Self(Kind::PositionVelocity(velocity_limit))
     }
-}
 
-impl sealed::Mode for ForcePosition {
-    const NUMBER: u8 = 4;
-    const BASE: u16 = 0x300;
-    const REST: Option<Command> = None;
+    /// Velocity mode: the drive's own loop follows a velocity, at most so fast: above 0 and at most VMAX.
+    #[must_use]
+    pub const fn velocity(velocity_limit: AngularVelocity) -> Self {
+        Self(Kind::Velocity(velocity_limit))
+    }
 
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)?;
-        if self.velocity_limit.as_rad_per_s() > MOST_VELOCITY {
-            let limit = self.velocity_limit.as_rad_per_s();
-            return Err(ConfigError::VelocityLimit(limit, MOST_VELOCITY));
+    /// Force-position mode: the drive's own loops go to an angle, at most so fast, above 0 and at most VMAX and 100 rad/s, with at most
+    /// this torque in Nm, above 0 and at most TMAX.
+    #[must_use]
+    pub const fn force_position(velocity_limit: AngularVelocity, torque_limit_nm: f32) -> Self {
+        Self(Kind::ForcePosition(velocity_limit, torque_limit_nm))
+    }
+
+    /// The value of the register `CTRL_MODE`.
+    pub(super) const fn number(&self) -> u8 {
+        match self.0 {
+            Kind::Impedance(_) => 1,
+            Kind::PositionVelocity(_) => 2,
+            Kind::Velocity(_) => 3,
+            Kind::ForcePosition(..) => 4,
         }
-        torque_limit(self.torque_limit_nm, model)
     }
 
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Angle])
+    /// What is added to the id of the drive.
+    pub(super) const fn base(&self) -> u16 {
+        (self.number() as u16 - 1) << 8
     }
 
-    fn command(&mut self, order: Order, drive: &Feedback, model: &Model) -> Option<Command> {
-        let position = position_of(&order, drive, model)?;
-        let velocity = self.velocity_limit.as_rad_per_s();
-        let torque = order.share * self.torque_limit_nm / model.tmax_nm();
-        Some(Command::ForcePosition(position, velocity, torque))
+    /// Tells whether a command of no gains and no torque is rest; a drive in another mode only rests when it is disabled.
+    pub(super) const fn has_rest(&self) -> bool {
+        matches!(self.0, Kind::Impedance(_))
     }
 
-    fn stay(&self, drive: &Feedback) -> Option<Command> {
-        Some(Command::ForcePosition(drive.measured.position_rad, 0.0, 0.0))
+    /// # Errors
+    /// A limit that is not within the ranges of the model.
+    pub(super) fn check(&self, model: &Model) -> Result<(), ConfigError> {
+        let torque = |limit| ConfigError::check_limit("torque limit in Nm", limit, model.tmax_nm());
+        let velocity = |limit: AngularVelocity, most| {
+            ConfigError::check_limit("velocity limit in rad/s", limit.as_rad_per_s(), most)
+        };
+        let vmax = model.vmax_rad_per_s();
+        match self.0 {
+            Kind::Impedance(control) => torque(control.torque_limit_nm()),
+            Kind::PositionVelocity(limit) | Kind::Velocity(limit) => velocity(limit, vmax),
+            Kind::ForcePosition(limit, torque_limit_nm) => {
+                velocity(limit, vmax.min(MOST_VELOCITY))?;
+                torque(torque_limit_nm)
+            }
+        }
+    }
+
+    pub(super) fn capabilities(&self) -> Capabilities {
+        match &self.0 {
+            Kind::Impedance(control) => control.capabilities(),
+            Kind::PositionVelocity(_) | Kind::ForcePosition(..) => {
+                Capabilities::of(&[Capability::Angle])
+            }
+            Kind::Velocity(_) => Capabilities::of(&[Capability::Velocity]),
+        }
+    }
+
+    /// Returns what the drive is told within the share of its largest effort; `None` to rest.
+    pub(super) fn command(
+        &mut self,
+        order: Order,
+        drive: &Feedback,
+        model: &Model,
+    ) -> Option<Command> {
+        match (&mut self.0, order.target) {
+            (Kind::Impedance(control), _) => {
+                let velocity = AngularVelocity::from_rad_per_s(drive.measured.velocity_rad_per_s);
+                let Impedance { angle, velocity, stiffness, damping, torque_nm } =
+                    control.step(order, drive.angle(), velocity, &model.most(), &model.count())?;
+                Some(Command::Mit(mit::Command {
+                    position_rad: angle.as_radians(),
+                    velocity_rad_per_s: velocity.as_rad_per_s(),
+                    kp: stiffness,
+                    kd: damping,
+                    torque_nm,
+                }))
+            }
+            (Kind::PositionVelocity(limit), Target::Angle(_)) => {
+                let position = position_of(&order, drive, model)?;
+                Some(Command::PositionVelocity(position, limit.as_rad_per_s() * order.share))
+            }
+            (Kind::ForcePosition(limit, torque_limit_nm), Target::Angle(_)) => {
+                let position = position_of(&order, drive, model)?;
+                let torque = order.share * *torque_limit_nm / model.tmax_nm();
+                Some(Command::ForcePosition(position, limit.as_rad_per_s(), torque))
+            }
+            (Kind::Velocity(limit), Target::Velocity(velocity)) => {
+                let limit = limit.as_rad_per_s();
+                Some(Command::Velocity(velocity.as_rad_per_s().min(limit).max(-limit)))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns a target where the shaft is, for before the drive is enabled. A drive in MIT mode that is enabled follows the last command,
+    /// which was rest.
+    pub(super) const fn stay(&self, drive: &Feedback) -> Option<Command> {
+        let position = drive.measured.position_rad;
+        match self.0 {
+            Kind::Impedance(_) => None,
+            Kind::PositionVelocity(_) => Some(Command::PositionVelocity(position, 0.0)),
+            Kind::ForcePosition(..) => Some(Command::ForcePosition(position, 0.0, 0.0)),
+            Kind::Velocity(_) => Some(Command::Velocity(drive.measured.velocity_rad_per_s)),
+        }
+    }
+
+    /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
+    pub(super) fn effort(&self) -> f32 {
+        if let Kind::Impedance(control) = &self.0 { control.effort() } else { 0.0 }
+    }
+
+    pub(super) fn reset(&mut self) {
+        if let Kind::Impedance(control) = &mut self.0 {
+            control.reset();
+        }
     }
 }
 
@@ -179,53 +183,4 @@ fn position_of(order: &Order, drive: &Feedback, model: &Model) -> Option<f32> {
     // At the very end a position is none any more.
     let end = model.pmax_rad() * 0.9995;
     Some((position + way).min(end).max(-end))
-}
-
-/// Velocity mode: the drive's own loop follows a velocity.
-#[derive(Debug, Clone, Copy)]
-pub struct Velocity {
-    velocity_limit: AngularVelocity,
-}
-
-impl Velocity {
-    /// Limits the velocity: above 0 and at most VMAX.
-    #[must_use]
-    pub const fn new(velocity_limit: AngularVelocity) -> Self {
-        Self { velocity_limit }
-    }
-}
-
-impl sealed::Mode for Velocity {
-    const NUMBER: u8 = 3;
-    const BASE: u16 = 0x200;
-    const REST: Option<Command> = None;
-
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        velocity_limit(self.velocity_limit, model)
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Velocity])
-    }
-
-    fn command(&mut self, order: Order, _: &Feedback, _: &Model) -> Option<Command> {
-        let Target::Velocity(velocity) = order.target else { return None };
-        let limit = self.velocity_limit.as_rad_per_s();
-        Some(Command::Velocity(velocity.as_rad_per_s().min(limit).max(-limit)))
-    }
-
-    fn stay(&self, drive: &Feedback) -> Option<Command> {
-        Some(Command::Velocity(drive.measured.velocity_rad_per_s))
-    }
-}
-
-fn torque_limit(limit_nm: f32, model: &Model) -> Result<(), ConfigError> {
-    let is_valid = limit_nm > 0.0 && limit_nm <= model.tmax_nm();
-    if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit_nm, model.tmax_nm())) }
-}
-
-fn velocity_limit(limit: AngularVelocity, model: &Model) -> Result<(), ConfigError> {
-    let (limit, most) = (limit.as_rad_per_s(), model.vmax_rad_per_s());
-    let is_valid = limit > 0.0 && limit <= most;
-    if is_valid { Ok(()) } else { Err(ConfigError::VelocityLimit(limit, most)) }
 }

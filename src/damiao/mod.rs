@@ -12,15 +12,15 @@
 //! Standard frames of 8 bytes at 1 Mbit/s. A drive sends one for each that it gets, so the bus carries two a motor and cycle: at
 //! 1 kHz it is full with three. Several drives may have one master id.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. The control
-//! mode is its type:
+//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its
+//! control mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
 //! |---|---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): MIT | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode | no gains, no torque |
-//! | [`ForcePosition`] | angle | the torque limit of the mode | disabled |
-//! | [`PositionVelocity`] | angle | the drive alone | disabled |
-//! | [`Velocity`] | velocity | the drive alone | disabled |
+//! | [`Mode::force_position`] | angle | the torque limit of the mode | disabled |
+//! | [`Mode::position_velocity`] | angle | the drive alone | disabled |
+//! | [`Mode::velocity`] | velocity | the drive alone | disabled |
 //!
 //! **Before a motor is armed, its registers are read.** `CTRL_MODE`, `PMAX`, `VMAX` and `TMAX` have to be what the configuration
 //! says, else [`arm`](crate::motor::Devices::arm) names the register and both values: a drive in another mode discards the
@@ -45,13 +45,12 @@
 //! reBot; the master id, the time-out and the states also from the manual of the DM-J4310-2EC. Frames of public tests are in
 //! `tests/data/wire`. Not known: how a drive behaves that is enabled without a target in the modes other than MIT; so a target
 //! where the shaft is goes out in each cycle until it is. A position mode brakes a shaft that turns when it is enabled with what the
-//! drive has. `ForcePosition` takes TMAX for the torque at full current, as damiao-motor says. Programs of the vendor send enabling and disabling frames to
+//! drive has. `Mode::force_position` takes TMAX for the torque at full current, as damiao-motor says. Programs of the vendor send enabling and disabling frames to
 //! the id of the mode, public packages to the bare id: here they go to both in turn.
 
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod register;
@@ -60,8 +59,7 @@ mod tests;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{ForcePosition, Mode, PositionVelocity, Velocity};
-pub use error::ConfigError;
+pub use config::Mode;
 pub use feedback::{Feedback, Status};
 pub use model::Model;
 pub use register::Register;

@@ -1,6 +1,6 @@
 //! Facts of the models, as a table that a program can extend.
 
-use super::ConfigError;
+use crate::error::ConfigError;
 use crate::motor::Impedance;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
@@ -30,7 +30,8 @@ use crate::wire::mit::Ranges;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::damiao::{ConfigError, Model};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::damiao::Model;
 ///
 /// assert_eq!((Model::J8009.name(), Model::J8009.tmax_nm()), ("DM-J8009", 54.0));
 /// let mine = Model::new("DM-S2325", 12.5, 200.0, 10.0)?;
@@ -87,7 +88,7 @@ impl Model {
     ) -> Result<Self, ConfigError> {
         match Ranges::new(pmax_rad, vmax_rad_per_s, tmax_nm) {
             Ok(ranges) => Ok(Self { name, ranges }),
-            Err(error) => Err(ConfigError::Range(error)),
+            Err(error) => Err(error),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The registers of a drive.
 
+use crate::error::ConfigError;
+
 macro_rules! registers {
     ($($register:ident $number:literal $kind:ident $doc:literal,)+) => {
         /// A register of a drive.
@@ -17,6 +19,15 @@ macro_rules! registers {
         }
 
         impl Register {
+            /// The name and the number, as errors print them.
+            const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$register => {
+                        concat!("register ", stringify!($number), " (", stringify!($register), ")")
+                    })+
+                }
+            }
+
             const fn kind(self) -> Kind {
                 match self {
                     $(Self::$register => Kind::$kind,)+
@@ -75,6 +86,18 @@ registers! {
 }
 
 impl Register {
+    /// # Errors
+    /// It is read only, or cannot hold the value.
+    pub(super) fn check(self, value: f32) -> Result<(), ConfigError> {
+        if !self.is_writable() {
+            Err(ConfigError::ReadOnly(self.name()))
+        } else if !self.holds(value) {
+            Err(ConfigError::CannotHold(self.name(), value))
+        } else {
+            Ok(())
+        }
+    }
+
     /// Returns the number in the protocol.
     #[must_use]
     pub const fn number(self) -> u8 {

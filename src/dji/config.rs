@@ -1,7 +1,7 @@
 use super::{Facts, Gm6020Voltage, Model};
 use crate::control::PidConfig;
 use crate::encoder::GearRatio;
-use crate::motor::{HealthConfig, OPENING, Recovery};
+use crate::motor::{HealthConfig, OPENING};
 use crate::time::Duration;
 use crate::units::{Current, Voltage};
 use core::marker::PhantomData;
@@ -41,7 +41,7 @@ pub(super) struct PlainConfig {
     pub(super) torque_constant_nm_per_a: Option<f32>,
     pub(super) speed: Option<PidConfig>,
     pub(super) position: Option<PidConfig>,
-    pub(super) recovery: Recovery,
+    pub(super) resumes: bool,
     pub(super) opening: Duration,
     pub(super) health: &'static HealthConfig,
 }
@@ -67,7 +67,7 @@ impl<M: Model> Config<M> {
                 torque_constant_nm_per_a: None,
                 speed: None,
                 position: None,
-                recovery: Recovery::Rearm,
+                resumes: false,
                 opening: OPENING,
                 health: &USUAL,
             },
@@ -132,10 +132,11 @@ impl<M: Model> Config<M> {
         self
     }
 
-    /// Sets what happens when the motor is heard again after being offline.
+    /// Has an armed motor take targets again when it is heard after being offline; its output range opens from zero as after arming.
+    /// Otherwise it stays relaxed until it is armed again.
     #[must_use]
-    pub const fn with_recovery(mut self, recovery: Recovery) -> Self {
-        self.plain.recovery = recovery;
+    pub const fn with_resume(mut self) -> Self {
+        self.plain.resumes = true;
         self
     }
 

@@ -234,43 +234,6 @@ impl core::fmt::Display for Message {
     }
 }
 
-/// Why a loop was not changed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum LoopError {
-    /// The handle's motor was detached.
-    Detached,
-    /// The motor was attached without this loop.
-    NoLoop,
-    /// A parameter is not usable.
-    Parameter(&'static str),
-    /// A proportional gain is impossible for the model, as in [`AttachError::Gain`].
-    Gain {
-        /// The name of the gain and of its loop.
-        parameter: &'static str,
-        /// The gain that was given.
-        value: u32,
-        /// The highest gain that the model takes.
-        highest: u32,
-    },
-}
-
-impl core::fmt::Display for LoopError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Detached => f.write_str("the motor was detached"),
-            Self::NoLoop => f.write_str("the motor was attached without this loop"),
-            Self::Parameter(parameter) => write!(f, "{parameter} is not usable"),
-            Self::Gain { parameter, value, highest } => {
-                f.write_str(Message::new().gain(parameter, *value, *highest).as_str())
-            }
-        }
-    }
-}
-
-impl core::error::Error for LoopError {}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -108,7 +108,7 @@ mod word_gains;
 pub use bus::{Bus, Counters};
 pub use command::CommandFrame;
 pub use config::Config;
-pub use error::{AttachError, LoopError, Message};
+pub use error::{AttachError, Message};
 pub use feedback::{ErrorCode, Feedback};
 pub use handle::{AnyHandle, Handle};
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};

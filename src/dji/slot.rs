@@ -14,8 +14,12 @@ use super::range::Range;
 use super::{Facts, Feedback};
 use crate::control::{Input, Pid, PidConfig, TimeStep};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
+use crate::error::ConfigError;
 use crate::motor::{HealthConfig, Monitor, MotorGuard, TargetError, Traffic};
 use crate::units::{Angle, AngularVelocity};
+
+/// The refusal of a handle whose motor is gone.
+pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
 pub(super) use health::Look;
 
 /// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.

@@ -1,9 +1,11 @@
 //! What the application asks of the motors.
 
+use super::slot::DETACHED;
 use super::slot::Slot;
-use super::{AnyHandle, Bus, Handle, LoopError, Model};
+use super::{AnyHandle, Bus, Handle, Model};
 use crate::control::PidConfig;
 use crate::encoder::Position;
+use crate::error::ConfigError;
 use crate::motor::{AngleDrive, Capabilities, LONGEST_PAUSE, Measured, TargetError, VelocityDrive};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
@@ -119,26 +121,28 @@ impl<B> Bus<B> {
     /// Changes the speed loop of a motor while it runs, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that `attach` would refuse; the loop is then as it was.
+    /// Names the parameter that `attach` would refuse, or the handle of a motor that was detached, or attached without this loop. The
+    /// loop is then as it was.
     pub fn set_speed_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
         config: PidConfig,
-    ) -> Result<(), LoopError> {
-        let slot = self.slot_mut(motor.into()).ok_or(LoopError::Detached)?;
+    ) -> Result<(), ConfigError> {
+        let slot = self.slot_mut(motor.into()).ok_or(DETACHED)?;
         slot.set_speed_loop(config)
     }
 
     /// Changes the position loop of a motor while it runs, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that `attach` would refuse; the loop is then as it was.
+    /// Names the parameter that `attach` would refuse, or the handle of a motor that was detached, or attached without this loop. The
+    /// loop is then as it was.
     pub fn set_position_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
         config: PidConfig,
-    ) -> Result<(), LoopError> {
-        let slot = self.slot_mut(motor.into()).ok_or(LoopError::Detached)?;
+    ) -> Result<(), ConfigError> {
+        let slot = self.slot_mut(motor.into()).ok_or(DETACHED)?;
         slot.set_position_loop(config)
     }
 

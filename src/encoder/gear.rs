@@ -1,3 +1,6 @@
+use crate::error::{ConfigError, check};
+use core::num::NonZeroU16;
+
 /// A gear ratio as an exact fraction: rotor turns to output turns.
 ///
 /// # Examples
@@ -18,28 +21,6 @@ pub struct GearRatio {
     output: u16,
 }
 
-/// A gear ratio that cannot be tracked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct GearError {
-    /// The rotor turns that were asked for.
-    pub rotor: u16,
-    /// The output turns that were asked for.
-    pub output: u16,
-}
-
-impl core::fmt::Display for GearError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(
-            f,
-            "gear ratio {}:{} is not between 1:2 and 4096:1, or needs more than 4096 rotor turns in lowest terms",
-            self.rotor, self.output
-        )
-    }
-}
-
-impl core::error::Error for GearError {}
-
 impl GearRatio {
     /// The output shaft is the rotor.
     pub const DIRECT: Self = Self { rotor: 1, output: 1 };
@@ -49,20 +30,21 @@ impl GearRatio {
     /// # Errors
     /// When one of them is zero, when the output would turn more than twice as fast as the rotor, or when the
     /// reduced fraction has more than 4096 rotor turns.
-    pub const fn new(rotor: u16, output: u16) -> Result<Self, GearError> {
+    pub const fn new(rotor: u16, output: u16) -> Result<Self, ConfigError> {
         let (mut divisor, mut rest) = (rotor, output);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
         }
-        if divisor == 0 {
-            return Err(GearError { rotor, output });
-        }
-        let ratio = Self { rotor: rotor / divisor, output: output / divisor };
-        let valid = ratio.rotor >= 1
-            && ratio.rotor <= 4096
-            && ratio.output >= 1
-            && ratio.output as u32 <= 2 * ratio.rotor as u32;
-        if valid { Ok(ratio) } else { Err(GearError { rotor, output }) }
+        // Both zero: NaN, which no range has.
+        let ratio = rotor as f32 / output as f32;
+        check!(ConfigError::check_range("gear ratio", ratio, 0.5, 4_096.0));
+        let Some(divisor) = NonZeroU16::new(divisor) else {
+            return Err(ConfigError::NotPositive("gear ratio"));
+        };
+        let (rotor, output) = (rotor / divisor.get(), output / divisor.get());
+        let turns = "rotor turns of the gear ratio in lowest terms";
+        check!(ConfigError::check_range(turns, rotor as f32, 1.0, 4_096.0));
+        Ok(Self { rotor, output })
     }
 
     /// Returns the rotor turns of the reduced fraction: 1 to 4096.
@@ -87,11 +69,13 @@ impl GearRatio {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn ratios_that_cannot_be_tracked_are_refused() {
         for (rotor, output) in [(0, 1), (1, 0), (0, 0), (1, 3), (4099, 1)] {
-            assert_eq!(GearRatio::new(rotor, output), Err(GearError { rotor, output }));
+            let name = GearRatio::new(rotor, output).map_err(|error| error.parameter());
+            assert!(name.is_err_and(|name| name.contains("gear ratio")), "{rotor}:{output}");
         }
         assert!(GearRatio::new(1, 2).is_ok());
         assert!(GearRatio::new(4096, 1).is_ok());
@@ -100,9 +84,12 @@ mod tests {
 
     #[test]
     fn a_refused_ratio_is_named_in_words() {
-        let error = GearRatio::new(4099, 1).unwrap_err();
-        assert!(
-            std::format!("{error}").starts_with("gear ratio 4099:1 is not between 1:2 and 4096:1")
+        let text = |rotor, output| GearRatio::new(rotor, output).unwrap_err().to_string();
+        assert_eq!(text(4_099, 1), "gear ratio 4099: 0.5 to 4096 are allowed");
+        assert_eq!(text(1, 3), "gear ratio 0.33333334: 0.5 to 4096 are allowed");
+        assert_eq!(
+            text(4_099, 4_098),
+            "rotor turns of the gear ratio in lowest terms 4099: 1 to 4096 are allowed"
         );
     }
 }

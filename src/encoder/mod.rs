@@ -23,7 +23,7 @@ mod homing;
 mod shaft;
 
 pub use gap::resolve_gap;
-pub use gear::{GearError, GearRatio};
+pub use gear::GearRatio;
 pub use homing::Homing;
 pub use shaft::{Position, Shaft, shortest};
 

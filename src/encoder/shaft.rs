@@ -41,7 +41,7 @@ pub const fn shortest(previous: u16, next: u16) -> i32 {
 /// }
 /// assert_eq!(shaft.rotor_counts(), 8000 + 36 * 8192);
 /// assert_eq!(shaft.position().turns(), 1); // 36 rotor turns are one output turn, exactly
-/// # Ok::<(), drivetrain::encoder::GearError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shaft {

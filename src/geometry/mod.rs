@@ -50,7 +50,6 @@ mod transform3;
 mod twist;
 mod vector;
 
-pub use error::MatrixError;
 pub use frame::{Body, Gimbal, World};
 pub use point::{Point2, Point3};
 pub use pose::Pose2;

@@ -1,6 +1,7 @@
+use super::Vec3;
 use super::error::TOLERANCE;
 use super::rotation2::angle_of;
-use super::{MatrixError, Vec3};
+use crate::error::ConfigError;
 use crate::math::{sin_cos, sqrt};
 use crate::units::Angle;
 
@@ -62,16 +63,16 @@ impl Rotation3 {
     /// Takes a quaternion of any length but zero; `w` is the real part.
     ///
     /// # Errors
-    /// [`MatrixError::NotFinite`] for NaN and infinity, [`MatrixError::NotRotation`] when the squared length is below
+    /// [`ConfigError::NotFinite`] for NaN and infinity, [`ConfigError::Unusable`] when the squared length is below
     /// 1e-12 or above 1e12.
-    pub fn from_quaternion(w: f32, x: f32, y: f32, z: f32) -> Result<Self, MatrixError> {
+    pub fn from_quaternion(w: f32, x: f32, y: f32, z: f32) -> Result<Self, ConfigError> {
         let vector = Vec3::new(x, y, z);
         if !(w.is_finite() && vector.is_finite()) {
-            return Err(MatrixError::NotFinite);
+            return Err(ConfigError::NotFinite("quaternion"));
         }
         let square = w * w + vector.dot(vector);
         if !(1e-12..=1e12).contains(&square) {
-            return Err(MatrixError::NotRotation);
+            return Err(ConfigError::Unusable("quaternion"));
         }
         let scale = 1.0 / sqrt(square);
         Ok(Self { w: w * scale, vector: vector * scale })
@@ -178,23 +179,23 @@ impl Rotation3 {
     /// Takes a rotation matrix, rows first.
     ///
     /// # Errors
-    /// [`MatrixError`] when a number is not finite, or the rows are not perpendicular and of length 1 (to 1e-3) or
+    /// [`ConfigError`] when a number is not finite, or the rows are not perpendicular and of length 1 (to 1e-3) or
     /// mirror.
-    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, MatrixError> {
+    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, ConfigError> {
         Self::check_rows(matrix.map(|[a, b, c]| Vec3::new(a, b, c)))?;
         Ok(Self::from_rows(matrix))
     }
 
     /// Lets rows pass that are those of a rotation, to 1e-3.
-    pub(super) fn check_rows([x, y, z]: [Vec3; 3]) -> Result<(), MatrixError> {
+    pub(super) fn check_rows([x, y, z]: [Vec3; 3]) -> Result<(), ConfigError> {
         if !(x.is_finite() && y.is_finite() && z.is_finite()) {
-            return Err(MatrixError::NotFinite);
+            return Err(ConfigError::NotFinite("matrix"));
         }
         // The third row is the cross product of the others exactly when nothing is skewed, scaled or mirrored.
         let third = x.cross(y) - z;
         let lengths = [x.dot(x) - 1.0, y.dot(y) - 1.0, x.dot(y), third.norm()];
         if lengths.iter().any(|error| error.abs() > 2.0 * TOLERANCE) {
-            return Err(MatrixError::NotRotation);
+            return Err(ConfigError::Unusable("rotation of the matrix"));
         }
         Ok(())
     }
@@ -344,15 +345,24 @@ mod tests {
     #[test]
     fn matrices_and_quaternions_that_are_no_rotation_are_refused() {
         let mirror = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
-        assert_eq!(Rotation3::from_matrix(mirror), Err(MatrixError::NotRotation));
+        assert_eq!(
+            Rotation3::from_matrix(mirror),
+            Err(ConfigError::Unusable("rotation of the matrix"))
+        );
         let scaled = [[1.01, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.01]];
-        assert_eq!(Rotation3::from_matrix(scaled), Err(MatrixError::NotRotation));
+        assert_eq!(
+            Rotation3::from_matrix(scaled),
+            Err(ConfigError::Unusable("rotation of the matrix"))
+        );
         let nan = [[f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert_eq!(Rotation3::from_matrix(nan), Err(MatrixError::NotFinite));
-        assert_eq!(Rotation3::from_quaternion(0.0, 0.0, 0.0, 0.0), Err(MatrixError::NotRotation));
+        assert_eq!(Rotation3::from_matrix(nan), Err(ConfigError::NotFinite("matrix")));
+        assert_eq!(
+            Rotation3::from_quaternion(0.0, 0.0, 0.0, 0.0),
+            Err(ConfigError::Unusable("quaternion"))
+        );
         assert_eq!(
             Rotation3::from_quaternion(0.0, f32::NAN, 0.0, 0.0),
-            Err(MatrixError::NotFinite)
+            Err(ConfigError::NotFinite("quaternion"))
         );
         let long = Rotation3::from_quaternion(2.0, 0.0, 0.0, 2.0).unwrap(); // F63: normalised
         close(long.apply(FORWARD), LEFT);

@@ -1,6 +1,7 @@
 //! What values with an invariant look like in a file, and how they are taken back: checked, or brought into form.
 
-use super::{MatrixError, Rotation2, Rotation3, Transform3, Vec2, Vec3};
+use super::{Rotation2, Rotation3, Transform3, Vec2, Vec3};
+use crate::error::ConfigError;
 
 /// A unit vector may be this far off in its squared length and still be taken bit by bit: rounding of `f32`.
 const ROUNDING: f32 = 1e-6;
@@ -13,10 +14,10 @@ pub(super) struct StoredRotation2 {
 }
 
 impl TryFrom<StoredRotation2> for Rotation2 {
-    type Error = MatrixError;
+    type Error = ConfigError;
 
     /// Takes a vector of any length but zero.
-    fn try_from(StoredRotation2 { cos, sin }: StoredRotation2) -> Result<Self, MatrixError> {
+    fn try_from(StoredRotation2 { cos, sin }: StoredRotation2) -> Result<Self, ConfigError> {
         let vector = Vec2::new(cos, sin);
         if is_unit(vector.dot(vector)) {
             return Ok(Self::from_parts(cos, sin));
@@ -35,10 +36,10 @@ pub(super) struct StoredRotation3 {
 }
 
 impl TryFrom<StoredRotation3> for Rotation3 {
-    type Error = MatrixError;
+    type Error = ConfigError;
 
     /// Takes a quaternion of any length but zero.
-    fn try_from(StoredRotation3 { w, vector }: StoredRotation3) -> Result<Self, MatrixError> {
+    fn try_from(StoredRotation3 { w, vector }: StoredRotation3) -> Result<Self, ConfigError> {
         if is_unit(w * w + vector.dot(vector)) {
             return Ok(Self::from_parts(w, vector));
         }
@@ -54,9 +55,9 @@ pub(super) struct StoredTransform3 {
 }
 
 impl<From, To> TryFrom<StoredTransform3> for Transform3<From, To> {
-    type Error = MatrixError;
+    type Error = ConfigError;
 
-    fn try_from(stored: StoredTransform3) -> Result<Self, MatrixError> {
+    fn try_from(stored: StoredTransform3) -> Result<Self, ConfigError> {
         let StoredTransform3 { rows, translation_m } = stored;
         Rotation3::check_rows(rows)?;
         Ok(Self::from_parts(rows, translation_m))

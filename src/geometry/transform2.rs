@@ -1,7 +1,8 @@
 use super::arc::Arc;
 use super::error::TOLERANCE;
 use super::vector::copy;
-use super::{Body, MatrixError, Point2, Pose2, Rotation2, Twist, Vec2};
+use super::{Body, Point2, Pose2, Rotation2, Twist, Vec2};
+use crate::error::ConfigError;
 use core::marker::PhantomData;
 
 /// Where the frame `From` stands in the frame `To`; applied to a point in `From` it gives the point in `To`.
@@ -176,19 +177,19 @@ impl<From, To> Transform2<From, To> {
     /// Takes a homogeneous matrix, rows first.
     ///
     /// # Errors
-    /// [`MatrixError`] when a number is not finite, the upper left 2x2 is no rotation (to 1e-3) or the last row is not
+    /// [`ConfigError`] when a number is not finite, the upper left 2x2 is no rotation (to 1e-3) or the last row is not
     /// 0, 0, 1.
-    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, MatrixError> {
+    pub fn from_matrix(matrix: [[f32; 3]; 3]) -> Result<Self, ConfigError> {
         let [[a, b, x], [c, d, y], last] = matrix;
         if !matrix.as_flattened().iter().all(|number| number.is_finite()) {
-            return Err(MatrixError::NotFinite);
+            return Err(ConfigError::NotFinite("matrix"));
         }
         let near = |is: f32, should: f32| (is - should).abs() <= TOLERANCE;
         if !(near(a, d) && near(b, -c) && near(a * a + c * c, 1.0)) {
-            return Err(MatrixError::NotRotation);
+            return Err(ConfigError::Unusable("rotation of the matrix"));
         }
         if !last.iter().zip([0.0, 0.0, 1.0]).all(|(&is, should)| near(is, should)) {
-            return Err(MatrixError::NotHomogeneous);
+            return Err(ConfigError::Unusable("last row of the matrix"));
         }
         let rotation = Rotation2::from_parts(0.5 * (a + d), 0.5 * (c - b)).normalized();
         Ok(Self::new(rotation, Vec2::new(x, y)))
@@ -273,9 +274,9 @@ mod tests {
             changed[row][column] = value;
             BodyToWorld::from_matrix(changed)
         };
-        assert_eq!(with(0, 2, f32::NAN), Err(MatrixError::NotFinite));
-        assert_eq!(with(0, 0, -0.5), Err(MatrixError::NotRotation));
-        assert_eq!(with(2, 2, 2.0), Err(MatrixError::NotHomogeneous));
+        assert_eq!(with(0, 2, f32::NAN), Err(ConfigError::NotFinite("matrix")));
+        assert_eq!(with(0, 0, -0.5), Err(ConfigError::Unusable("rotation of the matrix")));
+        assert_eq!(with(2, 2, 2.0), Err(ConfigError::Unusable("last row of the matrix")));
         assert!(
             BodyToWorld::from_matrix(matrix).is_ok_and(|t| difference(t, at(1.0, 2.0, 0.5)) < 1e-6)
         );

@@ -1,6 +1,7 @@
 use super::error::TOLERANCE;
 use super::vector::copy;
-use super::{MatrixError, Point3, Rotation3, Vec3};
+use super::{Point3, Rotation3, Vec3};
+use crate::error::ConfigError;
 use core::marker::PhantomData;
 
 /// Where the frame `From` stands in the frame `To`, in space; applied to a point in `From` it gives the point in `To`.
@@ -148,17 +149,17 @@ impl<From, To> Transform3<From, To> {
     /// Takes a homogeneous matrix, rows first.
     ///
     /// # Errors
-    /// [`MatrixError`] when a number is not finite, the upper left 3x3 is no rotation (to 1e-3) or the last row is not
+    /// [`ConfigError`] when a number is not finite, the upper left 3x3 is no rotation (to 1e-3) or the last row is not
     /// 0, 0, 0, 1.
-    pub fn from_matrix(matrix: [[f32; 4]; 4]) -> Result<Self, MatrixError> {
+    pub fn from_matrix(matrix: [[f32; 4]; 4]) -> Result<Self, ConfigError> {
         let [[a, b, c, x], [d, e, f, y], [g, h, i, z], last] = matrix;
         if !matrix.as_flattened().iter().all(|number| number.is_finite()) {
-            return Err(MatrixError::NotFinite);
+            return Err(ConfigError::NotFinite("matrix"));
         }
         let rotation = Rotation3::from_matrix([[a, b, c], [d, e, f], [g, h, i]])?;
         let bottom = [0.0, 0.0, 0.0, 1.0];
         if !last.iter().zip(bottom).all(|(is, should)| (is - should).abs() <= TOLERANCE) {
-            return Err(MatrixError::NotHomogeneous);
+            return Err(ConfigError::Unusable("last row of the matrix"));
         }
         Ok(Self::new(rotation, Vec3::new(x, y, z)))
     }
@@ -231,7 +232,10 @@ mod tests {
     fn a_last_row_that_scales_is_refused() {
         let mut matrix = BodyToWorld::IDENTITY.to_matrix();
         matrix[3][3] = 2.0;
-        assert_eq!(BodyToWorld::from_matrix(matrix), Err(MatrixError::NotHomogeneous));
+        assert_eq!(
+            BodyToWorld::from_matrix(matrix),
+            Err(ConfigError::Unusable("last row of the matrix"))
+        );
     }
 
     proptest! {

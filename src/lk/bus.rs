@@ -1,11 +1,11 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{id_of, is_command};
-use super::config::sealed::Goal;
-use super::config::{Mode, sealed};
+use super::config::{Goal, Mode};
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
 use super::questions::Questions;
-use super::{Command, ConfigError, Feedback, Model, State};
+use super::{Command, Feedback, Model, State};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
@@ -31,26 +31,26 @@ const OFF: u8 = 0x10;
 /// How many echoes may be due at once.
 const ECHOES: u8 = 3;
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
-/// use drivetrain::lk::{Model, Motor, Velocity};
+/// use drivetrain::lk::{Mode, Model, Motor};
 /// use drivetrain::motor::{Claim, OwnMotor};
 /// use drivetrain::units::AngularVelocity;
 ///
-/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
 /// let motor = Motor::new(Model::MG5010E_I10, 3, mode)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, ["command of MG5010E-i10 #3 on 0x143", "feedback of MG5010E-i10 #3 on 0x143"]);
-/// # Ok::<(), drivetrain::lk::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     is_reversed: bool,
-    mode: M,
+    mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     /// The angle of the rotor in 1/65536 of a turn, with turns.
@@ -71,15 +71,14 @@ pub struct Motor<M> {
     clears: bool,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 32, and the control mode.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=32) {
-            return Err(ConfigError::Id(id));
-        }
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
+        let mode = mode.into();
         mode.check(&model.scale())?;
         Ok(Self {
             model,
@@ -175,7 +174,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -191,7 +190,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         }
         let data = frame.bytes();
         let [code, ..] = *data;
-        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&code);
+        let is_answer = [0x9C, 0xA1, self.mode.code()].contains(&code);
         if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
             return Ingest::Unrelated;
         }
@@ -227,7 +226,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
     /// from the angle until that has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
-        let needs_angle = <M as sealed::Mode>::NEEDS_ANGLE;
+        let needs_angle = self.mode.needs_angle();
         let shaft = (self.angle(), self.velocity());
         let goal = self.mode.goal(order, shaft, &self.model.scale());
         let command = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
@@ -279,8 +278,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        let lacks_angle =
-            <M as sealed::Mode>::NEEDS_ANGLE && self.is_wanted && self.ahead.is_none();
+        let lacks_angle = self.mode.needs_angle() && self.is_wanted && self.ahead.is_none();
         Some(self.is_on && !lacks_angle)
     }
 
@@ -298,9 +296,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             self.state = Some(state);
             return true;
         }
-        if let Some(angle) =
-            Feedback::decode_angle(data).filter(|_| <M as sealed::Mode>::NEEDS_ANGLE)
-        {
+        if let Some(angle) = Feedback::decode_angle(data).filter(|_| self.mode.needs_angle()) {
             self.take_angle(angle);
             return true;
         }

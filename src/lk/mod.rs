@@ -17,18 +17,19 @@
 //! A drive sends one frame for each that it gets, within 0.25 ms, and none by itself. So the bus carries two a motor and cycle: at
 //! 1 kHz and 1 Mbit/s it is full with three.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. The control
-//! mode is its type:
+//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its control
+//! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by |
 //! |---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): torque frames, the loops run here | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode |
-//! | [`Velocity`] | velocity | the drive alone, or `with_torque_limit` |
-//! | [`PositionVelocity`] | angle | the drive alone |
+//! | [`Mode::velocity`] | velocity | the drive alone |
+//! | [`Mode::velocity_with_torque_limit`] | velocity | the drive, and the torque limit of the mode |
+//! | [`Mode::position_velocity`] | angle | the drive alone |
 //!
 //! **Rest is a torque frame with a current of 0** in each mode, and the drive is off besides. It answers a torque frame with feedback
 //! when it is off too, so that frame also polls it. `0x81` (stop) is never sent: the manual does not say whether a stopped drive holds.
-//! **Off clears the turns** that the drive has counted. So [`PositionVelocity`] reads the angle anew each time when the drive runs,
+//! **Off clears the turns** that the drive has counted. So [`Mode::position_velocity`] reads the angle anew each time when the drive runs,
 //! before it sends a position, and each 32 cycles from then on: a drive whose count has changed by more than half a turn of the rotor
 //! has lost its supply, and trips the motor.
 //!
@@ -45,8 +46,8 @@
 //! **Feedback is told from other frames by its first byte.** The echo of off and run is no feedback. One id has both directions, so
 //! a command that is read back would look like feedback: a frame that reads like a command of the motor is taken for one of another
 //! controller, see [`second_master`](crate::motor::CanDevice::second_master). At exactly 0 °C some feedback reads like a command,
-//! and is lost: at rest and in torque mode that without a current and with an encoder of 0, in [`Velocity`] that without a current or
-//! below the limit, in [`PositionVelocity`] that with a small positive current.
+//! and is lost: at rest and in torque mode that without a current and with an encoder of 0, in [`Mode::velocity`] that without a current or
+//! below the limit, in [`Mode::position_velocity`] that with a small positive current.
 //!
 //! Angles and velocities are those of the output shaft, from the encoder of the rotor and the gear. The angle of a geared motor
 //! is counted from the rotor's angle at the first feedback; the rotor has to make less than half a turn between two frames.
@@ -75,7 +76,6 @@
 pub(crate) mod bus;
 pub(crate) mod command;
 pub(crate) mod config;
-mod error;
 mod feedback;
 pub(crate) mod model;
 pub(crate) mod questions;
@@ -84,7 +84,6 @@ mod tests;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{Mode, PositionVelocity, Velocity};
-pub use error::ConfigError;
+pub use config::Mode;
 pub use feedback::{Feedback, State};
 pub use model::{Model, Series};

@@ -1,6 +1,6 @@
 //! Facts of the models, as a table that a program can extend.
 
-use super::ConfigError;
+use crate::error::{ConfigError, check};
 
 /// The largest current of a command, in counts.
 pub(super) const MOST_COUNTS: f32 = 2_048.0;
@@ -42,7 +42,8 @@ impl Series {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::lk::{ConfigError, Model, Series};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::lk::{Model, Series};
 ///
 /// assert!((Model::MF9025_16T.max_torque_nm() - 16.5 * 0.32).abs() < 1e-5);
 /// let mine = Model::new("MG8008E-i9", Series::Mg, 9.0, 2.07, 16)?;
@@ -102,15 +103,9 @@ impl Model {
         torque_constant: f32,
         encoder_bits: u8,
     ) -> Result<Self, ConfigError> {
-        if !(gear >= 1.0 && gear <= 1_000.0) {
-            return Err(ConfigError::Gear(gear));
-        }
-        if !(torque_constant >= 0.001 && torque_constant <= 1_000.0) {
-            return Err(ConfigError::TorqueConstant(torque_constant));
-        }
-        if !matches!(encoder_bits, 14..=16) {
-            return Err(ConfigError::EncoderBits(encoder_bits));
-        }
+        check!(ConfigError::check_range("gear", gear, 1.0, 1_000.0));
+        check!(ConfigError::check_range("torque constant", torque_constant, 0.001, 1_000.0));
+        check!(ConfigError::check_range("encoder bits", encoder_bits as f32, 14.0, 16.0));
         Ok(Self { name, series, gear, torque_constant, encoder_bits })
     }
 
@@ -171,7 +166,7 @@ pub(crate) const RAD_PER_DEGREE: f32 = core::f32::consts::PI / 180.0;
 
 /// The numbers of a model that the control modes need: those of `rmd` too.
 #[derive(Debug, Clone, Copy)]
-pub struct Scale {
+pub(crate) struct Scale {
     /// The torque of a count of current, in Nm.
     pub torque_per_count: f32,
     /// The largest torque, in Nm.

@@ -1,3 +1,4 @@
+use crate::error::ConfigError;
 use crate::time::Duration;
 
 /// Whether a motor is heard.
@@ -73,20 +74,22 @@ impl Timeouts {
     /// let blind = Timeouts::new().with_feedback(Duration::from_secs(10), Duration::from_millis(1));
     /// assert_eq!(
     ///     blind.map_err(|error| error.to_string()),
-    ///     Err("late after 10000000 us: 1 us to 1000000 us are allowed".into()),
+    ///     Err("late in us 10000000: 1 to 1000000 are allowed".into()),
     /// );
-    /// # Ok::<(), drivetrain::motor::TimeoutError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn with_feedback(
         self,
         late: Duration,
         offline: Duration,
-    ) -> Result<Self, TimeoutError> {
-        let late_us = match within("late", late, 1, BLIND_US) {
+    ) -> Result<Self, ConfigError> {
+        let late_us = match ConfigError::check_micros("late in us", late.micros_u32(), 1, BLIND_US)
+        {
             Ok(micros) => micros,
             Err(error) => return Err(error),
         };
-        match within("offline", offline, late_us, LONGEST_US) {
+        match ConfigError::check_micros("offline in us", offline.micros_u32(), late_us, LONGEST_US)
+        {
             Ok(offline_us) => Ok(Self { late_us, offline_us, ..self }),
             Err(error) => Err(error),
         }
@@ -97,8 +100,8 @@ impl Timeouts {
     ///
     /// # Errors
     /// The age is zero or longer than 1 s.
-    pub const fn with_command(self, command: Duration) -> Result<Self, TimeoutError> {
-        match within("command", command, 1, BLIND_US) {
+    pub const fn with_command(self, command: Duration) -> Result<Self, ConfigError> {
+        match ConfigError::check_micros("command in us", command.micros_u32(), 1, BLIND_US) {
             Ok(command_us) => Ok(Self { command_us, ..self }),
             Err(error) => Err(error),
         }
@@ -109,8 +112,9 @@ impl Timeouts {
     ///
     /// # Errors
     /// The age is out of that range.
-    pub const fn with_measured(self, measured: Duration) -> Result<Self, TimeoutError> {
-        match within("measurement", measured, 1_000, BLIND_US) {
+    pub const fn with_measured(self, measured: Duration) -> Result<Self, ConfigError> {
+        match ConfigError::check_micros("measurement in us", measured.micros_u32(), 1_000, BLIND_US)
+        {
             #[expect(clippy::cast_possible_truncation, reason = "at most 1000")]
             Ok(micros) => Ok(Self { measured_ms: (micros / 1_000) as u16, ..self }),
             Err(error) => Err(error),
@@ -181,55 +185,3 @@ const BLIND_US: u32 = 1_000_000;
 
 /// Far below the 71 minutes after which a 32-bit stamp repeats.
 const LONGEST_US: u32 = 10_000_000;
-
-/// An age that [`Timeouts`] refuse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct TimeoutError {
-    /// The name of the age.
-    pub parameter: &'static str,
-    /// The value that was given.
-    pub given: Duration,
-    /// The shortest that is allowed.
-    pub shortest: Duration,
-    /// The longest that is allowed.
-    pub longest: Duration,
-}
-
-impl core::fmt::Display for TimeoutError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { parameter, given, shortest, longest } = self;
-        let [given, shortest, longest] = [given, shortest, longest].map(|age| age.as_micros());
-        write!(f, "{parameter} after {given} us: {shortest} us to {longest} us are allowed")
-    }
-}
-
-impl core::error::Error for TimeoutError {}
-
-const fn within(
-    parameter: &'static str,
-    given: Duration,
-    shortest_us: u32,
-    longest_us: u32,
-) -> Result<u32, TimeoutError> {
-    match given.micros_u32() {
-        Some(micros) if micros >= shortest_us && micros <= longest_us => Ok(micros),
-        _ => Err(TimeoutError {
-            parameter,
-            given,
-            shortest: Duration::from_micros(shortest_us as u64),
-            longest: Duration::from_micros(longest_us as u64),
-        }),
-    }
-}
-
-/// What an armed motor does when it is heard again after being offline.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Recovery {
-    /// It stays relaxed until it is armed again.
-    #[default]
-    Rearm,
-    /// It takes targets again; its output range opens from zero as after arming.
-    Resume,
-}

@@ -3,8 +3,7 @@
 use super::command::{
     COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, heard, id, request,
 };
-use super::config::sealed::Wanted;
-use super::config::{Mode, sealed};
+use super::config::Wanted;
 use super::enabling::{NOT_SET, PARTS, Phase};
 use super::feedback::{bit_of, endpoint_value};
 use super::{Feedback, Firmware, Heartbeat, Motor};
@@ -39,7 +38,7 @@ const MOST_FRAMES: u8 = 200;
 /// Added to the bit of a reason for which the drive disarmed.
 const DISARMED: u8 = 128;
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.node)
     }
@@ -53,7 +52,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             (None, Some(_)) => &[0x04],
             (None, None) => &[],
         };
-        let target: &[u8] = match <M as sealed::Mode>::NUMBER {
+        let target: &[u8] = match self.mode.number() {
             1 => &[0x0E],
             2 => &[0x0D],
             _ => &[0x0C],
@@ -97,7 +96,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         if self.asks() {
             return request(self.node, ESTIMATES);
         }
-        match <M as sealed::Mode>::NUMBER {
+        match self.mode.number() {
             1 => self.send(Command::Torque(0.0)),
             _ => self.idle(),
         }
@@ -121,15 +120,14 @@ impl<M: Mode> OwnMotor for Motor<M> {
             return request(self.node, ESTIMATES);
         }
         let (sent, since) = self.limits;
-        let parts =
-            if <M as sealed::Mode>::NUMBER == 1 { PARTS } else { parts_of(order.share).min(PARTS) };
+        let parts = if self.mode.number() == 1 { PARTS } else { parts_of(order.share).min(PARTS) };
         self.limits = (sent, since.saturating_add(1));
         if parts != sent || since >= LIMITS_EACH {
             self.limits = (parts, 0);
             return self.limits_of(parts);
         }
         // In position mode firmware 0.5 would take the angle of the shaft for its target.
-        if since == LIMITS_EACH / 2 && <M as sealed::Mode>::NUMBER < 3 {
+        if since == LIMITS_EACH / 2 && self.mode.number() < 3 {
             return self.modes();
         }
         let velocity = self.velocity();
@@ -169,7 +167,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     fn disable(&mut self) -> Option<CanFrame> {
         (self.phase, self.enabling, self.rests) = (Phase::Off, None, 0);
         self.refused = self.refused.and_then(|(code, left)| Some((code, left.checked_sub(1)?)));
-        (<M as sealed::Mode>::NUMBER == 1).then(|| self.idle())
+        (self.mode.number() == 1).then(|| self.idle())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
@@ -264,7 +262,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Counts a frame of rest, and tells whether estimates are to be asked for instead.
     fn asks(&mut self) -> bool {
         self.rests = (self.rests + 1) % POLL_UPDATES;
@@ -273,7 +271,7 @@ impl<M: Mode> Motor<M> {
 
     /// Returns a command that leaves the shaft as it is.
     fn stay(&self, drive: &Feedback) -> CanFrame {
-        self.send(match <M as sealed::Mode>::NUMBER {
+        self.send(match self.mode.number() {
             2 => Command::Velocity(drive.turns_per_s, 0.0),
             3 => Command::Position(drive.turns, 0.0, 0.0),
             _ => Command::Torque(0.0),

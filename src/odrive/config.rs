@@ -1,83 +1,123 @@
-//! The control modes and the endpoints, with what a user chooses for each.
+//! The control mode and the endpoints, with what a user chooses for each.
 
-use super::ConfigError;
+use crate::error::ConfigError;
 use crate::motor::{Capabilities, Capability, Impedance, ImpedanceControl, Order, Target};
 use crate::units::{Angle, AngularVelocity};
 
-/// A control mode of the drive: [`ImpedanceControl`] for torque, [`Velocity`] or [`Position`].
-pub trait Mode: sealed::Mode {}
+/// A control mode of the drive. An [`ImpedanceControl`] is one too: torque mode, in which the drive follows a torque that our gains or
+/// loops compute for each cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Mode(Kind);
 
-impl<M: sealed::Mode> Mode for M {}
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Torque(ImpedanceControl),
+    /// The torque limit in Nm.
+    Velocity(f32),
+    Position {
+        torque_limit_nm: f32,
+        /// 1 passthrough, 3 filter, 5 trajectory.
+        input: u8,
+        /// Of a trajectory, in rad/s².
+        acceleration: Option<f32>,
+    },
+}
 
-pub(super) mod sealed {
-    use super::{Angle, AngularVelocity, Capabilities, ConfigError, Order};
-
-    /// A command in units of the output shaft: Nm, rad/s, or rad.
-    #[derive(Debug, Clone, Copy)]
-    pub enum Wanted {
-        Torque(f32),
-        Velocity(f32),
-        Angle(f32),
-    }
-
-    pub trait Mode: core::fmt::Debug + Copy {
-        /// The control mode: 1 torque, 2 velocity, 3 position.
-        const NUMBER: u8;
-
-        /// Returns the input mode: 1 passthrough, 3 filter, 5 trajectory.
-        fn input(&self) -> u8 {
-            1
-        }
-
-        /// Returns the acceleration of a trajectory in rad/s².
-        fn acceleration(&self) -> Option<f32> {
-            None
-        }
-
-        fn torque_limit_nm(&self) -> f32;
-
-        /// # Errors
-        /// A limit that is not above zero and finite.
-        fn check(&self) -> Result<(), ConfigError> {
-            let limit = self.torque_limit_nm();
-            let is_valid = limit > 0.0 && limit.is_finite();
-            if is_valid { Ok(()) } else { Err(ConfigError::TorqueLimit(limit)) }
-        }
-
-        fn capabilities(&self) -> Capabilities;
-
-        /// Returns what the drive is told; `None` to rest.
-        fn command(
-            &mut self,
-            order: Order,
-            angle: Angle,
-            velocity: AngularVelocity,
-        ) -> Option<Wanted>;
-
-        /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
-        fn effort(&self) -> f32 {
-            0.0
-        }
-
-        fn reset(&mut self) {}
+impl From<ImpedanceControl> for Mode {
+    fn from(control: ImpedanceControl) -> Self {
+        Self(Kind::Torque(control))
     }
 }
 
-use sealed::Wanted;
+/// A command in units of the output shaft: Nm, rad/s, or rad.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Wanted {
+    Torque(f32),
+    Velocity(f32),
+    Angle(f32),
+}
 
-/// Torque mode: the drive follows a torque, which our gains or loops compute for each cycle.
-impl sealed::Mode for ImpedanceControl {
-    const NUMBER: u8 = 1;
-
-    fn torque_limit_nm(&self) -> f32 {
-        Self::torque_limit_nm(self)
+impl Mode {
+    /// Velocity mode: the drive's own loop follows a velocity, with at most this torque of the output shaft in Nm, above 0: the drive
+    /// gets a current limit for it.
+    #[must_use]
+    pub const fn velocity(torque_limit_nm: f32) -> Self {
+        Self(Kind::Velocity(torque_limit_nm))
     }
 
-    fn capabilities(&self) -> Capabilities {
-        Self::capabilities(self)
+    /// Position mode: the drive's own loops go to an angle by the shortest way, with at most this torque of the output shaft in Nm,
+    /// above 0. Each target is followed at once, up to the velocity limit of the motor.
+    #[must_use]
+    pub const fn position(torque_limit_nm: f32) -> Self {
+        Self(Kind::Position { torque_limit_nm, input: 1, acceleration: None })
     }
 
-    fn command(&mut self, order: Order, angle: Angle, velocity: AngularVelocity) -> Option<Wanted> {
+    /// As [`position`](Self::position), and the drive smooths each target with its second-order filter, whose `input_filter_bandwidth` is
+    /// a setting of the drive.
+    #[must_use]
+    pub const fn position_with_filter(torque_limit_nm: f32) -> Self {
+        Self(Kind::Position { torque_limit_nm, input: 3, acceleration: None })
+    }
+
+    /// As [`position`](Self::position), and the drive plans a trajectory to each target: at most as fast as the velocity limit of the
+    /// motor, with this acceleration and deceleration of the output shaft in rad/s², above 0.
+    #[must_use]
+    pub const fn position_with_trajectory(torque_limit_nm: f32, acceleration: f32) -> Self {
+        Self(Kind::Position { torque_limit_nm, input: 5, acceleration: Some(acceleration) })
+    }
+
+    /// The control mode: 1 torque, 2 velocity, 3 position.
+    pub(super) const fn number(&self) -> u8 {
+        match self.0 {
+            Kind::Torque(_) => 1,
+            Kind::Velocity(_) => 2,
+            Kind::Position { .. } => 3,
+        }
+    }
+
+    /// Returns the input mode: 1 passthrough, 3 filter, 5 trajectory.
+    pub(super) const fn input(&self) -> u8 {
+        if let Kind::Position { input, .. } = self.0 { input } else { 1 }
+    }
+
+    /// Returns the acceleration of a trajectory in rad/s².
+    pub(super) const fn acceleration(&self) -> Option<f32> {
+        if let Kind::Position { acceleration, .. } = self.0 { acceleration } else { None }
+    }
+
+    pub(super) const fn torque_limit_nm(&self) -> f32 {
+        match &self.0 {
+            Kind::Torque(control) => control.torque_limit_nm(),
+            Kind::Velocity(torque_limit_nm) | Kind::Position { torque_limit_nm, .. } => {
+                *torque_limit_nm
+            }
+        }
+    }
+
+    /// # Errors
+    /// A limit that is not above zero and finite.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        ConfigError::check_limit("torque limit in Nm", self.torque_limit_nm(), f32::MAX)?;
+        self.acceleration().map_or(Ok(()), |limit| {
+            ConfigError::check_limit("acceleration in rad/s^2", limit, f32::MAX)
+        })
+    }
+
+    pub(super) fn capabilities(&self) -> Capabilities {
+        match &self.0 {
+            Kind::Torque(control) => control.capabilities(),
+            Kind::Velocity(_) => Capabilities::of(&[Capability::Velocity]),
+            Kind::Position { .. } => Capabilities::of(&[Capability::Angle]),
+        }
+    }
+
+    /// Returns what the drive is told; `None` to rest.
+    pub(super) fn command(
+        &mut self,
+        order: Order,
+        angle: Angle,
+        velocity: AngularVelocity,
+    ) -> Option<Wanted> {
         const MOST: Impedance = Impedance {
             angle: Angle::from_radians(f32::MAX),
             velocity: AngularVelocity::from_rad_per_s(f32::MAX),
@@ -85,104 +125,32 @@ impl sealed::Mode for ImpedanceControl {
             damping: f32::MAX,
             torque_nm: f32::MAX,
         };
-        let limit = Self::torque_limit_nm(self);
-        let most = limit * order.share;
-        self.step(order, Some(angle), velocity, &MOST, &Impedance::FREE)?;
-        let torque_nm = (Self::effort(self) * limit).min(most).max(-most);
-        Some(Wanted::Torque(torque_nm))
+        match (&mut self.0, order.target) {
+            (Kind::Torque(control), _) => {
+                let limit = control.torque_limit_nm();
+                let most = limit * order.share;
+                control.step(order, Some(angle), velocity, &MOST, &Impedance::FREE)?;
+                Some(Wanted::Torque((control.effort() * limit).min(most).max(-most)))
+            }
+            (Kind::Velocity(_), Target::Velocity(velocity)) => {
+                Some(Wanted::Velocity(velocity.as_rad_per_s()))
+            }
+            (Kind::Position { .. }, Target::Angle(angle)) => {
+                Some(Wanted::Angle(angle.as_radians()))
+            }
+            _ => None,
+        }
     }
 
-    fn effort(&self) -> f32 {
-        Self::effort(self)
+    /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
+    pub(super) fn effort(&self) -> f32 {
+        if let Kind::Torque(control) = &self.0 { control.effort() } else { 0.0 }
     }
 
-    fn reset(&mut self) {
-        Self::reset(self);
-    }
-}
-
-/// Velocity mode: the drive's own loop follows a velocity.
-#[derive(Debug, Clone, Copy)]
-pub struct Velocity {
-    torque_limit_nm: f32,
-}
-
-impl Velocity {
-    /// Limits the torque of the output shaft in Nm, above 0: the drive gets a current limit for it.
-    #[must_use]
-    pub const fn new(torque_limit_nm: f32) -> Self {
-        Self { torque_limit_nm }
-    }
-}
-
-impl sealed::Mode for Velocity {
-    const NUMBER: u8 = 2;
-
-    fn torque_limit_nm(&self) -> f32 {
-        self.torque_limit_nm
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Velocity])
-    }
-
-    fn command(&mut self, order: Order, _: Angle, _: AngularVelocity) -> Option<Wanted> {
-        let Target::Velocity(velocity) = order.target else { return None };
-        Some(Wanted::Velocity(velocity.as_rad_per_s()))
-    }
-}
-
-/// Position mode: the drive's own loops go to an angle by the shortest way.
-#[derive(Debug, Clone, Copy)]
-pub struct Position {
-    torque_limit_nm: f32,
-    input: u8,
-    acceleration: Option<f32>,
-}
-
-impl Position {
-    /// Limits the torque of the output shaft in Nm, above 0. Each target is followed at once, up to the velocity limit of the motor.
-    #[must_use]
-    pub const fn new(torque_limit_nm: f32) -> Self {
-        Self { torque_limit_nm, input: 1, acceleration: None }
-    }
-
-    /// Has the drive smooth each target with its second-order filter, whose `input_filter_bandwidth` is a setting of the drive.
-    #[must_use]
-    pub const fn with_filter(self) -> Self {
-        Self { input: 3, acceleration: None, ..self }
-    }
-
-    /// Has the drive plan a trajectory to each target: at most as fast as the velocity limit of the motor, with this acceleration and
-    /// deceleration of the output shaft in rad/s², above 0.
-    #[must_use]
-    pub const fn with_trajectory(self, acceleration: f32) -> Self {
-        Self { input: 5, acceleration: Some(acceleration), ..self }
-    }
-}
-
-impl sealed::Mode for Position {
-    const NUMBER: u8 = 3;
-
-    fn input(&self) -> u8 {
-        self.input
-    }
-
-    fn acceleration(&self) -> Option<f32> {
-        self.acceleration
-    }
-
-    fn torque_limit_nm(&self) -> f32 {
-        self.torque_limit_nm
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Angle])
-    }
-
-    fn command(&mut self, order: Order, _: Angle, _: AngularVelocity) -> Option<Wanted> {
-        let Target::Angle(angle) = order.target else { return None };
-        Some(Wanted::Angle(angle.as_radians()))
+    pub(super) fn reset(&mut self) {
+        if let Kind::Torque(control) = &mut self.0 {
+            control.reset();
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! How a drive is brought into closed loop, step by step.
 
 use super::command::{Command, ESTIMATES, HEARTBEAT, endpoint, request};
-use super::config::{Endpoints, Mode, Setting, sealed};
+use super::config::{Endpoints, Setting};
 use super::{Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::Inquiry;
@@ -29,7 +29,7 @@ pub(super) enum Phase {
 }
 
 /// Frames that several steps send.
-impl<M: Mode> Motor<M> {
+impl Motor {
     pub(super) fn send(&self, command: Command) -> CanFrame {
         command.frame(self.node)
     }
@@ -49,7 +49,7 @@ impl<M: Mode> Motor<M> {
 
     /// Sets control mode and input mode.
     pub(super) fn modes(&self) -> CanFrame {
-        let (control, input) = (<M as sealed::Mode>::NUMBER, self.mode.input());
+        let (control, input) = (self.mode.number(), self.mode.input());
         self.send(Command::ControllerMode(control.into(), input.into()))
     }
 
@@ -63,7 +63,7 @@ impl<M: Mode> Motor<M> {
 }
 
 /// How the drive is enabled.
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Returns the next frame on the way to closed loop.
     pub(super) fn starting(&mut self) -> CanFrame {
         let turn = match self.phase {
@@ -148,7 +148,7 @@ impl<M: Mode> Motor<M> {
     /// Returns the value that a setting has to have.
     fn expected(&self, setting: Setting) -> f32 {
         match setting {
-            Setting::ControlMode => <M as sealed::Mode>::NUMBER.into(),
+            Setting::ControlMode => self.mode.number().into(),
             Setting::InputMode => self.mode.input().into(),
             Setting::WatchdogTimeout => self.endpoints.map_or(0.0, |(_, watchdog)| watchdog),
             Setting::EnableWatchdog => 1.0,

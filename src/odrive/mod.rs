@@ -12,14 +12,14 @@
 //! endpoints  0x04, answer 0x05, 0.6 only        read or write | number u16 | 0 | value
 //! ```
 //! Turns, torques and currents on the wire are those of the motor; those of [`Motor`] are of the output shaft, by its
-//! [gear](Motor::with_gear) and [direction](Motor::reversed). [`Own`](crate::motor::Own) makes a device of a motor. The control mode is its
-//! type:
+//! [gear](Motor::with_gear) and [direction](Motor::reversed). [`Own`](crate::motor::Own) makes a device of a motor. Its control mode is an
+//! [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
 //! |---|---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): torque | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | each command, and the drive's current limit | a torque of zero, then idle |
-//! | [`Velocity`] | velocity | the drive's current limit | idle |
-//! | [`Position`] | angle; at once, by the drive's filter, or by its trajectory | the drive's current limit | idle |
+//! | [`Mode::velocity`] | velocity | the drive's current limit | idle |
+//! | [`Mode::position`], [`position_with_filter`](Mode::position_with_filter), [`position_with_trajectory`](Mode::position_with_trajectory) | angle; at once, by the drive's filter, or by its trajectory | the drive's current limit | idle |
 //!
 //! **The link is the encoder estimates.** They alone count as feedback. The heartbeat tells the state of the axis and its errors: a motor
 //! without one for half a second is not armed, and one that is driven trips. Stale estimates beside a fresh heartbeat do not drive.
@@ -56,12 +56,12 @@
 //!
 //! ```
 //! use drivetrain::motor::{Devices, Own};
-//! use drivetrain::odrive::{Firmware, Model, Motor, Velocity};
+//! use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 //! use drivetrain::time::Instant;
 //! use drivetrain::units::AngularVelocity;
 //!
 //! let fastest = AngularVelocity::from_rpm(600.0); // of the wheel
-//! let motor = Motor::new(Model::D5065, Firmware::V0_5, 3, fastest, Velocity::new(2.0))?; // at most 2 Nm
+//! let motor = Motor::new(Model::D5065, Firmware::V0_5, 3, fastest, Mode::velocity(2.0))?; // at most 2 Nm
 //! let mut wheel = Own::new(motor.with_gear(5.0)?.reversed());
 //! let refused = wheel.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from D5065 #3".into()));
@@ -78,7 +78,6 @@ mod bus;
 mod command;
 mod config;
 mod enabling;
-mod error;
 mod feedback;
 mod model;
 mod motor;
@@ -86,8 +85,7 @@ mod motor;
 mod tests;
 
 pub use command::Command;
-pub use config::{Endpoints, Mode, Position, Velocity};
-pub use error::ConfigError;
+pub use config::{Endpoints, Mode};
 pub use feedback::{Feedback, Firmware, Heartbeat};
 pub use model::Model;
 pub use motor::Motor;

@@ -1,6 +1,6 @@
 //! Facts of the motors, as a table that a program can extend.
 
-use super::ConfigError;
+use crate::error::ConfigError;
 
 /// A motor at an ODrive: its name and its torque constant.
 ///
@@ -15,7 +15,8 @@ use super::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::odrive::{ConfigError, Model};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::odrive::Model;
 ///
 /// assert!((Model::D5065.torque_constant() - 0.03063).abs() < 1e-5);
 /// let hub = Model::new("hoverboard", 16.0)?; // 0.517 Nm/A
@@ -43,12 +44,11 @@ impl Model {
     /// Describes another motor by its velocity constant in rpm/V.
     ///
     /// # Errors
-    /// [`ConfigError::VelocityConstant`] for a constant that is not between 0.1 and 100000.
+    /// [`ConfigError::Range`] for a constant that is not between 0.1 and 100000.
     pub const fn new(name: &'static str, kv: f32) -> Result<Self, ConfigError> {
-        if kv >= 0.1 && kv <= 100_000.0 {
-            Ok(Self { name, kv })
-        } else {
-            Err(ConfigError::VelocityConstant(kv))
+        match ConfigError::check_range("velocity constant in rpm/V", kv, 0.1, 100_000.0) {
+            Ok(()) => Ok(Self { name, kv }),
+            Err(error) => Err(error),
         }
     }
 

@@ -2,36 +2,37 @@
 
 use super::config::{Endpoints, Mode, Setting};
 use super::enabling::Phase;
-use super::{ConfigError, Feedback, Firmware, Heartbeat, Model};
+use super::{Feedback, Firmware, Heartbeat, Model};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::Settings;
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
 /// use drivetrain::motor::{Claim, OwnMotor};
-/// use drivetrain::odrive::{Firmware, Model, Motor, Velocity};
+/// use drivetrain::odrive::{Firmware, Mode, Model, Motor};
 /// use drivetrain::units::AngularVelocity;
 ///
 /// let fastest = AngularVelocity::from_rpm(300.0); // of the output shaft
-/// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Velocity::new(4.0))?.with_gear(8.0)?;
+/// let motor = Motor::new(Model::D6374, Firmware::V0_5, 3, fastest, Mode::velocity(4.0))?.with_gear(8.0)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims.first().map(String::as_str), Some("feedback of D6374 #3 on 0x69"));
 /// assert!(claims.contains(&"command of D6374 #3 on 0x6D".into()));
-/// # Ok::<(), drivetrain::odrive::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     pub(super) model: Model,
     pub(super) firmware: Firmware,
     pub(super) node: u8,
     pub(super) velocity_limit: AngularVelocity,
     /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
     pub(super) gear: f32,
-    pub(super) mode: M,
+    pub(super) mode: Mode,
     /// The endpoints, and the watchdog in s.
     pub(super) endpoints: Option<(Endpoints, f32)>,
     pub(super) settings: Settings<Setting, { Setting::ALL.len() }>,
@@ -63,7 +64,7 @@ pub struct Motor<M> {
     pub(super) stops: bool,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the firmware and the node id of the drive, 0 to 62, the velocity limit of the output shaft, and the control mode
     /// with the torque limit. The output shaft is that of the motor.
     ///
@@ -74,19 +75,13 @@ impl<M: Mode> Motor<M> {
         firmware: Firmware,
         node: u8,
         velocity_limit: AngularVelocity,
-        mode: M,
+        mode: impl Into<Mode>,
     ) -> Result<Self, ConfigError> {
-        if node > 62 {
-            return Err(ConfigError::Node(node));
-        }
+        ConfigError::check_range("node id", node.into(), 0.0, 62.0)?;
+        let mode = mode.into();
         mode.check()?;
         let limit = velocity_limit.as_rad_per_s();
-        if !(limit > 0.0 && limit.is_finite()) {
-            return Err(ConfigError::VelocityLimit(limit));
-        }
-        if let Some(limit) = mode.acceleration().filter(|it| !(*it > 0.0 && it.is_finite())) {
-            return Err(ConfigError::Acceleration(limit));
-        }
+        ConfigError::check_limit("velocity limit in rad/s", limit, f32::MAX)?;
         Ok(Self {
             model,
             firmware,
@@ -116,11 +111,10 @@ impl<M: Mode> Motor<M> {
     /// Sets the turns of the motor for one of the output shaft.
     ///
     /// # Errors
-    /// [`ConfigError::GearRatio`] for a ratio that is not between 0.001 and 100000.
+    /// [`ConfigError::Range`] for a ratio that is not between 0.001 and 100000.
     pub fn with_gear(self, ratio: f32) -> Result<Self, ConfigError> {
-        let is_valid = (0.001..=100_000.0).contains(&ratio);
-        let gear = ratio.copysign(self.gear);
-        if is_valid { Ok(Self { gear, ..self }) } else { Err(ConfigError::GearRatio(ratio)) }
+        ConfigError::check_range("gear ratio", ratio, 0.001, 100_000.0)?;
+        Ok(Self { gear: ratio.copysign(self.gear), ..self })
     }
 
     /// Has the output shaft turn clockwise when the position of the drive rises.
@@ -133,21 +127,18 @@ impl<M: Mode> Motor<M> {
     /// after `watchdog` without a frame, 10 ms to 10 s.
     ///
     /// # Errors
-    /// [`ConfigError::Endpoints`] for firmware 0.5; [`ConfigError::Watchdog`] for another time.
+    /// [`ConfigError::Unsupported`] for firmware 0.5, whose watchdog is set by USB; [`ConfigError::Range`] for another time.
     pub fn with_endpoints(
         self,
         endpoints: Endpoints,
         watchdog: Duration,
     ) -> Result<Self, ConfigError> {
         if self.firmware == Firmware::V0_5 {
-            return Err(ConfigError::Endpoints);
+            return Err(ConfigError::Unsupported("endpoints over CAN (set the watchdog by USB)"));
         }
-        match u32::try_from(watchdog.as_micros()) {
-            Ok(micros @ 10_000..=10_000_000) => {
-                Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
-            }
-            _ => Err(ConfigError::Watchdog(watchdog)),
-        }
+        let micros =
+            ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;
+        Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
     }
 
     /// Returns the last encoder estimates; `None` before the first.

@@ -4,7 +4,8 @@ mod health;
 
 use super::Direction;
 use super::rc::duty;
-use crate::control::{ConfigError, Pid, TimeStep};
+use crate::control::{Pid, TimeStep};
+use crate::error::ConfigError;
 use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
 use crate::time::{Instant, Tick};
 pub use config::BrushedConfig;

@@ -1,4 +1,5 @@
-use crate::control::{ConfigError, TimeStep};
+use crate::control::TimeStep;
+use crate::error::ConfigError;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
     OPENING, TargetError, Timeouts, VelocityDrive,

@@ -3,11 +3,12 @@
 use super::enabling::Enabling;
 use super::model::AMPERES_PER_COUNT;
 use super::track::Track;
-use super::{Command, ConfigError, Feedback, Mode, Model, State};
+use super::{Command, Feedback, Mode, Model, State};
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
 use crate::lk::command::{id_of, is_command};
-use crate::lk::config::sealed::{self, Goal};
+use crate::lk::config::Goal;
 use crate::lk::model::RAD_PER_DEGREE;
 use crate::lk::questions::Questions;
 use crate::motor::{
@@ -32,26 +33,26 @@ const WRITES: u8 = 8;
 /// The first byte of a report that the time-out of the drive has expired.
 const EXPIRED: u8 = 0xF1;
 
-/// A motor of this family, in the control mode `M`: see the [module](super).
+/// A motor of this family, in one control mode: see the [module](super).
 ///
 /// # Examples
 /// ```
 /// use drivetrain::motor::{Claim, OwnMotor};
-/// use drivetrain::rmd::{Model, Motor, Velocity};
+/// use drivetrain::rmd::{Mode, Model, Motor};
 /// use drivetrain::units::AngularVelocity;
 ///
-/// let mode = Velocity::new(AngularVelocity::from_rpm(60.0));
+/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
 /// let motor = Motor::new(Model::X8_120, 3, mode)?;
 /// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
 /// assert_eq!(claims, ["command of RMD-X8-120 #3 on 0x143", "feedback of RMD-X8-120 #3 on 0x243"]);
-/// # Ok::<(), drivetrain::rmd::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     is_reversed: bool,
-    mode: M,
+    mode: Mode,
     /// In ms; `None` to leave the drive's as it is.
     timeout: Option<u32>,
     /// The time-out that the drive answered.
@@ -75,15 +76,14 @@ pub struct Motor<M> {
     asks_angle: bool,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 32, and the control mode.
     ///
     /// # Errors
-    /// Names the value that is not allowed: [`ConfigError::NoTorqueLimit`] for a [`Velocity`](super::Velocity) with a torque limit.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=32) {
-            return Err(ConfigError::Id(id));
-        }
+    /// Names the value that is not allowed: [`ConfigError::Unsupported`] for a velocity with a torque limit.
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
+        let mode = mode.into();
         mode.check(&model.scale())?;
         Ok(Self {
             model,
@@ -116,12 +116,11 @@ impl<M: Mode> Motor<M> {
     /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Timeout`] for another time.
+    /// Names the time that is not allowed.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        match u32::try_from(timeout.as_micros() / 1_000) {
-            Ok(ms @ 10..=60_000) => Ok(Self { timeout: Some(ms), ..self }),
-            _ => Err(ConfigError::Timeout(timeout)),
-        }
+        let micros =
+            ConfigError::check_micros("time-out", timeout.micros_u32(), 10_000, 60_000_000)?;
+        Ok(Self { timeout: Some(micros / 1_000), ..self })
     }
 
     /// Leaves the time-out of the drive as it is: a drive without one goes on with its last command when the cable is cut.
@@ -177,8 +176,8 @@ impl<M: Mode> Motor<M> {
 
     /// The frame that has to be answered before the drive may be driven: a torque does not release the holding brake, and a
     /// position counts from the angle.
-    const fn preparation() -> Option<Command> {
-        match <M as sealed::Mode>::CODE {
+    const fn preparation(&self) -> Option<Command> {
+        match self.mode.code() {
             0xA1 => Some(Command::ReleaseBrake),
             0xA4 => Some(Command::ReadAngle),
             _ => None,
@@ -205,14 +204,14 @@ impl<M: Mode> Motor<M> {
         if self.has_angle && self.track.is_some_and(|track| track.is_far_from(angle)) {
             self.doubt();
         } else {
-            self.enabling.is_prepared |= <M as sealed::Mode>::NEEDS_ANGLE;
+            self.enabling.is_prepared |= self.mode.needs_angle();
         }
         self.track = Some(Track::new(angle, drive.angle_deg));
         (self.has_angle, self.silent) = (true, 0);
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -227,7 +226,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             return Ingest::Malformed(Malformed::Length(frame.length()));
         }
         let data = frame.bytes();
-        let is_answer = [0x9C, 0xA1, <M as sealed::Mode>::CODE].contains(&data[0]);
+        let is_answer = [0x9C, 0xA1, self.mode.code()].contains(&data[0]);
         if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
             return Ingest::Unrelated;
         }
@@ -266,7 +265,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         let shaft = (self.angle(), self.velocity());
         let goal = self.mode.goal(order, shaft, &self.model.scale());
         self.last = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
-        self.silent = self.silent.saturating_add(<M as sealed::Mode>::NEEDS_ANGLE.into());
+        self.silent = self.silent.saturating_add(self.mode.needs_angle().into());
         if self.silent > SILENT {
             return self.frame_of(Command::ReadAngle);
         }
@@ -289,7 +288,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
         }
         self.enabling.is_wanted = true;
         let timeout = self.timeout.filter(|_| !self.has_timeout() && self.writes < WRITES);
-        let command = match (timeout, Self::preparation()) {
+        let command = match (timeout, self.preparation()) {
             _ if !self.enabling.is_sound => Command::ReadState,
             (Some(ms), _) => {
                 self.writes += 1;
@@ -340,7 +339,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             0x92 => {
                 Feedback::decode_angle(data).into_iter().for_each(|angle| self.take_angle(angle))
             }
-            0x77 => self.enabling.is_prepared |= <M as sealed::Mode>::CODE == 0xA1,
+            0x77 => self.enabling.is_prepared |= self.mode.code() == 0xA1,
             0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
             0x78 => self.is_open = false,
             0x80 => self.enabling.is_off = !self.enabling.is_wanted,
@@ -348,7 +347,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
             _ if *data == self.last.encode() => self.doubt(),
             _ => return false,
         }
-        self.enabling.settle(Self::preparation().is_some(), self.has_timeout());
+        self.enabling.settle(self.preparation().is_some(), self.has_timeout());
         true
     }
 

@@ -1,3 +1,3 @@
-//! The control modes: those of `lk`, with the scales of the output shaft.
+//! The control mode: that of `lk`, with the scales of the output shaft.
 
-pub use crate::lk::{Mode, PositionVelocity, Velocity};
+pub use crate::lk::Mode;

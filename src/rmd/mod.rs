@@ -88,7 +88,6 @@ mod bus;
 mod command;
 mod config;
 mod enabling;
-mod error;
 mod feedback;
 mod model;
 #[cfg(test)]
@@ -97,7 +96,6 @@ mod track;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{Mode, PositionVelocity, Velocity};
-pub use error::ConfigError;
+pub use config::Mode;
 pub use feedback::{Feedback, State};
 pub use model::Model;

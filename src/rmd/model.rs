@@ -1,6 +1,6 @@
 //! Facts of the models, as a table that a program can extend.
 
-use super::ConfigError;
+use crate::error::{ConfigError, check};
 use crate::lk::model::Scale;
 
 /// The current of a count, in A (manual, "torque closed loop").
@@ -26,7 +26,8 @@ pub(super) const AMPERES_PER_COUNT: f32 = 0.01;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::rmd::{ConfigError, Model};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::rmd::Model;
 ///
 /// assert!((Model::X8_60.max_torque_nm() - 30.0).abs() < 1e-4);
 /// let mine = Model::new("RMD-X6-8", 1.25, 3.6)?; // 4.5 Nm at 3.6 A
@@ -83,12 +84,13 @@ impl Model {
         torque_constant: f32,
         max_current_a: f32,
     ) -> Result<Self, ConfigError> {
-        if !(torque_constant >= 0.001 && torque_constant <= 1_000.0) {
-            return Err(ConfigError::TorqueConstant(torque_constant));
-        }
-        if !(max_current_a >= AMPERES_PER_COUNT && max_current_a <= 327.0) {
-            return Err(ConfigError::Current(max_current_a));
-        }
+        check!(ConfigError::check_range("torque constant", torque_constant, 0.001, 1_000.0));
+        check!(ConfigError::check_range(
+            "largest current in A",
+            max_current_a,
+            AMPERES_PER_COUNT,
+            327.0
+        ));
         Ok(Self { name, torque_constant, max_current_a })
     }
 

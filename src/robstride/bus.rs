@@ -1,10 +1,11 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{Command, extended};
-use super::config::{Mode, sealed};
+use super::config::Mode;
 use super::feedback::{Answer, answer, laps, register, report_code};
 use super::setup::Setup;
-use super::{ConfigError, Feedback, Model, Register, Status};
+use super::{Feedback, Model, Register, Status};
+use crate::error::{ConfigError, check};
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
@@ -27,7 +28,7 @@ const CALIBRATION_CODE: u8 = 1;
 const COMMANDS: [(u32, u32); 3] =
     [(0x0100_0000, 0x0D00_00FF), (0x0400_0000, 0x1C00_00FF), (0x1200_0000, 0x1B00_00FF)];
 
-/// A motor of this family, in the run mode `M`: see the [module](super).
+/// A motor of this family in one of the run modes: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -46,12 +47,12 @@ const COMMANDS: [(u32, u32); 3] =
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
     host: u8,
     timeout_units: u32,
-    mode: M,
+    mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     /// How many times the range of the feedback the shaft is away from the turns that it can report.
@@ -65,15 +66,14 @@ pub struct Motor<M> {
     turn: u8,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the model, the id of the drive, 1 to 127, and the run mode. The id of the host is 0xFD.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if !matches!(id, 1..=127) {
-            return Err(ConfigError::Id(id));
-        }
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
+        let mode = mode.into();
         mode.check(&model)?;
         let last = if model.has_timeout() { Register::Timeout } else { Register::RunMode };
         Ok(Self {
@@ -94,25 +94,25 @@ impl<M: Mode> Motor<M> {
     /// Sets the id of the host: any but that of a motor.
     ///
     /// # Errors
-    /// [`ConfigError::HostId`] for the id of this motor. That of another one is found where both are attached.
+    /// [`ConfigError::Conflict`] for the id of this motor. That of another one is found where both are attached.
     pub fn with_host_id(self, host: u8) -> Result<Self, ConfigError> {
-        if host == self.id { Err(ConfigError::HostId(host)) } else { Ok(Self { host, ..self }) }
+        if host == self.id {
+            return Err(ConfigError::Conflict("host id"));
+        }
+        Ok(Self { host, ..self })
     }
 
     /// Sets the time without a command after which the drive disables itself: 1 ms to 5 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Timeout`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
+    /// [`ConfigError::Range`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
         if !self.model.has_timeout() {
             return Err(ConfigError::Unsupported("time-out"));
         }
-        match u32::try_from(timeout.as_micros()) {
-            Ok(micros @ 1_000..=5_000_000) => {
-                Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
-            }
-            _ => Err(ConfigError::Timeout(timeout)),
-        }
+        let micros =
+            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 5_000_000)?;
+        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -137,11 +137,9 @@ impl<M: Mode> Motor<M> {
     /// [`read`](Self::read).
     ///
     /// # Errors
-    /// [`ConfigError::Register`] if the parameter is read only, or cannot hold the value.
+    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the parameter.
     pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        if !register.is_writable() || !register.holds(value) {
-            return Err(ConfigError::Register(register, value));
-        }
+        register.check(value)?;
         self.setup.settings.request(Inquiry::Write(register, value));
         Ok(())
     }
@@ -169,10 +167,11 @@ impl<M: Mode> Motor<M> {
     /// of it: make another one.
     ///
     /// # Errors
-    /// [`ConfigError::Id`] for another id, and for that of the host.
+    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for that of the host.
     pub const fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
-        if !matches!(id, 1..=127) || id == self.host {
-            return Err(ConfigError::Id(id));
+        check!(ConfigError::check_range("id", id as f32, 1.0, 127.0));
+        if id == self.host {
+            return Err(ConfigError::Conflict("id"));
         }
         self.setup.once = Some(Command::SetId(id));
         Ok(())
@@ -210,7 +209,7 @@ impl<M: Mode> Motor<M> {
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
             Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
-            Register::MechanicalPosition if <M as sealed::Mode>::NEEDS_ANGLE => {
+            Register::MechanicalPosition if self.mode.needs_angle() => {
                 found.abs() < self.model.pmax_rad()
             }
             _ => found.is_finite(),
@@ -240,7 +239,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name(), self.id)
     }
@@ -287,7 +286,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
     }
 
     fn rest(&mut self) -> CanFrame {
-        match <M as sealed::Mode>::REST {
+        match self.mode.rest() {
             Some(command) => self.frame_of(command),
             None => self.off(),
         }
@@ -319,7 +318,7 @@ impl<M: Mode> OwnMotor for Motor<M> {
 
     fn disable(&mut self) -> Option<CanFrame> {
         self.setup.prepare_anew();
-        <M as sealed::Mode>::REST.is_some().then(|| self.off())
+        self.mode.rest().is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {

@@ -14,20 +14,20 @@
 //! Extended frames of 8 bytes at 1 Mbit/s. A drive sends one for each that it gets, so the bus carries two a motor and cycle: at
 //! 1 kHz it is full with three.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. The run
-//! mode is its type:
+//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its run
+//! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | `run_mode` | targets | torque is limited by | rest is |
 //! |---|--:|---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): operation | 0 | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode, here and in the drive | no gains, no torque |
-//! | [`Position`] | 5, CyberGear 1 | angle | the current limit of the mode | disabled |
-//! | [`Velocity`] | 2 | velocity | the current limit of the mode | disabled |
-//! | [`Current`] | 3 | torque | the current limit of the mode | no current |
+//! | [`Mode::position`] | 5, CyberGear 1 | angle | the current limit of the mode | disabled |
+//! | [`Mode::velocity`] | 2 | velocity | the current limit of the mode | disabled |
+//! | [`Mode::current`] | 3 | torque | the current limit of the mode | no current |
 //!
 //! **Before a motor is armed, `run_mode` is read, and set where it is another one**: a drive forgets it with the supply.
 //! [`arm`](crate::motor::Devices::arm) refuses until the drive has the right one. `mechPos`, the position with its turns, is read as
 //! well: the feedback of a RobStride starts again at the other end of its range, and an angle beyond is none, so that no spring and no
-//! position mode is driven from it. A [`Position`] motor is not armed there.
+//! position mode is driven from it. A motor in [`Mode::position`] is not armed there.
 //!
 //! **Before a drive is enabled**, these are written and read back, each time: `canTimeout`, 100 ms unless configured otherwise; in
 //! the operation mode `limit_torque`; in the position and speed modes `limit_cur` at zero, which opens with the output afterwards, and
@@ -80,7 +80,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod register;
@@ -90,8 +89,7 @@ mod tests;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{Current, Mode, Position, Velocity};
-pub use error::ConfigError;
+pub use config::Mode;
 pub use feedback::{Feedback, Status};
 pub use model::Model;
 pub use register::Register;

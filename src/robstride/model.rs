@@ -1,6 +1,6 @@
 //! Facts of the models, as a table that a program can extend.
 
-use super::ConfigError;
+use crate::error::ConfigError;
 use crate::motor::Impedance;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::Ranges;
@@ -36,7 +36,8 @@ use crate::wire::mit::Ranges;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::robstride::{ConfigError, Model};
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::robstride::Model;
 ///
 /// assert_eq!((Model::RS04.name(), Model::RS04.tmax_nm()), ("RS04", 120.0));
 /// let old = Model::RS00.with_position_range(12.5)?;
@@ -84,7 +85,7 @@ impl Model {
     /// 5 unless [`Ranges::with_gains`] sets them.
     ///
     /// # Errors
-    /// [`ConfigError::CurrentLimit`] for a current that is zero, negative or not finite.
+    /// [`ConfigError::NotPositive`] for a current that is zero, negative or not finite.
     pub const fn new(
         name: &'static str,
         ranges: Ranges,
@@ -93,7 +94,7 @@ impl Model {
         if current_a > 0.0 && current_a.is_finite() {
             Ok(Self { name, ranges, current_a, is_cybergear: false })
         } else {
-            Err(ConfigError::CurrentLimit(current_a, f32::MAX))
+            Err(ConfigError::NotPositive("current_a"))
         }
     }
 
@@ -121,7 +122,7 @@ impl Model {
         let (kp, kd) = self.ranges.gains();
         match Ranges::new(pmax_rad, self.vmax_rad_per_s(), self.tmax_nm()) {
             Ok(ranges) => Self { ranges, ..self }.with_gain_ranges(kp, kd),
-            Err(error) => Err(ConfigError::Range(error)),
+            Err(error) => Err(error),
         }
     }
 
@@ -133,7 +134,7 @@ impl Model {
     pub const fn with_gain_ranges(self, kp: f32, kd: f32) -> Result<Self, ConfigError> {
         match self.ranges.with_gains(kp, kd) {
             Ok(ranges) => Ok(Self { ranges, ..self }),
-            Err(error) => Err(ConfigError::Range(error)),
+            Err(error) => Err(error),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The parameters of a drive.
 
+use crate::error::ConfigError;
+
 macro_rules! registers {
     ($($register:ident $index:literal $kind:ident $access:ident $doc:literal,)+) => {
         /// A parameter of a drive. Those above 0x7020 are RobStride's alone, but for those that [`Model::CYBERGEAR`](super::Model)
@@ -25,6 +27,15 @@ macro_rules! registers {
         impl Register {
             /// The parameters of the table.
             pub const ALL: &[Self] = &[$(Self::$register),+];
+
+            /// The name and the index, as errors print them.
+            const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$register => {
+                        concat!("parameter ", stringify!($index), " (", stringify!($register), ")")
+                    })+
+                }
+            }
 
             const fn kind(self) -> (Kind, Access) {
                 match self {
@@ -79,6 +90,18 @@ registers! {
 }
 
 impl Register {
+    /// # Errors
+    /// It is read only, or cannot hold the value.
+    pub(super) fn check(self, value: f32) -> Result<(), ConfigError> {
+        if !self.is_writable() {
+            Err(ConfigError::ReadOnly(self.name()))
+        } else if !self.holds(value) {
+            Err(ConfigError::CannotHold(self.name(), value))
+        } else {
+            Ok(())
+        }
+    }
+
     /// Returns the index in the protocol.
     #[must_use]
     pub const fn index(self) -> u16 {

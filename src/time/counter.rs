@@ -1,4 +1,5 @@
 use super::Instant;
+use crate::error::ConfigError;
 use core::num::NonZeroU32;
 
 /// Extends a free-running 16- or 32-bit hardware counter to an [`Instant`] that never wraps.
@@ -17,7 +18,7 @@ use core::num::NonZeroU32;
 ///
 /// let mut cycles = ExtendedCounter::new_32_bit(168_000_000)?; // the Cortex-M cycle counter
 /// assert_eq!(cycles.extend(168_000), Instant::from_micros(1_000));
-/// # Ok::<(), drivetrain::time::CounterError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ExtendedCounter {
@@ -29,40 +30,6 @@ pub struct ExtendedCounter {
     denominator: NonZeroU32,
 }
 
-/// Why a counter is not extended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum CounterError {
-    /// The ratio of the frequency to 1 MHz does not fit 32 bits.
-    Ratio {
-        /// The refused frequency.
-        ticks_per_second: u32,
-    },
-    /// A counter of 16 bits wraps in less than 10 ms.
-    Wrap {
-        /// The refused frequency.
-        ticks_per_second: u32,
-    },
-}
-
-impl core::fmt::Display for CounterError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Ratio { ticks_per_second } => write!(
-                f,
-                "a counter of {ticks_per_second} Hz has no exact ratio to 1 MHz that fits 32 bits: use a rounder frequency"
-            ),
-            Self::Wrap { ticks_per_second } => write!(
-                f,
-                "a 16-bit counter of {ticks_per_second} Hz wraps within 10 ms: use a prescaler, {} Hz at most, or 32 bits",
-                ExtendedCounter::FASTEST_16_BIT
-            ),
-        }
-    }
-}
-
-impl core::error::Error for CounterError {}
-
 impl ExtendedCounter {
     /// In ticks a second: 10 ms to a wrap. A loop at 1 kHz may then miss nine periods, and feedback counts as late by then.
     const FASTEST_16_BIT: u32 = 0x1_0000 * 100;
@@ -73,9 +40,11 @@ impl ExtendedCounter {
     /// Above 6 553 600 Hz, where the counter wraps in less than 10 ms: a loop that reads it each 1 ms and stalls once would lose a
     /// wrap. For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not leave room
     /// for the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 999 983 Hz does not.
-    pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, CounterError> {
+    pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, ConfigError> {
+        let (value, most) = (ticks_per_second as f32, Self::FASTEST_16_BIT as f32);
         if ticks_per_second > Self::FASTEST_16_BIT {
-            return Err(CounterError::Wrap { ticks_per_second });
+            let parameter = "ticks_per_second of a counter of 16 bits without a prescaler";
+            return Err(ConfigError::Range { parameter, value, least: 1.0, most });
         }
         Self::new(ticks_per_second, 0xFFFF)
     }
@@ -84,12 +53,12 @@ impl ExtendedCounter {
     ///
     /// # Errors
     /// For 0 Hz and a frequency without such a ratio, as [`new_16_bit`](Self::new_16_bit). The fastest wraps in 1 s.
-    pub const fn new_32_bit(ticks_per_second: u32) -> Result<Self, CounterError> {
+    pub const fn new_32_bit(ticks_per_second: u32) -> Result<Self, ConfigError> {
         Self::new(ticks_per_second, u32::MAX)
     }
 
-    const fn new(ticks_per_second: u32, mask: u32) -> Result<Self, CounterError> {
-        let error = CounterError::Ratio { ticks_per_second };
+    const fn new(ticks_per_second: u32, mask: u32) -> Result<Self, ConfigError> {
+        let error = ConfigError::Ratio { ticks_per_second };
         let (mut divisor, mut rest) = (ticks_per_second, 1_000_000);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
@@ -131,10 +100,10 @@ mod tests {
         for ticks_per_second in [0, 4_294_967_291, 8_388_593, 268_435_250] {
             assert_eq!(
                 ExtendedCounter::new_32_bit(ticks_per_second).err(),
-                Some(CounterError::Ratio { ticks_per_second })
+                Some(ConfigError::Ratio { ticks_per_second })
             );
         }
-        let refused = std::format!("{}", CounterError::Ratio { ticks_per_second: 8_388_593 });
+        let refused = ExtendedCounter::new_32_bit(8_388_593).unwrap_err().to_string();
         assert!(refused.starts_with("a counter of 8388593 Hz has no exact ratio"), "{refused}");
     }
 
@@ -142,12 +111,17 @@ mod tests {
     fn a_counter_that_wraps_faster_than_a_loop_reads_it_is_refused() {
         for ticks_per_second in [6_553_601, 84_000_000, u32::MAX] {
             let refused = ExtendedCounter::new_16_bit(ticks_per_second).err();
-            assert_eq!(refused, Some(CounterError::Wrap { ticks_per_second }));
+            let (value, most) = (ticks_per_second as f32, 6_553_600.0);
+            let parameter = "ticks_per_second of a counter of 16 bits without a prescaler";
+            assert_eq!(refused, Some(ConfigError::Range { parameter, value, least: 1.0, most }));
         }
         assert!(ExtendedCounter::new_16_bit(6_553_600).is_ok());
         assert!(ExtendedCounter::new_32_bit(84_000_000).is_ok());
-        let refused = CounterError::Wrap { ticks_per_second: 84_000_000 }.to_string();
-        assert!(refused.ends_with("use a prescaler, 6553600 Hz at most, or 32 bits"), "{refused}");
+        let refused = ExtendedCounter::new_16_bit(84_000_000).unwrap_err().to_string();
+        assert!(
+            refused.ends_with("without a prescaler 84000000: 1 to 6553600 are allowed"),
+            "{refused}"
+        );
     }
 
     #[test]

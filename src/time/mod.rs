@@ -27,7 +27,7 @@ mod instant;
 mod ticker;
 
 pub use clock::{Clock, ManualClock};
-pub use counter::{CounterError, ExtendedCounter};
+pub use counter::ExtendedCounter;
 pub use duration::Duration;
 pub use edge::ConditionEdge;
 pub use instant::Instant;

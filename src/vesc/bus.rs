@@ -1,11 +1,12 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{HOST, SHORT_MESSAGE, extended, question};
-use super::config::{At, Mode, Rest, sealed};
+use super::config::{At, Mode, Rest};
 use super::feedback::fault;
 use super::tachometer::Tachometer;
-use super::{ConfigError, Feedback, Model};
+use super::{Feedback, Model};
 use crate::encoder;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
@@ -26,7 +27,7 @@ const STATUSES: [(u8, u8); 5] = [(MOTION, 0), (14, 1), (TEMPERATURES, 0), (TACHO
 /// Commands for one question.
 const ORDERS: u8 = 50;
 
-/// A motor on a VESC, in the control mode `M`: see the [module](super).
+/// A motor on a VESC, in one of the control modes: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -34,7 +35,7 @@ const ORDERS: u8 = 50;
 /// use drivetrain::frame::CanFrame;
 /// use drivetrain::motor::OwnMotor;
 /// use drivetrain::units::AngularVelocity;
-/// use drivetrain::vesc::{Model, Motor, Rest, Velocity};
+/// use drivetrain::vesc::{Mode, Model, Motor, Rest};
 ///
 /// const WHEEL: Model = Model {
 ///     name: "hub",
@@ -45,17 +46,17 @@ const ORDERS: u8 = 50;
 ///     max_velocity: AngularVelocity::from_rpm(500.0),
 ///     is_reversed: false,
 /// };
-/// let mut wheel = Motor::new(WHEEL, 1, Velocity::new())?;
+/// let mut wheel = Motor::new(WHEEL, 1, Mode::velocity())?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000101 [4] 00 00 00 00"); // current 0
 /// let mut wheel = wheel.with_rest(Rest::Brake(4.0))?;
 /// assert_eq!(format!("{:?}", wheel.rest()), "00000201 [4] 00 00 0F A0"); // brake 4000 mA
-/// # Ok::<(), drivetrain::vesc::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Motor<M> {
+pub struct Motor {
     model: Model,
     id: u8,
-    mode: M,
+    mode: Mode,
     rest: Rest,
     has_encoder: bool,
     has_fault_code: bool,
@@ -71,15 +72,13 @@ pub struct Motor<M> {
     effort: Option<f32>,
 }
 
-impl<M: Mode> Motor<M> {
+impl Motor {
     /// Takes the motor, the id of the drive, 0 to 253, and the control mode.
     ///
     /// # Errors
     /// Names the value that is not allowed.
-    pub fn new(model: Model, id: u8, mode: M) -> Result<Self, ConfigError> {
-        if id >= HOST {
-            return Err(ConfigError::Id(id));
-        }
+    pub fn new(model: Model, id: u8, mode: Mode) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 0.0, f32::from(HOST - 1))?;
         model.check()?;
         mode.check(&model)?;
         Ok(Self {
@@ -88,7 +87,7 @@ impl<M: Mode> Motor<M> {
             id,
             mode,
             rest: Rest::Release,
-            has_encoder: <M as sealed::Mode>::HAS_POSITION,
+            has_encoder: mode.has_position(),
             has_fault_code: true,
             feedback: Feedback::default(),
             angle_age: u8::MAX,
@@ -101,14 +100,14 @@ impl<M: Mode> Motor<M> {
     /// Sets the command of a motor that is not driven: [`Rest::Release`] at first.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a current that is not above 0 and within the limit of the model.
+    /// [`ConfigError::Limit`] for a current that is not above 0 and within the limit of the model.
     pub fn with_rest(self, rest: Rest) -> Result<Self, ConfigError> {
         rest.check(&self.model)?;
         Ok(Self { rest, ..self })
     }
 
     /// Takes the angle from status 4, the position of the drive's encoder, instead of the tachometer in status 5. In the mode
-    /// [`Position`](super::Position) it always does.
+    /// [`Mode::position`](super::Mode::position) it always does.
     ///
     /// It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio. Without an encoder,
     /// status 4 has the electrical angle.
@@ -172,7 +171,7 @@ impl<M: Mode> Motor<M> {
     }
 }
 
-impl<M: Mode> OwnMotor for Motor<M> {
+impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
         MotorName::new(self.model.name, self.id)
     }

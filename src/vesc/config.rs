@@ -1,52 +1,46 @@
-//! The control modes, with what a user chooses for each.
+//! The control mode, with what a user chooses for it.
 
+use super::Model;
 use super::command::Command;
-use super::error::within_range;
-use super::{ConfigError, Model};
-use crate::control::{Cascade, ConfigError as LoopError, Pid, PidConfig};
+use crate::control::{Cascade, Pid, PidConfig};
+use crate::error::ConfigError;
 use crate::math::{wrap_pi, wrap_tau};
 use crate::motor::{Capabilities, Capability, Order, Target};
 use crate::units::{Angle, AngularVelocity};
 
-/// A control mode: [`CurrentControl`], [`Duty`], [`Velocity`] or [`Position`].
-pub trait Mode: sealed::Mode {}
+/// A control mode of the drive.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::PidConfig;
+/// use drivetrain::vesc::{Mode, Rest};
+///
+/// let speed = PidConfig::new(0.02, 0.2, 0.0); // rad/s to Nm
+/// let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0); // rad to rad/s
+/// let wheel = Mode::current_with_speed_loop(speed)?;
+/// let joint = Mode::current_with_loops(position, speed)?;
+/// let braked = Mode::velocity_with_standstill(Rest::Brake(5.0)); // a target of 0 brakes
+/// # let _ = (wheel, joint, braked);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Mode(Kind);
 
-impl<M: sealed::Mode> Mode for M {}
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Current(CurrentControl),
+    Duty(DutyControl),
+    /// What a target of exactly 0 does.
+    Velocity(Rest),
+    Position,
+}
 
 /// Where the output shaft is, by the last feedback.
-#[derive(Debug)]
-pub struct At<'a> {
+pub(super) struct At<'a> {
     pub(super) model: &'a Model,
     pub(super) velocity_rad_per_s: f32,
     pub(super) angle: Option<Angle>,
     pub(super) duty: f32,
-}
-
-pub(super) mod sealed {
-    use super::{At, Capabilities, Command, ConfigError, Model, Order};
-
-    pub trait Mode: core::fmt::Debug + Copy {
-        /// The drive itself controls the position, so its angle is that of status 4.
-        const HAS_POSITION: bool = false;
-
-        /// # Errors
-        /// A value that is not allowed.
-        fn check(&self, _model: &Model) -> Result<(), ConfigError> {
-            Ok(())
-        }
-
-        fn capabilities(&self) -> Capabilities;
-
-        /// Tells whether a target needs the angle of the shaft.
-        fn needs_angle(&self) -> bool {
-            Self::HAS_POSITION
-        }
-
-        /// Returns the command and its share of the largest effort, where that is not the drive's business; `None` to rest.
-        fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)>;
-
-        fn reset(&mut self) {}
-    }
 }
 
 /// Rest: the command of a motor that is not driven. In each mode it is what a disarmed motor gets, and one without a target.
@@ -75,69 +69,18 @@ impl Rest {
 
     pub(super) fn check(self, model: &Model) -> Result<(), ConfigError> {
         let (Self::Brake(current) | Self::Handbrake(current)) = self else { return Ok(()) };
-        within_range("current of rest in A", current, model.current_limit_a)
+        ConfigError::check_limit("current of rest in A", current, model.current_limit_a)
     }
 }
 
-/// Current control: a torque becomes a current by the torque constant, and our own loops follow velocities and angles by a torque.
-///
-/// # Examples
-/// ```
-/// use drivetrain::control::PidConfig;
-/// use drivetrain::vesc::CurrentControl;
-///
-/// let speed = PidConfig::new(0.02, 0.2, 0.0); // rad/s to Nm
-/// let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0); // rad to rad/s
-/// let wheel = CurrentControl::new().with_speed_loop(speed)?;
-/// let joint = CurrentControl::new().with_loops(position, speed)?;
-/// # Ok::<(), drivetrain::control::ConfigError>(())
-/// ```
-#[derive(Debug, Default, Clone, Copy)]
-pub struct CurrentControl {
+/// The loops of current control, which are ours.
+#[derive(Debug, Clone, Copy)]
+struct CurrentControl {
     loops: Option<Cascade>,
     has_angle: bool,
 }
 
 impl CurrentControl {
-    /// Takes torques.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { loops: None, has_angle: false }
-    }
-
-    /// Takes velocities too, by a loop from rad/s to Nm.
-    ///
-    /// # Errors
-    /// As [`Cascade::new`].
-    pub fn with_speed_loop(self, speed: PidConfig) -> Result<Self, LoopError> {
-        let position = PidConfig::new(0.0, 0.0, 0.0);
-        Ok(Self { loops: Some(Cascade::new(position, speed)?), ..self })
-    }
-
-    /// Takes velocities and angles too, by loops from rad to rad/s and from rad/s to Nm. The tachometer has six steps for an
-    /// electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
-    ///
-    /// # Errors
-    /// As [`Cascade::new`].
-    pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, LoopError> {
-        Ok(Self { loops: Some(Cascade::new(position, speed)?), has_angle: true })
-    }
-}
-
-impl sealed::Mode for CurrentControl {
-    fn capabilities(&self) -> Capabilities {
-        let torque = Capabilities::of(&[Capability::Torque]);
-        match (self.loops, self.has_angle) {
-            (None, _) => torque,
-            (_, false) => torque.with(Capability::Velocity),
-            (_, true) => torque.with(Capability::Velocity).with(Capability::Angle),
-        }
-    }
-
-    fn needs_angle(&self) -> bool {
-        self.has_angle
-    }
-
     fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
         let Order { target, share, step } = order;
         let (model, velocity) = (at.model, at.velocity_rad_per_s);
@@ -162,40 +105,16 @@ impl sealed::Mode for CurrentControl {
         let current = kept(model.current_of(torque), model.current_limit_a * share);
         Some((Command::Current(current), Some(torque / most)))
     }
-
-    fn reset(&mut self) {
-        if let Some(loops) = &mut self.loops {
-            loops.reset();
-        }
-    }
 }
 
-/// Duty control: our own loop follows a velocity by the share of the supply voltage.
-///
-/// A duty of 0 shorts the phases, so this mode brakes with all that the drive allows. The duty keeps near the one that the drive reports:
-/// within the share of the order times the limit, so a motor that turns when it is armed is not braked at once.
+/// The loop of duty control, which is ours, and the largest duty.
 #[derive(Debug, Clone, Copy)]
-pub struct Duty {
+struct DutyControl {
     limit: f32,
     speed: Pid,
 }
 
-impl Duty {
-    /// Takes the largest duty, above 0 and at most 1, and a loop from rad/s to duty: 1 is the whole supply.
-    ///
-    /// # Errors
-    /// Names the value that is not allowed.
-    pub fn new(limit: f32, speed: PidConfig) -> Result<Self, ConfigError> {
-        within_range("duty limit", limit, 1.0)?;
-        Ok(Self { limit, speed: Pid::new(speed)? })
-    }
-}
-
-impl sealed::Mode for Duty {
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Velocity])
-    }
-
+impl DutyControl {
     fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
         let Order { target, share, step } = order;
         let Target::Velocity(target) = target else { return None };
@@ -209,80 +128,135 @@ impl sealed::Mode for Duty {
         let duty = wanted.min(highest).max(lowest);
         Some((Command::Duty(at.model.signed(duty)), Some(duty / self.limit)))
     }
-
-    fn reset(&mut self) {
-        self.speed.reset();
-    }
 }
 
-/// Velocity control by the drive's own loop.
-///
-/// # Examples
-/// ```
-/// use drivetrain::vesc::{Rest, Velocity};
-///
-/// let wheel = Velocity::new().with_standstill(Rest::Brake(5.0)); // a target of 0 brakes
-/// # let _ = wheel;
-/// ```
-#[derive(Debug, Default, Clone, Copy)]
-pub struct Velocity {
-    standstill: Rest,
-}
-
-impl Velocity {
-    /// A target of 0 lets the shaft go, as the drive does.
+impl Mode {
+    /// Current control: a torque becomes a current by the torque constant.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { standstill: Rest::Release }
+    pub const fn current() -> Self {
+        Self(Kind::Current(CurrentControl { loops: None, has_angle: false }))
     }
 
-    /// Sets what a target of exactly 0 does.
+    /// Current control that takes velocities too, by a loop of ours from rad/s to Nm.
+    ///
+    /// # Errors
+    /// As [`Cascade::new`].
+    pub fn current_with_speed_loop(speed: PidConfig) -> Result<Self, ConfigError> {
+        let loops = Cascade::new(PidConfig::new(0.0, 0.0, 0.0), speed)?;
+        Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: false })))
+    }
+
+    /// Current control that takes velocities and angles too, by loops of ours from rad to rad/s and from rad/s to Nm. The tachometer has
+    /// six steps for an electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
+    ///
+    /// # Errors
+    /// As [`Cascade::new`].
+    pub fn current_with_loops(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
+        let loops = Cascade::new(position, speed)?;
+        Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: true })))
+    }
+
+    /// Duty control: our own loop follows a velocity by the share of the supply voltage. Takes the largest duty, above 0 and at most 1,
+    /// and a loop from rad/s to duty: 1 is the whole supply.
+    ///
+    /// A duty of 0 shorts the phases, so this mode brakes with all that the drive allows. The duty keeps near the one that the drive
+    /// reports: within the share of the order times the limit, so a motor that turns when it is armed is not braked at once.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed.
+    pub fn duty(limit: f32, speed: PidConfig) -> Result<Self, ConfigError> {
+        ConfigError::check_limit("duty limit", limit, 1.0)?;
+        Ok(Self(Kind::Duty(DutyControl { limit, speed: Pid::new(speed)? })))
+    }
+
+    /// Velocity control by the drive's own loop. A target of 0 lets the shaft go, as the drive does.
     #[must_use]
-    pub const fn with_standstill(self, standstill: Rest) -> Self {
-        Self { standstill }
+    pub const fn velocity() -> Self {
+        Self(Kind::Velocity(Rest::Release))
+    }
+
+    /// As [`velocity`](Self::velocity), with what a target of exactly 0 does.
+    #[must_use]
+    pub const fn velocity_with_standstill(standstill: Rest) -> Self {
+        Self(Kind::Velocity(standstill))
+    }
+
+    /// Position control by the drive's own loop, which needs an encoder.
+    ///
+    /// The angle is that of status 4. It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio.
+    #[must_use]
+    pub const fn position() -> Self {
+        Self(Kind::Position)
+    }
+
+    /// The drive itself controls the position, so its angle is that of status 4.
+    pub(super) const fn has_position(&self) -> bool {
+        matches!(self.0, Kind::Position)
+    }
+
+    /// # Errors
+    /// A value that is not allowed.
+    pub(super) fn check(&self, model: &Model) -> Result<(), ConfigError> {
+        if let Kind::Velocity(standstill) = self.0 { standstill.check(model) } else { Ok(()) }
+    }
+
+    pub(super) fn capabilities(&self) -> Capabilities {
+        let torque = Capabilities::of(&[Capability::Torque]);
+        match &self.0 {
+            Kind::Current(CurrentControl { loops: None, .. }) => torque,
+            Kind::Current(CurrentControl { has_angle: false, .. }) => {
+                torque.with(Capability::Velocity)
+            }
+            Kind::Current(_) => torque.with(Capability::Velocity).with(Capability::Angle),
+            Kind::Duty(_) | Kind::Velocity(_) => Capabilities::of(&[Capability::Velocity]),
+            Kind::Position => Capabilities::of(&[Capability::Angle]),
+        }
+    }
+
+    /// Tells whether a target needs the angle of the shaft.
+    pub(super) const fn needs_angle(&self) -> bool {
+        match &self.0 {
+            Kind::Current(control) => control.has_angle,
+            Kind::Duty(_) | Kind::Velocity(_) => false,
+            Kind::Position => true,
+        }
+    }
+
+    /// Returns the command and its share of the largest effort, where that is not the drive's business; `None` to rest.
+    pub(super) fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        match &mut self.0 {
+            Kind::Current(control) => control.command(order, at),
+            Kind::Duty(control) => control.command(order, at),
+            Kind::Velocity(standstill) => velocity(*standstill, order, at),
+            Kind::Position => position(order, at),
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        match &mut self.0 {
+            Kind::Current(CurrentControl { loops: Some(loops), .. }) => loops.reset(),
+            Kind::Duty(control) => control.speed.reset(),
+            Kind::Current(_) | Kind::Velocity(_) | Kind::Position => {}
+        }
     }
 }
 
-impl sealed::Mode for Velocity {
-    fn check(&self, model: &Model) -> Result<(), ConfigError> {
-        self.standstill.check(model)
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Velocity])
-    }
-
-    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-        let Order { target, share, step: _ } = order;
-        let Target::Velocity(target) = target else { return None };
-        let target = within(target, at.model.max_velocity);
-        let speed = at.model.erpm_of(AngularVelocity::from_rad_per_s(target));
-        // Less than a whole number on the wire is a speed of 0.
-        let stands = speed.abs() < 1.0;
-        Some((if stands { self.standstill.command(share) } else { Command::Speed(speed) }, None))
-    }
+fn velocity(standstill: Rest, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+    let Order { target, share, step: _ } = order;
+    let Target::Velocity(target) = target else { return None };
+    let target = within(target, at.model.max_velocity);
+    let speed = at.model.erpm_of(AngularVelocity::from_rad_per_s(target));
+    // Less than a whole number on the wire is a speed of 0.
+    let stands = speed.abs() < 1.0;
+    Some((if stands { standstill.command(share) } else { Command::Speed(speed) }, None))
 }
 
-/// Position control by the drive's own loop, which needs an encoder.
-///
-/// The angle is that of status 4. It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio.
-#[derive(Debug, Clone, Copy)]
-pub struct Position;
-
-impl sealed::Mode for Position {
-    const HAS_POSITION: bool = true;
-
-    fn capabilities(&self) -> Capabilities {
-        Capabilities::of(&[Capability::Angle])
-    }
-
-    fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-        let Order { target, share: _, step: _ } = order;
-        let Target::Angle(target) = target else { return None };
-        at.angle?;
-        let angle = Angle::from_radians(wrap_tau(at.model.signed(target.as_radians())));
-        Some((Command::Position(angle.as_degrees()), None))
-    }
+fn position(order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+    let Order { target, share: _, step: _ } = order;
+    let Target::Angle(target) = target else { return None };
+    at.angle?;
+    let angle = Angle::from_radians(wrap_tau(at.model.signed(target.as_radians())));
+    Some((Command::Position(angle.as_degrees()), None))
 }
 
 fn within(target: AngularVelocity, limit: AngularVelocity) -> f32 {

@@ -15,17 +15,17 @@
 //! Extended frames, big-endian, at the bit rate that the drive is set to: 500 kbit/s at delivery. The ids are 0 to 253: 254 is the one
 //! of this program, and 255 means every drive.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. The control
-//! mode is its type:
+//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its control
+//! mode is a [`Mode`]:
 //!
 //! | mode | targets | current is limited by | a value of zero |
 //! |---|---|---|---|
-//! | [`CurrentControl`] | torque; with loops velocity and angle | [`Model::current_limit_a`] | lets the shaft go |
-//! | [`Duty`] | velocity, by a loop of ours | the drive alone | brakes: the phases are shorted |
-//! | [`Velocity`] | velocity, by the loop of the drive | the drive alone | lets the shaft go, as does any speed below the drive's smallest, 900 electrical rpm at delivery |
-//! | [`Position`] | angle, by the loop of the drive | the drive alone | 0° |
+//! | [`Mode::current`], [`current_with_speed_loop`](Mode::current_with_speed_loop), [`current_with_loops`](Mode::current_with_loops) | torque; with loops velocity and angle | [`Model::current_limit_a`] | lets the shaft go |
+//! | [`Mode::duty`] | velocity, by a loop of ours | the drive alone | brakes: the phases are shorted |
+//! | [`Mode::velocity`] | velocity, by the loop of the drive | the drive alone | lets the shaft go, as does any speed below the drive's smallest, 900 electrical rpm at delivery |
+//! | [`Mode::position`] | angle, by the loop of the drive | the drive alone | 0° |
 //!
-//! Only [`CurrentControl`] has its current scaled by the share of the order, so heat and a stall reduce it there. In the modes of the
+//! Only [`Mode::current`] has its current scaled by the share of the order, so heat and a stall reduce it there. In the modes of the
 //! drive's own loops the share has no effect once the output range is open; what stops them is rest.
 //!
 //! The drive lets the shaft go for currents below its smallest, 0.05 A at delivery.
@@ -53,7 +53,7 @@
 //! use drivetrain::motor::{Devices, Own};
 //! use drivetrain::time::Instant;
 //! use drivetrain::units::AngularVelocity;
-//! use drivetrain::vesc::{CurrentControl, Model, Motor};
+//! use drivetrain::vesc::{Mode, Model, Motor};
 //!
 //! const SHOOTER: Model = Model {
 //!     name: "5065",
@@ -64,7 +64,7 @@
 //!     max_velocity: AngularVelocity::from_rpm(6_000.0),
 //!     is_reversed: false,
 //! };
-//! let mut shooter = Own::new(Motor::new(SHOOTER, 23, CurrentControl::new())?);
+//! let mut shooter = Own::new(Motor::new(SHOOTER, 23, Mode::current())?);
 //! let refused = shooter.arm(Instant::from_micros(1_000)).map_err(|error| error.to_string());
 //! assert_eq!(refused, Err("no feedback from 5065 #23".into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -79,7 +79,6 @@
 mod bus;
 mod command;
 mod config;
-mod error;
 mod feedback;
 mod model;
 mod tachometer;
@@ -88,7 +87,6 @@ mod tests;
 
 pub use bus::Motor;
 pub use command::Command;
-pub use config::{CurrentControl, Duty, Mode, Position, Rest, Velocity};
-pub use error::ConfigError;
+pub use config::{Mode, Rest};
 pub use feedback::Feedback;
 pub use model::Model;

@@ -1,8 +1,7 @@
 //! Facts of a motor, which a program states: a VESC drives any.
 
-use super::ConfigError;
-use super::error::within_range;
 use crate::encoder::GearRatio;
+use crate::error::ConfigError;
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 
@@ -25,7 +24,7 @@ use core::f32::consts::TAU;
 /// };
 /// assert_eq!(joint.torque_limit_nm(), 18.0); // 40 A of 0.05 Nm/A through a gear of 9
 /// assert_eq!(joint.erpm_of(AngularVelocity::from_rpm(100.0)).round(), 6_300.0); // times 9, times 7
-/// # Ok::<(), drivetrain::encoder::GearError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -81,19 +80,26 @@ impl Model {
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        within_range("pole_pairs", self.pole_pairs.into(), 255.0)?;
-        within_range("torque_constant_nm_per_a", self.torque_constant_nm_per_a, 1e6)?;
-        within_range("current_limit_a", self.current_limit_a, MOST_AMPERES)?;
-        within_range("torque limit in Nm", self.torque_limit_nm(), f32::MAX)?;
-        within_range("max_velocity in rad/s", self.max_velocity.as_rad_per_s(), f32::MAX)?;
+        ConfigError::check_limit("pole_pairs", self.pole_pairs.into(), 255.0)?;
+        ConfigError::check_limit("torque_constant_nm_per_a", self.torque_constant_nm_per_a, 1e6)?;
+        ConfigError::check_limit("current_limit_a", self.current_limit_a, MOST_AMPERES)?;
+        ConfigError::check_limit("torque limit in Nm", self.torque_limit_nm(), f32::MAX)?;
+        ConfigError::check_limit(
+            "max_velocity in rad/s",
+            self.max_velocity.as_rad_per_s(),
+            f32::MAX,
+        )?;
         let speed = self.erpm_of(self.max_velocity).abs();
-        within_range("max_velocity in electrical rpm", speed, MOST_ERPM)?;
+        ConfigError::check_limit("max_velocity in electrical rpm", speed, MOST_ERPM)?;
         // Counts of the tachometer are divided by this product in 32 bits.
         let turn = TACHO * u32::from(self.pole_pairs) * u32::from(self.gear.rotor());
-        match turn.checked_mul(u32::from(self.gear.output())) {
-            Some(..=0x3FFF_FFFF) => Ok(()),
-            _ => Err(ConfigError::Gear(self.gear)),
-        }
+        let product = turn.saturating_mul(u32::from(self.gear.output()));
+        let most = f32::from_bits(0x4E7F_FFFF); // the last below 2^30
+        ConfigError::check_limit(
+            "pole_pairs times 6 times both numbers of gear",
+            product as f32,
+            most,
+        )
     }
 }
 

@@ -20,7 +20,7 @@
 //! };
 //! assert_eq!(J4310.encode(&Command::REST), [0x7F, 0xFF, 0x7F, 0xF0, 0x00, 0x00, 0x07, 0xFF]);
 //! assert_eq!(J4310.decode(&[0; 8]).torque_nm, -10.0);
-//! # Ok::<(), drivetrain::wire::mit::RangeError>(())
+//! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 //!
 //! **A drive goes on with its last command** when no other comes: a cut cable, or a program that stops, leaves it driving. Only a
@@ -32,6 +32,8 @@
 //! is there or beyond.
 //!
 //! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
+
+use crate::error::ConfigError;
 
 /// The data that enables a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);
@@ -110,7 +112,7 @@ pub struct Feedback {
 /// assert!((sent.kd - 1.0).abs() < 5.0 / 4095.0);
 /// let refused = Ranges::new(12.5, 30.0, -10.0).map_err(|error| error.to_string());
 /// assert_eq!(refused, Err("torque range -10: 0.001 to 1000000 are allowed".into()));
-/// # Ok::<(), drivetrain::wire::mit::RangeError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -132,10 +134,10 @@ impl Ranges {
         position_rad: f32,
         velocity_rad_per_s: f32,
         torque_nm: f32,
-    ) -> Result<Self, RangeError> {
-        let position = Range::around_zero("position", position_rad);
-        let velocity = Range::around_zero("velocity", velocity_rad_per_s);
-        let torque = Range::around_zero("torque", torque_nm);
+    ) -> Result<Self, ConfigError> {
+        let position = Range::around_zero("position range", position_rad);
+        let velocity = Range::around_zero("velocity range", velocity_rad_per_s);
+        let torque = Range::around_zero("torque range", torque_nm);
         match (position, velocity, torque) {
             (Ok(position), Ok(velocity), Ok(torque)) => {
                 let (kp, kd) = (Range::KP, Range::KD);
@@ -160,8 +162,8 @@ impl Ranges {
     ///
     /// # Errors
     /// Names the first range that is not between 0.001 and 1000000.
-    pub const fn with_gains(self, kp: f32, kd: f32) -> Result<Self, RangeError> {
-        match (Range::from_zero("kp", kp), Range::from_zero("kd", kd)) {
+    pub const fn with_gains(self, kp: f32, kd: f32) -> Result<Self, ConfigError> {
+        match (Range::from_zero("kp range", kp), Range::from_zero("kd range", kd)) {
             (Ok(kp), Ok(kd)) => Ok(Self { kp, kd, ..self }),
             (Err(error), _) | (_, Err(error)) => Err(error),
         }
@@ -269,18 +271,17 @@ impl Range {
     const KP: Self = Self { lower: 0.0, upper: 500.0 };
     const KD: Self = Self { lower: 0.0, upper: 5.0 };
 
-    const fn around_zero(range: &'static str, upper: f32) -> Result<Self, RangeError> {
+    const fn around_zero(range: &'static str, upper: f32) -> Result<Self, ConfigError> {
         match Self::from_zero(range, upper) {
             Ok(range) => Ok(Self { lower: -upper, ..range }),
             Err(error) => Err(error),
         }
     }
 
-    const fn from_zero(range: &'static str, upper: f32) -> Result<Self, RangeError> {
-        if upper >= RangeError::LOWEST && upper <= RangeError::HIGHEST {
-            Ok(Self { lower: 0.0, upper })
-        } else {
-            Err(RangeError { range, value: upper })
+    const fn from_zero(range: &'static str, upper: f32) -> Result<Self, ConfigError> {
+        match ConfigError::check_range(range, upper, 1e-3, 1e6) {
+            Ok(()) => Ok(Self { lower: 0.0, upper }),
+            Err(error) => Err(error),
         }
     }
 
@@ -310,25 +311,3 @@ impl Range {
         self.lower + counts as f32 * (self.upper - self.lower) / top as f32
     }
 }
-
-/// A range that no drive has.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RangeError {
-    range: &'static str,
-    value: f32,
-}
-
-impl RangeError {
-    const LOWEST: f32 = 1e-3;
-    const HIGHEST: f32 = 1e6;
-}
-
-impl core::fmt::Display for RangeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let (lowest, highest) = (Self::LOWEST, Self::HIGHEST);
-        write!(f, "{} range {}: {lowest} to {highest} are allowed", self.range, self.value)
-    }
-}
-
-impl core::error::Error for RangeError {}

@@ -2,25 +2,25 @@
 
 use super::*;
 use drivetrain::control::PidConfig;
-use drivetrain::damiao::{ForcePosition, Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::sim::DamiaoDrive;
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
-struct Joint<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Joint {
+    motor: Own<Motor>,
     drive: RefCell<DamiaoDrive>,
     /// An answer about a register, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
-    set: Drive<M>,
+    set: Drive,
 }
 
-impl<M: Mode> Joint<M> {
-    fn new(mode: M, number: f32, set: Drive<M>) -> Self {
+impl Joint {
+    fn new(mode: impl Into<Mode>, number: f32, set: Drive) -> Self {
         let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
         Self {
             motor: Own::new(Motor::new(Model::J4310, 1, mode).unwrap()),
@@ -35,8 +35,8 @@ impl<M: Mode> Joint<M> {
     }
 }
 
-impl<M: Mode> Subject for Joint<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Joint {
+    type Device = Own<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);
@@ -83,7 +83,8 @@ impl<M: Mode> Subject for Joint<M> {
     }
 }
 
-fn kept<M: Mode>(mode: M, number: f32, set: Drive<M>) {
+fn kept(mode: impl Into<Mode>, number: f32, set: Drive) {
+    let mode = mode.into();
     assert_eq!(check_contract(|| Joint::new(mode, number, set)), Ok(RULES), "{mode:?}");
 }
 
@@ -102,11 +103,9 @@ fn motors_of_damiao_keep_the_contract_in_each_mode_with_each_kind_of_target() {
             motor.set_impedance(Impedance { angle, stiffness: 20.0, ..Impedance::FREE })
         });
     }
-    kept(Velocity::new(quick), 3.0, |motor, share| motor.set_velocity((), velocity(share)));
-    let turn: Drive<PositionVelocity> =
-        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-    kept(PositionVelocity::new(quick), 2.0, turn);
-    let push: Drive<ForcePosition> =
-        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-    kept(ForcePosition::new(quick, 2.0), 4.0, push);
+    kept(Mode::velocity(quick), 3.0, |motor, share| motor.set_velocity((), velocity(share)));
+    let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(Mode::position_velocity(quick), 2.0, turn);
+    let push: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(Mode::force_position(quick, 2.0), 4.0, push);
 }

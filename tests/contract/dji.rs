@@ -3,7 +3,6 @@
 use super::*;
 use drivetrain::dji::{Gm6020Current, Gm6020Voltage, Handle, M2006, M3508};
 use drivetrain::encoder::Position;
-use drivetrain::motor::Recovery;
 use drivetrain::time::Duration;
 
 /// A bus with motors of one model, driven through `VelocityDrive`.
@@ -57,11 +56,8 @@ fn a_bus_of_each_model_keeps_the_contract() {
     assert_eq!(check_contract(|| OneModel::<Gm6020Voltage, 2>::new([1, 7], |c| c)), Ok(RULES));
     assert_eq!(check_contract(|| OneModel::<Gm6020Current, 2>::new([4, 5], |c| c)), Ok(RULES));
     let opening = Duration::from_millis(50);
-    let ramps = || {
-        OneModel::<M3508, 2>::new([1, 2], |config| {
-            config.with_recovery(Recovery::Resume).with_opening(opening)
-        })
-    };
+    let ramps =
+        || OneModel::<M3508, 2>::new([1, 2], |config| config.with_resume().with_opening(opening));
     assert_eq!(check_contract(ramps), Ok(RULES));
 }
 

@@ -2,25 +2,25 @@
 
 use super::*;
 use drivetrain::control::PidConfig;
-use drivetrain::lk::{Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::lk::{Mode, Model, Motor};
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
 use drivetrain::sim::LkDrive;
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
-struct Wheel<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Wheel {
+    motor: Own<Motor>,
     drive: RefCell<LkDrive>,
     /// An answer that is no feedback, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
-    set: Drive<M>,
+    set: Drive,
 }
 
-impl<M: Mode> Wheel<M> {
-    fn new(mode: M, set: Drive<M>) -> Self {
+impl Wheel {
+    fn new(mode: impl Into<Mode>, set: Drive) -> Self {
         Self {
             motor: Own::new(Motor::new(Model::MG5010E_I10, 1, mode).unwrap()),
             drive: RefCell::new(LkDrive::new(1, 66.0 / 4096.0, 1.0, 10.0, 16)),
@@ -34,8 +34,8 @@ impl<M: Mode> Wheel<M> {
     }
 }
 
-impl<M: Mode> Subject for Wheel<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Wheel {
+    type Device = Own<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);
@@ -85,7 +85,8 @@ thread_local! {
     static OPENING_MS: Cell<u64> = const { Cell::new(260) };
 }
 
-fn kept<M: Mode>(mode: M, set: Drive<M>) {
+fn kept(mode: impl Into<Mode>, set: Drive) {
+    let mode = mode.into();
     assert_eq!(check_contract(|| Wheel::new(mode, set)), Ok(RULES), "{mode:?}");
 }
 
@@ -95,9 +96,8 @@ fn no_question_takes_the_place_of_a_new_command() {
     for later_ms in 0..34 {
         OPENING_MS.set(260 + later_ms);
         kept(ImpedanceControl::new(3.0).unwrap(), |motor, share| motor.set_torque(3.0 * share));
-        let turn: Drive<PositionVelocity> =
-            |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-        kept(PositionVelocity::new(quick), turn);
+        let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+        kept(Mode::position_velocity(quick), turn);
     }
 }
 
@@ -116,10 +116,9 @@ fn motors_of_lk_keep_the_contract_in_each_mode_with_each_kind_of_target() {
             motor.set_impedance(Impedance { angle, stiffness: 20.0, ..Impedance::FREE })
         });
     }
-    for mode in [Velocity::new(quick), Velocity::new(quick).with_torque_limit(2.0)] {
+    for mode in [Mode::velocity(quick), Mode::velocity_with_torque_limit(quick, 2.0)] {
         kept(mode, |motor, share| motor.set_velocity((), velocity(share)));
     }
-    let turn: Drive<PositionVelocity> =
-        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-    kept(PositionVelocity::new(quick), turn);
+    let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(Mode::position_velocity(quick), turn);
 }

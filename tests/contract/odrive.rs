@@ -2,21 +2,21 @@
 
 use super::*;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
-use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor, Position, Velocity};
+use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::OdriveDrive;
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and an axis whose shaft stands.
-struct Axle<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Axle {
+    motor: Own<Motor>,
     drive: RefCell<OdriveDrive>,
     /// From when a fault was played first, each heartbeat has it, but for those between feedback and the next frames of the motor.
     fails: Cell<bool>,
     is_well: Cell<bool>,
-    set: Drive<M>,
+    set: Drive,
 }
 
 fn message(drive: &OdriveDrive, number: u16) -> Option<CanFrame> {
@@ -24,8 +24,8 @@ fn message(drive: &OdriveDrive, number: u16) -> Option<CanFrame> {
     copy.hear(&CanFrame::new_remote(id(0x60 | number), 8)?)
 }
 
-impl<M: Mode> Axle<M> {
-    fn new(mode: M, firmware: Firmware, set: Drive<M>) -> Self {
+impl Axle {
+    fn new(mode: impl Into<Mode>, firmware: Firmware, set: Drive) -> Self {
         let motor = Motor::new(Model::D6374, firmware, 3, velocity(10.0), mode).unwrap();
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, firmware == Firmware::V0_6, constant, 1.0);
@@ -39,8 +39,8 @@ impl<M: Mode> Axle<M> {
     }
 }
 
-impl<M: Mode> Subject for Axle<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Axle {
+    type Device = Own<Motor>;
     /// A heartbeat has come before whatever is asked of the motor.
     fn device(&mut self) -> &mut Self::Device {
         let mut drive = *self.drive.borrow();
@@ -83,7 +83,8 @@ impl<M: Mode> Subject for Axle<M> {
     }
 }
 
-fn kept<M: Mode>(mode: M, set: Drive<M>) {
+fn kept(mode: impl Into<Mode>, set: Drive) {
+    let mode = mode.into();
     for firmware in [Firmware::V0_5, Firmware::V0_6] {
         let made = || Axle::new(mode, firmware, set);
         assert_eq!(check_contract(made), Ok(RULES), "{firmware:?} {mode:?}");
@@ -104,7 +105,7 @@ fn motors_at_an_odrive_keep_the_contract_in_each_mode_with_each_kind_of_target()
             motor.set_impedance(Impedance { angle, stiffness: 20.0, ..Impedance::FREE })
         });
     }
-    kept(Velocity::new(3.0), |motor, share| motor.set_velocity((), velocity(share)));
-    let turn: Drive<Position> = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-    kept(Position::new(3.0), turn);
+    kept(Mode::velocity(3.0), |motor, share| motor.set_velocity((), velocity(share)));
+    let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(Mode::position(3.0), turn);
 }

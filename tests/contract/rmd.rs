@@ -3,24 +3,24 @@
 use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
-use drivetrain::rmd::{Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::rmd::{Mode, Model, Motor};
 use drivetrain::sim::RmdDrive;
 use drivetrain::units::Angle;
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
-struct Wheel<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Wheel {
+    motor: Own<Motor>,
     drive: RefCell<RmdDrive>,
     /// An answer that is no feedback, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
-    set: Drive<M>,
+    set: Drive,
 }
 
-impl<M: Mode> Wheel<M> {
-    fn new(mode: M, set: Drive<M>) -> Self {
+impl Wheel {
+    fn new(mode: impl Into<Mode>, set: Drive) -> Self {
         Self {
             motor: Own::new(Motor::new(Model::X8_120, 1, mode).unwrap()),
             drive: RefCell::new(RmdDrive::new(1, 2.4)),
@@ -34,8 +34,8 @@ impl<M: Mode> Wheel<M> {
     }
 }
 
-impl<M: Mode> Subject for Wheel<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Wheel {
+    type Device = Own<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);
@@ -84,7 +84,8 @@ thread_local! {
     static OPENING_MS: Cell<u64> = const { Cell::new(290) };
 }
 
-fn kept<M: Mode>(mode: M, set: Drive<M>) {
+fn kept(mode: impl Into<Mode>, set: Drive) {
+    let mode = mode.into();
     assert_eq!(check_contract(|| Wheel::new(mode, set)), Ok(RULES), "{mode:?}");
 }
 
@@ -94,9 +95,8 @@ fn no_question_takes_the_place_of_a_new_command() {
     for later_ms in 0..34 {
         OPENING_MS.set(290 + later_ms);
         kept(ImpedanceControl::new(3.0).unwrap(), |motor, share| motor.set_torque(3.0 * share));
-        let turn: Drive<PositionVelocity> =
-            |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-        kept(PositionVelocity::new(quick), turn);
+        let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+        kept(Mode::position_velocity(quick), turn);
     }
 }
 
@@ -115,8 +115,7 @@ fn motors_of_rmd_keep_the_contract_in_each_mode_with_each_kind_of_target() {
             motor.set_impedance(Impedance { angle, stiffness: 20.0, ..Impedance::FREE })
         });
     }
-    kept(Velocity::new(quick), |motor, share| motor.set_velocity((), velocity(share)));
-    let turn: Drive<PositionVelocity> =
-        |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-    kept(PositionVelocity::new(quick), turn);
+    kept(Mode::velocity(quick), |motor, share| motor.set_velocity((), velocity(share)));
+    let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+    kept(Mode::position_velocity(quick), turn);
 }

@@ -3,25 +3,25 @@
 use super::*;
 use drivetrain::control::PidConfig;
 use drivetrain::motor::{AngleDrive, Impedance, ImpedanceControl};
-use drivetrain::robstride::{Current, Mode, Model, Motor, Position, Velocity};
+use drivetrain::robstride::{Mode, Model, Motor};
 use drivetrain::sim::RobStrideDrive;
 use drivetrain::units::Angle;
 use embedded_can::ExtendedId;
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 /// A motor, and a drive whose shaft stands.
-struct Joint<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Joint {
+    motor: Own<Motor>,
     drive: RefCell<RobStrideDrive>,
     /// An answer about a parameter, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
-    set: Drive<M>,
+    set: Drive,
 }
 
-impl<M: Mode> Joint<M> {
-    fn new(model: Model, mode: M, set: Drive<M>) -> Self {
+impl Joint {
+    fn new(model: Model, mode: impl Into<Mode>, set: Drive) -> Self {
         let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
         let drive = if model == Model::CYBERGEAR {
             RobStrideDrive::cybergear(1)
@@ -43,8 +43,8 @@ impl<M: Mode> Joint<M> {
     }
 }
 
-impl<M: Mode> Subject for Joint<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Joint {
+    type Device = Own<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);
@@ -90,7 +90,8 @@ impl<M: Mode> Subject for Joint<M> {
     }
 }
 
-fn kept<M: Mode>(model: Model, mode: M, set: Drive<M>) {
+fn kept(model: Model, mode: impl Into<Mode>, set: Drive) {
+    let mode = mode.into();
     assert_eq!(check_contract(|| Joint::new(model, mode, set)), Ok(RULES), "{mode:?}");
 }
 
@@ -112,12 +113,11 @@ fn motors_of_robstride_keep_the_contract_in_each_mode_with_each_kind_of_target()
         });
     }
     for model in [Model::RS02, Model::CYBERGEAR] {
-        kept(model, Current::new(4.0, 1.0), |motor, share| motor.set_torque(3.0 * share));
-        kept(model, Velocity::new(quick, 8.0), |motor, share| {
+        kept(model, Mode::current(4.0, 1.0), |motor, share| motor.set_torque(3.0 * share));
+        kept(model, Mode::velocity(quick, 8.0), |motor, share| {
             motor.set_velocity((), velocity(share))
         });
-        let turn: Drive<Position> =
-            |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
-        kept(model, Position::new(quick, 8.0), turn);
+        let turn: Drive = |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share));
+        kept(model, Mode::position(quick, 8.0), turn);
     }
 }

@@ -5,10 +5,10 @@ use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{AngleDrive, Role};
 use drivetrain::sim::{VescDrive, VescMotor};
 use drivetrain::units::Angle;
-use drivetrain::vesc::{CurrentControl, Duty, Mode, Model, Motor, Position, Rest, Velocity};
+use drivetrain::vesc::{Mode, Model, Motor, Rest};
 use std::cell::{Cell, RefCell};
 
-type Drive<M> = fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>;
+type Drive = fn(&mut Own<Motor>, f32) -> Result<(), TargetError>;
 
 const MODEL: Model = Model {
     name: "6374",
@@ -21,17 +21,17 @@ const MODEL: Model = Model {
 };
 
 /// A motor, and a drive whose shaft stands.
-struct Station<M: Mode> {
-    motor: Own<Motor<M>>,
+struct Station {
+    motor: Own<Motor>,
     drive: RefCell<VescDrive>,
     /// An answer about the fault code, which the motor takes before all else.
     answer: Cell<Option<CanFrame>>,
-    set: Drive<M>,
+    set: Drive,
     rest: Rest,
 }
 
-impl<M: Mode> Station<M> {
-    fn new(mode: M, rest: Rest, set: Drive<M>) -> Self {
+impl Station {
+    fn new(mode: Mode, rest: Rest, set: Drive) -> Self {
         let motor = VescMotor {
             pole_pairs: 7,
             gear: 1.0,
@@ -45,8 +45,8 @@ impl<M: Mode> Station<M> {
     }
 }
 
-impl<M: Mode> Subject for Station<M> {
-    type Device = Own<Motor<M>>;
+impl Subject for Station {
+    type Device = Own<Motor>;
     fn device(&mut self) -> &mut Self::Device {
         if let Some(answer) = self.answer.take() {
             self.motor.motor_mut().decode_answer(&answer);
@@ -101,7 +101,7 @@ fn extended(raw: u32) -> embedded_can::Id {
     embedded_can::Id::Extended(embedded_can::ExtendedId::new(raw).unwrap())
 }
 
-fn kept<M: Mode>(mode: M, set: Drive<M>) {
+fn kept(mode: Mode, set: Drive) {
     for rest in [Rest::Release, Rest::Brake(4.0), Rest::Handbrake(3.0)] {
         assert_eq!(
             check_contract(|| Station::new(mode, rest, set)),
@@ -115,23 +115,23 @@ fn kept<M: Mode>(mode: M, set: Drive<M>) {
 fn motors_on_vesc_drives_keep_the_contract_in_each_mode_with_each_kind_of_target() {
     let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
     let speed = PidConfig::new(0.3, 1.0, 0.0);
-    let loops = CurrentControl::new().with_loops(position, speed).unwrap();
-    kept(CurrentControl::new(), |motor, share| motor.set_torque(share));
+    let loops = Mode::current_with_loops(position, speed).unwrap();
+    kept(Mode::current(), |motor, share| motor.set_torque(share));
     kept(loops, |motor, share| motor.set_torque(share));
     kept(loops, |motor, share| motor.set_velocity((), velocity(share)));
     kept(loops, |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share)));
-    let wheel = CurrentControl::new().with_speed_loop(speed).unwrap();
+    let wheel = Mode::current_with_speed_loop(speed).unwrap();
     kept(wheel, |motor, share| motor.set_velocity((), velocity(share)));
-    kept(Velocity::new(), |motor, share| motor.set_velocity((), velocity(20.0 * share)));
-    kept(Position, |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share)));
-    let duty = Duty::new(0.8, PidConfig::new(0.01, 0.02, 0.0)).unwrap();
+    kept(Mode::velocity(), |motor, share| motor.set_velocity((), velocity(20.0 * share)));
+    kept(Mode::position(), |motor, share| motor.set_angle((), Angle::from_turns(0.25 * share)));
+    let duty = Mode::duty(0.8, PidConfig::new(0.01, 0.02, 0.0)).unwrap();
     kept(duty, |motor, share| motor.set_velocity((), velocity(share)));
 }
 
 /// Two claims of one motor have the question and the answer; all others are its own.
 #[test]
 fn only_questions_and_answers_are_shared_with_others() {
-    let motor = |id| Motor::new(MODEL, id, Position).unwrap();
+    let motor = |id| Motor::new(MODEL, id, Mode::position()).unwrap();
     let (first, second) = (motor(1), motor(2));
     for claim in first.claims() {
         let clashes = second.claims().into_iter().any(|other| claim.clashes_with(&other));

@@ -9,8 +9,8 @@ use drivetrain::time::{Instant, Tick};
 pub(crate) const J4310: [f32; 3] = [12.5, 30.0, 10.0];
 
 /// A motor and its drive on a bus that loses nothing.
-pub(crate) struct Bench<M: Mode> {
-    pub(crate) own: Own<Motor<M>>,
+pub(crate) struct Bench {
+    pub(crate) own: Own<Motor>,
     pub(crate) drive: DamiaoDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -18,8 +18,8 @@ pub(crate) struct Bench<M: Mode> {
     pub(crate) is_cut: bool,
 }
 
-impl<M: Mode> Bench<M> {
-    pub(crate) fn new(mode: M, number: f32) -> Self {
+impl Bench {
+    pub(crate) fn new(mode: impl Into<Mode>, number: f32) -> Self {
         let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
         let drive = DamiaoDrive::new(1, 0x11, J4310).with_register(10, number);
         Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false }
@@ -56,7 +56,7 @@ impl<M: Mode> Bench<M> {
         }
     }
 
-    pub(crate) fn armed(mode: M, number: f32) -> Self {
+    pub(crate) fn armed(mode: impl Into<Mode>, number: f32) -> Self {
         let mut bench = Self::new(mode, number);
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();

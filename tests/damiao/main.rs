@@ -14,9 +14,8 @@ mod review;
 
 use bench::{Bench, J4310, mit};
 use drivetrain::control::PidConfig;
-use drivetrain::damiao::{
-    ConfigError, ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Velocity,
-};
+use drivetrain::damiao::{Mode, Model, Motor, Register};
+use drivetrain::error::ConfigError;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Own, TargetError, VelocityDrive,
 };
@@ -27,7 +26,7 @@ use drivetrain::units::{Angle, AngularVelocity};
 #[test]
 fn a_motor_is_armed_when_its_settings_have_been_read() {
     let mut bench = Bench::new(mit(), 1.0);
-    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from DM-J4310 #1");
     bench.steps(5, |_| {});
     assert!(refused(&mut bench).starts_with("DM-J4310 #1 has not answered yet what its "));
@@ -54,7 +53,7 @@ fn a_write_is_lost_with_the_supply_unless_it_was_stored_and_noticed_before_armin
 #[test]
 fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     let wheel = AngularVelocity::from_rad_per_s(6.0);
-    let mut velocity = Bench::armed(Velocity::new(AngularVelocity::from_rad_per_s(20.0)), 3.0);
+    let mut velocity = Bench::armed(Mode::velocity(AngularVelocity::from_rad_per_s(20.0)), 3.0);
     velocity.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
     assert!((velocity.drive.shaft().velocity_rad_per_s() - 6.0).abs() < 0.2);
     rests(velocity);
@@ -79,12 +78,12 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 
     let quick = AngularVelocity::from_rad_per_s(10.0);
     let joint = Angle::from_radians(1.0);
-    let mut position = Bench::armed(PositionVelocity::new(quick), 2.0);
+    let mut position = Bench::armed(Mode::position_velocity(quick), 2.0);
     position.steps(2_000, |bench| bench.own.set_angle((), joint).unwrap());
     assert!((position.drive.shaft().angle_rad() - 1.0).abs() < 0.02);
     rests(position);
 
-    let mut force = Bench::armed(ForcePosition::new(quick, 2.0), 4.0);
+    let mut force = Bench::armed(Mode::force_position(quick, 2.0), 4.0);
     force.steps(2_000, |bench| {
         bench.own.set_angle((), joint).unwrap();
         assert!(bench.drive.shaft().torque_nm().abs() <= 2.001);
@@ -94,7 +93,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 }
 
 /// Disarmed, the drive gives no torque from the next frames on, and is disabled.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     bench.own.disarm();
     bench.step();
     bench.steps(50, |bench| {
@@ -140,7 +139,7 @@ fn an_impedance_holds_a_weight_at_its_angle_and_never_asks_for_more_than_the_lim
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     let quick = AngularVelocity::from_rad_per_s(10.0);
     let there = Angle::from_radians(-1.5);
-    let mut position = Bench::new(PositionVelocity::new(quick), 2.0);
+    let mut position = Bench::new(Mode::position_velocity(quick), 2.0);
     position.drive.shaft_mut().set_angle(1.5);
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
@@ -210,8 +209,7 @@ fn two_motors_with_one_master_id_are_told_apart() {
 
 #[test]
 fn bad_configurations_are_refused_with_the_limit() {
-    let text =
-        |outcome: Result<Motor<ImpedanceControl>, ConfigError>| outcome.unwrap_err().to_string();
+    let text = |outcome: Result<Motor, ConfigError>| outcome.unwrap_err().to_string();
     assert_eq!(
         text(Motor::new(Model::J4310, 0, ImpedanceControl::new(1.0).unwrap())),
         "id 0: 1 to 15 are allowed"
@@ -221,11 +219,13 @@ fn bad_configurations_are_refused_with_the_limit() {
         "id 16: 1 to 15 are allowed"
     );
     let motor = |limit| {
-        let mode =
-            ImpedanceControl::new(limit).map_err(|_| ConfigError::Timeout(Duration::ZERO))?;
+        let mode = ImpedanceControl::new(limit)?;
         Motor::new(Model::J4310, 1, mode)
     };
-    assert!(text(motor(10.001)).ends_with("above 0 and at most TMAX, 10 Nm"));
+    assert!(
+        text(motor(10.001))
+            .ends_with("torque limit in Nm 10.001: above 0 and at most 10 is allowed")
+    );
     for limit in [0.0, -1.0, f32::INFINITY, f32::NAN] {
         assert!(ImpedanceControl::new(limit).is_err(), "{limit}");
     }

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, mit};
 use drivetrain::control::TimeStep;
-use drivetrain::damiao::{ForcePosition, Mode, Model, Motor, PositionVelocity, Register, Velocity};
+use drivetrain::damiao::{Mode, Model, Motor, Register};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Devices, Impedance, ImpedanceControl, Order, Own, OwnMotor, Target, VelocityDrive,
@@ -113,7 +113,7 @@ fn the_answer_to_a_store_is_no_feedback() {
 /// another tool) before the first target makes the "stay" frame -27.6 rad/s, with the drive's full torque behind it.
 #[test]
 fn velocity_mode_does_not_jump_after_a_duplicated_answer() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     let answer = CanFrame::standard(0x11, [1, 0, 0x33, 10, 3, 0, 0, 0]).unwrap();
     for _ in 0..2 {
         let now = bench.now();
@@ -177,7 +177,7 @@ fn a_drive_that_answers_a_write_after_15_ms_can_be_driven() {
 /// After the loss of one frame (the first, which replaces the target), the drive should not go on to its target of before.
 #[test]
 fn velocity_mode_does_not_resume_its_old_speed_when_one_frame_is_lost() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
     bench.steps(5_000, |_| {});
@@ -211,7 +211,7 @@ fn velocity_mode_does_not_resume_its_old_speed_when_one_frame_is_lost() {
 /// Nor when the driver took no frame for 10 ms: nothing was lost, but the frame that waited was replaced by the next step.
 #[test]
 fn velocity_mode_does_not_resume_its_old_speed_when_the_bus_was_busy() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
     bench.steps(5_000, |_| {});
@@ -247,7 +247,7 @@ fn velocity_mode_does_not_resume_its_old_speed_when_the_bus_was_busy() {
 /// enabled with what the shaft does then, not with the velocity of long ago.
 #[test]
 fn velocity_mode_does_not_jump_to_a_velocity_measured_long_before() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
     bench.steps(80, |_| {});
@@ -279,7 +279,7 @@ fn velocity_mode_does_not_jump_to_a_velocity_measured_long_before() {
 
 /// A drive whose supply sags while it is enabled (the inrush of all motors at once) has lost its TIMEOUT, and its settings. It should not be
 /// enabled before it has confirmed TIMEOUT anew.
-fn sags<M: Mode>(mode: M, number: f32, gap: u32, set: impl Fn(&mut Own<Motor<M>>)) {
+fn sags(mode: impl Into<Mode> + Copy, number: f32, gap: u32, set: impl Fn(&mut Own<Motor>)) {
     let mut bad = Vec::new();
     for at in 0..60 {
         let mut bench = Bench::armed(mode, number);
@@ -311,7 +311,7 @@ fn no_drive_is_enabled_without_its_time_out_after_a_sag_of_30_ms_mit() {
 
 #[test]
 fn no_drive_is_enabled_without_its_time_out_after_a_sag_position() {
-    sags(PositionVelocity::new(quick()), 2.0, 12, |own| _ = own.set_angle((), Angle::ZERO));
+    sags(Mode::position_velocity(quick()), 2.0, 12, |own| _ = own.set_angle((), Angle::ZERO));
 }
 
 /// A sag brings back what was written and not stored: TMAX 28 in the place of 10. The drive should not be driven before that is noticed.
@@ -453,7 +453,7 @@ fn a_spring_with_feedback_9_ms_late_keeps_near_its_limit() {
 
 // ---------------------------------------------------------------- end of PMAX
 
-fn is_held_at_the_ends<M: Mode>(mode: M, number: f32) {
+fn is_held_at_the_ends(mode: impl Into<Mode> + Copy, number: f32) {
     for angle in [12.7_f32, -12.7] {
         let mut bench = Bench::new(mode, number);
         bench.drive.shaft_mut().set_angle(angle.signum() * 12.3);
@@ -471,7 +471,7 @@ fn is_held_at_the_ends<M: Mode>(mode: M, number: f32) {
 /// is no position there, so it is disabled and trips: a loaded arm falls.
 #[test]
 fn a_joint_that_is_led_to_the_end_of_its_range_is_held() {
-    is_held_at_the_ends(PositionVelocity::new(quick()), 2.0);
+    is_held_at_the_ends(Mode::position_velocity(quick()), 2.0);
 }
 
 #[test]
@@ -484,7 +484,7 @@ fn a_spring_that_is_led_to_the_end_of_its_range_is_held() {
 /// `ForcePosition::new`: "the velocity, above 0 and at most VMAX and 100 rad/s". 200 should be refused.
 #[test]
 fn force_position_refuses_more_than_100_rad_s() {
-    assert!(Motor::new(Model::H3510, 1, ForcePosition::new(rad_s(200.0), 0.5)).is_err());
+    assert!(Motor::new(Model::H3510, 1, Mode::force_position(rad_s(200.0), 0.5)).is_err());
 }
 
 /// 0x7FF is the id of all drives. A tool, or a second controller, that asks *another* drive should not be a second master of this one.
@@ -502,14 +502,14 @@ fn a_question_to_another_drive_is_no_second_master() {
 #[test]
 fn frames_for_each_update_are_few() {
     for (name, frames) in
-        [("mit", most_frames(mit(), 1.0)), ("velocity", most_frames(Velocity::new(quick()), 3.0))]
+        [("mit", most_frames(mit(), 1.0)), ("velocity", most_frames(Mode::velocity(quick()), 3.0))]
     {
         println!("{name}: {frames:?} frames in an update at most: disarmed, enabling, driven");
         assert!(frames.iter().all(|count| *count <= 3));
     }
 }
 
-fn most_frames<M: Mode>(mode: M, number: f32) -> [usize; 3] {
+fn most_frames(mode: impl Into<Mode> + Copy, number: f32) -> [usize; 3] {
     let mut bench = Bench::new(mode, number);
     let mut most = [0; 3];
     for tick in 0..600 {
@@ -539,10 +539,10 @@ impl Random {
 /// Random calls, lost, delayed, duplicated and refused frames, bad clocks and power cycles. After a disarm or an emergency stop every
 /// frame is rest as a foreign decoder reads it; a drive is never enabled without TIMEOUT by a frame while disarmed; what MIT commands ask for
 /// at the reported place keeps within the limit and half a count.
-fn storm<M: Mode>(
-    mode: M,
+fn storm(
+    mode: impl Into<Mode> + Copy,
     number: f32,
-    set: impl Fn(&mut Own<Motor<M>>, f32),
+    set: impl Fn(&mut Own<Motor>, f32),
     sags: bool,
     writes: bool,
 ) {
@@ -661,7 +661,7 @@ fn rest_in_a_storm_mit() {
 #[test]
 fn rest_in_a_storm_velocity() {
     storm(
-        Velocity::new(quick()),
+        Mode::velocity(quick()),
         3.0,
         |own, x| _ = own.set_velocity((), rad_s(10.0 * x)),
         true,
@@ -672,7 +672,7 @@ fn rest_in_a_storm_velocity() {
 #[test]
 fn rest_in_a_storm_position() {
     storm(
-        PositionVelocity::new(quick()),
+        Mode::position_velocity(quick()),
         2.0,
         |own, x| _ = own.set_angle((), Angle::from_radians(x)),
         true,
@@ -683,7 +683,7 @@ fn rest_in_a_storm_position() {
 #[test]
 fn rest_in_a_storm_force() {
     storm(
-        ForcePosition::new(quick(), 2.0),
+        Mode::force_position(quick(), 2.0),
         4.0,
         |own, x| _ = own.set_angle((), Angle::from_radians(x)),
         true,
@@ -696,21 +696,21 @@ fn rest_in_a_storm_force() {
 fn time_out_in_a_storm() {
     storm(mit(), 1.0, |own, x| _ = own.set_angle((), Angle::from_radians(x)), false, false);
     storm(
-        Velocity::new(quick()),
+        Mode::velocity(quick()),
         3.0,
         |own, x| _ = own.set_velocity((), rad_s(10.0 * x)),
         false,
         false,
     );
     storm(
-        PositionVelocity::new(quick()),
+        Mode::position_velocity(quick()),
         2.0,
         |own, x| _ = own.set_angle((), Angle::from_radians(x)),
         false,
         false,
     );
     storm(
-        ForcePosition::new(quick(), 2.0),
+        Mode::force_position(quick(), 2.0),
         4.0,
         |own, x| _ = own.set_angle((), Angle::from_radians(x)),
         false,
@@ -843,7 +843,7 @@ fn an_impedance_keeps_the_limit_of_each_share() {
 /// "stay at 20 rad/s", and then told 0 rad/s, as the output opens from zero: a full brake.
 #[test]
 fn velocity_mode_does_not_brake_hard_after_late_feedback() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
     let (mut torque, mut slowest) = (0.0_f32, f32::MAX);
@@ -863,7 +863,7 @@ fn velocity_mode_does_not_brake_hard_after_late_feedback() {
 /// The same when a coasting wheel is armed, its target the speed that it has.
 #[test]
 fn velocity_mode_does_not_brake_a_coasting_wheel_when_armed() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(3_000, |b| b.own.set_velocity((), quick()).unwrap());
     bench.own.disarm();
@@ -910,7 +910,7 @@ fn a_spring_does_not_come_back_at_once_after_late_feedback() {
 /// emergency stop. The frames go to the id of our mode alone, which such a drive discards.
 #[test]
 fn an_emergency_stop_disables_a_drive_in_another_mode() {
-    let mut bench = Bench::new(Velocity::new(quick()), 1.0);
+    let mut bench = Bench::new(Mode::velocity(quick()), 1.0);
     bench.steps(100, |_| {});
     _ = bench.drive.hear(&CanFrame::standard(1, [255, 255, 255, 255, 255, 255, 255, 252]).unwrap());
     assert!(bench.drive.is_enabled());
@@ -922,7 +922,7 @@ fn an_emergency_stop_disables_a_drive_in_another_mode() {
 /// A refused frame is its sender's: `requeue` should return true for each frame that came from `next_frame`.
 #[test]
 fn each_frame_of_a_motor_can_be_given_back() {
-    let mut bench = Bench::new(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::new(Mode::velocity(quick()), 3.0);
     let mut foreign = Vec::new();
     for tick in 0..300 {
         if tick == 150 {
@@ -948,7 +948,7 @@ fn each_frame_of_a_motor_can_be_given_back() {
 /// "clear error", 1000 times a second, which also feeds its watchdog: it goes on with its last velocity for ever.
 #[test]
 fn a_drive_is_disabled_after_an_error_that_is_over() {
-    let mut bench = Bench::armed(Velocity::new(quick()), 3.0);
+    let mut bench = Bench::armed(Mode::velocity(quick()), 3.0);
     bench.steps(1_000, |b| b.own.set_velocity((), quick()).unwrap());
     let now = bench.now();
     _ = Devices::ingest(&mut bench.own, &feedback_of([12.5, 30.0, 10.0], 1, 8, 0.0, 20.0), now);
@@ -1012,7 +1012,7 @@ fn a_spring_with_feedback_20_ms_old_keeps_within_twice_its_limit() {
 /// A joint on its way in position-velocity mode, whose feedback is late once by 15 ms: how hard it is braked.
 #[test]
 fn position_mode_does_not_brake_hard_after_late_feedback() {
-    let mut bench = Bench::new(PositionVelocity::new(rad_s(10.0)), 2.0);
+    let mut bench = Bench::new(Mode::position_velocity(rad_s(10.0)), 2.0);
     bench.drive = bench.drive.with_shaft(DriveShaft::new(0.01, 0.001));
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
@@ -1077,7 +1077,7 @@ fn rest_that_the_driver_refused_gives_way_to_no_other_frame() {
         bench.drive.shaft_mut().set_load(-1.0);
         bench.steps(20, |b| b.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0)).unwrap());
         assert!(bench.drive.shaft().torque_nm() > 0.5);
-        let update = |bench: &mut Bench<ImpedanceControl>| {
+        let update = |bench: &mut Bench| {
             bench.now_us += 12_000;
             let now = bench.now();
             Devices::update(&mut bench.own, Tick::new(now, 0.001));

@@ -5,8 +5,9 @@
 use crate::case::{Case, cases, safe_after, saw};
 use crate::rig::{armed, at_ms, at_once, feedback, step, words};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Condition, Devices, Link, TargetError, TimeoutError, Timeouts};
+use drivetrain::motor::{Condition, Devices, Link, TargetError, Timeouts};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::time::{Duration, Instant, ManualClock, Tick};
 use drivetrain::units::Current;
@@ -373,25 +374,25 @@ fn f71_ages_that_would_drive_blindly_are_refused() {
     let (ms, defaults) = (Duration::from_millis, Timeouts::new());
     let longest = Duration::from_micros(u64::MAX);
     for (late, offline, parameter) in [
-        (ms(10_000), ms(1), "late"),
-        (ms(1_001), ms(2_000), "late"),
-        (Duration::ZERO, ms(100), "late"),
-        (longest, longest, "late"),
-        (ms(40), ms(39), "offline"),
-        (ms(40), ms(10_001), "offline"),
-        (ms(40), longest, "offline"),
+        (ms(10_000), ms(1), "late in us"),
+        (ms(1_001), ms(2_000), "late in us"),
+        (Duration::ZERO, ms(100), "late in us"),
+        (longest, longest, "late in us"),
+        (ms(40), ms(39), "offline in us"),
+        (ms(40), ms(10_001), "offline in us"),
+        (ms(40), longest, "offline in us"),
     ] {
-        let refused: Result<Timeouts, TimeoutError> = defaults.with_feedback(late, offline);
-        assert_eq!(refused.unwrap_err().parameter, parameter, "{late:?} {offline:?}");
+        let refused: Result<Timeouts, ConfigError> = defaults.with_feedback(late, offline);
+        assert_eq!(refused.unwrap_err().parameter(), parameter, "{late:?} {offline:?}");
     }
     for command in [Duration::ZERO, ms(1_001), longest] {
-        assert_eq!(defaults.with_command(command).unwrap_err().parameter, "command");
+        assert_eq!(defaults.with_command(command).unwrap_err().parameter(), "command in us");
     }
     for measured in [Duration::ZERO, Duration::from_micros(999), ms(1_001), longest] {
-        assert_eq!(defaults.with_measured(measured).unwrap_err().parameter, "measurement");
+        assert_eq!(defaults.with_measured(measured).unwrap_err().parameter(), "measurement in us");
     }
     let told = defaults.with_feedback(ms(10_000), ms(1)).unwrap_err().to_string();
-    assert_eq!(told, "late after 10000000 us: 1 us to 1000000 us are allowed");
+    assert_eq!(told, "late in us 10000000: 1 to 1000000 are allowed");
 
     // The longest that is taken: no motor is driven longer without feedback, or without a target.
     let slowest =

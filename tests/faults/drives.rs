@@ -8,7 +8,7 @@ use drivetrain::damiao::{Register, Status};
 use drivetrain::lk;
 use drivetrain::motor::{AngleDrive, ArmError, CanDevice, Devices, Link, VelocityDrive};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::vesc::Velocity;
+use drivetrain::vesc::Mode;
 
 /// The cases of this file.
 pub(crate) const CASES: &[Case] = cases![
@@ -64,7 +64,7 @@ fn f72_a_drive_in_another_mode_or_with_other_ranges_is_not_armed_and_the_registe
 #[cfg_attr(test, test)]
 fn f73_the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time() {
     let mut bench = Bench::armed(mit(), 1.0);
-    let drive = |bench: &mut Bench<_>| {
+    let drive = |bench: &mut Bench| {
         _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
     };
     bench.steps(500, drive);
@@ -90,7 +90,7 @@ fn f73_the_drive_stops_by_itself_when_the_cable_is_cut_and_is_told_so_each_time(
 #[cfg_attr(test, test)]
 fn f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itself() {
     let mut bench = Bench::armed(mit(), 1.0);
-    let drive = |bench: &mut Bench<_>| {
+    let drive = |bench: &mut Bench| {
         _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0));
     };
     bench.steps(300, drive);
@@ -109,7 +109,7 @@ fn f74_an_error_of_the_drive_trips_and_is_cleared_and_does_not_come_back_by_itse
 fn f75_a_drive_that_forgets_its_turns_does_not_unwind_them() {
     // Two turns and two thirds, by a third each.
     let turned = || {
-        let mode = lk::PositionVelocity::new(AngularVelocity::from_rad_per_s(8.0));
+        let mode = lk::Mode::position_velocity(AngularVelocity::from_rad_per_s(8.0));
         let mut bench = lk_bench::Bench::armed(lk::Model::MF9025_16T, mode);
         for third in 1..=8_u8 {
             let target = Angle::from_turns(f32::from(third) / 3.0);
@@ -180,7 +180,7 @@ fn f76_an_echo_or_a_command_that_is_read_back_is_no_feedback() {
 #[cfg_attr(test, test)]
 fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
     let mut bench = lk_bench::Bench::armed(lk::Model::MG5010E_I10, lk_bench::torque());
-    let drive = |bench: &mut lk_bench::Bench<_>| {
+    let drive = |bench: &mut lk_bench::Bench| {
         _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(3.0));
     };
     bench.steps(300, drive);
@@ -201,7 +201,7 @@ fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
 
 #[cfg_attr(test, test)]
 fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
-    let mut bench = vesc_bench::Bench::armed(Velocity::new());
+    let mut bench = vesc_bench::Bench::armed(Mode::velocity());
     let wheel = AngularVelocity::from_rad_per_s(60.0);
     bench.steps(500, |bench| bench.own.set_velocity((), wheel).unwrap());
     bench.drive.fail(4);
@@ -225,7 +225,7 @@ fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
 #[cfg_attr(test, test)]
 fn f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
     let mut bench = vesc_bench::Bench::armed(looped());
-    let turn = |bench: &mut vesc_bench::Bench<_>| {
+    let turn = |bench: &mut vesc_bench::Bench| {
         _ = bench.own.set_angle((), Angle::from_radians(3.0));
     };
     bench.steps(150, turn);

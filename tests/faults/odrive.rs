@@ -3,7 +3,7 @@
 use crate::axle::{Bench, torque};
 use crate::case::{Case, cases, saw};
 use drivetrain::motor::{Devices, OwnMotor, VelocityDrive};
-use drivetrain::odrive::{Firmware, Heartbeat, Velocity};
+use drivetrain::odrive::{Firmware, Heartbeat, Mode};
 use drivetrain::units::AngularVelocity;
 
 /// The cases of this file.
@@ -14,7 +14,7 @@ pub(crate) const CASES: &[Case] = cases![
     f84_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone,
 ];
 
-fn drive(bench: &mut Bench<Velocity>) {
+fn drive(bench: &mut Bench) {
     _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(5.0));
 }
 
@@ -34,7 +34,7 @@ fn f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_tha
         assert!(bench.own.motor().heartbeat().is_some());
         saw("0 Nm 12 ms after the last estimates, with a heartbeat each 2 ms");
     }
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
     bench.steps(400, drive);
     bench.lost = Some(0x01);
     bench.steps(510, drive);
@@ -44,7 +44,7 @@ fn f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_tha
 
 #[cfg_attr(test, test)]
 fn f82_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_6);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_6);
     bench.drive.refuse(14);
     let (mut codes, mut requests) = (Vec::new(), 0);
     bench.steps(900, |bench| {
@@ -76,7 +76,7 @@ fn f83_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
 
 #[cfg_attr(test, test)]
 fn f84_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone() {
-    let mut bench = Bench::new(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::new(Mode::velocity(3.0), Firmware::V0_5);
     bench.drive = bench.drive.with_watchdog(0.1);
     bench.arm();
     bench.steps(400, drive);

@@ -4,7 +4,7 @@ use crate::case::{Case, cases, saw};
 use crate::rmd_bench::{Bench, torque};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Own, VelocityDrive};
-use drivetrain::rmd::{Model, Velocity};
+use drivetrain::rmd::{Mode, Model};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
 
@@ -21,7 +21,7 @@ fn rad_s(value: f32) -> AngularVelocity {
 
 #[cfg_attr(test, test)]
 fn f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_trips() {
-    let mut bench = Bench::armed(Model::X8_120, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(Model::X8_120, Mode::velocity(rad_s(20.0)));
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     let before = *bench.own.motor().feedback().unwrap();
     bench.own.set_velocity((), rad_s(6.0)).unwrap();
@@ -49,7 +49,7 @@ fn f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_tr
 
 #[cfg_attr(test, test)]
 fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
-    let mut bench = Bench::new(Model::X8_120, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::new(Model::X8_120, Mode::velocity(rad_s(20.0)));
     bench.drive = bench.drive.refusing_timeouts();
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();

@@ -3,7 +3,7 @@
 use crate::case::{Case, cases, saw};
 use crate::robstride_bench as robstride;
 use drivetrain::motor::{AngleDrive, ArmError, Devices, Impedance, ImpedanceControl};
-use drivetrain::robstride::{Model, Position, Velocity};
+use drivetrain::robstride::{Mode, Model};
 use drivetrain::sim::RobStrideDrive;
 use drivetrain::units::{Angle, AngularVelocity};
 
@@ -19,7 +19,7 @@ pub(crate) const CASES: &[Case] = cases![
 fn f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if_it_does_not_take_it()
  {
     let slow = AngularVelocity::from_rad_per_s(10.0);
-    let mut bench = robstride::Bench::new(Velocity::new(slow, 8.0));
+    let mut bench = robstride::Bench::new(Mode::velocity(slow, 8.0));
     for _ in 0..2 {
         bench.steps(150, |_| {});
         assert_eq!(bench.drive.parameter(0x7005), Some(2.0));
@@ -28,7 +28,7 @@ fn f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if
         bench.drive.lose_supply();
         assert_eq!(bench.drive.parameter(0x7005), Some(0.0));
     }
-    let mut old = robstride::Bench::new(Position::new(slow, 8.0));
+    let mut old = robstride::Bench::new(Mode::position(slow, 8.0));
     old.drive = RobStrideDrive::cybergear(1);
     old.steps(300, |_| {});
     let refused = old.own.arm(old.now()).unwrap_err();
@@ -86,7 +86,7 @@ fn f87_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
 #[cfg_attr(test, test)]
 fn f88_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target() {
     for model in [Model::RS02, Model::CYBERGEAR] {
-        let mode = Position::new(AngularVelocity::from_rad_per_s(10.0), 8.0);
+        let mode = Mode::position(AngularVelocity::from_rad_per_s(10.0), 8.0);
         let mut bench = robstride::Bench::of(model, mode);
         bench.drive.shaft_mut().set_angle(3.0);
         bench.steps(150, |_| {});

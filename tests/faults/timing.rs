@@ -4,7 +4,7 @@ use crate::case::{Case, cases, safe_after, saw};
 use crate::rig::{Rig, SPEED, armed, at_ms, at_once, feedback, rpm, step, ticks_since, words};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
-use drivetrain::motor::{ArmError, Condition, Link, Recovery, TargetError};
+use drivetrain::motor::{ArmError, Condition, Link, TargetError};
 use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::sim::{Fault, Line, Simulation};
 use drivetrain::time::{Duration, ExtendedCounter, Instant, ManualClock, Tick};
@@ -399,9 +399,8 @@ fn f33_recovery_takes_ten_good_frames_and_starts_from_zero() {
 
     let world = Simulation::new(2);
     let opening = Duration::from_millis(200);
-    let mut rig = Rig::with(&world, Line::Can1, 1, |config| {
-        config.with_recovery(Recovery::Resume).with_opening(opening)
-    });
+    let mut rig =
+        Rig::with(&world, Line::Can1, 1, |config| config.with_resume().with_opening(opening));
     world.fault(Fault::Silent(rig.keys[0]), at_ms(300)..at_ms(500)).unwrap();
     rig.drive(800);
     let back = rig.words(0, 500, 800).into_iter().find(|word| *word != 0).unwrap();

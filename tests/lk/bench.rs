@@ -7,8 +7,8 @@ use drivetrain::sim::LkDrive;
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing.
-pub(crate) struct Bench<M: Mode> {
-    pub(crate) own: Own<Motor<M>>,
+pub(crate) struct Bench {
+    pub(crate) own: Own<Motor>,
     pub(crate) drive: LkDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -16,8 +16,8 @@ pub(crate) struct Bench<M: Mode> {
     pub(crate) is_cut: bool,
 }
 
-impl<M: Mode> Bench<M> {
-    pub(crate) fn new(model: Model, mode: M) -> Self {
+impl Bench {
+    pub(crate) fn new(model: Model, mode: impl Into<Mode>) -> Self {
         let own = Own::new(Motor::new(model, 1, mode).unwrap());
         Self { own, drive: drive_of(&model), now_us: 1_000, frames: Vec::new(), is_cut: false }
     }
@@ -53,7 +53,7 @@ impl<M: Mode> Bench<M> {
         }
     }
 
-    pub(crate) fn armed(model: Model, mode: M) -> Self {
+    pub(crate) fn armed(model: Model, mode: impl Into<Mode>) -> Self {
         let mut bench = Self::new(model, mode);
         bench.steps(100, |_| {});
         bench.own.arm(bench.now()).unwrap();

@@ -9,7 +9,7 @@ mod review;
 use bench::{Bench, drive_of, torque};
 use drivetrain::control::PidConfig;
 use drivetrain::frame::CanFrame;
-use drivetrain::lk::{Mode, Model, Motor, PositionVelocity, Series, Velocity};
+use drivetrain::lk::{Mode, Model, Motor, Series};
 use drivetrain::motor::{
     AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Own, OwnMotor,
     VelocityDrive,
@@ -38,7 +38,7 @@ fn frame(data: [u8; 8]) -> CanFrame {
 #[test]
 fn a_motor_is_armed_when_its_state_has_been_read() {
     let mut bench = Bench::new(Model::MF9025_16T, torque());
-    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from MF9025-16T #1");
     bench.steps(5, |_| {});
     assert_eq!(refused(&mut bench), "MF9025-16T #1 has not answered yet what its motorState is");
@@ -64,7 +64,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
         assert!((looped.drive.shaft().angle_rad() + 2.0).abs() < 0.02);
         rests(looped);
 
-        let mut velocity = Bench::armed(model, Velocity::new(rad_s(20.0)).with_torque_limit(2.0));
+        let mut velocity = Bench::armed(model, Mode::velocity_with_torque_limit(rad_s(20.0), 2.0));
         velocity.steps(1_000, |bench| {
             bench.own.set_velocity((), rad_s(-6.0)).unwrap();
             assert!(bench.drive.shaft().torque_nm().abs() <= 2.001);
@@ -72,7 +72,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
         assert!((velocity.drive.shaft().velocity_rad_per_s() + 6.0).abs() < 0.2);
         rests(velocity);
 
-        let mut position = Bench::armed(model, PositionVelocity::new(rad_s(8.0)));
+        let mut position = Bench::armed(model, Mode::position_velocity(rad_s(8.0)));
         position.steps(2_000, |bench| {
             bench.own.set_angle((), rad(2.0)).unwrap();
             assert!(bench.drive.shaft().velocity_rad_per_s().abs() < 8.1);
@@ -83,7 +83,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 }
 
 /// Disarmed, the drive gives no torque from the next frames on, and is off.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     bench.own.disarm();
     bench.step();
     bench.steps(50, |bench| {
@@ -94,7 +94,7 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 
 #[test]
 fn a_reversed_motor_turns_the_other_way_in_each_mode() {
-    let reversed = |bench: &mut Bench<_>| bench.own = Own::new(bench.own.motor().reversed());
+    let reversed = |bench: &mut Bench| bench.own = Own::new(bench.own.motor().reversed());
     let mut torqued = Bench::new(Model::MG5010E_I10, torque());
     reversed(&mut torqued);
     torqued.steps(100, |_| {});
@@ -103,7 +103,7 @@ fn a_reversed_motor_turns_the_other_way_in_each_mode() {
     assert!(torqued.drive.shaft().velocity_rad_per_s() < -2.5);
     assert!(torqued.own.velocity(()).unwrap().as_rad_per_s() > 2.5);
 
-    let mut position = Bench::new(Model::MG5010E_I10, PositionVelocity::new(rad_s(8.0)));
+    let mut position = Bench::new(Model::MG5010E_I10, Mode::position_velocity(rad_s(8.0)));
     position.own = Own::new(position.own.motor().reversed());
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
@@ -146,7 +146,7 @@ fn no_command_is_beyond_the_torque_limit() {
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     for model in MODELS {
         let there = rad(-1.5);
-        let mut position = Bench::new(model, PositionVelocity::new(rad_s(8.0)));
+        let mut position = Bench::new(model, Mode::position_velocity(rad_s(8.0)));
         // Some turns away, so that the drive's own count is another one than that of its encoder.
         position.drive.shaft_mut().set_angle(1.5 + 5.0 * TAU);
         position.steps(100, |_| {});
@@ -162,7 +162,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
         assert!(is_there || model.gear() > 1.0, "{end}");
         assert!((position.own.angle(()).unwrap() - there).as_radians().rem_euclid(TAU) < 0.02);
 
-        let mut velocity = Bench::new(model, Velocity::new(rad_s(20.0)));
+        let mut velocity = Bench::new(model, Mode::velocity(rad_s(20.0)));
         velocity.drive.shaft_mut().set_velocity(5.0);
         velocity.steps(100, |_| {});
         velocity.own.arm(velocity.now()).unwrap();
@@ -176,7 +176,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 /// Off clears the turns of the drive, so a position that counts from before would turn the shaft by all of them.
 #[test]
 fn a_position_motor_that_was_off_with_many_turns_does_not_unwind_them() {
-    let mut bench = Bench::armed(Model::MF9025_16T, PositionVelocity::new(rad_s(30.0)));
+    let mut bench = Bench::armed(Model::MF9025_16T, Mode::position_velocity(rad_s(30.0)));
     // Eight thirds of a turn in steps of a third, by the shortest way each.
     for third in 1..=8_u8 {
         let target = rad(TAU / 3.0 * f32::from(third));
@@ -199,7 +199,7 @@ fn a_position_motor_that_was_off_with_many_turns_does_not_unwind_them() {
 /// The output opens when the angle is known, not before: the first position is where the shaft is, however late the answer comes.
 #[test]
 fn no_position_is_sent_before_the_angle_of_the_drive_is_known() {
-    let mut bench = Bench::armed(Model::MF9025_16T, PositionVelocity::new(rad_s(8.0)));
+    let mut bench = Bench::armed(Model::MF9025_16T, Mode::position_velocity(rad_s(8.0)));
     bench.drive.shaft_mut().set_angle(1.0 + 3.0 * TAU);
     bench.steps(20, |_| {});
     let mut positions = Vec::new();
@@ -230,14 +230,14 @@ fn no_position_is_sent_before_the_angle_of_the_drive_is_known() {
 #[test]
 fn a_drive_that_resets_while_it_holds_a_position_trips_before_it_has_gone_far() {
     for silent_ms in [0, 3, 6, 9, 30] {
-        let mut bench = Bench::armed(Model::MF9025_16T, PositionVelocity::new(rad_s(8.0)));
+        let mut bench = Bench::armed(Model::MF9025_16T, Mode::position_velocity(rad_s(8.0)));
         for third in 1..=8_u8 {
             let target = rad(TAU / 3.0 * f32::from(third));
             bench.steps(1_000, |bench| bench.own.set_angle((), target).unwrap());
         }
         let before = bench.drive.shaft().angle_rad();
         bench.drive.lose_supply();
-        let target = |bench: &mut Bench<_>| _ = bench.own.set_angle((), rad(TAU * 8.0 / 3.0));
+        let target = |bench: &mut Bench| _ = bench.own.set_angle((), rad(TAU * 8.0 / 3.0));
         bench.is_cut = true;
         bench.steps(silent_ms, target);
         bench.is_cut = false;
@@ -257,7 +257,7 @@ fn a_drive_that_resets_while_it_holds_a_position_trips_before_it_has_gone_far() 
 
 #[test]
 fn lost_feedback_switches_the_drive_off_and_it_goes_on_when_it_is_heard() {
-    for mode in [Velocity::new(rad_s(20.0)), Velocity::new(rad_s(20.0)).with_torque_limit(1.0)] {
+    for mode in [Mode::velocity(rad_s(20.0)), Mode::velocity_with_torque_limit(rad_s(20.0), 1.0)] {
         let mut bench = Bench::armed(Model::MF9025_16T, mode);
         bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
         assert!(bench.drive.is_on());
@@ -281,7 +281,7 @@ fn lost_feedback_switches_the_drive_off_and_it_goes_on_when_it_is_heard() {
 /// The drive has no time-out: what the manual says, and what the module says.
 #[test]
 fn a_drive_whose_cable_is_cut_goes_on_with_its_last_command() {
-    let mut bench = Bench::armed(Model::MF9025_16T, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(Model::MF9025_16T, Mode::velocity(rad_s(20.0)));
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     bench.is_cut = true;
     bench.steps(1_000, |_| {});
@@ -369,7 +369,7 @@ fn an_echo_is_never_feedback() {
 /// A driver that hands back what was sent, without a drive.
 #[test]
 fn commands_that_are_read_back_are_no_feedback_and_count_as_another_controller() {
-    fn looped<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) {
+    fn looped(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
         let mut bench = Bench::armed(Model::MF9025_16T, mode);
         for tick in 0..400 {
             set(&mut bench.own);
@@ -390,10 +390,10 @@ fn commands_that_are_read_back_are_no_feedback_and_count_as_another_controller()
         assert!(drivetrain::motor::CanDevice::second_master(&bench.own).is_some());
     }
     looped(torque(), |own| _ = own.set_torque(1.0));
-    looped(Velocity::new(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(6.0)));
-    let limited = Velocity::new(rad_s(20.0)).with_torque_limit(2.0);
+    looped(Mode::velocity(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(6.0)));
+    let limited = Mode::velocity_with_torque_limit(rad_s(20.0), 2.0);
     looped(limited, |own| _ = own.set_velocity((), rad_s(-6.0)));
-    looped(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
+    looped(Mode::position_velocity(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
 }
 
 #[test]
@@ -460,7 +460,7 @@ fn turns_are_counted_over_the_ends_of_each_encoder() {
 /// Questions take the place of commands, and their answers are no feedback: none of them makes a motor late.
 #[test]
 fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
-    fn runs<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) {
+    fn runs(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
         let mut bench = Bench::new(Model::MF9025_16T, mode);
         let mut off = 0;
         for tick in 0..2_000_u32 {
@@ -479,8 +479,8 @@ fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
         assert_eq!(off, 0);
     }
     runs(torque(), |own| own.set_torque(0.0).unwrap_or_default());
-    runs(Velocity::new(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(2.0)));
-    runs(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(1.0)));
+    runs(Mode::velocity(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(2.0)));
+    runs(Mode::position_velocity(rad_s(8.0)), |own| _ = own.set_angle((), rad(1.0)));
 }
 
 #[test]

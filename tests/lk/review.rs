@@ -29,7 +29,8 @@ const EVENTS: [Event; 6] = [
 ];
 
 /// Lets an event come at a moment after arming; each frame from then on, or from its limit on, is one of rest.
-fn rests_after<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), event: Event, moment_ms: u32) {
+fn rests_after(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), event: Event, moment_ms: u32) {
+    let mode = mode.into();
     let mut bench = Bench::armed(Model::MF9025_16T, mode);
     bench.steps(moment_ms, |bench| set(&mut bench.own));
     let allowed_ms = match event {
@@ -72,9 +73,9 @@ fn every_frame_after_an_event_is_one_of_rest_at_every_moment() {
         // Through enabling, opening, and the places of the questions.
         for moment_ms in (0..70).chain([150, 223, 301]) {
             rests_after(torque(), |own| _ = own.set_torque(1.0), event, moment_ms);
-            let velocity = Velocity::new(rad_s(20.0)).with_torque_limit(2.0);
+            let velocity = Mode::velocity_with_torque_limit(rad_s(20.0), 2.0);
             rests_after(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), event, moment_ms);
-            let position = PositionVelocity::new(rad_s(8.0));
+            let position = Mode::position_velocity(rad_s(8.0));
             rests_after(position, |own| _ = own.set_angle((), rad(2.0)), event, moment_ms);
         }
     }
@@ -141,7 +142,7 @@ fn both_directions_on_one_id_clash_with_each_other_motor_on_it() {
 /// 0 in the field of a limit stands for none with some drives, and the share of the output is 0 right after arming.
 #[test]
 fn a_limit_is_never_sent_as_none() {
-    fn limits<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), code: u8) -> Vec<u16> {
+    fn limits(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), code: u8) -> Vec<u16> {
         let mut bench = Bench::armed(Model::MF9025_16T, mode);
         let mut limits = Vec::new();
         bench.steps(400, |bench| {
@@ -152,10 +153,10 @@ fn a_limit_is_never_sent_as_none() {
         });
         limits
     }
-    let velocity = Velocity::new(rad_s(20.0)).with_torque_limit(2.0);
-    let position = PositionVelocity::new(rad_s(8.0));
-    let weak = Velocity::new(rad_s(20.0)).with_torque_limit(0.006);
-    let slow = PositionVelocity::new(rad_s(0.05));
+    let velocity = Mode::velocity_with_torque_limit(rad_s(20.0), 2.0);
+    let position = Mode::position_velocity(rad_s(8.0));
+    let weak = Mode::velocity_with_torque_limit(rad_s(20.0), 0.006);
+    let slow = Mode::position_velocity(rad_s(0.05));
     for (limits, most) in [
         (limits(weak, |own| _ = own.set_velocity((), rad_s(6.0)), 0xA2), 2),
         (limits(slow, |own| _ = own.set_angle((), rad(2.0)), 0xA4), 2),

@@ -11,8 +11,8 @@ use drivetrain::units::AngularVelocity;
 pub(crate) const GEAR: f32 = 5.0;
 
 /// A motor and its drive on a bus that loses nothing.
-pub(crate) struct Bench<M: Mode> {
-    pub(crate) own: Own<Motor<M>>,
+pub(crate) struct Bench {
+    pub(crate) own: Own<Motor>,
     pub(crate) drive: OdriveDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -23,17 +23,17 @@ pub(crate) struct Bench<M: Mode> {
     pub(crate) lost: Option<u32>,
 }
 
-pub(crate) fn motor<M: Mode>(mode: M, firmware: Firmware) -> Motor<M> {
+pub(crate) fn motor(mode: impl Into<Mode>, firmware: Firmware) -> Motor {
     let fastest = AngularVelocity::from_rad_per_s(20.0);
     Motor::new(Model::D6374, firmware, 3, fastest, mode).unwrap().with_gear(GEAR).unwrap()
 }
 
-impl<M: Mode> Bench<M> {
-    pub(crate) fn new(mode: M, firmware: Firmware) -> Self {
+impl Bench {
+    pub(crate) fn new(mode: impl Into<Mode>, firmware: Firmware) -> Self {
         Self::with(motor(mode, firmware), GEAR)
     }
 
-    pub(crate) fn with(motor: Motor<M>, gear: f32) -> Self {
+    pub(crate) fn with(motor: Motor, gear: f32) -> Self {
         let is_0_6 = motor.claims_endpoints();
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, is_0_6, constant, gear).with_periods(0.1, 0.002);
@@ -81,7 +81,7 @@ impl<M: Mode> Bench<M> {
     }
 
     /// Armed, with a heartbeat heard.
-    pub(crate) fn armed(mode: M, firmware: Firmware) -> Self {
+    pub(crate) fn armed(mode: impl Into<Mode>, firmware: Firmware) -> Self {
         let mut bench = Self::new(mode, firmware);
         bench.arm();
         bench
@@ -103,7 +103,7 @@ trait Generation {
     fn claims_endpoints(&self) -> bool;
 }
 
-impl<M: Mode> Generation for Motor<M> {
+impl Generation for Motor {
     fn claims_endpoints(&self) -> bool {
         use drivetrain::motor::OwnMotor;
         self.claims()

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, GEAR, torque};
 use drivetrain::motor::{AngleDrive, Devices, VelocityDrive};
-use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Position, Velocity};
+use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model};
 use drivetrain::units::{Angle, AngularVelocity};
 
 /// xorshift
@@ -25,15 +25,16 @@ struct Seen {
     armed: u32,
 }
 
-fn run<M: Mode>(
+fn run(
     seed: u64,
     firmware: Firmware,
-    mode: M,
+    mode: impl Into<Mode>,
     modes: (u32, u32),
     limit_nm: f32,
-    set: fn(&mut Bench<M>, f32),
+    set: fn(&mut Bench, f32),
     seen: &mut Seen,
 ) {
+    let mode = mode.into();
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let mut bench = Bench::new(mode, firmware);
     let (mut until, mut cut_until, mut sets) = (0, 0, true);
@@ -109,7 +110,7 @@ fn a_torque_needs_an_armed_motor_its_mode_and_its_limits_whatever_gets_lost() {
             run(
                 seed,
                 firmware,
-                Velocity::new(2.0),
+                Mode::velocity(2.0),
                 (2, 1),
                 2.0,
                 |bench, share| {
@@ -121,7 +122,7 @@ fn a_torque_needs_an_armed_motor_its_mode_and_its_limits_whatever_gets_lost() {
             run(
                 seed,
                 firmware,
-                Position::new(2.0),
+                Mode::position(2.0),
                 (3, 1),
                 2.0,
                 |bench, share| _ = bench.own.set_angle((), Angle::from_radians(share)),

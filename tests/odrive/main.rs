@@ -9,11 +9,10 @@ mod vectors;
 
 use bench::{Bench, GEAR, motor, torque};
 use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, Ingest, Malformed, Own, OwnMotor, VelocityDrive};
-use drivetrain::odrive::{
-    ConfigError, Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor, Position, Velocity,
-};
+use drivetrain::odrive::{Endpoints, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Duration, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -32,7 +31,7 @@ fn angle(radians: f32) -> Angle {
 }
 
 /// Disarmed, the shaft gets no torque from the next frames on, and the axis is idle.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     bench.own.disarm();
     bench.step();
     assert!(bench.drive.state() == Heartbeat::IDLE, "{:?}", bench.frames);
@@ -44,7 +43,7 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 fn a_motor_is_armed_when_its_heartbeat_says_that_it_is_idle() {
     for firmware in BOTH {
         let mut bench = Bench::new(torque(), firmware);
-        let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+        let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
         assert_eq!(refused(&mut bench), "no feedback from D6374 #3");
         bench.lost = Some(1);
         bench.steps(50, |_| {});
@@ -57,7 +56,7 @@ fn a_motor_is_armed_when_its_heartbeat_says_that_it_is_idle() {
 
 #[test]
 fn an_axis_that_calibrates_is_not_armed() {
-    let mut bench = Bench::new(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::new(Mode::velocity(3.0), Firmware::V0_5);
     bench.is_cut = true;
     bench.drive.set_state(7);
     bench.steps(150, |_| {});
@@ -68,7 +67,7 @@ fn an_axis_that_calibrates_is_not_armed() {
 #[test]
 fn each_mode_reaches_its_target_with_each_firmware_and_rests_after_a_disarm() {
     for firmware in BOTH {
-        let mut wheel = Bench::armed(Velocity::new(3.0), firmware);
+        let mut wheel = Bench::armed(Mode::velocity(3.0), firmware);
         wheel.steps(1_500, |bench| {
             bench.own.set_velocity((), velocity(6.0)).unwrap();
             assert!(bench.drive.shaft().torque_nm().abs() <= 3.001);
@@ -92,9 +91,9 @@ fn each_mode_reaches_its_target_with_each_firmware_and_rests_after_a_disarm() {
         }
 
         for mode in [
-            Position::new(3.0),
-            Position::new(3.0).with_filter(),
-            Position::new(3.0).with_trajectory(20.0),
+            Mode::position(3.0),
+            Mode::position_with_filter(3.0),
+            Mode::position_with_trajectory(3.0, 20.0),
         ] {
             let mut joint = Bench::armed(mode, firmware);
             joint.steps(2_500, |bench| bench.own.set_angle((), angle(1.0)).unwrap());
@@ -112,7 +111,7 @@ fn a_reversed_gear_turns_the_shaft_the_other_way_and_its_torque_too() {
     assert!((wheel.drive.shaft().torque_nm() - 0.5).abs() < 1e-3);
     wheel.steps(1_000, |bench| bench.own.set_velocity((), velocity(-4.0)).unwrap());
     assert!((wheel.drive.shaft().velocity_rad_per_s() + 4.0).abs() < 0.2);
-    let mut joint = Bench::with(motor(Position::new(3.0), Firmware::V0_5).reversed(), -GEAR);
+    let mut joint = Bench::with(motor(Mode::position(3.0), Firmware::V0_5).reversed(), -GEAR);
     joint.arm();
     joint.steps(2_000, |bench| bench.own.set_angle((), angle(-1.0)).unwrap());
     assert!((joint.drive.shaft().angle_rad() + 1.0).abs() < 0.02);
@@ -122,7 +121,7 @@ fn a_reversed_gear_turns_the_shaft_the_other_way_and_its_torque_too() {
 #[test]
 fn closed_loop_is_requested_once_after_modes_and_limits_and_a_target_where_the_shaft_is() {
     for firmware in BOTH {
-        let mut bench = Bench::new(Position::new(3.0).with_trajectory(10.0), firmware);
+        let mut bench = Bench::new(Mode::position_with_trajectory(3.0, 10.0), firmware);
         bench.drive.shaft_mut().set_angle(1.5);
         bench.arm();
         let mut order = Vec::new();
@@ -147,7 +146,7 @@ fn closed_loop_is_requested_once_after_modes_and_limits_and_a_target_where_the_s
 
 #[test]
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
-    for mode in [Position::new(3.0), Position::new(3.0).with_filter()] {
+    for mode in [Mode::position(3.0), Mode::position_with_filter(3.0)] {
         let mut joint = Bench::new(mode, Firmware::V0_6);
         joint.drive.shaft_mut().set_angle(1.5);
         joint.arm();
@@ -162,7 +161,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
         });
         assert!(since > 100);
     }
-    let mut wheel = Bench::new(Velocity::new(3.0), Firmware::V0_5);
+    let mut wheel = Bench::new(Mode::velocity(3.0), Firmware::V0_5);
     wheel.drive = wheel.drive.with_shaft(DriveShaft::new(0.01, 0.0));
     wheel.drive.shaft_mut().set_velocity(5.0);
     wheel.arm();
@@ -180,7 +179,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 
 #[test]
 fn the_current_limit_is_that_of_the_torque_limit_and_opens_with_the_share() {
-    let mut wheel = Bench::armed(Velocity::new(2.0), Firmware::V0_6);
+    let mut wheel = Bench::armed(Mode::velocity(2.0), Firmware::V0_6);
     let constant = Model::D6374.torque_constant();
     let mut limits = Vec::new();
     wheel.steps(600, |bench| {
@@ -209,7 +208,7 @@ fn late_estimates_beside_a_fresh_heartbeat_do_not_drive() {
             _ = bench.own.set_torque(1.0);
             assert!(bench.drive.shaft().torque_nm() == 0.0);
         });
-        let mut joint = Bench::armed(Position::new(3.0), firmware);
+        let mut joint = Bench::armed(Mode::position(3.0), firmware);
         joint.steps(400, |bench| bench.own.set_angle((), angle(1.0)).unwrap());
         joint.lost = Some(9);
         joint.steps(12, |bench| _ = bench.own.set_angle((), angle(1.0)));
@@ -222,8 +221,8 @@ fn late_estimates_beside_a_fresh_heartbeat_do_not_drive() {
 
 #[test]
 fn a_lost_heartbeat_trips_within_half_a_second_and_is_not_armed() {
-    let mut wheel = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
-    let drive = |bench: &mut Bench<Velocity>| _ = bench.own.set_velocity((), velocity(5.0));
+    let mut wheel = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), velocity(5.0));
     wheel.steps(400, drive);
     assert_eq!(wheel.drive.state(), Heartbeat::CLOSED_LOOP);
     wheel.lost = Some(1);
@@ -237,7 +236,7 @@ fn a_lost_heartbeat_trips_within_half_a_second_and_is_not_armed() {
 #[test]
 fn estimates_that_are_not_cyclic_are_asked_for_within_one_frame_a_cycle() {
     for firmware in BOTH {
-        let mut wheel = Bench::new(Velocity::new(3.0), firmware);
+        let mut wheel = Bench::new(Mode::velocity(3.0), firmware);
         wheel.drive = wheel.drive.with_periods(0.1, 0.0);
         wheel.arm();
         let mut commands = 0;
@@ -254,9 +253,9 @@ fn estimates_that_are_not_cyclic_are_asked_for_within_one_frame_a_cycle() {
 
 #[test]
 fn a_refused_closed_loop_is_a_fault_with_its_reason_and_can_be_tried_again() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_6);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_6);
     bench.drive.refuse(14);
-    let drive = |bench: &mut Bench<Velocity>| _ = bench.own.set_velocity((), velocity(5.0));
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), velocity(5.0));
     let mut codes = Vec::new();
     bench.steps(900, |bench| {
         drive(bench);
@@ -270,7 +269,7 @@ fn a_refused_closed_loop_is_a_fault_with_its_reason_and_can_be_tried_again() {
     bench.steps(400, drive);
     assert_eq!(bench.drive.state(), Heartbeat::CLOSED_LOOP);
     // Firmware 0.5 says INVALID_STATE instead, until it is cleared.
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
     bench.drive.refuse(14);
     bench.steps(600, drive);
     assert_eq!(bench.own.motor().vitals().error_code, 1);
@@ -296,8 +295,8 @@ fn errors_stay_until_they_are_cleared_by_the_program() {
 
 #[test]
 fn a_reset_of_the_drive_trips_and_it_is_set_up_anew() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_6);
-    let drive = |bench: &mut Bench<Velocity>| _ = bench.own.set_velocity((), velocity(5.0));
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_6);
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), velocity(5.0));
     bench.steps(400, drive);
     bench.drive.lose_supply();
     bench.steps(400, drive);
@@ -326,8 +325,8 @@ fn an_axis_that_others_left_in_closed_loop_is_made_idle_before_its_mode_is_set()
 
 #[test]
 fn a_target_that_comes_back_before_the_heartbeat_enables_the_drive_anew() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
-    let drive = |bench: &mut Bench<Velocity>| bench.own.set_velocity((), velocity(5.0)).unwrap();
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
+    let drive = |bench: &mut Bench| bench.own.set_velocity((), velocity(5.0)).unwrap();
     bench.steps(400, drive);
     bench.steps(110, |_| {}); // the target is too old, and the drive idle, but its heartbeat is of before
     assert_eq!(bench.drive.state(), Heartbeat::IDLE);
@@ -386,11 +385,11 @@ fn frames_that_the_bus_gives_back_come_again_remote_ones_too() {
 
 #[test]
 fn the_watchdog_of_0_6_is_set_and_the_modes_read_back_before_the_drive_is_enabled() {
-    let mode = Velocity::new(3.0);
+    let mode = Mode::velocity(3.0);
     let set = motor(mode, Firmware::V0_6).with_endpoints(ENDPOINTS, Duration::from_millis(50));
     let mut bench = Bench::with(set.unwrap(), GEAR);
     bench.arm();
-    let drive = |bench: &mut Bench<Velocity>| _ = bench.own.set_velocity((), velocity(5.0));
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), velocity(5.0));
     bench.steps(500, |bench| {
         drive(bench);
         if bench.drive.state() == Heartbeat::CLOSED_LOOP {
@@ -414,7 +413,7 @@ fn the_watchdog_of_0_6_is_set_and_the_modes_read_back_before_the_drive_is_enable
 
 #[test]
 fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
-    let mode = Velocity::new(3.0);
+    let mode = Mode::velocity(3.0);
     // The endpoints are those of another version: what is read as the control mode is the input mode.
     let wrong = Endpoints { control_mode: 2, input_mode: 1, ..ENDPOINTS };
     let set = motor(mode, Firmware::V0_6).with_endpoints(wrong, Duration::from_millis(50));
@@ -441,7 +440,7 @@ fn a_drive_that_does_not_take_its_mode_is_never_enabled() {
 #[test]
 fn a_stop_is_sent_until_the_heartbeat_has_it() {
     for (firmware, bit) in [(Firmware::V0_5, 0x4000), (Firmware::V0_6, 0x0200_0000)] {
-        let mut bench = Bench::armed(Velocity::new(3.0), firmware);
+        let mut bench = Bench::armed(Mode::velocity(3.0), firmware);
         bench.steps(400, |bench| bench.own.set_velocity((), velocity(5.0)).unwrap());
         bench.is_cut = true;
         bench.own.motor_mut().stop();
@@ -495,36 +494,54 @@ fn frames_that_are_damaged_or_of_others_change_nothing() {
 #[test]
 fn bad_configurations_are_refused_with_the_limit() {
     let fastest = velocity(10.0);
-    let text = |outcome: Result<Motor<Velocity>, ConfigError>| outcome.unwrap_err().to_string();
+    let text = |outcome: Result<Motor, ConfigError>| outcome.unwrap_err().to_string();
     let made = |node, fastest, limit| {
-        Motor::new(Model::D5065, Firmware::V0_5, node, fastest, Velocity::new(limit))
+        Motor::new(Model::D5065, Firmware::V0_5, node, fastest, Mode::velocity(limit))
     };
     assert_eq!(text(made(63, fastest, 1.0)), "node id 63: 0 to 62 are allowed");
-    assert_eq!(text(made(0, velocity(0.0), 1.0)), "velocity limit 0 rad/s: above 0 and finite");
+    assert_eq!(
+        text(made(0, velocity(0.0), 1.0)),
+        "velocity limit in rad/s 0: must be above 0 and finite"
+    );
     for limit in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(made(0, fastest, limit), Err(ConfigError::TorqueLimit(_))), "{limit}");
+        assert!(
+            matches!(
+                made(0, fastest, limit),
+                Err(ConfigError::Limit { parameter: "torque limit in Nm", .. })
+            ),
+            "{limit}"
+        );
         assert!(made(0, velocity(limit), 1.0).is_err());
-        let mode = Position::new(1.0).with_trajectory(limit);
+        let mode = Mode::position_with_trajectory(1.0, limit);
         let made = Motor::new(Model::D5065, Firmware::V0_5, 0, fastest, mode);
-        assert!(matches!(made, Err(ConfigError::Acceleration(_))));
+        assert!(matches!(
+            made,
+            Err(ConfigError::Limit { parameter: "acceleration in rad/s^2", .. })
+        ));
     }
     for ratio in [0.0, -5.0, f32::NAN, f32::INFINITY] {
         assert!(matches!(
             made(0, fastest, 1.0).unwrap().with_gear(ratio),
-            Err(ConfigError::GearRatio(_))
+            Err(ConfigError::Range { parameter: "gear ratio", .. })
         ));
     }
     let refused = made(0, fastest, 1.0).unwrap().with_endpoints(ENDPOINTS, Duration::from_secs(1));
-    assert_eq!(refused.unwrap_err(), ConfigError::Endpoints);
-    let pro = Motor::new(Model::D5065, Firmware::V0_6, 0, fastest, Velocity::new(1.0)).unwrap();
+    assert_eq!(
+        refused.unwrap_err(),
+        ConfigError::Unsupported("endpoints over CAN (set the watchdog by USB)")
+    );
+    let pro = Motor::new(Model::D5065, Firmware::V0_6, 0, fastest, Mode::velocity(1.0)).unwrap();
     for time in [Duration::ZERO, Duration::from_secs(11)] {
-        assert_eq!(pro.with_endpoints(ENDPOINTS, time).unwrap_err(), ConfigError::Watchdog(time));
+        let value = time.as_micros() as f32;
+        let refused =
+            ConfigError::Range { parameter: "watchdog in us", value, least: 1e4, most: 1e7 };
+        assert_eq!(pro.with_endpoints(ENDPOINTS, time).unwrap_err(), refused);
     }
 }
 
 #[test]
 fn a_drive_that_never_says_that_it_is_idle_is_a_fault_and_not_silence() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
     let mut codes = Vec::new();
     // Its frames do not reach the axis, which others hold in closed loop.
     bench.is_cut = true;
@@ -551,7 +568,7 @@ fn a_request_to_clear_errors_does_not_wait_for_errors_to_come() {
 
 #[test]
 fn nothing_is_enabled_while_a_stop_waits_for_its_heartbeat() {
-    let mut bench = Bench::armed(Velocity::new(3.0), Firmware::V0_5);
+    let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_5);
     bench.own.motor_mut().stop();
     bench.lost = Some(1);
     bench.steps(400, |bench| {
@@ -566,7 +583,7 @@ fn nothing_is_enabled_while_a_stop_waits_for_its_heartbeat() {
 fn whenever_it_is_disarmed_no_torque_follows_the_next_frames() {
     for firmware in BOTH {
         for ms in (0..420).step_by(7) {
-            let mut bench = Bench::armed(Position::new(3.0), firmware);
+            let mut bench = Bench::armed(Mode::position(3.0), firmware);
             bench.steps(ms, |bench| bench.own.set_angle((), angle(1.0)).unwrap());
             bench.own.disarm();
             bench.step();

@@ -3,12 +3,12 @@
 use crate::bench::{Bench, torque};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, VelocityDrive};
-use drivetrain::odrive::{Firmware, Heartbeat, Mode, Position, Velocity};
+use drivetrain::odrive::{Firmware, Heartbeat, Mode};
 use drivetrain::time::Tick;
 use drivetrain::units::{Angle, AngularVelocity};
 
 /// Runs an update, and returns its frames.
-fn update<M: Mode>(bench: &mut Bench<M>) -> Vec<CanFrame> {
+fn update(bench: &mut Bench) -> Vec<CanFrame> {
     bench.now_us += 1_000;
     let now = bench.now();
     bench.own.update(Tick::new(now, 0.001));
@@ -16,7 +16,8 @@ fn update<M: Mode>(bench: &mut Bench<M>) -> Vec<CanFrame> {
 }
 
 /// Disarms a motor that is driven on a bus that refuses all frames for some updates; the first frames that pass have to bring rest.
-fn rests_when_the_bus_is_free<M: Mode>(mode: M, firmware: Firmware, set: fn(&mut Bench<M>)) {
+fn rests_when_the_bus_is_free(mode: impl Into<Mode>, firmware: Firmware, set: fn(&mut Bench)) {
+    let mode = mode.into();
     for refused in 0..60 {
         let mut bench = Bench::armed(mode, firmware);
         bench.steps(700, set);
@@ -41,11 +42,11 @@ fn rests_when_the_bus_is_free<M: Mode>(mode: M, firmware: Firmware, set: fn(&mut
 fn rest_goes_before_questions_when_the_bus_has_refused_it() {
     for firmware in [Firmware::V0_5, Firmware::V0_6] {
         rests_when_the_bus_is_free(torque(), firmware, |bench| _ = bench.own.set_torque(1.0));
-        rests_when_the_bus_is_free(Velocity::new(2.0), firmware, |bench| {
+        rests_when_the_bus_is_free(Mode::velocity(2.0), firmware, |bench| {
             let target = AngularVelocity::from_rad_per_s(bench.drive.shaft().angle_rad() + 1.0);
             _ = bench.own.set_velocity((), target);
         });
-        rests_when_the_bus_is_free(Position::new(2.0), firmware, |bench| {
+        rests_when_the_bus_is_free(Mode::position(2.0), firmware, |bench| {
             let target = bench.drive.shaft().angle_rad() + 1.0;
             _ = bench.own.set_angle((), Angle::from_radians(target));
         });
@@ -57,7 +58,7 @@ fn rest_goes_before_questions_when_the_bus_has_refused_it() {
 fn a_drive_that_was_just_enabled_gets_rest_with_the_first_frame_after_its_target_is_lost() {
     let mut torques = 0;
     for until in 1..60 {
-        let mut bench = Bench::armed(Position::new(2.0), Firmware::V0_6);
+        let mut bench = Bench::armed(Mode::position(2.0), Firmware::V0_6);
         // The load has the drive's own loop hold the shaft.
         bench.drive.shaft_mut().set_load(1.0);
         bench.steps(until, |bench| _ = bench.own.set_angle((), Angle::from_radians(0.3)));

@@ -8,12 +8,13 @@ mod review;
 
 use bench::{Bench, torque};
 use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Condition, Devices, Impedance, ImpedanceControl, Ingest, Link, Malformed, Own,
     OwnMotor, Timeouts, VelocityDrive,
 };
-use drivetrain::rmd::{ConfigError, Mode, Model, Motor, PositionVelocity, Velocity};
+use drivetrain::rmd::{Mode, Model, Motor};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
@@ -36,7 +37,7 @@ fn answer(data: [u8; 8]) -> CanFrame {
 #[test]
 fn a_motor_is_armed_when_its_state_and_its_angle_have_been_read() {
     let mut bench = Bench::new(MODEL, torque());
-    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from RMD-X8-120 #1");
     bench.steps(5, |_| {});
     assert_eq!(refused(&mut bench), "RMD-X8-120 #1 has not answered yet what its errorState is");
@@ -62,12 +63,12 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     assert!((looped.drive.shaft().angle_rad() + 2.0).abs() < 0.02);
     rests(looped);
 
-    let mut velocity = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut velocity = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     velocity.steps(1_000, |bench| bench.own.set_velocity((), rad_s(-6.0)).unwrap());
     assert!((velocity.drive.shaft().velocity_rad_per_s() + 6.0).abs() < 0.2);
     rests(velocity);
 
-    let mut position = Bench::armed(MODEL, PositionVelocity::new(rad_s(8.0)));
+    let mut position = Bench::armed(MODEL, Mode::position_velocity(rad_s(8.0)));
     position.steps(2_000, |bench| {
         bench.own.set_angle((), rad(2.0)).unwrap();
         assert!(bench.drive.shaft().velocity_rad_per_s().abs() < 8.1);
@@ -77,7 +78,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 }
 
 /// Disarmed, the drive gives no torque from the next frames on.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     assert_eq!(bench.drive.timeout_ms(), 100);
     bench.own.disarm();
     bench.step();
@@ -88,7 +89,7 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 
 #[test]
 fn a_reversed_motor_turns_the_other_way_in_each_mode() {
-    fn turns<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) -> (f32, f32) {
+    fn turns(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) -> (f32, f32) {
         let mut bench = Bench::new(MODEL, mode);
         bench.own = Own::new(bench.own.motor().reversed());
         bench.steps(100, |_| {});
@@ -100,9 +101,9 @@ fn a_reversed_motor_turns_the_other_way_in_each_mode() {
     let (true_rad, found) = turns(torque(), |own| own.set_torque(0.1).unwrap());
     assert!(true_rad < -1.0 && (found + true_rad).abs() < 0.05, "{true_rad}, {found}");
     let (true_rad, found) =
-        turns(Velocity::new(rad_s(8.0)), |own| own.set_velocity((), rad_s(2.0)).unwrap());
+        turns(Mode::velocity(rad_s(8.0)), |own| own.set_velocity((), rad_s(2.0)).unwrap());
     assert!(true_rad < -1.0 && (found + true_rad).abs() < 0.02, "{true_rad}, {found}");
-    let mode = PositionVelocity::new(rad_s(8.0));
+    let mode = Mode::position_velocity(rad_s(8.0));
     let (true_rad, found) = turns(mode, |own| own.set_angle((), rad(1.0)).unwrap());
     assert!((true_rad + 1.0).abs() < 0.01 && (found - 1.0).abs() < 0.01, "{true_rad}, {found}");
 }
@@ -111,7 +112,7 @@ fn a_reversed_motor_turns_the_other_way_in_each_mode() {
 #[test]
 fn the_angle_is_finer_than_the_feedback() {
     for speed in [0.0_f32, 0.3, 6.0, -25.0] {
-        let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(30.0)));
+        let mut bench = Bench::armed(MODEL, Mode::velocity(rad_s(30.0)));
         bench.drive.shaft_mut().set_angle(571.0 * speed.signum());
         bench.steps(150, |_| {});
         _ = bench.own.arm(bench.now());
@@ -144,7 +145,7 @@ fn no_command_is_beyond_the_torque_limit() {
 #[test]
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     let there = rad(-1.5);
-    let mut position = Bench::new(MODEL, PositionVelocity::new(rad_s(8.0)));
+    let mut position = Bench::new(MODEL, Mode::position_velocity(rad_s(8.0)));
     position.drive.shaft_mut().set_angle(1.5 + 5.0 * TAU);
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
@@ -156,7 +157,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     assert!((end - 5.0 * TAU - 1.5).abs() < TAU / 2.0 + 0.02, "the shortest way: {end}");
     assert!((end + 1.5).rem_euclid(TAU) < 0.02 || (end + 1.5).rem_euclid(TAU) > TAU - 0.02);
 
-    let mut velocity = Bench::new(MODEL, Velocity::new(rad_s(20.0)));
+    let mut velocity = Bench::new(MODEL, Mode::velocity(rad_s(20.0)));
     velocity.drive.shaft_mut().set_velocity(5.0);
     velocity.steps(100, |_| {});
     velocity.own.arm(velocity.now()).unwrap();
@@ -187,7 +188,7 @@ fn a_torque_motor_is_driven_when_its_brake_is_open() {
     bench.steps(3, |_| {});
     assert!(bench.drive.is_locked(), "off locks it");
 
-    let mut position = Bench::new(MODEL, PositionVelocity::new(rad_s(8.0)));
+    let mut position = Bench::new(MODEL, Mode::position_velocity(rad_s(8.0)));
     position.drive = position.drive.with_brake();
     position.steps(100, |_| {});
     position.own.arm(position.now()).unwrap();
@@ -219,7 +220,7 @@ fn a_brake_that_the_motor_released_is_locked_after_off() {
         assert!(locked_us.is_some() && sent == 1, "{locked_us:?}, {sent} frames");
     }
     // A motor that released no brake locks none.
-    let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     bench.steps(300, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     bench.own.disarm();
     bench.steps(500, |bench| {
@@ -229,7 +230,7 @@ fn a_brake_that_the_motor_released_is_locked_after_off() {
 
 #[test]
 fn a_drive_that_does_not_take_its_timeout_is_not_driven_and_the_error_names_it() {
-    let mut bench = Bench::new(MODEL, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::new(MODEL, Mode::velocity(rad_s(20.0)));
     bench.drive = bench.drive.refusing_timeouts();
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
@@ -253,7 +254,7 @@ fn a_drive_that_does_not_take_its_timeout_is_not_driven_and_the_error_names_it()
 /// The memory of the drive wears: the time-out is written once for as long as the drive is heard, and at most 8 times in a row.
 #[test]
 fn the_timeout_is_not_written_again_and_again() {
-    let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     let mut written = 0;
     for _ in 0..20 {
         for ms in 0..400 {
@@ -266,7 +267,7 @@ fn the_timeout_is_not_written_again_and_again() {
     }
     assert_eq!(written, 1);
 
-    let mut silent = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut silent = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     let mut written = 0;
     for _ in 0..1_000 {
         _ = silent.own.set_velocity((), rad_s(1.0));
@@ -289,7 +290,8 @@ fn the_timeout_is_not_written_again_and_again() {
 /// The cable is cut for longer than the time-out of the drive. It comes to rest by itself, and nothing of before moves it after.
 #[test]
 fn a_drive_whose_cable_is_cut_stops_and_does_not_go_on_by_itself() {
-    fn stops<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), cut_ms: u32, trips: bool) {
+    fn stops(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), cut_ms: u32, trips: bool) {
+        let mode = mode.into();
         let mut bench = Bench::armed(MODEL, mode);
         bench.steps(800, |bench| set(&mut bench.own));
         assert!(bench.drive.is_on());
@@ -308,8 +310,8 @@ fn a_drive_whose_cable_is_cut_stops_and_does_not_go_on_by_itself() {
     }
     for cut_ms in [102, 150, 400, 2_500] {
         stops(torque(), |own| _ = own.set_torque(0.5), cut_ms, true);
-        stops(Velocity::new(rad_s(9.0)), |own| _ = own.set_velocity((), rad_s(6.0)), cut_ms, true);
-        let position = PositionVelocity::new(rad_s(8.0));
+        stops(Mode::velocity(rad_s(9.0)), |own| _ = own.set_velocity((), rad_s(6.0)), cut_ms, true);
+        let position = Mode::position_velocity(rad_s(8.0));
         stops(position, |own| _ = own.set_angle((), rad(3.0)), cut_ms, true);
     }
 }
@@ -319,7 +321,7 @@ fn a_drive_whose_cable_is_cut_stops_and_does_not_go_on_by_itself() {
 #[test]
 fn a_drive_that_timed_out_unnoticed_trips_the_motor() {
     for has_report in [true, false] {
-        let mode = Velocity::new(rad_s(20.0));
+        let mode = Mode::velocity(rad_s(20.0));
         let motor = Motor::new(MODEL, 1, mode).unwrap();
         let mut bench = Bench::new(MODEL, mode);
         let ages = [60, 200].map(Duration::from_millis);
@@ -350,7 +352,7 @@ fn a_drive_that_timed_out_unnoticed_trips_the_motor() {
 
 #[test]
 fn a_drive_that_resets_while_it_is_driven_trips_and_does_not_go_on() {
-    let mut bench = Bench::armed(MODEL, PositionVelocity::new(rad_s(8.0)));
+    let mut bench = Bench::armed(MODEL, Mode::position_velocity(rad_s(8.0)));
     for third in 1..=8_u8 {
         let target = rad(TAU / 3.0 * f32::from(third));
         bench.steps(1_000, |bench| bench.own.set_angle((), target).unwrap());
@@ -378,7 +380,7 @@ fn a_drive_that_resets_while_it_is_driven_trips_and_does_not_go_on() {
 
 #[test]
 fn lost_feedback_switches_the_drive_off_and_it_goes_on_when_it_is_heard() {
-    let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     // The drive hears, and is not heard.
     for _ in 0..30 {
@@ -427,7 +429,7 @@ fn an_error_is_an_edge_with_its_code_and_goes_away_with_its_cause_or_by_a_reset(
 
 #[test]
 fn a_reset_is_sent_once_and_never_to_a_drive_that_is_driven() {
-    let mut bench = Bench::armed(MODEL, Velocity::new(rad_s(20.0)));
+    let mut bench = Bench::armed(MODEL, Mode::velocity(rad_s(20.0)));
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     bench.own.motor_mut().reset_drive();
     bench.steps(500, |bench| {
@@ -481,7 +483,7 @@ fn a_frame_of_another_length_is_malformed_and_changes_nothing() {
 /// Questions take the place of commands, and their answers are no feedback: none of them makes a motor late.
 #[test]
 fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
-    fn runs<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) {
+    fn runs(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
         let mut bench = Bench::new(MODEL, mode);
         for tick in 0..2_000_u32 {
             bench.now_us += 3_000;
@@ -498,8 +500,8 @@ fn a_motor_that_is_updated_250_times_a_second_is_never_late() {
         assert!(Devices::is_armed(&mut bench.own));
     }
     runs(torque(), |own| own.set_torque(0.0).unwrap_or_default());
-    runs(Velocity::new(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(2.0)));
-    runs(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(1.0)));
+    runs(Mode::velocity(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(2.0)));
+    runs(Mode::position_velocity(rad_s(8.0)), |own| _ = own.set_angle((), rad(1.0)));
 }
 
 #[test]
@@ -548,9 +550,9 @@ fn an_impedance_crosses_turns_without_a_jump() {
 
 #[test]
 fn what_the_drive_has_no_field_for_is_refused() {
-    let mode = Velocity::new(rad_s(10.0)).with_torque_limit(2.0);
+    let mode = Mode::velocity_with_torque_limit(rad_s(10.0), 2.0);
     let error = Motor::new(MODEL, 1, mode).unwrap_err();
-    assert_eq!(error, ConfigError::NoTorqueLimit);
+    assert_eq!(error, ConfigError::Unsupported("torque limit of a velocity"));
     assert!(error.to_string().starts_with("torque limit of a velocity"), "{error}");
     for ms in [0, 9, 60_001] {
         let motor = Motor::new(MODEL, 1, torque()).unwrap();

@@ -28,7 +28,8 @@ const EVENTS: [Event; 6] = [
 ];
 
 /// Lets an event come at a moment after arming; each frame from then on, or from its limit on, is one of rest.
-fn rests_after<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>), event: Event, moment_ms: u32) {
+fn rests_after(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), event: Event, moment_ms: u32) {
+    let mode = mode.into();
     let mut bench = Bench::armed(MODEL, mode);
     bench.steps(moment_ms, |bench| set(&mut bench.own));
     let allowed_ms = match event {
@@ -71,9 +72,9 @@ fn every_frame_after_an_event_is_one_of_rest_at_every_moment() {
         // Through the state, the time-out, the brake or the angle, opening, and the places of the questions.
         for moment_ms in (0..80).chain([150, 223, 301]) {
             rests_after(torque(), |own| _ = own.set_torque(1.0), event, moment_ms);
-            let velocity = Velocity::new(rad_s(20.0));
+            let velocity = Mode::velocity(rad_s(20.0));
             rests_after(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), event, moment_ms);
-            let position = PositionVelocity::new(rad_s(8.0));
+            let position = Mode::position_velocity(rad_s(8.0));
             rests_after(position, |own| _ = own.set_angle((), rad(2.0)), event, moment_ms);
         }
     }
@@ -127,7 +128,7 @@ fn drawn_frames_drive_nothing() {
 #[test]
 fn a_limit_is_never_sent_as_none() {
     for (limit, most) in [(8.0, 458), (0.05, 2)] {
-        let mut bench = Bench::armed(MODEL, PositionVelocity::new(rad_s(limit)));
+        let mut bench = Bench::armed(MODEL, Mode::position_velocity(rad_s(limit)));
         let mut limits = Vec::new();
         bench.steps(600, |bench| {
             bench.own.set_angle((), rad(2.0)).unwrap();
@@ -143,7 +144,7 @@ fn a_limit_is_never_sent_as_none() {
 /// The echo of a question reads like an angle of 0, with which a position motor would go round by all of its turns.
 #[test]
 fn a_question_that_is_sent_back_is_no_answer() {
-    let mut bench = Bench::armed(MODEL, PositionVelocity::new(rad_s(8.0)));
+    let mut bench = Bench::armed(MODEL, Mode::position_velocity(rad_s(8.0)));
     bench.drive.shaft_mut().set_angle(30.0);
     bench.steps(200, |_| {});
     _ = bench.own.arm(bench.now());
@@ -163,7 +164,8 @@ fn a_question_that_is_sent_back_is_no_answer() {
 /// Each mode, and each command of it that could be sent back by a drive whose time is over.
 #[test]
 fn a_command_that_is_sent_back_is_never_feedback() {
-    fn heard<M: Mode>(mode: M, set: fn(&mut Own<Motor<M>>)) {
+    fn heard(mode: impl Into<Mode>, set: fn(&mut Own<Motor>)) {
+        let mode = mode.into();
         let mut bench = Bench::armed(MODEL, mode);
         bench.steps(400, |bench| set(&mut bench.own));
         let before = *bench.own.motor().feedback().unwrap();
@@ -181,8 +183,8 @@ fn a_command_that_is_sent_back_is_never_feedback() {
         assert!(sent_back >= 40 && bench.own.motor().feedback() == Some(&before), "{mode:?}");
     }
     heard(torque(), |own| _ = own.set_torque(0.5));
-    heard(Velocity::new(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(6.0)));
-    heard(PositionVelocity::new(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
+    heard(Mode::velocity(rad_s(20.0)), |own| _ = own.set_velocity((), rad_s(6.0)));
+    heard(Mode::position_velocity(rad_s(8.0)), |own| _ = own.set_angle((), rad(2.0)));
 }
 
 /// Two frames may be made before one is sent: a drive that is not known to be off is sent nothing else.

@@ -7,8 +7,8 @@ use drivetrain::sim::RobStrideDrive;
 use drivetrain::time::{Instant, Tick};
 
 /// A motor and its drive on a bus that loses nothing unless told.
-pub(crate) struct Bench<M: Mode> {
-    pub(crate) own: Own<Motor<M>>,
+pub(crate) struct Bench {
+    pub(crate) own: Own<Motor>,
     pub(crate) drive: RobStrideDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -22,12 +22,12 @@ pub(crate) struct Bench<M: Mode> {
     pub(crate) dt_s: f32,
 }
 
-impl<M: Mode> Bench<M> {
-    pub(crate) fn new(mode: M) -> Self {
+impl Bench {
+    pub(crate) fn new(mode: impl Into<Mode>) -> Self {
         Self::of(Model::RS02, mode)
     }
 
-    pub(crate) fn of(model: Model, mode: M) -> Self {
+    pub(crate) fn of(model: Model, mode: impl Into<Mode>) -> Self {
         let own = Own::new(Motor::new(model, 1, mode).unwrap());
         let (kp, kd) = model.ranges().gains();
         let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), kp, kd];
@@ -49,7 +49,7 @@ impl<M: Mode> Bench<M> {
         }
     }
 
-    pub(crate) fn armed(mode: M) -> Self {
+    pub(crate) fn armed(mode: impl Into<Mode>) -> Self {
         let mut bench = Self::new(mode);
         bench.steps(150, |_| {});
         bench.own.arm(bench.now()).unwrap();

@@ -10,14 +10,13 @@ mod rest;
 
 use bench::{Bench, operation};
 use drivetrain::control::PidConfig;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, ArmError, Devices, Edge, Impedance, ImpedanceControl, Own, TargetError,
     VelocityDrive,
 };
-use drivetrain::robstride::{
-    ConfigError, Current, Mode, Model, Motor, Position, Register, Status, Velocity,
-};
+use drivetrain::robstride::{Mode, Model, Motor, Register, Status};
 use drivetrain::sim::{DriveShaft, RobStrideDrive};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -36,7 +35,7 @@ fn extended(raw: u32, data: [u8; 8]) -> CanFrame {
     CanFrame::of(embedded_can::ExtendedId::new(raw).unwrap(), data)
 }
 
-fn status<M: Mode>(bench: &Bench<M>) -> Status {
+fn status(bench: &Bench) -> Status {
     bench.own.motor().feedback().unwrap().status
 }
 
@@ -47,7 +46,7 @@ fn rad_per_s(value: f32) -> AngularVelocity {
 #[test]
 fn a_motor_is_armed_when_its_settings_have_been_read() {
     let mut bench = Bench::new(operation());
-    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from RS02 #1");
     bench.steps(5, |_| {});
     assert!(refused(&mut bench).starts_with("RS02 #1 has not answered yet what its "));
@@ -58,7 +57,7 @@ fn a_motor_is_armed_when_its_settings_have_been_read() {
 #[test]
 fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
     let wheel = rad_per_s(6.0);
-    let mut velocity = Bench::armed(Velocity::new(rad_per_s(20.0), 10.0));
+    let mut velocity = Bench::armed(Mode::velocity(rad_per_s(20.0), 10.0));
     velocity.steps(1_000, |bench| bench.own.set_velocity((), wheel).unwrap());
     assert!((velocity.drive.shaft().velocity_rad_per_s() - 6.0).abs() < 0.2);
     rests(velocity);
@@ -83,7 +82,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 
     for model in [Model::RS02, Model::CYBERGEAR] {
         let joint = Angle::from_radians(1.0);
-        let mut position = Bench::of(model, Position::new(rad_per_s(10.0), 8.0));
+        let mut position = Bench::of(model, Mode::position(rad_per_s(10.0), 8.0));
         position.steps(150, |_| {});
         position.own.arm(position.now()).unwrap();
         position.steps(2_000, |bench| {
@@ -94,7 +93,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
         rests(position);
     }
 
-    let mut current = Bench::armed(Current::new(4.0, 1.0));
+    let mut current = Bench::armed(Mode::current(4.0, 1.0));
     current.drive = current.drive.with_shaft(DriveShaft::new(0.05, 1.0));
     current.steps(1_000, |bench| bench.own.set_torque(2.0).unwrap());
     assert!((current.drive.shaft().torque_nm() - 2.0).abs() < 0.01);
@@ -104,7 +103,7 @@ fn each_mode_reaches_its_target_and_rests_after_a_disarm() {
 }
 
 /// Disarmed, the drive gives no torque from the next frames on, and is disabled.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     bench.own.disarm();
     bench.step();
     bench.steps(50, |bench| {
@@ -115,7 +114,7 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 
 #[test]
 fn the_run_mode_is_read_and_set_before_a_motor_is_armed() {
-    let mut bench = Bench::new(Velocity::new(rad_per_s(20.0), 10.0));
+    let mut bench = Bench::new(Mode::velocity(rad_per_s(20.0), 10.0));
     bench.drive = bench.drive.with_parameter(0x7005, 3.0);
     bench.steps(150, |_| {});
     assert_eq!(bench.drive.parameter(0x7005), Some(2.0));
@@ -125,7 +124,7 @@ fn the_run_mode_is_read_and_set_before_a_motor_is_armed() {
 /// A firmware that does not know the mode keeps its own.
 #[test]
 fn a_drive_that_does_not_take_the_run_mode_is_not_armed_and_the_parameter_is_named() {
-    let mut bench = Bench::new(Position::new(rad_per_s(10.0), 8.0));
+    let mut bench = Bench::new(Mode::position(rad_per_s(10.0), 8.0));
     bench.drive = RobStrideDrive::cybergear(1);
     bench.steps(400, |bench| assert!(!bench.drive.is_enabled()));
     let refused = bench.own.arm(bench.now()).unwrap_err();
@@ -135,8 +134,8 @@ fn a_drive_that_does_not_take_the_run_mode_is_not_armed_and_the_parameter_is_nam
 
 #[test]
 fn a_drive_whose_supply_fails_while_it_is_driven_trips_and_is_not_enabled_again_by_itself() {
-    let mut bench = Bench::armed(Velocity::new(rad_per_s(20.0), 10.0));
-    let drive = |bench: &mut Bench<_>| _ = bench.own.set_velocity((), rad_per_s(6.0));
+    let mut bench = Bench::armed(Mode::velocity(rad_per_s(20.0), 10.0));
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), rad_per_s(6.0));
     bench.steps(500, drive);
     assert!(bench.drive.is_enabled());
     bench.drive.lose_supply();
@@ -154,7 +153,7 @@ fn a_drive_whose_supply_fails_while_it_is_driven_trips_and_is_not_enabled_again_
 #[test]
 fn lost_feedback_disables_the_drive_and_it_does_not_go_on_by_itself() {
     let mut bench = Bench::armed(operation());
-    let drive = |bench: &mut Bench<_>| _ = bench.own.set_velocity((), rad_per_s(6.0));
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), rad_per_s(6.0));
     bench.steps(500, drive);
     bench.is_deaf = true;
     let mut ms = 0;
@@ -171,7 +170,7 @@ fn lost_feedback_disables_the_drive_and_it_does_not_go_on_by_itself() {
 #[test]
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     let there = Angle::from_radians(-1.5);
-    let mut position = Bench::new(Position::new(rad_per_s(10.0), 8.0));
+    let mut position = Bench::new(Mode::position(rad_per_s(10.0), 8.0));
     position.drive.shaft_mut().set_angle(1.5);
     position.steps(150, |_| {});
     position.own.arm(position.now()).unwrap();
@@ -200,7 +199,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 /// In the position mode a drive goes on to the target that it has: zero, after power-on.
 #[test]
 fn a_drive_that_is_enabled_has_no_current_and_its_target_where_the_shaft_is() {
-    let mut bench = Bench::new(Position::new(rad_per_s(10.0), 8.0));
+    let mut bench = Bench::new(Mode::position(rad_per_s(10.0), 8.0));
     bench.drive.shaft_mut().set_angle(3.0);
     bench.steps(150, |_| {});
     bench.own.arm(bench.now()).unwrap();
@@ -267,7 +266,7 @@ fn a_shaft_beyond_the_range_of_the_feedback_has_no_angle_and_no_spring_pulls_it(
     let mut bench = Bench::armed(operation());
     bench.drive.shaft_mut().set_angle(12.0);
     bench.steps(20, |_| {});
-    let turns: fn(&mut Bench<_>) = |bench| {
+    let turns: fn(&mut Bench) = |bench| {
         let target = Impedance {
             angle: Angle::from_radians(12.0),
             stiffness: 20.0,
@@ -295,7 +294,7 @@ fn a_shaft_beyond_the_range_of_the_feedback_has_no_angle_and_no_spring_pulls_it(
 
 #[test]
 fn a_position_motor_beyond_the_range_of_the_feedback_is_not_armed() {
-    let mut bench = Bench::new(Position::new(rad_per_s(10.0), 8.0));
+    let mut bench = Bench::new(Mode::position(rad_per_s(10.0), 8.0));
     bench.drive.shaft_mut().set_angle(-30.0);
     bench.steps(200, |_| {});
     let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
@@ -318,7 +317,7 @@ fn a_fault_trips_and_is_an_edge_with_its_code_and_is_cleared() {
         (1 << 3, 35, true),
     ] {
         let mut bench = Bench::armed(operation());
-        let drive = |bench: &mut Bench<_>| _ = bench.own.set_velocity((), rad_per_s(6.0));
+        let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), rad_per_s(6.0));
         bench.steps(300, drive);
         while bench.own.next_edge().is_some() {}
         bench.drive.fail(faults);
@@ -385,7 +384,10 @@ fn a_parameter_that_the_drive_does_not_have_reads_as_no_number() {
 fn a_cybergear_is_never_told_to_store() {
     let mut bench = Bench::of(Model::CYBERGEAR, operation());
     let refused = bench.own.motor_mut().store().unwrap_err();
-    assert_eq!(refused.to_string(), "a CyberGear has no frame to store parameters");
+    assert_eq!(
+        refused.to_string(),
+        "frame to store parameters: this model, or its firmware, has none"
+    );
     bench.steps(200, |bench| assert!(bench.frames.iter().all(|frame| kind(frame) != 22)));
     bench.own.arm(bench.now()).unwrap();
     bench.steps(300, |bench| {
@@ -469,24 +471,24 @@ fn bad_configurations_are_refused_with_the_limit() {
     let text = |outcome: Result<(), ConfigError>| outcome.unwrap_err().to_string();
     let made = |id| Motor::new(Model::RS02, id, operation());
     for id in [0, 128, 255] {
-        assert_eq!(
-            text(made(id).map(|_| ())),
-            format!("id {id}: 1 to 127 are allowed, but for the id of the host")
-        );
+        assert_eq!(text(made(id).map(|_| ())), format!("id {id}: 1 to 127 are allowed"));
     }
     let torque = |limit| Motor::new(Model::RS02, 1, ImpedanceControl::new(limit).unwrap());
-    assert_eq!(text(torque(17.01).map(|_| ())), "torque limit 17.01 Nm: above 0 and at most 17 Nm");
+    assert_eq!(
+        text(torque(17.01).map(|_| ())),
+        "torque limit in Nm 17.01: above 0 and at most 17 is allowed"
+    );
     for current in [0.0, -1.0, 16.1, f32::NAN] {
-        assert!(Motor::new(Model::RS02, 1, Current::new(current, 1.0)).is_err(), "{current}");
-        assert!(Motor::new(Model::RS02, 1, Velocity::new(rad_per_s(1.0), current)).is_err());
-        assert!(Motor::new(Model::RS02, 1, Position::new(rad_per_s(1.0), current)).is_err());
+        assert!(Motor::new(Model::RS02, 1, Mode::current(current, 1.0)).is_err(), "{current}");
+        assert!(Motor::new(Model::RS02, 1, Mode::velocity(rad_per_s(1.0), current)).is_err());
+        assert!(Motor::new(Model::RS02, 1, Mode::position(rad_per_s(1.0), current)).is_err());
     }
     for velocity in [0.0, -1.0, 44.1, f32::NAN] {
-        assert!(Motor::new(Model::RS02, 1, Velocity::new(rad_per_s(velocity), 1.0)).is_err());
-        assert!(Motor::new(Model::RS02, 1, Position::new(rad_per_s(velocity), 1.0)).is_err());
+        assert!(Motor::new(Model::RS02, 1, Mode::velocity(rad_per_s(velocity), 1.0)).is_err());
+        assert!(Motor::new(Model::RS02, 1, Mode::position(rad_per_s(velocity), 1.0)).is_err());
     }
     for constant in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(Motor::new(Model::RS02, 1, Current::new(1.0, constant)).is_err(), "{constant}");
+        assert!(Motor::new(Model::RS02, 1, Mode::current(1.0, constant)).is_err(), "{constant}");
     }
     let motor = made(1).unwrap();
     for micros in [0, 999, 5_000_001] {
@@ -494,7 +496,7 @@ fn bad_configurations_are_refused_with_the_limit() {
     }
     let cybergear = Motor::new(Model::CYBERGEAR, 1, operation()).unwrap();
     let refused = cybergear.with_timeout(Duration::from_millis(50)).map(|_| ());
-    assert_eq!(text(refused), "a CyberGear has no time-out");
+    assert_eq!(text(refused), "time-out: this model, or its firmware, has none");
     let mut motor = motor;
     assert_eq!(
         text(motor.write(Register::SupplyVoltage, 10.0)),
@@ -513,7 +515,7 @@ trait Named {
     fn name_is(&self) -> String;
 }
 
-impl<M: Mode> Named for Motor<M> {
+impl Named for Motor {
     fn name_is(&self) -> String {
         drivetrain::motor::OwnMotor::name(self).to_string()
     }

@@ -4,7 +4,7 @@ use crate::bench::{Bench, operation};
 use crate::{index, kind, rad_per_s};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, Own, VelocityDrive};
-use drivetrain::robstride::{Current, Mode, Model, Motor, Position, Velocity};
+use drivetrain::robstride::{Mode, Model, Motor};
 use drivetrain::units::Angle;
 
 /// No gains and a torque within half a count of zero; disabled; a question; the run mode; or no current. Nothing else, above all no
@@ -19,7 +19,7 @@ fn is_rest(frame: &CanFrame) -> bool {
     }
 }
 
-type Set<M> = fn(&mut Own<Motor<M>>);
+type Set = fn(&mut Own<Motor>);
 
 #[derive(Debug, Clone, Copy)]
 enum Event {
@@ -42,7 +42,7 @@ const fn delay(event: Event) -> u32 {
     }
 }
 
-fn rests_after<M: Mode>(model: Model, mode: M, set: Set<M>, event: Event, moment: u32) {
+fn rests_after(model: Model, mode: impl Into<Mode>, set: Set, event: Event, moment: u32) {
     let mut bench = Bench::of(model, mode);
     bench.steps(150, |_| {});
     bench.own.arm(bench.now()).unwrap();
@@ -76,7 +76,7 @@ fn rests_after<M: Mode>(model: Model, mode: M, set: Set<M>, event: Event, moment
     }
 }
 
-fn rests<M: Mode>(model: Model, mode: M, set: Set<M>) {
+fn rests(model: Model, mode: impl Into<Mode> + Copy, set: Set) {
     for event in [
         Event::Disarm,
         Event::EmergencyStop,
@@ -102,12 +102,12 @@ fn each_frame_after_the_end_of_driving_is_rest_in_the_operation_mode() {
 #[test]
 fn each_frame_after_the_end_of_driving_is_rest_in_the_modes_of_the_drive() {
     for model in [Model::RS02, Model::CYBERGEAR] {
-        rests(model, Velocity::new(rad_per_s(10.0), 8.0), |own| {
+        rests(model, Mode::velocity(rad_per_s(10.0), 8.0), |own| {
             _ = own.set_velocity((), rad_per_s(5.0));
         });
-        rests(model, Position::new(rad_per_s(10.0), 8.0), |own| {
+        rests(model, Mode::position(rad_per_s(10.0), 8.0), |own| {
             _ = own.set_angle((), Angle::from_radians(1.0));
         });
-        rests(model, Current::new(8.0, 1.0), |own| _ = own.set_torque(2.0));
+        rests(model, Mode::current(8.0, 1.0), |own| _ = own.set_torque(2.0));
     }
 }

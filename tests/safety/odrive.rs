@@ -7,7 +7,7 @@ use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
     Reaction, TargetError,
 };
-use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor, Position};
+use drivetrain::odrive::{Firmware, Heartbeat, Mode, Model, Motor};
 use drivetrain::sim::OdriveDrive;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
@@ -16,32 +16,31 @@ use embedded_can::{Frame, StandardId};
 static STANDS: HealthConfig =
     HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Ignore);
 
-pub(super) struct Odrive<M: Mode> {
-    motor: Own<Motor<M>>,
+pub(super) struct Odrive {
+    motor: Own<Motor>,
     drive: OdriveDrive,
-    set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+    set: fn(&mut Own<Motor>, f32) -> Result<(), TargetError>,
 }
 
-impl Odrive<ImpedanceControl> {
+impl Odrive {
     pub(super) fn torque() -> Self {
         let mode = ImpedanceControl::new(3.0).unwrap();
         Self::new(mode, Firmware::V0_5, |motor, value| motor.set_torque(3.0 * value))
     }
 }
 
-impl Odrive<Position> {
+impl Odrive {
     pub(super) fn position() -> Self {
-        let set =
-            |motor: &mut Own<Motor<_>>, value| motor.set_angle((), Angle::from_radians(value));
-        Self::new(Position::new(3.0), Firmware::V0_6, set)
+        let set = |motor: &mut Own<Motor>, value| motor.set_angle((), Angle::from_radians(value));
+        Self::new(Mode::position(3.0), Firmware::V0_6, set)
     }
 }
 
-impl<M: Mode> Odrive<M> {
+impl Odrive {
     fn new(
-        mode: M,
+        mode: impl Into<Mode>,
         firmware: Firmware,
-        set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+        set: fn(&mut Own<Motor>, f32) -> Result<(), TargetError>,
     ) -> Self {
         let fastest = AngularVelocity::from_rad_per_s(10.0);
         let motor = Motor::new(Model::D6374, firmware, 3, fastest, mode).unwrap();
@@ -62,7 +61,7 @@ impl<M: Mode> Odrive<M> {
     }
 }
 
-impl<M: Mode> Subject<1> for Odrive<M> {
+impl Subject<1> for Odrive {
     const RULES: [Rules; 1] = [Rules {
         late_us: Some(10_000),
         resumes: false,

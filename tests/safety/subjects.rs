@@ -2,14 +2,14 @@
 
 use super::custom_motor::MyMotor;
 use super::reference::{BadStep, Rules};
-use drivetrain::damiao::{Mode, Model, Motor, PositionVelocity};
+use drivetrain::damiao::{Mode, Model, Motor};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::lk;
 use drivetrain::motor::{
     AngleDrive, ArmError, Condition, Devices, HealthConfig, ImpedanceControl, Link, Own, OwnMotor,
-    Reaction, Recovery, TargetError, VelocityDrive,
+    Reaction, TargetError, VelocityDrive,
 };
 use drivetrain::rmd;
 use drivetrain::robstride;
@@ -78,11 +78,8 @@ pub(super) struct Wheel<const RESUMES: bool>(Bus, Handle<M3508>);
 
 impl<const RESUMES: bool> Wheel<RESUMES> {
     pub(super) fn new() -> Self {
-        let recovery = if RESUMES { Recovery::Resume } else { Recovery::Rearm };
-        let config = Config::<M3508>::new(1)
-            .with_recovery(recovery)
-            .with_health(&STANDS)
-            .with_opening(Duration::ZERO);
+        let config = Config::<M3508>::new(1).with_health(&STANDS).with_opening(Duration::ZERO);
+        let config = if RESUMES { config.with_resume() } else { config };
         let mut bus = Bus::new();
         let wheel = bus.attach(config).unwrap();
         Self(bus, wheel)
@@ -167,32 +164,32 @@ impl Subject<2> for Both {
 }
 
 /// A drive that is asked for its settings, and enabled, before it is driven.
-pub(super) struct Damiao<M: Mode> {
-    motor: Own<Motor<M>>,
+pub(super) struct Damiao {
+    motor: Own<Motor>,
     drive: DamiaoDrive,
     value: f32,
-    set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+    set: fn(&mut Own<Motor>, f32) -> Result<(), TargetError>,
 }
 
-impl Damiao<ImpedanceControl> {
+impl Damiao {
     pub(super) fn mit() -> Self {
         let mode = ImpedanceControl::new(3.0).unwrap();
         Self::new(mode, 1.0, |motor, value| motor.set_torque(3.0 * value))
     }
 }
 
-impl Damiao<PositionVelocity> {
+impl Damiao {
     pub(super) fn position() -> Self {
-        let mode = PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        let mode = Mode::position_velocity(AngularVelocity::from_rad_per_s(10.0));
         Self::new(mode, 2.0, |motor, value| motor.set_angle((), Angle::from_radians(value)))
     }
 }
 
-impl<M: Mode> Damiao<M> {
+impl Damiao {
     fn new(
-        mode: M,
+        mode: impl Into<Mode>,
         number: f32,
-        set: fn(&mut Own<Motor<M>>, f32) -> Result<(), TargetError>,
+        set: fn(&mut Own<Motor>, f32) -> Result<(), TargetError>,
     ) -> Self {
         let motor = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
         let drive = DamiaoDrive::new(1, 0x11, [12.5, 30.0, 10.0]).with_register(10, number);
@@ -209,7 +206,7 @@ impl<M: Mode> Damiao<M> {
     }
 }
 
-impl<M: Mode> Subject<1> for Damiao<M> {
+impl Subject<1> for Damiao {
     const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
 
     stops!(self => self.motor);
@@ -249,37 +246,40 @@ impl<M: Mode> Subject<1> for Damiao<M> {
 }
 
 /// A drive that is asked for its state, switched on, and asked for its angle, before it is driven.
-pub(super) struct Lk<M: lk::Mode> {
-    motor: Own<lk::Motor<M>>,
+pub(super) struct Lk {
+    motor: Own<lk::Motor>,
     drive: LkDrive,
-    set: fn(&mut Own<lk::Motor<M>>, f32) -> Result<(), TargetError>,
+    set: fn(&mut Own<lk::Motor>, f32) -> Result<(), TargetError>,
 }
 
-impl Lk<ImpedanceControl> {
+impl Lk {
     pub(super) fn torque() -> Self {
         let mode = ImpedanceControl::new(2.0).unwrap();
         Self::new(mode, |motor, value| motor.set_torque(2.0 * value))
     }
 }
 
-impl Lk<lk::Velocity> {
+impl Lk {
     pub(super) fn velocity() -> Self {
-        let mode = lk::Velocity::new(AngularVelocity::from_rad_per_s(10.0));
+        let mode = lk::Mode::velocity(AngularVelocity::from_rad_per_s(10.0));
         Self::new(mode, |motor, value| {
             motor.set_velocity((), AngularVelocity::from_rad_per_s(5.0 * value))
         })
     }
 }
 
-impl Lk<lk::PositionVelocity> {
+impl Lk {
     pub(super) fn position() -> Self {
-        let mode = lk::PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        let mode = lk::Mode::position_velocity(AngularVelocity::from_rad_per_s(10.0));
         Self::new(mode, |motor, value| motor.set_angle((), Angle::from_radians(value)))
     }
 }
 
-impl<M: lk::Mode> Lk<M> {
-    fn new(mode: M, set: fn(&mut Own<lk::Motor<M>>, f32) -> Result<(), TargetError>) -> Self {
+impl Lk {
+    fn new(
+        mode: impl Into<lk::Mode>,
+        set: fn(&mut Own<lk::Motor>, f32) -> Result<(), TargetError>,
+    ) -> Self {
         let motor = Own::new(lk::Motor::new(lk::Model::MF9025_16T, 1, mode).unwrap());
         let drive = LkDrive::new(1, 33.0 / 4096.0, 0.32, 1.0, 16);
         let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
@@ -287,7 +287,7 @@ impl<M: lk::Mode> Lk<M> {
     }
 }
 
-impl<M: lk::Mode> Subject<1> for Lk<M> {
+impl Subject<1> for Lk {
     const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
 
     stops!(self => self.motor);
@@ -328,37 +328,34 @@ impl<M: lk::Mode> Subject<1> for Lk<M> {
 }
 
 /// A drive that is asked for its state, confirms its time-out, and releases its brake or tells its angle, before it is driven.
-pub(super) struct Rmd<M: rmd::Mode> {
-    motor: Own<rmd::Motor<M>>,
+pub(super) struct Rmd {
+    motor: Own<rmd::Motor>,
     drive: RmdDrive,
-    set: fn(&mut Own<rmd::Motor<M>>, f32) -> Result<(), TargetError>,
+    set: fn(&mut Own<rmd::Motor>, f32) -> Result<(), TargetError>,
 }
 
-impl Rmd<ImpedanceControl> {
+impl Rmd {
     pub(super) fn torque() -> Self {
         let mode = ImpedanceControl::new(2.0).unwrap();
         Self::new(mode, |motor, value| motor.set_torque(2.0 * value))
     }
-}
 
-impl Rmd<rmd::Velocity> {
     pub(super) fn velocity() -> Self {
-        let mode = rmd::Velocity::new(AngularVelocity::from_rad_per_s(10.0));
+        let mode = rmd::Mode::velocity(AngularVelocity::from_rad_per_s(10.0));
         Self::new(mode, |motor, value| {
             motor.set_velocity((), AngularVelocity::from_rad_per_s(5.0 * value))
         })
     }
-}
 
-impl Rmd<rmd::PositionVelocity> {
     pub(super) fn position() -> Self {
-        let mode = rmd::PositionVelocity::new(AngularVelocity::from_rad_per_s(10.0));
+        let mode = rmd::Mode::position_velocity(AngularVelocity::from_rad_per_s(10.0));
         Self::new(mode, |motor, value| motor.set_angle((), Angle::from_radians(value)))
     }
-}
 
-impl<M: rmd::Mode> Rmd<M> {
-    fn new(mode: M, set: fn(&mut Own<rmd::Motor<M>>, f32) -> Result<(), TargetError>) -> Self {
+    fn new(
+        mode: impl Into<rmd::Mode>,
+        set: fn(&mut Own<rmd::Motor>, f32) -> Result<(), TargetError>,
+    ) -> Self {
         let motor = Own::new(rmd::Motor::new(rmd::Model::X8_120, 1, mode).unwrap());
         let drive = RmdDrive::new(1, 2.4);
         let motor = motor.with_health(&STANDS).unwrap().with_opening(Duration::ZERO);
@@ -366,7 +363,7 @@ impl<M: rmd::Mode> Rmd<M> {
     }
 }
 
-impl<M: rmd::Mode> Subject<1> for Rmd<M> {
+impl Subject<1> for Rmd {
     const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
 
     stops!(self => self.motor);
@@ -562,7 +559,7 @@ pub(super) mod pins {
 }
 
 /// A wheel on a VESC that turns by torque, without a question for the fault code, which has a time of its own.
-pub(super) struct Vesc(Own<vesc::Motor<vesc::CurrentControl>>);
+pub(super) struct Vesc(Own<vesc::Motor>);
 
 impl Vesc {
     pub(super) fn new() -> Self {
@@ -575,7 +572,7 @@ impl Vesc {
             max_velocity: AngularVelocity::from_rad_per_s(300.0),
             is_reversed: false,
         };
-        let motor = vesc::Motor::new(model, 23, vesc::CurrentControl::new()).unwrap();
+        let motor = vesc::Motor::new(model, 23, vesc::Mode::current()).unwrap();
         Self(
             Own::new(motor.without_fault_code())
                 .with_health(&STANDS)
@@ -618,30 +615,30 @@ impl Subject<1> for Vesc {
     }
 }
 
-pub(super) struct RobStride<M: robstride::Mode> {
-    motor: Own<robstride::Motor<M>>,
+pub(super) struct RobStride {
+    motor: Own<robstride::Motor>,
     drive: RobStrideDrive,
-    set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+    set: fn(&mut Own<robstride::Motor>, f32) -> Result<(), TargetError>,
 }
 
-impl RobStride<ImpedanceControl> {
+impl RobStride {
     pub(super) fn operation() -> Self {
         let mode = ImpedanceControl::new(3.0).unwrap();
         Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
     }
 }
 
-impl RobStride<robstride::Current> {
+impl RobStride {
     pub(super) fn current() -> Self {
-        let mode = robstride::Current::new(4.0, 1.0);
+        let mode = robstride::Mode::current(4.0, 1.0);
         Self::new(mode, |motor, value| motor.set_torque(3.0 * value))
     }
 }
 
-impl<M: robstride::Mode> RobStride<M> {
+impl RobStride {
     fn new(
-        mode: M,
-        set: fn(&mut Own<robstride::Motor<M>>, f32) -> Result<(), TargetError>,
+        mode: impl Into<robstride::Mode>,
+        set: fn(&mut Own<robstride::Motor>, f32) -> Result<(), TargetError>,
     ) -> Self {
         let motor = Own::new(robstride::Motor::new(robstride::Model::RS02, 1, mode).unwrap());
         let drive = RobStrideDrive::new(1, [12.566, 44.0, 17.0, 500.0, 5.0]);
@@ -657,7 +654,7 @@ impl<M: robstride::Mode> RobStride<M> {
     }
 }
 
-impl<M: robstride::Mode> Subject<1> for RobStride<M> {
+impl Subject<1> for RobStride {
     const RULES: [Rules; 1] = [Rules { is_prepared: true, ..OWN }];
 
     stops!(self => self.motor);

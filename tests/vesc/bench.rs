@@ -7,7 +7,7 @@ use drivetrain::motor::{Devices, Ingest, Own};
 use drivetrain::sim::{VescDrive, VescMotor};
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
-use drivetrain::vesc::{CurrentControl, Mode, Model, Motor};
+use drivetrain::vesc::{Mode, Model, Motor};
 
 pub(crate) const MODEL: Model = Model {
     name: "6374",
@@ -32,8 +32,8 @@ pub(crate) fn drive(id: u8) -> VescDrive {
 }
 
 /// A motor and its drive on a bus that loses nothing. The drive reports at 1 kHz.
-pub(crate) struct Bench<M: Mode> {
-    pub(crate) own: Own<Motor<M>>,
+pub(crate) struct Bench {
+    pub(crate) own: Own<Motor>,
     pub(crate) drive: VescDrive,
     pub(crate) now_us: u64,
     /// The frames of the last update.
@@ -43,8 +43,8 @@ pub(crate) struct Bench<M: Mode> {
     pub(crate) is_cut: bool,
 }
 
-impl<M: Mode> Bench<M> {
-    pub(crate) fn of(motor: Motor<M>) -> Self {
+impl Bench {
+    pub(crate) fn of(motor: Motor) -> Self {
         Self {
             own: Own::new(motor),
             drive: drive(23),
@@ -55,11 +55,11 @@ impl<M: Mode> Bench<M> {
         }
     }
 
-    pub(crate) fn new(mode: M) -> Self {
+    pub(crate) fn new(mode: Mode) -> Self {
         Self::of(Motor::new(MODEL, 23, mode).unwrap())
     }
 
-    pub(crate) fn armed(mode: M) -> Self {
+    pub(crate) fn armed(mode: Mode) -> Self {
         let mut bench = Self::new(mode);
         bench.arm();
         bench
@@ -112,6 +112,6 @@ pub(crate) const SPEED: PidConfig = PidConfig::new(0.3, 1.0, 0.0);
 /// rad to rad/s.
 pub(crate) const POSITION: PidConfig = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(20.0);
 
-pub(crate) fn looped() -> CurrentControl {
-    CurrentControl::new().with_loops(POSITION, SPEED).unwrap()
+pub(crate) fn looped() -> Mode {
+    Mode::current_with_loops(POSITION, SPEED).unwrap()
 }

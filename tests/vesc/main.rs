@@ -8,6 +8,7 @@ mod bench;
 use bench::{Bench, MODEL, SPEED, drive, looped};
 use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     AngleDrive, Condition, Devices, Ingest, Own, TargetError, Timeouts, VelocityDrive,
@@ -15,10 +16,7 @@ use drivetrain::motor::{
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::vesc::{
-    Command, ConfigError, CurrentControl, Duty, Feedback, Mode, Model, Motor, Position, Rest,
-    Velocity,
-};
+use drivetrain::vesc::{Command, Feedback, Mode, Model, Motor, Rest};
 use embedded_can::{ExtendedId, Frame, Id};
 use serde_json::Value;
 
@@ -121,10 +119,10 @@ fn a_value_that_is_not_finite_lets_the_shaft_go() {
 }
 
 /// Disarmed, the drive gets nothing but the configured rest and questions, from the next frames on.
-fn rests<M: Mode>(mut bench: Bench<M>) {
+fn rests(mut bench: Bench) {
     for ends in 0..4 {
         bench.arm();
-        let drive = |bench: &mut Bench<M>| {
+        let drive = |bench: &mut Bench| {
             _ = bench.own.set_velocity((), rad_s(30.0));
             _ = bench.own.set_angle((), Angle::from_radians(1.0));
             _ = bench.own.set_torque(0.2);
@@ -155,25 +153,25 @@ fn rests<M: Mode>(mut bench: Bench<M>) {
 #[test]
 fn each_mode_reaches_its_target_and_rests_afterwards() {
     let wheel = rad_s(60.0);
-    let mut current = Bench::armed(CurrentControl::new().with_speed_loop(SPEED).unwrap());
+    let mut current = Bench::armed(Mode::current_with_speed_loop(SPEED).unwrap());
     current.steps(1_500, |bench| bench.own.set_velocity((), wheel).unwrap());
     assert!((current.drive.shaft().velocity_rad_per_s() - 60.0).abs() < 0.5);
     assert_eq!(current.own.set_angle((), Angle::ZERO), Err(TargetError::Unsupported));
     rests(current);
 
-    let mut torque = Bench::armed(CurrentControl::new());
+    let mut torque = Bench::armed(Mode::current());
     torque.steps(300, |bench| bench.own.set_torque(0.25).unwrap());
     assert!((torque.drive.shaft().torque_nm() - 0.25).abs() < 1e-4, "5 A of 0.05 Nm/A");
     assert_eq!(torque.own.set_velocity((), wheel), Err(TargetError::Unsupported));
     rests(torque);
 
-    let mut velocity = Bench::armed(Velocity::new());
+    let mut velocity = Bench::armed(Mode::velocity());
     velocity.steps(500, |bench| bench.own.set_velocity((), wheel).unwrap());
     assert!((velocity.drive.shaft().velocity_rad_per_s() - 60.0).abs() < 1.0);
     rests(velocity);
 
     let loops = PidConfig::new(0.001, 0.02, 0.0);
-    let mut duty = Bench::armed(Duty::new(0.8, loops).unwrap());
+    let mut duty = Bench::armed(Mode::duty(0.8, loops).unwrap());
     duty.steps(1_500, |bench| bench.own.set_velocity((), wheel).unwrap());
     assert!(
         (duty.drive.shaft().velocity_rad_per_s() - 60.0).abs() < 0.5,
@@ -182,7 +180,7 @@ fn each_mode_reaches_its_target_and_rests_afterwards() {
     );
     rests(duty);
 
-    let mut position = Bench::armed(Position);
+    let mut position = Bench::armed(Mode::position());
     position.steps(1_500, |bench| bench.own.set_angle((), Angle::from_radians(1.0)).unwrap());
     assert!((position.drive.shaft().angle_rad() - 1.0).abs() < 0.01);
     rests(position);
@@ -227,7 +225,7 @@ fn the_current_stays_within_the_limit_whatever_is_asked() {
 fn a_reversed_motor_behind_a_gear_has_its_units_at_the_output_shaft() {
     let gear = GearRatio::new(9, 1).unwrap();
     let model = Model { gear, is_reversed: true, ..MODEL };
-    let mut bench = Bench::of(Motor::new(model, 23, CurrentControl::new()).unwrap());
+    let mut bench = Bench::of(Motor::new(model, 23, Mode::current()).unwrap());
     // The bench's drive has no gear: 90 rad/s of its rotor are 10 of the output shaft, the other way round.
     bench.drive.shaft_mut().set_velocity(90.0);
     bench.step();
@@ -242,7 +240,7 @@ fn a_reversed_motor_behind_a_gear_has_its_units_at_the_output_shaft() {
 
 #[test]
 fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
-    let mut position = Bench::new(Position);
+    let mut position = Bench::new(Mode::position());
     position.drive.shaft_mut().set_angle(1.5);
     position.arm();
     position.steps(40, |bench| {
@@ -255,7 +253,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
     assert_eq!(first.0, 4);
     // A wheel that turns is neither braked nor driven at once, in the modes whose zero is a brake too.
     let loops = PidConfig::new(0.001, 0.02, 0.0);
-    let mut duty = Bench::new(Duty::new(1.0, loops).unwrap());
+    let mut duty = Bench::new(Mode::duty(1.0, loops).unwrap());
     duty.drive = duty.drive.with_shaft(DriveShaft::new(0.01, 0.0));
     duty.drive.shaft_mut().set_velocity(100.0);
     duty.arm();
@@ -263,7 +261,7 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
         bench.own.set_velocity((), rad_s(0.0)).unwrap();
         assert!(bench.drive.shaft().velocity_rad_per_s() > 90.0, "{:?}", bench.drive.shaft());
     });
-    let mut velocity = Bench::new(Velocity::new());
+    let mut velocity = Bench::new(Mode::velocity());
     velocity.drive.shaft_mut().set_velocity(100.0);
     velocity.arm();
     let before = velocity.drive.shaft().velocity_rad_per_s();
@@ -280,7 +278,7 @@ fn the_configured_rest_is_what_a_foreign_decoder_reads() {
         (Rest::Brake(4.0), (2, 4_000)),
         (Rest::Handbrake(3.0), (12, 3_000)),
     ] {
-        let motor = Motor::new(MODEL, 23, CurrentControl::new()).unwrap().with_rest(rest).unwrap();
+        let motor = Motor::new(MODEL, 23, Mode::current()).unwrap().with_rest(rest).unwrap();
         let mut bench = Bench::of(motor);
         bench.steps(100, |bench| {
             assert!(bench.frames.iter().all(|f| is_question(f) || read(f) == expected));
@@ -300,19 +298,19 @@ fn the_configured_rest_is_what_a_foreign_decoder_reads() {
 /// A speed of 0 lets the shaft go, a duty of 0 brakes.
 #[test]
 fn a_target_of_zero_lets_go_or_brakes_by_mode_and_configuration() {
-    let turning = |mode: Velocity| {
+    let turning = |mode: Mode| {
         let mut bench = Bench::armed(mode);
         bench.steps(500, |bench| bench.own.set_velocity((), rad_s(60.0)).unwrap());
         bench.steps(200, |bench| bench.own.set_velocity((), rad_s(0.0)).unwrap());
         bench
     };
-    let coasts = turning(Velocity::new());
+    let coasts = turning(Mode::velocity());
     assert_eq!(read(&coasts.frames[0]), (1, 0));
     assert!(coasts.drive.shaft().velocity_rad_per_s() > 50.0);
-    let brakes = turning(Velocity::new().with_standstill(Rest::Brake(10.0)));
+    let brakes = turning(Mode::velocity_with_standstill(Rest::Brake(10.0)));
     assert_eq!(read(&brakes.frames[0]), (2, 10_000));
     assert!(brakes.drive.shaft().velocity_rad_per_s().abs() < 55.0);
-    let mut duty = Bench::armed(Duty::new(1.0, PidConfig::new(0.001, 0.02, 0.0)).unwrap());
+    let mut duty = Bench::armed(Mode::duty(1.0, PidConfig::new(0.001, 0.02, 0.0)).unwrap());
     duty.drive.shaft_mut().set_velocity(60.0);
     duty.steps(1_000, |bench| bench.own.set_velocity((), rad_s(0.0)).unwrap());
     assert!(duty.drive.shaft().velocity_rad_per_s().abs() < 1.0);
@@ -320,8 +318,8 @@ fn a_target_of_zero_lets_go_or_brakes_by_mode_and_configuration() {
 
 #[test]
 fn a_motor_is_armed_when_the_drive_has_said_that_it_has_no_fault() {
-    let mut bench = Bench::new(CurrentControl::new());
-    let refused = |bench: &mut Bench<_>| bench.own.arm(bench.now()).unwrap_err().to_string();
+    let mut bench = Bench::new(Mode::current());
+    let refused = |bench: &mut Bench| bench.own.arm(bench.now()).unwrap_err().to_string();
     assert_eq!(refused(&mut bench), "no feedback from 6374 #23");
     let now = bench.now();
     let status = bench.drive.report(9).unwrap();
@@ -336,7 +334,7 @@ fn a_motor_is_armed_when_the_drive_has_said_that_it_has_no_fault() {
 #[test]
 fn a_drive_that_never_answers_is_armed_only_where_the_program_says_so() {
     for asks in [true, false] {
-        let motor = Motor::new(MODEL, 23, CurrentControl::new()).unwrap();
+        let motor = Motor::new(MODEL, 23, Mode::current()).unwrap();
         let mut own = Own::new(if asks { motor } else { motor.without_fault_code() });
         let mut now = Instant::START;
         for ms in 1..200 {
@@ -353,8 +351,8 @@ fn a_drive_that_never_answers_is_armed_only_where_the_program_says_so() {
 
 #[test]
 fn a_fault_while_driven_trips_with_its_code_and_does_not_come_back_by_itself() {
-    let mut bench = Bench::armed(CurrentControl::new().with_speed_loop(SPEED).unwrap());
-    let drive = |bench: &mut Bench<_>| _ = bench.own.set_velocity((), rad_s(60.0));
+    let mut bench = Bench::armed(Mode::current_with_speed_loop(SPEED).unwrap());
+    let drive = |bench: &mut Bench| _ = bench.own.set_velocity((), rad_s(60.0));
     bench.steps(1_000, drive);
     while bench.own.next_edge().is_some() {}
     bench.drive.fail(4);
@@ -373,7 +371,7 @@ fn a_fault_while_driven_trips_with_its_code_and_does_not_come_back_by_itself() {
 #[test]
 fn an_angle_that_no_longer_comes_is_late_feedback() {
     let mut bench = Bench::armed(looped());
-    let drive = |bench: &mut Bench<_>| _ = bench.own.set_angle((), Angle::from_radians(2.0));
+    let drive = |bench: &mut Bench| _ = bench.own.set_angle((), Angle::from_radians(2.0));
     bench.steps(100, drive);
     bench.reports = vec![9]; // status 5 ends, status 1 goes on
     bench.steps(12, drive);
@@ -388,7 +386,7 @@ fn an_angle_that_no_longer_comes_is_late_feedback() {
     assert!(!Devices::is_armed(&mut bench.own), "lost after 100 ms");
     assert_eq!(bench.own.angle(()), None);
     // A motor that controls a velocity does not mind, and has no angle.
-    let mut wheel = Bench::new(CurrentControl::new().with_speed_loop(SPEED).unwrap());
+    let mut wheel = Bench::new(Mode::current_with_speed_loop(SPEED).unwrap());
     wheel.reports = vec![9];
     wheel.arm();
     wheel.steps(500, |bench| bench.own.set_velocity((), rad_s(30.0)).unwrap());
@@ -436,7 +434,7 @@ fn a_drive_that_restarts_is_armed_anew_where_the_shaft_is() {
 
 #[test]
 fn the_drive_stops_by_itself_after_its_own_time_out() {
-    let mut bench = Bench::new(CurrentControl::new());
+    let mut bench = Bench::new(Mode::current());
     bench.drive = drive(23).with_timeout(0.1, 5.0);
     bench.arm();
     bench.steps(500, |bench| bench.own.set_torque(0.3).unwrap());
@@ -451,7 +449,7 @@ fn the_drive_stops_by_itself_after_its_own_time_out() {
 #[test]
 fn two_drives_on_a_bus_with_neighbouring_ids_hear_only_their_own() {
     let motor = |id| {
-        let mode = CurrentControl::new().with_speed_loop(SPEED).unwrap();
+        let mode = Mode::current_with_speed_loop(SPEED).unwrap();
         Own::new(Motor::new(MODEL, id, mode).unwrap())
     };
     let mut robot = [motor(0), motor(253)];
@@ -484,7 +482,7 @@ fn two_drives_on_a_bus_with_neighbouring_ids_hear_only_their_own() {
 
 #[test]
 fn damaged_and_foreign_frames_change_nothing() {
-    let mut bench = Bench::new(Position);
+    let mut bench = Bench::new(Mode::position());
     bench.steps(100, |_| {});
     let before = *bench.own.motor().feedback();
     let now = bench.now();
@@ -517,7 +515,7 @@ fn another_program_that_commands_the_drive_is_a_second_master_and_a_tool_that_as
     for (raw, is_rival) in
         [(0x017, true), (0x317, true), (0xD17, true), (0x817, false), (0x118, false)]
     {
-        let mut bench = Bench::new(CurrentControl::new());
+        let mut bench = Bench::new(Mode::current());
         bench.steps(100, |_| {});
         let frame = CanFrame::new(extended(raw), &[0, 0, 0, 1]).unwrap();
         bench.steps(5, |bench| {
@@ -534,7 +532,7 @@ fn slow_status_frames_need_time_outs_that_say_so() {
         .with_feedback(Duration::from_millis(50), Duration::from_millis(200))
         .unwrap();
     for (timeouts, drives) in [(Timeouts::new(), false), (slow, true)] {
-        let mut bench = Bench::new(CurrentControl::new().with_speed_loop(SPEED).unwrap());
+        let mut bench = Bench::new(Mode::current_with_speed_loop(SPEED).unwrap());
         bench.own = bench.own.with_timeouts(timeouts);
         bench.arm();
         let mut refused = 0;
@@ -550,23 +548,27 @@ fn slow_status_frames_need_time_outs_that_say_so() {
 
 #[test]
 fn bad_configurations_are_refused_with_the_limit() {
-    let refused = |model| Motor::new(model, 1, Position).map(|_| ()).unwrap_err().to_string();
+    let refused =
+        |model| Motor::new(model, 1, Mode::position()).map(|_| ()).unwrap_err().to_string();
     assert_eq!(
-        Motor::new(MODEL, 254, Position).unwrap_err().to_string(),
+        Motor::new(MODEL, 254, Mode::position()).unwrap_err().to_string(),
         "id 254: 0 to 253 are allowed"
     );
-    assert!(Motor::new(MODEL, 0, Position).is_ok() && Motor::new(MODEL, 253, Position).is_ok());
-    assert!(refused(Model { pole_pairs: 0, ..MODEL }).starts_with("pole_pairs is 0"));
+    assert!(
+        Motor::new(MODEL, 0, Mode::position()).is_ok()
+            && Motor::new(MODEL, 253, Mode::position()).is_ok()
+    );
+    assert!(refused(Model { pole_pairs: 0, ..MODEL }).starts_with("pole_pairs 0"));
     for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert!(
             refused(Model { torque_constant_nm_per_a: wrong, ..MODEL }).contains("torque_constant")
         );
         assert!(refused(Model { current_limit_a: wrong, ..MODEL }).contains("current_limit_a"));
         assert!(refused(Model { max_velocity: rad_s(wrong), ..MODEL }).contains("max_velocity"));
-        assert!(Duty::new(wrong, SPEED).is_err());
-        let motor = Motor::new(MODEL, 1, Position).unwrap();
+        assert!(Mode::duty(wrong, SPEED).is_err());
+        let motor = Motor::new(MODEL, 1, Mode::position()).unwrap();
         assert!(motor.with_rest(Rest::Brake(wrong)).is_err());
-        let mode = Velocity::new().with_standstill(Rest::Handbrake(wrong));
+        let mode = Mode::velocity_with_standstill(Rest::Handbrake(wrong));
         assert!(Motor::new(MODEL, 1, mode).is_err());
     }
     assert!(
@@ -577,19 +579,22 @@ fn bad_configurations_are_refused_with_the_limit() {
             .contains("torque")
     );
     assert!(refused(Model { max_velocity: rad_s(1e7), ..MODEL }).contains("16777216"));
-    let motor = Motor::new(MODEL, 1, Position).unwrap();
+    let motor = Motor::new(MODEL, 1, Mode::position()).unwrap();
     let beyond = motor.with_rest(Rest::Brake(20.001)).unwrap_err();
-    assert_eq!(beyond, ConfigError::Range("current of rest in A", 20.001, 20.0));
+    assert_eq!(
+        beyond,
+        ConfigError::Limit { parameter: "current of rest in A", value: 20.001, most: 20.0 }
+    );
     assert!(matches!(
-        Duty::new(0.5, PidConfig::new(f32::NAN, 0.0, 0.0)),
-        Err(ConfigError::Loop(_))
+        Mode::duty(0.5, PidConfig::new(f32::NAN, 0.0, 0.0)),
+        Err(ConfigError::Negative("kp"))
     ));
 }
 
 /// A drive that answered before the answers were lost may have any fault now.
 #[test]
 fn a_drive_that_no_longer_answers_is_not_armed() {
-    let mut bench = Bench::new(CurrentControl::new());
+    let mut bench = Bench::new(Mode::current());
     bench.steps(100, |_| {});
     assert_eq!(bench.own.motor().feedback().fault, Some(0));
     for ms in 0..100_u64 {
@@ -629,7 +634,7 @@ fn late_feedback_after_a_wrap_does_not_turn_the_angle() {
 #[test]
 fn a_velocity_target_keeps_within_the_largest_of_the_model() {
     let model = Model { max_velocity: rad_s(50.0), ..MODEL };
-    let mode = CurrentControl::new().with_speed_loop(SPEED).unwrap();
+    let mode = Mode::current_with_speed_loop(SPEED).unwrap();
     let mut bench = Bench::of(Motor::new(model, 23, mode).unwrap());
     bench.arm();
     bench.steps(2_000, |bench| {
@@ -637,7 +642,7 @@ fn a_velocity_target_keeps_within_the_largest_of_the_model() {
         assert!(bench.drive.shaft().velocity_rad_per_s() < 58.0);
     });
     assert!((bench.drive.shaft().velocity_rad_per_s() - 50.0).abs() < 0.5);
-    let mut own = Bench::of(Motor::new(model, 23, Velocity::new()).unwrap());
+    let mut own = Bench::of(Motor::new(model, 23, Mode::velocity()).unwrap());
     own.arm();
     // The drive's own current is no runaway, although no command of ours asks for it.
     own.steps(500, |bench| bench.own.set_velocity((), rad_s(-1e6)).unwrap());

@@ -41,13 +41,11 @@ pub fn call_all() {
     ImpedanceControl::reset.call();
     Impedance::is_finite.call();
     settings();
-    PositionVelocity::new.call();
-    Velocity::new.call();
-    ForcePosition::new.call();
-    motor::<ImpedanceControl>();
-    motor::<PositionVelocity>();
-    motor::<Velocity>();
-    motor::<ForcePosition>();
+    Mode::position_velocity.call();
+    Mode::velocity.call();
+    Mode::force_position.call();
+    (|control: ImpedanceControl| Mode::from(control)).call();
+    motor();
 }
 
 fn settings() {
@@ -63,24 +61,24 @@ fn settings() {
     (|asked: &Settings<Register, 4>| Settings::wrong(asked, |_: Register, _| any())).call();
 }
 
-fn motor<M: Mode + 'static>() {
-    Motor::<M>::new.call();
-    Motor::<M>::with_master_id.call();
-    Motor::<M>::with_timeout.call();
-    Motor::<M>::feedback.call();
-    Motor::<M>::read.call();
-    Motor::<M>::write.call();
-    Motor::<M>::store.call();
-    Motor::<M>::register.call();
-    Motor::<M>::inquire.call();
-    Motor::<M>::decode_answer.call();
-    Motor::<M>::wrong_setting.call();
-    Motor::<M>::forget_settings.call();
-    Motor::<M>::poll.call();
-    Own::<Motor<M>>::set_impedance.call();
-    Own::<Motor<M>>::motor_mut.call();
-    (|own: &mut Own<Motor<M>>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor<M>>, target| own.set_angle((), target)).call();
-    family::<Own<Motor<M>>>();
-    device::<Own<Motor<M>>>();
+fn motor() {
+    (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
+    Motor::with_master_id.call();
+    Motor::with_timeout.call();
+    Motor::feedback.call();
+    Motor::read.call();
+    Motor::write.call();
+    Motor::store.call();
+    Motor::register.call();
+    Motor::inquire.call();
+    Motor::decode_answer.call();
+    Motor::wrong_setting.call();
+    Motor::forget_settings.call();
+    Motor::poll.call();
+    Own::<Motor>::set_impedance.call();
+    Own::<Motor>::motor_mut.call();
+    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
+    family::<Own<Motor>>();
+    device::<Own<Motor>>();
 }

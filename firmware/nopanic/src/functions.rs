@@ -2,14 +2,13 @@
 
 use crate::opaque::{Function, any};
 use core::hint::black_box;
-use drivetrain::control::{
-    ConfigError, Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan,
-};
+use drivetrain::control::{Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
 };
 use drivetrain::encoder::{GearRatio, Homing, Position, Shaft, resolve_gap, shortest};
+use drivetrain::error::ConfigError;
 use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
@@ -395,7 +394,7 @@ fn dji() {
     Config::<M3508>::position_loop.call();
     Config::<M3508>::with_gear.call();
     Config::<M3508>::with_torque_constant.call();
-    Config::<M3508>::with_recovery.call();
+    Config::<M3508>::with_resume.call();
     Config::<M3508>::with_opening.call();
     Config::<M3508>::id.call();
     Config::<M2006>::with_current_limit.call();

@@ -20,28 +20,27 @@ pub fn call_all() {
     Feedback::torque_nm.call();
     Feedback::velocity_rad_per_s.call();
     State::decode.call();
-    PositionVelocity::new.call();
-    Velocity::new.call();
-    Velocity::with_torque_limit.call();
-    motor::<ImpedanceControl>();
-    motor::<PositionVelocity>();
-    motor::<Velocity>();
+    Mode::position_velocity.call();
+    Mode::velocity.call();
+    Mode::velocity_with_torque_limit.call();
+    (|control: ImpedanceControl| Mode::from(control)).call();
+    motor();
 }
 
-fn motor<M: Mode + 'static>() {
-    Motor::<M>::new.call();
-    Motor::<M>::reversed.call();
-    Motor::<M>::feedback.call();
-    Motor::<M>::state.call();
-    Motor::<M>::inquire.call();
-    Motor::<M>::decode_answer.call();
-    Motor::<M>::wrong_setting.call();
-    Motor::<M>::forget_settings.call();
-    Motor::<M>::poll.call();
-    Own::<Motor<M>>::set_impedance.call();
-    Own::<Motor<M>>::motor_mut.call();
-    (|own: &mut Own<Motor<M>>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor<M>>, target| own.set_angle((), target)).call();
-    family::<Own<Motor<M>>>();
-    device::<Own<Motor<M>>>();
+fn motor() {
+    (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
+    Motor::reversed.call();
+    Motor::feedback.call();
+    Motor::state.call();
+    Motor::inquire.call();
+    Motor::decode_answer.call();
+    Motor::wrong_setting.call();
+    Motor::forget_settings.call();
+    Motor::poll.call();
+    Own::<Motor>::set_impedance.call();
+    Own::<Motor>::motor_mut.call();
+    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
+    family::<Own<Motor>>();
+    device::<Own<Motor>>();
 }

@@ -13,37 +13,39 @@ pub fn call_all() {
     Feedback::decode.call();
     Heartbeat::decode.call();
     Heartbeat::error_code.call();
-    Velocity::new.call();
-    Position::new.call();
-    Position::with_filter.call();
-    Position::with_trajectory.call();
-    motor::<ImpedanceControl>();
-    motor::<Velocity>();
-    motor::<Position>();
+    Mode::velocity.call();
+    Mode::position.call();
+    Mode::position_with_filter.call();
+    Mode::position_with_trajectory.call();
+    (|control: ImpedanceControl| Mode::from(control)).call();
+    motor();
 }
 
-fn motor<M: Mode + 'static>() {
-    Motor::<M>::new.call();
-    Motor::<M>::with_gear.call();
-    Motor::<M>::reversed.call();
-    Motor::<M>::with_endpoints.call();
-    Motor::<M>::feedback.call();
-    Motor::<M>::heartbeat.call();
-    Motor::<M>::errors.call();
-    Motor::<M>::clear_errors.call();
-    Motor::<M>::stop.call();
-    Motor::<M>::inquire.call();
-    Motor::<M>::decode_answer.call();
-    Motor::<M>::wrong_setting.call();
-    Motor::<M>::forget_settings.call();
-    Motor::<M>::poll.call();
-    Motor::<M>::enable.call();
-    Motor::<M>::disable.call();
-    Own::<Motor<M>>::set_torque.call();
-    Own::<Motor<M>>::set_impedance.call();
-    Own::<Motor<M>>::motor_mut.call();
-    (|own: &mut Own<Motor<M>>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor<M>>, target| own.set_angle((), target)).call();
-    family::<Own<Motor<M>>>();
-    device::<Own<Motor<M>>>();
+fn motor() {
+    (|model, firmware, node, velocity, mode: Mode| {
+        Motor::new(model, firmware, node, velocity, mode)
+    })
+    .call();
+    Motor::with_gear.call();
+    Motor::reversed.call();
+    Motor::with_endpoints.call();
+    Motor::feedback.call();
+    Motor::heartbeat.call();
+    Motor::errors.call();
+    Motor::clear_errors.call();
+    Motor::stop.call();
+    Motor::inquire.call();
+    Motor::decode_answer.call();
+    Motor::wrong_setting.call();
+    Motor::forget_settings.call();
+    Motor::poll.call();
+    Motor::enable.call();
+    Motor::disable.call();
+    Own::<Motor>::set_torque.call();
+    Own::<Motor>::set_impedance.call();
+    Own::<Motor>::motor_mut.call();
+    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
+    family::<Own<Motor>>();
+    device::<Own<Motor>>();
 }

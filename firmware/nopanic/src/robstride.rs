@@ -27,13 +27,11 @@ pub fn call_all() {
     Register::is_float.call();
     Register::is_writable.call();
     settings();
-    Position::new.call();
-    Velocity::new.call();
-    Current::new.call();
-    motor::<ImpedanceControl>();
-    motor::<Position>();
-    motor::<Velocity>();
-    motor::<Current>();
+    Mode::position.call();
+    Mode::velocity.call();
+    Mode::current.call();
+    (|control: ImpedanceControl| Mode::from(control)).call();
+    motor();
 }
 
 fn settings() {
@@ -49,25 +47,25 @@ fn settings() {
     (|asked: &Settings<Register, 3>| Settings::wrong(asked, |_: Register, _| any())).call();
 }
 
-fn motor<M: Mode + 'static>() {
-    Motor::<M>::new.call();
-    Motor::<M>::with_host_id.call();
-    Motor::<M>::with_timeout.call();
-    Motor::<M>::feedback.call();
-    Motor::<M>::reported_faults.call();
-    Motor::<M>::read.call();
-    Motor::<M>::write.call();
-    Motor::<M>::store.call();
-    Motor::<M>::set_zero.call();
-    Motor::<M>::set_id.call();
-    Motor::<M>::register.call();
-    Motor::<M>::inquire.call();
-    Motor::<M>::decode_answer.call();
-    Motor::<M>::wrong_setting.call();
-    Motor::<M>::forget_settings.call();
-    Motor::<M>::poll.call();
-    (|own: &mut Own<Motor<M>>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor<M>>, target| own.set_angle((), target)).call();
-    family::<Own<Motor<M>>>();
-    device::<Own<Motor<M>>>();
+fn motor() {
+    (|model, id, mode: Mode| Motor::new(model, id, mode)).call();
+    Motor::with_host_id.call();
+    Motor::with_timeout.call();
+    Motor::feedback.call();
+    Motor::reported_faults.call();
+    Motor::read.call();
+    Motor::write.call();
+    Motor::store.call();
+    Motor::set_zero.call();
+    Motor::set_id.call();
+    Motor::register.call();
+    Motor::inquire.call();
+    Motor::decode_answer.call();
+    Motor::wrong_setting.call();
+    Motor::forget_settings.call();
+    Motor::poll.call();
+    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
+    family::<Own<Motor>>();
+    device::<Own<Motor>>();
 }

@@ -15,33 +15,31 @@ pub fn call_all() {
         Feedback::take(feedback, packet, data.get(..length).unwrap_or_default())
     })
     .call();
-    CurrentControl::new.call();
-    CurrentControl::with_speed_loop.call();
-    CurrentControl::with_loops.call();
-    Duty::new.call();
-    Velocity::new.call();
-    Velocity::with_standstill.call();
-    motor::<CurrentControl>();
-    motor::<Duty>();
-    motor::<Velocity>();
-    motor::<Position>();
+    Mode::current.call();
+    Mode::current_with_speed_loop.call();
+    Mode::current_with_loops.call();
+    Mode::duty.call();
+    Mode::velocity.call();
+    Mode::velocity_with_standstill.call();
+    Mode::position.call();
+    motor();
 }
 
-fn motor<M: Mode + 'static>() {
-    Motor::<M>::new.call();
-    Motor::<M>::with_rest.call();
-    Motor::<M>::with_encoder.call();
-    Motor::<M>::without_fault_code.call();
-    Motor::<M>::feedback.call();
-    Motor::<M>::position.call();
-    Motor::<M>::inquire.call();
-    Motor::<M>::decode_answer.call();
-    Motor::<M>::wrong_setting.call();
-    Motor::<M>::forget_settings.call();
-    Own::<Motor<M>>::set_torque.call();
-    Own::<Motor<M>>::motor_mut.call();
-    (|own: &mut Own<Motor<M>>, target| own.set_velocity((), target)).call();
-    (|own: &mut Own<Motor<M>>, target| own.set_angle((), target)).call();
-    family::<Own<Motor<M>>>();
-    device::<Own<Motor<M>>>();
+fn motor() {
+    Motor::new.call();
+    Motor::with_rest.call();
+    Motor::with_encoder.call();
+    Motor::without_fault_code.call();
+    Motor::feedback.call();
+    Motor::position.call();
+    Motor::inquire.call();
+    Motor::decode_answer.call();
+    Motor::wrong_setting.call();
+    Motor::forget_settings.call();
+    Own::<Motor>::set_torque.call();
+    Own::<Motor>::motor_mut.call();
+    (|own: &mut Own<Motor>, target| own.set_velocity((), target)).call();
+    (|own: &mut Own<Motor>, target| own.set_angle((), target)).call();
+    family::<Own<Motor>>();
+    device::<Own<Motor>>();
 }

@@ -5,10 +5,11 @@ use crate::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::control::{
-    Biquad, Cascade, ConfigError, Differentiator, FeedForward, LowPass, MotionLimits, Pid,
-    PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator,
-    StepResponse, TimeStep, Window,
+    Biquad, Cascade, Differentiator, FeedForward, LowPass, MotionLimits, Pid, PidConfig,
+    PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator, StepResponse,
+    TimeStep, Window,
 };
+use drivetrain::error::ConfigError;
 
 const DT_S: f32 = 0.001;
 

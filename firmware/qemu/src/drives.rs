@@ -250,7 +250,7 @@ pub fn rows() {
         current_max_a: 40.0,
         no_load_rad_per_s: 60.0,
     };
-    let mode = vesc::CurrentControl::new().with_speed_loop(SPEED_LOOP).unwrap();
+    let mode = vesc::Mode::current_with_speed_loop(SPEED_LOOP).unwrap();
     let motors = ids().map(|id| vesc::Motor::new(model, id, mode).unwrap());
     let drives = ids().map(|id| Vesc(VescDrive::new(id, motor), false));
     measure(["vesc_tick", "vesc_ingest"], Group::new(motors, drives));

@@ -13,7 +13,7 @@ use drivetrain::units::AngularVelocity;
 
 const MOTORS: usize = 8;
 
-type Joints = [Own<Motor<ImpedanceControl>>; MOTORS];
+type Joints = [Own<Motor>; MOTORS];
 
 struct Arm {
     joints: Joints,

@@ -1,6 +1,6 @@
-use crate::control::error::ConfigError;
 use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// A position loop over a speed loop: the way that is left becomes a velocity, and that an effort.
 ///
@@ -28,7 +28,7 @@ use crate::control::step::TimeStep;
 /// let step = TimeStep::of(0.001);
 /// assert_eq!(arm.step(1.0, 1.0, &step), 6.0); // 4 rad/s wanted, 1 rad/s measured
 /// assert_eq!(arm.speed_mut().step(1.5, 1.0, &step), 1.0); // the speed loop alone
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

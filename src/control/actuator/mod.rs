@@ -17,9 +17,10 @@ pub use cascade::Cascade;
 pub use position::PositionActuator;
 pub use speed::SpeedActuator;
 
-use super::error::{ConfigError, positive};
+use super::error::positive;
 use super::filter::LowPass;
 use super::step::TimeStep;
+use crate::error::ConfigError;
 
 /// A low-pass that may be absent.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,8 @@
 use super::speed::SpeedFilters;
 use super::{Cascade, OptionalFilter, SpeedActuator};
-use crate::control::error::ConfigError;
 use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
@@ -32,7 +32,7 @@ use crate::control::step::TimeStep;
 /// assert_eq!(arm.step(1.0, 0.0, 1.0, &TimeStep::of(0.001)), 6.0); // 4 rad/s wanted, 1 rad/s measured
 /// assert_eq!(arm.speed_setpoint(), 4.0);
 /// assert_eq!(arm.with_outer_divider(0).unwrap_err().parameter(), "outer_divider");
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -150,7 +150,7 @@ impl PositionActuator {
     /// let mut arm = PositionActuator::new(angle, speed)?;
     /// arm.reset_to(3.0);
     /// assert_eq!((arm.output(), arm.step(1.0, 0.0, 0.0, &TimeStep::of(0.001))), (3.0, 3.0));
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn reset_to(&mut self, output: f32) {
         self.reset();

@@ -1,7 +1,7 @@
 use super::OptionalFilter;
-use crate::control::error::ConfigError;
 use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// A speed loop with its filters.
 ///
@@ -26,7 +26,7 @@ use crate::control::step::TimeStep;
 /// assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0);
 /// let error = wheel.with_feedback_filter(100.0)?.with_output_filter(0.0).unwrap_err();
 /// assert_eq!(error.parameter(), "output_filter");
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -164,7 +164,7 @@ impl SpeedActuator {
     /// }
     /// wheel.interrupt();
     /// assert!((wheel.step(1.0, 0.7, &TimeStep::of(0.001)) - 1.0).abs() < 1e-3); // no kick of D for the step of 0.7
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn interrupt(&mut self) {
         self.filters.interrupt();

@@ -1,4 +1,5 @@
-use crate::control::error::{ConfigError, check, positive};
+use crate::control::error::{check, positive};
+use crate::error::ConfigError;
 use crate::math;
 
 /// A second-order filter for samples at a fixed rate: low-pass or notch.

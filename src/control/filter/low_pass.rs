@@ -1,6 +1,7 @@
-use crate::control::error::{ConfigError, check, positive};
+use crate::control::error::{check, positive};
 use crate::control::number::finite;
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// A first-order low-pass filter.
 ///

@@ -1,6 +1,7 @@
 use crate::control::error::{
-    ConfigError, check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
+    check, gains, not_negative, off_or_positive, ordered, output_ends, positive,
 };
+use crate::error::ConfigError;
 
 const ASYMMETRIC: u16 = 1;
 const INTEGRAL_WEIGHT: u16 = 1 << 1;
@@ -257,7 +258,7 @@ impl PidConfig {
     ///     pid.step(1.0, 0.0, &step);
     /// }
     /// assert!((pid.output() - 0.96).abs() < 0.01);
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
     pub const fn with_tracking(mut self, r: f32) -> Self {
@@ -281,7 +282,7 @@ impl PidConfig {
     /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0); // 2 times the change of the error
     /// pid.set_gains(8.0, 0.0, 0.0)?;
     /// assert_eq!(pid.step(1.5, 0.0, &step), 6.0);
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
     pub const fn with_incremental_form(mut self) -> Self {

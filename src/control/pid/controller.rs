@@ -3,8 +3,9 @@ use super::config::{
     TRACK_OUTPUT, TRACKING,
 };
 use super::law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
-use crate::control::error::{ConfigError, check, gains};
+use crate::control::error::{check, gains};
 use crate::control::number::{finite, limited};
+use crate::error::ConfigError;
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
 ///
@@ -61,7 +62,7 @@ use crate::control::number::{finite, limited};
 ///     pid.step(0.0, 0.0, &step);
 ///     assert!((pid.step(0.0, dt_s, &step) + 0.2).abs() < 1e-6); // kd times 1/s
 /// }
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -154,7 +155,7 @@ impl Pid {
     /// }
     /// pid.interrupt();
     /// assert!((pid.step(1.0, 0.7, &step) - 1.0).abs() < 1e-3); // no kick of D for the step of 0.7
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn interrupt(&mut self) {
         self.error = UNKNOWN;

@@ -40,7 +40,7 @@ impl Pid {
     /// let step = TimeStep::of(0.01);
     /// assert_eq!(pid.step(1.0, 0.0, &step), 2.0); // P
     /// assert_eq!(pid.step(1.0, 0.0, &step), 2.1); // and 10/s for 10 ms
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[inline]
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
@@ -69,7 +69,7 @@ impl Pid {
     ///
     /// let mut pid = Pid::new(PidConfig::new(10.0, 0.0, 0.5))?;
     /// assert_eq!(pid.step_error(0.3, 2.0, &TimeStep::of(0.001)), 2.0); // 10 times 0.3, less 0.5 times 2
-    /// # Ok::<(), drivetrain::control::ConfigError>(())
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {

@@ -1,5 +1,6 @@
-use crate::control::error::{ConfigError, check, not_negative};
+use crate::control::error::{check, not_negative};
 use crate::control::number::finite;
+use crate::error::ConfigError;
 
 /// The effort that a motion takes: `kS sign(velocity) + kV velocity + kA acceleration`.
 ///

@@ -1,5 +1,6 @@
-use crate::control::error::{ConfigError, check, finite, positive};
+use crate::control::error::{check, finite, positive};
 use crate::control::number;
+use crate::error::ConfigError;
 use crate::math;
 
 /// How fast a [`Profile`] may go.
@@ -87,7 +88,7 @@ pub struct ProfileState {
 /// assert_eq!(travel.at(0.5).velocity, 1.0);
 /// assert_eq!(travel.at(1.75).position, 1.5);
 /// assert_eq!(travel.at(9.9).position, 3.0);
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,6 +1,7 @@
-use crate::control::error::{ConfigError, check, positive};
+use crate::control::error::{check, positive};
 use crate::control::number::limited;
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// Bounds the rate at which a value rises and falls.
 ///
@@ -23,7 +24,7 @@ use crate::control::step::TimeStep;
 /// let mut speed = SlewLimiter::new(2.0, 5.0)?; // up by 2, down by 5 a second
 /// assert_eq!(speed.update(1.0, 0.1), 0.2);
 /// assert_eq!(speed.update(-1.0, 0.1), -0.3);
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

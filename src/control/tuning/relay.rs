@@ -1,8 +1,9 @@
 use super::TuningRule;
-use crate::control::error::{ConfigError, check, finite, not_negative, positive};
+use crate::control::error::{check, finite, not_negative, positive};
 use crate::control::number::{self, Sum};
 use crate::control::pid::PidConfig;
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 use crate::math;
 use core::f32::consts::PI;
 
@@ -240,7 +241,8 @@ impl RelayTuner {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{ConfigError, RelayTuner};
+    /// use drivetrain::error::ConfigError;
+    /// use drivetrain::control::RelayTuner;
     ///
     /// // A speed that follows at once: it swings from one sample to the next.
     /// let mut tuner = RelayTuner::new(1.0, 0.0)?;

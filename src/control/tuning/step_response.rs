@@ -1,6 +1,7 @@
-use crate::control::error::{self, ConfigError, check, positive};
+use crate::control::error::{self, check, positive};
 use crate::control::number::{Sum, finite};
 use crate::control::step::TimeStep;
+use crate::error::ConfigError;
 
 /// Measures the answer of a loop to a step, sample by sample, without storing it.
 ///
@@ -23,7 +24,7 @@ use crate::control::step::TimeStep;
 /// assert!((response.rise_time_s().unwrap_or(0.0) - 0.22).abs() < 0.002);
 /// assert!((response.settling_time_s().unwrap_or(0.0) - 0.39).abs() < 0.003);
 /// assert_eq!(response.overshoot(), 0.0);
-/// # Ok::<(), drivetrain::control::ConfigError>(())
+/// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,5 +1,6 @@
-use crate::control::error::{ConfigError, check, positive};
+use crate::control::error::{check, positive};
 use crate::control::pid::PidConfig;
+use crate::error::ConfigError;
 
 /// A driven wheel of a robot, from which the gains of its speed loop follow.
 ///

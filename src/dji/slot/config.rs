@@ -8,9 +8,10 @@ use crate::dji::error::SteepGain;
 use crate::dji::feedback::ErrorTable;
 use crate::dji::handle::Key;
 use crate::dji::range::Range;
-use crate::dji::{AttachError, Facts, LoopError};
+use crate::dji::{AttachError, Facts};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};
-use crate::motor::{Capabilities, Capability, HealthConfig, MotorGuard, MotorName, Recovery};
+use crate::error::ConfigError;
+use crate::motor::{Capabilities, Capability, HealthConfig, MotorGuard, MotorName};
 use core::f32::consts::TAU;
 
 impl Slot {
@@ -76,8 +77,7 @@ impl Slot {
             nm_per_a,
             range: Range::within(limit_raw),
             full_limit: limit_raw,
-            guard: MotorGuard::NEW
-                .with(config.opening, matches!(config.recovery, Recovery::Resume)),
+            guard: MotorGuard::NEW.with(config.opening, config.resumes),
             speed: speed_loop,
             position: position_loop,
             generation,
@@ -143,8 +143,8 @@ impl Slot {
     }
 
     /// Changes the gains of the speed loop without a jump of its output.
-    pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
-        let facts = self.facts.ok_or(LoopError::Detached)?;
+    pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), ConfigError> {
+        let facts = self.facts.ok_or(super::DETACHED)?;
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
         let steep = steep_speed(&config, facts, self.rad_per_s_per_rpm);
         self.rest_loops();
@@ -154,8 +154,11 @@ impl Slot {
     }
 
     /// Changes the gains of the position loop without a jump of its output.
-    pub(in crate::dji) fn set_position_loop(&mut self, config: PidConfig) -> Result<(), LoopError> {
-        let facts = self.facts.ok_or(LoopError::Detached)?;
+    pub(in crate::dji) fn set_position_loop(
+        &mut self,
+        config: PidConfig,
+    ) -> Result<(), ConfigError> {
+        let facts = self.facts.ok_or(super::DETACHED)?;
         let limit = no_load_velocity(facts, self.rad_per_s_per_rpm);
         let steep = steep_position(&config, facts);
         self.rest_loops();
@@ -184,15 +187,15 @@ fn replace(
     config: PidConfig,
     limit: f32,
     steep: Option<SteepGain>,
-) -> Result<(), LoopError> {
+) -> Result<(), ConfigError> {
     if !is_loop(pid) {
-        return Err(LoopError::NoLoop);
+        return Err(ConfigError::Unusable("handle of a motor without this loop"));
     }
     if let Some(SteepGain { parameter, value, highest }) = steep {
-        return Err(LoopError::Gain { parameter, value, highest });
+        let (value, most) = (value as f32, highest as f32);
+        return Err(ConfigError::Range { parameter, value, least: 0.0, most });
     }
     pid.set_config(within(Some(config), limit))
-        .map_err(|error| LoopError::Parameter(error.parameter()))
 }
 
 /// Returns the proportional gain of a speed loop with which an error of one rpm of the rotor, the finest that feedback tells, asks

@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::ConfigError;
 
 #[test]
 fn one_ampere_is_the_raw_value_of_each_model() {
@@ -143,7 +144,10 @@ fn a_target_without_its_loop_is_an_error() {
     let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)]);
     assert_eq!(bus.set_velocity(wheel, AngularVelocity::ZERO), Err(TargetError::NoLoop));
     assert_eq!(bus.set_position(wheel, Position::ZERO), Err(TargetError::NoLoop));
-    assert_eq!(bus.set_speed_loop(wheel, SPEED), Err(LoopError::NoLoop));
+    assert_eq!(
+        bus.set_speed_loop(wheel, SPEED),
+        Err(ConfigError::Unusable("handle of a motor without this loop"))
+    );
 }
 
 #[test]
@@ -154,7 +158,7 @@ fn gains_change_while_running() {
     assert_eq!(sent(&mut bus), [(0x200, [3277, 0, 0, 0])]);
     bus.set_speed_loop(wheel, PidConfig::new(2.0, 0.0, 0.0)).unwrap();
     let error = bus.set_speed_loop(wheel, PidConfig::new(1.0, f32::NAN, 0.0)).unwrap_err();
-    assert_eq!(error, LoopError::Parameter("ki"));
+    assert_eq!(error, ConfigError::Negative("ki"));
     bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(4.0)).unwrap();
     for ms in 3..50 {
         assert_eq!(bus.ingest(&feedback(0x201, 0, 0), at_ms(ms)), Ingest::Taken);
@@ -246,7 +250,7 @@ fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     let loops = |kp| PidConfig::new(kp, 0.0, 0.0);
     let (mut bus, [joint]) = armed([Config::<M3508>::at_once(1).position_loop(loops(1.0), SPEED)]);
     let wrong = bus.set_position_loop(joint, loops(f32::NAN)).unwrap_err();
-    assert_eq!(wrong.to_string(), "kp is not usable");
+    assert_eq!(wrong.to_string(), "kp: must be zero or more, and finite");
     bus.set_position(joint, Position::from_turns(1)).unwrap();
     step(&mut bus, 2);
     let before = sent(&mut bus)[0].1[0];
@@ -258,8 +262,8 @@ fn a_position_loop_changes_while_the_motor_runs_or_says_why_not() {
     assert!((after - 2 * before).abs() <= 1, "{before}, then {after}");
     bus.detach(joint);
     let detached = bus.set_position_loop(joint, loops(1.0)).unwrap_err();
-    assert_eq!(detached.to_string(), "the motor was detached");
+    assert_eq!(detached.to_string(), "handle of a detached motor is not usable");
     let wheel = bus.attach(Config::<M3508>::at_once(2).speed_loop(SPEED)).unwrap();
     let without = bus.set_position_loop(wheel, loops(1.0)).unwrap_err();
-    assert_eq!(without.to_string(), "the motor was attached without this loop");
+    assert_eq!(without.to_string(), "handle of a motor without this loop is not usable");
 }

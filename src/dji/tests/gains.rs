@@ -1,5 +1,6 @@
 use super::*;
 use crate::encoder::GearRatio;
+use crate::error::ConfigError;
 
 const fn p(kp: f32) -> PidConfig {
     PidConfig::new(kp, 0.0, 0.0)
@@ -15,7 +16,12 @@ fn assert_steepest<M: Model>(config: Config<M>, steepest: f32) {
         (f64::from(steepest) - f64::from(highest), f64::from(value) - f64::from(1.001 * steepest));
     assert!((0.0..1.0).contains(&down) && (0.0..1.0).contains(&up), "{error:?}");
     let motor = bus.attach(config.speed_loop(p(0.999 * steepest))).unwrap();
-    let refused = Err(LoopError::Gain { parameter, value, highest });
+    let refused = Err(ConfigError::Range {
+        parameter,
+        value: value as f32,
+        least: 0.0,
+        most: highest as f32,
+    });
     assert_eq!(bus.set_speed_loop(motor, p(1.001 * steepest)), refused);
     assert_eq!(bus.set_speed_loop(motor, p(0.999 * steepest)), Ok(()));
 }
@@ -43,7 +49,12 @@ fn a_gain_with_which_one_count_of_the_encoder_asks_for_the_no_load_speed_is_refu
     let AttachError::Gain { parameter, value, highest, .. } = error else { panic!("{error}") };
     assert_eq!((parameter, value), ("kp of the position loop", 1_265_000));
     let arm = bus.attach(with(1.263e6)).unwrap();
-    let refused = Err(LoopError::Gain { parameter, value, highest });
+    let refused = Err(ConfigError::Range {
+        parameter,
+        value: value as f32,
+        least: 0.0,
+        most: highest as f32,
+    });
     assert_eq!(bus.set_position_loop(arm, p(1.265e6)), refused);
     assert_eq!(bus.set_position_loop(arm, p(1.263e6)), Ok(()));
     let yaw = |kp| Config::<Gm6020Voltage>::new(5).position_loop(p(kp), SPEED);
@@ -60,7 +71,7 @@ fn gains_that_are_no_numbers_keep_their_name() {
         assert_eq!(error.to_string(), "M3508 #1: kp is not usable");
     }
     let motor = bus.attach(wheel.speed_loop(SPEED)).unwrap();
-    assert_eq!(bus.set_speed_loop(motor, p(f32::INFINITY)), Err(LoopError::Parameter("kp")));
+    assert_eq!(bus.set_speed_loop(motor, p(f32::INFINITY)), Err(ConfigError::Negative("kp")));
 }
 
 /// In a `const` the same refusal is one of the compiler. A gain in words per rpm, taken as A per rad/s, is possible.

@@ -149,7 +149,7 @@ fn an_offline_motor_is_latched_until_it_is_armed_again() {
 fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
     let config = Config::<M3508>::at_once(1)
         .speed_loop(PidConfig::new(100.0, 0.0, 0.0))
-        .with_recovery(Recovery::Resume)
+        .with_resume()
         .with_opening(Duration::from_millis(100));
     let (mut bus, [wheel]) = armed([config]);
     for ms in 2..150 {
@@ -172,7 +172,7 @@ fn a_motor_with_a_ramp_comes_back_by_itself_and_from_zero() {
 #[test]
 fn a_motor_that_one_frame_brings_back_comes_from_zero_as_well() {
     let opening = Duration::from_millis(100);
-    let config = Config::<M3508>::new(1).with_recovery(Recovery::Resume).with_opening(opening);
+    let config = Config::<M3508>::new(1).with_resume().with_opening(opening);
     let (bus, [wheel]) = armed([config]);
     let mut bus = bus.with_timeouts(Timeouts::new().with_good_frames(1));
     for ms in 2..150 {
@@ -275,17 +275,17 @@ fn timeouts_that_would_drive_blindly_are_refused() {
     assert_eq!(timeouts.with_command(ms(1_000)).unwrap().command(), ms(1_000));
     assert_eq!(timeouts.with_measured(us(1_999)).unwrap().measured(), ms(1));
     let refused =
-        |late, offline| Timeouts::new().with_feedback(late, offline).unwrap_err().parameter;
-    assert_eq!(refused(ms(10_000), ms(1)), "late");
-    assert_eq!(refused(us(1_000_001), ms(10_000)), "late");
-    assert_eq!(refused(us(0), ms(100)), "late");
-    assert_eq!(refused(ms(20), us(19_999)), "offline");
-    assert_eq!(refused(ms(20), us(10_000_001)), "offline");
+        |late, offline| Timeouts::new().with_feedback(late, offline).unwrap_err().parameter();
+    assert_eq!(refused(ms(10_000), ms(1)), "late in us");
+    assert_eq!(refused(us(1_000_001), ms(10_000)), "late in us");
+    assert_eq!(refused(us(0), ms(100)), "late in us");
+    assert_eq!(refused(ms(20), us(19_999)), "offline in us");
+    assert_eq!(refused(ms(20), us(10_000_001)), "offline in us");
     for command in [us(0), us(1_000_001), ms(u64::MAX / 1_000)] {
-        assert_eq!(timeouts.with_command(command).unwrap_err().parameter, "command");
+        assert_eq!(timeouts.with_command(command).unwrap_err().parameter(), "command in us");
     }
     for measured in [us(999), us(1_000_001)] {
-        assert_eq!(timeouts.with_measured(measured).unwrap_err().parameter, "measurement");
+        assert_eq!(timeouts.with_measured(measured).unwrap_err().parameter(), "measurement in us");
     }
 }
 

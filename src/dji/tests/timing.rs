@@ -38,9 +38,8 @@ fn a_ramp_rises_for_as_long_as_it_is_to_whatever_the_clock_shows() {
     {
         for started_us in [TURN_US - 500, TURN_US + 500, TURN_US + 1_500, TURN_US + 2_500] {
             let opening = Duration::from_millis(ramp_ms);
-            let (mut bus, [wheel]) = armed([Config::<M3508>::at_once(1)
-                .with_recovery(Recovery::Resume)
-                .with_opening(opening)]);
+            let (mut bus, [wheel]) =
+                armed([Config::<M3508>::at_once(1).with_resume().with_opening(opening)]);
             // Offline, then heard ten times to the moment.
             let at = |ms: u64| Instant::from_micros(started_us + 1_000 * ms);
             bus.update(Tick::new(at(0), 0.001));

@@ -279,9 +279,7 @@ fn a_short_silence_hides_nothing_from_the_looks_after_it() {
 fn a_ramp_of_a_motor_with_which_nothing_is_wrong_comes_to_its_end() {
     for (ramp_ms, ticks) in [(2_000, 2_100), (65_000, 80_000)] {
         let opening = Duration::from_millis(ramp_ms);
-        let mut bench = Bench::new(
-            Config::<M3508>::at_once(1).with_recovery(Recovery::Resume).with_opening(opening),
-        );
+        let mut bench = Bench::new(Config::<M3508>::at_once(1).with_resume().with_opening(opening));
         bench.run(30, CALM, 0);
         bench.ms += 150;
         step(&mut bench.bus, bench.ms);

@@ -1,6 +1,7 @@
 //! Facts of the models and the codec of commands and answers.
 
 use super::*;
+use crate::error::ConfigError;
 
 #[test]
 fn the_models_of_the_table_are_valid() {
@@ -71,13 +72,22 @@ fn bad_configurations_are_refused_with_the_limit() {
     use std::string::ToString;
     let model = |gear, constant, bits| Model::new("mine", Series::Mg, gear, constant, bits);
     for gear in [0.5, 0.0, -1.0, 1_001.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(model(gear, 1.0, 16), Err(ConfigError::Gear(_))), "{gear}");
+        assert!(
+            matches!(model(gear, 1.0, 16), Err(ConfigError::Range { parameter: "gear", .. })),
+            "{gear}"
+        );
     }
     for constant in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(model(1.0, constant, 16), Err(ConfigError::TorqueConstant(_))));
+        assert!(matches!(
+            model(1.0, constant, 16),
+            Err(ConfigError::Range { parameter: "torque constant", .. })
+        ));
     }
     for bits in [0, 13, 17, 18] {
-        assert_eq!(model(1.0, 1.0, bits), Err(ConfigError::EncoderBits(bits)));
+        let value = bits.into();
+        let refused =
+            ConfigError::Range { parameter: "encoder bits", value, least: 14.0, most: 16.0 };
+        assert_eq!(model(1.0, 1.0, bits), Err(refused));
     }
     let torque = |id, limit| {
         Motor::new(Model::MF9025_16T, id, ImpedanceControl::new(limit).unwrap())
@@ -87,16 +97,16 @@ fn bad_configurations_are_refused_with_the_limit() {
     assert_eq!(torque(0, 1.0), Some("id 0: 1 to 32 are allowed".into()));
     assert_eq!(torque(33, 1.0), Some("id 33: 1 to 32 are allowed".into()));
     assert_eq!(torque(32, 5.27), None);
-    assert!(torque(1, 5.3).is_some_and(|text| text.starts_with("torque limit 5.3 Nm: ")));
+    assert!(torque(1, 5.3).is_some_and(|text| text.starts_with("torque limit in Nm 5.3: ")));
     assert!(torque(1, 0.002).is_some(), "less than a count");
     for limit in [0.0, -1.0, 58.0, f32::NAN, f32::INFINITY] {
         let limit = AngularVelocity::from_rad_per_s(limit);
-        assert!(Motor::new(Model::MG5010E_I10, 1, Velocity::new(limit)).is_err(), "{limit:?}");
-        assert!(Motor::new(Model::MG5010E_I10, 1, PositionVelocity::new(limit)).is_err());
+        assert!(Motor::new(Model::MG5010E_I10, 1, Mode::velocity(limit)).is_err(), "{limit:?}");
+        assert!(Motor::new(Model::MG5010E_I10, 1, Mode::position_velocity(limit)).is_err());
     }
     let slow = AngularVelocity::from_rad_per_s(1.0);
     for limit in [0.0, -1.0, 34.0, f32::NAN] {
-        let mode = Velocity::new(slow).with_torque_limit(limit);
+        let mode = Mode::velocity_with_torque_limit(slow, limit);
         assert!(Motor::new(Model::MG5010E_I10, 1, mode).is_err(), "{limit}");
     }
 }

@@ -1,7 +1,8 @@
 //! Impedance: a target, and the control of a drive that follows one.
 
 use super::{Order, Target};
-use crate::control::{Cascade, ConfigError, PidConfig, TimeStep, limited};
+use crate::control::{Cascade, PidConfig, TimeStep, limited};
+use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};

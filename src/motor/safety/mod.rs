@@ -31,7 +31,7 @@
 //! | tripped | armed | | | disarmed |
 //!
 //! Latched and tripped differ in one thing: a motor that is latched takes targets again by itself when it is online, where
-//! [`Recovery::Resume`](super::Recovery) is configured. What latches or trips a motor, and the emergency stop, begins the pause of the
+//! [`with_resume`](crate::dji::Config::with_resume) is configured. What latches or trips a motor, and the emergency stop, begins the pause of the
 //! gesture; to disarm does not.
 //!
 //! Times of a motor are stamps of 32 bits. Ages of several motors are judged together ([`Ages`]): nobody looks at a motor again

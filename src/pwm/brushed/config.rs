@@ -1,4 +1,5 @@
-use crate::control::{ConfigError, Pid, PidConfig};
+use crate::control::{Pid, PidConfig};
+use crate::error::ConfigError;
 use crate::motor::{HealthConfig, MotorName, OPENING, Timeouts};
 use crate::time::Duration;
 use crate::units::AngularVelocity;

@@ -1,7 +1,7 @@
 //! The RC ESC and servo.
 
 use super::*;
-use crate::control::ConfigError;
+use crate::error::ConfigError;
 
 fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
     let config = config.with_arming_time(Duration::from_millis(5));

@@ -67,28 +67,30 @@ fn bad_configurations_are_refused_with_the_limit() {
     use crate::units::AngularVelocity;
     use std::string::ToString;
     for constant in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(Model::new("mine", constant, 1.0), Err(ConfigError::TorqueConstant(_))));
+        let error = Model::new("mine", constant, 1.0).unwrap_err();
+        assert_eq!(error.parameter(), "torque constant");
     }
     for current in [0.0, 0.009, -1.0, 328.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(Model::new("mine", 1.0, current), Err(ConfigError::Current(_))));
+        let error = Model::new("mine", 1.0, current).unwrap_err();
+        assert_eq!(error.parameter(), "largest current in A");
     }
     let torque = |id, limit| {
         Motor::new(Model::X8_60, id, ImpedanceControl::new(limit).unwrap())
             .map_err(|error| error.to_string())
             .err()
     };
-    assert_eq!(torque(0, 1.0), Some("id 0: 1 to 32 are allowed".into()));
-    assert_eq!(torque(33, 1.0), Some("id 33: 1 to 32 are allowed".into()));
+    assert_eq!(torque(0, 1.0), Some("id 0: 1 to 32 is allowed".into()));
+    assert_eq!(torque(33, 1.0), Some("id 33: 1 to 32 is allowed".into()));
     assert_eq!(torque(32, 30.0), None);
-    assert!(torque(1, 30.1).is_some_and(|text| text.starts_with("torque limit 30.1 Nm: ")));
+    assert!(torque(1, 30.1).is_some_and(|text| text.starts_with("torque limit in Nm 30.1: ")));
     assert!(torque(1, 0.07).is_some(), "less than a count");
     for limit in [0.0, -1.0, 572.0, f32::NAN, f32::INFINITY] {
         let limit = AngularVelocity::from_rad_per_s(limit);
-        assert!(Motor::new(Model::X8_60, 1, Velocity::new(limit)).is_err(), "{limit:?}");
-        assert!(Motor::new(Model::X8_60, 1, PositionVelocity::new(limit)).is_err());
+        assert!(Motor::new(Model::X8_60, 1, Mode::velocity(limit)).is_err(), "{limit:?}");
+        assert!(Motor::new(Model::X8_60, 1, Mode::position_velocity(limit)).is_err());
     }
     let motor = Motor::new(Model::X8_60, 1, ImpedanceControl::new(1.0).unwrap()).unwrap();
     let error = motor.with_timeout(Duration::from_millis(9)).unwrap_err().to_string();
-    assert_eq!(error, "time-out of 9000 us: 10 ms to 60 s are allowed");
+    assert_eq!(error, "time-out 9000: 10000 to 60000000 is allowed");
     assert!(motor.with_timeout(Duration::from_secs(60)).is_ok());
 }

@@ -3,6 +3,7 @@
 use super::tachometer::Tachometer;
 use super::*;
 use crate::encoder::GearRatio;
+use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{Ingest, OwnMotor};
 use crate::units::AngularVelocity;
@@ -68,8 +69,10 @@ fn the_longest_products_of_the_tachometer_stay_within_32_bits() {
     let max_velocity = AngularVelocity::from_rad_per_s(1.0);
     let model = Model { pole_pairs: 255, gear, max_velocity, ..MODEL };
     let long = Model { gear: GearRatio::new(4_095, 4_094).unwrap(), ..model };
-    assert_eq!(Motor::new(model, 1, Position).err(), None);
-    assert!(matches!(Motor::new(long, 1, Position), Err(ConfigError::Gear(_))));
+    assert_eq!(Motor::new(model, 1, Mode::position()).err(), None);
+    assert!(
+        matches!(Motor::new(long, 1, Mode::position()), Err(ConfigError::Limit { parameter, .. }) if parameter.contains("gear"))
+    );
     for model in [model, Model { is_reversed: true, ..model }] {
         let mut shaft = Tachometer::new(&model);
         for count in [i32::MAX, i32::MIN, 0, i32::MIN, -1, 1, i32::MAX] {
@@ -95,11 +98,9 @@ fn each_status_has_one_length_and_others_change_nothing() {
 
 #[test]
 fn frames_of_other_drives_and_with_other_ids_are_not_its_own() {
-    let mut motor = Motor::new(MODEL, 23, CurrentControl::new()).unwrap();
+    let mut motor = Motor::new(MODEL, 23, Mode::current()).unwrap();
     let extended = |raw| Id::Extended(ExtendedId::new(raw).unwrap());
-    let claimed = |motor: &Motor<CurrentControl>, id: Id| {
-        motor.claims().into_iter().any(|claim| claim.covers(id))
-    };
+    let claimed = |motor: &Motor, id: Id| motor.claims().into_iter().any(|claim| claim.covers(id));
     for packet in 0..=255_u32 {
         let is_own = matches!(packet, 0..=4 | 8 | 9..=13 | 14..=16 | 27 | 58);
         assert_eq!(claimed(&motor, extended(packet << 8 | 23)), is_own, "{packet}");

@@ -1,0 +1,235 @@
+//! The error of every configuration: which parameter, which value, which limits.
+//!
+//! A controller, a chassis, a gear, a transform and a motor of any family are all refused with one type, so a program that makes
+//! them needs one error type too:
+//!
+//! ```
+//! use drivetrain::control::{Pid, PidConfig};
+//! use drivetrain::damiao::{Mode, Model, Motor};
+//! use drivetrain::encoder::GearRatio;
+//! use drivetrain::error::ConfigError;
+//! use drivetrain::units::AngularVelocity;
+//!
+//! fn wire() -> Result<(), ConfigError> {
+//!     let _speed = Pid::new(PidConfig::new(0.02, 0.2, 0.0))?;
+//!     let _gear = GearRatio::new(36, 1)?;
+//!     let mode = Mode::velocity(AngularVelocity::from_rad_per_s(60.0));
+//!     let _wheel = Motor::new(Model::H6215, 2, mode)?; // its largest velocity is 45 rad/s
+//!     Ok(())
+//! }
+//! let text = wire().map_err(|error| error.to_string());
+//! assert_eq!(text, Err("velocity limit in rad/s 60: above 0 and at most 45 is allowed".into()));
+//! ```
+
+use core::fmt;
+
+/// A parameter that cannot work, by its name; with the value and its limits where they are numbers.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Pid, PidConfig};
+/// use drivetrain::error::ConfigError;
+///
+/// let reversed = PidConfig::new(1.0, 0.0, 0.0).with_output_range(5.0, -4.0);
+/// let error = Pid::new(reversed).unwrap_err();
+/// assert_eq!(error, ConfigError::Reversed("output_range"));
+/// assert_eq!(error.parameter(), "output_range");
+/// assert_eq!(error.to_string(), "output_range: the lower end must lie below the upper one");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// It is negative, NaN or infinite, and must be zero or more.
+    Negative(&'static str),
+    /// It is zero, negative, NaN or infinite, and must be more than zero.
+    NotPositive(&'static str),
+    /// It is zero, negative or NaN, and must be more than zero; an infinite limit limits nothing.
+    NotAboveZero(&'static str),
+    /// Its lower end is not below its upper end, or one of them is NaN or infinite.
+    Reversed(&'static str),
+    /// It is too fast for the time step: the result would overshoot or grow without bound.
+    Unstable(&'static str),
+    /// It is NaN or infinite.
+    NotFinite(&'static str),
+    /// It is outside of the range that its documentation gives.
+    Unusable(&'static str),
+    /// It does not go together with another parameter.
+    Conflict(&'static str),
+    /// It is where the change starts, so that there is none.
+    NoChange(&'static str),
+    /// It is outside of the range that the documentation gives, where `f32` is not exact enough.
+    OutOfRange(&'static str),
+    /// A [`RelayTuner`](crate::control::RelayTuner) saw no steady swing within this time: too small an amplitude, a bias that does
+    /// not hold, or too much hysteresis.
+    OutOfTime(&'static str),
+    /// A half-period has fewer than [`RelayTuner::LEAST_SAMPLES`](crate::control::RelayTuner::LEAST_SAMPLES) samples: take more of
+    /// this, less amplitude or a faster loop.
+    TooFewSamples(&'static str),
+    /// The swing is no larger than this, or beyond `f32`, so that no gain follows from it.
+    NoGain(&'static str),
+    /// The wheels leave a direction of motion undetermined, or nearly: the named one, or several.
+    ///
+    /// That is when the condition number of their normal equations is above 1000: a motion then shows in the wheels with
+    /// less than about 3 % of the strongest. A turn counts in m, at the mean distance of the wheels from the origin.
+    Singular(&'static str),
+    /// A loop, by its name, and its parameter, which cannot work.
+    Loop(&'static str, &'static str),
+    /// The model, or its firmware, does not have it.
+    Unsupported(&'static str),
+    /// A register that cannot be written.
+    ReadOnly(&'static str),
+    /// A register, and the value that it cannot hold.
+    CannotHold(&'static str, f32),
+    /// A counter whose frequency has no ratio to 1 MHz that fits 32 bits.
+    Ratio {
+        /// The frequency that was given, in Hz.
+        ticks_per_second: u32,
+    },
+    /// A value that is not from `least` to `most`.
+    Range {
+        /// The name of the parameter, with its unit.
+        parameter: &'static str,
+        /// The value that was given.
+        value: f32,
+        /// The least that is allowed.
+        least: f32,
+        /// The most that is allowed.
+        most: f32,
+    },
+    /// A limit that is not above 0 and at most `most`.
+    Limit {
+        /// The name of the parameter, with its unit.
+        parameter: &'static str,
+        /// The value that was given.
+        value: f32,
+        /// The most that is allowed.
+        most: f32,
+    },
+}
+
+impl ConfigError {
+    /// Returns the name of the parameter, as it stands in the `with_*` method or the constructor.
+    #[must_use]
+    pub const fn parameter(&self) -> &'static str {
+        match *self {
+            Self::Ratio { .. } => "ticks_per_second",
+            Self::Negative(parameter)
+            | Self::NotPositive(parameter)
+            | Self::NotAboveZero(parameter)
+            | Self::Reversed(parameter)
+            | Self::Unstable(parameter)
+            | Self::NotFinite(parameter)
+            | Self::Unusable(parameter)
+            | Self::Conflict(parameter)
+            | Self::NoChange(parameter)
+            | Self::OutOfRange(parameter)
+            | Self::OutOfTime(parameter)
+            | Self::TooFewSamples(parameter)
+            | Self::NoGain(parameter)
+            | Self::Singular(parameter)
+            | Self::Loop(_, parameter)
+            | Self::Unsupported(parameter)
+            | Self::ReadOnly(parameter)
+            | Self::CannotHold(parameter, _)
+            | Self::Range { parameter, .. }
+            | Self::Limit { parameter, .. } => parameter,
+        }
+    }
+
+    /// Lets a limit pass that is above 0 and at most `most`.
+    pub(crate) const fn check_limit(
+        parameter: &'static str,
+        value: f32,
+        most: f32,
+    ) -> Result<(), Self> {
+        let is_valid = value > 0.0 && value <= most;
+        if is_valid { Ok(()) } else { Err(Self::Limit { parameter, value, most }) }
+    }
+
+    /// Lets a value pass that is from `least` to `most`.
+    pub(crate) const fn check_range(
+        parameter: &'static str,
+        value: f32,
+        least: f32,
+        most: f32,
+    ) -> Result<(), Self> {
+        let is_valid = value >= least && value <= most;
+        if is_valid { Ok(()) } else { Err(Self::Range { parameter, value, least, most }) }
+    }
+
+    /// Returns the microseconds of a time from `least` to `most`, both in microseconds; `None` is longer than any.
+    pub(crate) const fn check_micros(
+        parameter: &'static str,
+        micros: Option<u32>,
+        least: u32,
+        most: u32,
+    ) -> Result<u32, Self> {
+        match micros {
+            Some(micros) if micros >= least && micros <= most => return Ok(micros),
+            _ => {}
+        }
+        let value = match micros {
+            Some(micros) => micros as f32,
+            None => f32::INFINITY,
+        };
+        Err(Self::Range { parameter, value, least: least as f32, most: most as f32 })
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parameter = self.parameter();
+        f.write_str(match self {
+            Self::Range { value, least, most, .. } => {
+                return write!(f, "{parameter} {value}: {least} to {most} are allowed");
+            }
+            Self::Limit { value, most, .. } if *most >= f32::MAX => {
+                return write!(f, "{parameter} {value}: must be above 0 and finite");
+            }
+            Self::Limit { value, most, .. } => {
+                return write!(f, "{parameter} {value}: above 0 and at most {most} is allowed");
+            }
+            Self::Ratio { ticks_per_second } => {
+                return write!(
+                    f,
+                    "a counter of {ticks_per_second} Hz has no exact ratio to 1 MHz that fits 32 bits: use a rounder frequency"
+                );
+            }
+            Self::CannotHold(_, value) => return write!(f, "{parameter} cannot hold {value}"),
+            Self::Loop(name, _) => return write!(f, "{name}: {parameter} is not usable"),
+            Self::Singular(_) => return write!(f, "the wheels do not determine {parameter}"),
+            _ => parameter,
+        })?;
+        f.write_str(match self {
+            Self::Negative(_) => ": must be zero or more, and finite",
+            Self::NotPositive(_) => ": must be more than zero, and finite",
+            Self::NotAboveZero(_) => ": must be more than zero",
+            Self::Reversed(_) => ": the lower end must lie below the upper one",
+            Self::Unstable(_) => ": too fast for this time step",
+            Self::NotFinite(_) => ": must be finite",
+            Self::Unusable(_) => " is not usable",
+            Self::Conflict(_) => ": does not go together with another parameter",
+            Self::NoChange(_) => ": must differ from the start",
+            Self::OutOfRange(_) => ": outside of the range in which f32 is exact enough",
+            Self::OutOfTime(_) => ": no steady swing within the time limit",
+            Self::TooFewSamples(_) => ": fewer than 8 samples in half a period of the swing",
+            Self::NoGain(_) => ": the swing is not larger than the hysteresis, or beyond f32",
+            Self::Unsupported(_) => ": this model, or its firmware, has none",
+            Self::ReadOnly(_) => " is read only",
+            _ => "",
+        })
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// `?` for a `const fn`.
+macro_rules! check {
+    ($result:expr) => {
+        if let Err(error) = $result {
+            return Err(error);
+        }
+    };
+}
+pub(crate) use check;

@@ -1,3 +1,0 @@
-//! Errors of the configuration: those of `lk`.
-
-pub use crate::lk::ConfigError;
