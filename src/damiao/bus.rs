@@ -148,6 +148,7 @@ impl Motor {
         self.mode.base() + self.id as u16
     }
 
+    #[inline]
     fn frame_of(&self, command: Command) -> CanFrame {
         CanFrame::of(standard(self.command_id()), command.encode(self.model.ranges()))
     }
@@ -213,7 +214,7 @@ impl OwnMotor for Motor {
 
     fn rest(&mut self) -> CanFrame {
         if self.mode.has_rest() {
-            self.frame_of(Command::Mit(mit::Command::REST))
+            CanFrame::of(standard(self.id.into()), self.model.ranges().encode(&mit::Command::REST))
         } else {
             self.off()
         }

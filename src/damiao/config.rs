@@ -112,6 +112,7 @@ impl Mode {
     }
 
     /// Returns what the drive is told within the share of its largest effort; `None` to rest.
+    #[inline]
     pub(super) fn command(
         &mut self,
         order: Order,
