@@ -287,7 +287,7 @@ fn wrong_options_say_what_is_wrong() {
         ("--motors m3508", "not model:ids"),
         ("--motors servo:1", "no model servo"),
         ("--motors vesc:1", "no model vesc"),
-        ("--motors vesc0:1", "pole_pairs is 0"),
+        ("--motors vesc0:1", "pole_pairs 0"),
         ("--motors odrive0.6:63", "63"),
         ("--motors mg4005e-i10:33", "33"),
         ("--motors", "--motors needs a value"),

@@ -79,8 +79,8 @@ fn bad_configurations_are_refused_with_the_limit() {
             .map_err(|error| error.to_string())
             .err()
     };
-    assert_eq!(torque(0, 1.0), Some("id 0: 1 to 32 is allowed".into()));
-    assert_eq!(torque(33, 1.0), Some("id 33: 1 to 32 is allowed".into()));
+    assert_eq!(torque(0, 1.0), Some("id 0: 1 to 32 are allowed".into()));
+    assert_eq!(torque(33, 1.0), Some("id 33: 1 to 32 are allowed".into()));
     assert_eq!(torque(32, 30.0), None);
     assert!(torque(1, 30.1).is_some_and(|text| text.starts_with("torque limit in Nm 30.1: ")));
     assert!(torque(1, 0.07).is_some(), "less than a count");
