@@ -137,16 +137,19 @@ fn a_wheel_limit_that_is_none_stops_all_wheels_of_any_layout() {
     for bad in BROKEN.into_iter().chain([0.0]) {
         let still = AngularVelocity::ZERO;
         let wheels = two.inverse(twist);
-        assert_eq!(two.desaturate(wheels, limit(bad)), [still; 2], "{bad}");
+        assert_eq!(two.desaturate(wheels, limit(bad)), ([still; 2], 0.0), "{bad}");
         let wheels = three.inverse(twist);
-        assert_eq!(three.desaturate(wheels, limit(bad)), [still; 3], "{bad}");
+        assert_eq!(three.desaturate(wheels, limit(bad)), ([still; 3], 0.0), "{bad}");
         let modules = swerve.inverse(twist);
-        let told = swerve.desaturate(modules, limit(bad));
-        assert!(told.iter().all(|module| module.velocity == still), "{bad}: {told:?}");
+        let (told, factor) = swerve.desaturate(modules, limit(bad));
+        assert!(
+            factor == 0.0 && told.iter().all(|module| module.velocity == still),
+            "{bad}: {told:?}"
+        );
         assert!(told.iter().zip(modules).all(|(told, module)| told.angle == module.angle));
     }
     let wheels = two.inverse(twist);
-    assert_eq!(two.desaturate(wheels, limit(f32::INFINITY)), wheels);
+    assert_eq!(two.desaturate(wheels, limit(f32::INFINITY)), (wheels, 1.0));
 }
 
 #[test]

@@ -118,11 +118,12 @@ where
     // At their limit all wheels are slowed by one factor.
     let limit = AngularVelocity::from_rad_per_s(limit);
     let mut most = 0.0_f32;
-    let limited = layout.desaturate(rolling, limit);
+    let (limited, slower) = layout.desaturate(rolling, limit);
     let _: K::Wheels<()> = K::map(rolling, |wheel| {
         most = most.max(wheel.velocity().as_rad_per_s().abs());
     });
     let scale = (limit.as_rad_per_s() / most).min(1.0);
+    prop_assert!((slower - scale).abs() <= 1e-6, "{} instead of {}", slower, scale);
     let mut fastest = 0.0_f32;
     let _: K::Wheels<()> = K::map(limited, |wheel| {
         fastest = fastest.max(wheel.velocity().as_rad_per_s().abs());

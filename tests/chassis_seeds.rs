@@ -88,7 +88,8 @@ fn three_full_sticks_are_slowed_to_the_limit_and_keep_their_direction() {
     let sticks = Twist::new(full, full, full / 0.225);
     let asked = mecanum().inverse(sticks);
     assert!((asked.front_right.as_rad_per_s() - 60.0).abs() < 1e-3, "{asked:?}");
-    let limited = asked.desaturate(fastest);
+    let (limited, factor) = asked.desaturate(fastest);
+    assert!((factor - 1.0 / 3.0).abs() < 1e-6, "{factor}");
     let slowed = mecanum().forward(limited) - sticks * (1.0 / 3.0);
     assert!(slowed.linear().norm() < 1e-5 && slowed.wz_rad_s.abs() < 1e-4, "{slowed:?}");
 }

@@ -316,7 +316,9 @@ fn the_wheel_limit_slows_a_chassis_that_drives_back_as_one_that_drives_forward()
     );
     // So does the layout's own function, for modules that are reversed already.
     let swerve = swerve();
-    let told = swerve.desaturate([-8.0, 2.0, -4.0, 1.0].map(|speed| module(speed, 30.0)), limit);
+    let (told, factor) =
+        swerve.desaturate([-8.0, 2.0, -4.0, 1.0].map(|speed| module(speed, 30.0)), limit);
+    assert!(near(factor, 0.5), "{factor}");
     for (told, speed) in told.into_iter().zip([-4.0, 1.0, -2.0, 0.5]) {
         assert!(near(told.velocity.as_rad_per_s(), speed), "{told:?}");
         assert!(near(told.angle.as_degrees(), 30.0), "{told:?}");

@@ -277,7 +277,9 @@ impl<K: Kinematics> Chassis<K> {
             return;
         }
         let body = self.reference();
+        let offset = self.odometry.gyro_offset();
         self.odometry = Odometry::new(pose);
+        self.odometry.set_gyro_offset(offset);
         self.reference = body.to_world(self.odometry.heading());
     }
 
@@ -291,6 +293,17 @@ impl<K: Kinematics> Chassis<K> {
     #[must_use]
     pub const fn kinematics(&self) -> &K {
         &self.kinematics
+    }
+
+    /// Sets the angle that is added to each heading of the gyroscope: see [`Odometry::set_gyro_offset`]. It outlasts
+    /// [`set_pose`](Self::set_pose). An angle that is NaN or infinite changes nothing, and is counted in
+    /// [`ChassisStatus::rejected`].
+    pub const fn set_gyro_offset(&mut self, offset: Angle) {
+        if offset.is_finite() {
+            self.odometry.set_gyro_offset(offset);
+        } else {
+            self.status.rejected = self.status.rejected.saturating_add(1);
+        }
     }
 
     /// Reads the motors of all wheels, sets their targets, and returns the targets.
@@ -548,6 +561,21 @@ mod tests {
     }
 
     #[test]
+    fn an_offset_of_the_gyroscope_turns_the_pose_and_not_the_motion_and_outlasts_a_new_pose() {
+        let mut chassis = Chassis::new(mecanum());
+        chassis.set_gyro_offset(Angle::from_degrees(90.0));
+        chassis.set_gyro_offset(Angle::from_degrees(f32::NAN));
+        assert_eq!(chassis.status().rejected, 1);
+        chassis.set_pose(Pose2::new(1.0, 2.0, Angle::ZERO));
+        // Along x of the world, while the gyroscope says 0 and the chassis faces y: to its right.
+        chassis.set_world(Twist::new(1.0, 0.0, 0.0), facing(0.0));
+        chassis.update(NONE, TICK);
+        assert!((chassis.pose().angle.as_degrees() - 90.0).abs() < 1e-3, "{:?}", chassis.pose());
+        let right = chassis.reference() - Twist::new(0.0, -1.0, 0.0);
+        assert!(right.linear().norm() < 1e-5, "{:?}", chassis.reference());
+    }
+
+    #[test]
     fn a_command_of_nan_stops_and_is_counted() {
         let mut chassis = Chassis::new(mecanum());
         chassis.set_body(Twist::new(f32::NAN, 0.0, 0.0));
@@ -765,7 +793,7 @@ mod tests {
         chassis.update(NONE, TICK);
         chassis.lock();
         assert_eq!(chassis.update(NONE, TICK), MecanumWheels::splat(AngularVelocity::ZERO));
-        assert_eq!(size_of::<Chassis<Mecanum>>(), 164); // steering costs them nothing
+        assert_eq!(size_of::<Chassis<Mecanum>>(), 168); // steering costs them nothing
     }
 
     const CORNERS: [Vec2; 4] =

@@ -79,17 +79,18 @@ pub trait Kinematics {
 
     /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
     ///
-    /// A limit below zero or NaN counts as zero; if any wheel is NaN or infinite, all stop.
+    /// Returns the wheels and the factor, 0 to 1: a planner or a loop around the chassis multiplies its motion by it, so that it does not
+    /// wind up. A limit below zero or NaN counts as zero; if any wheel is NaN or infinite, all stop and the factor is 0.
     #[must_use]
     fn desaturate(
         &self,
         wheels: Self::Wheels<Self::Speed>,
         limit: AngularVelocity,
-    ) -> Self::Wheels<Self::Speed> {
+    ) -> (Self::Wheels<Self::Speed>, f32) {
         let mut fastest = Fastest::default();
         let _: Self::Wheels<()> = Self::map(wheels, |wheel| fastest.see(wheel.velocity()));
         let scale = fastest.scale(limit);
-        Self::map(wheels, |wheel| slowed(wheel, scale))
+        (Self::map(wheels, |wheel| slowed(wheel, scale)), scale)
     }
 
     /// Returns the largest difference in m/s between a wheel and the rigid motion that fits best.

@@ -308,10 +308,10 @@ mod tests {
         let limit = AngularVelocity::from_rad_per_s;
         let fast = usual().inverse(Twist::new(1.0, 0.5, 0.0));
         let still = MecanumWheels::splat(AngularVelocity::ZERO);
-        assert_eq!(fast.desaturate(limit(f32::NAN)), still);
-        assert_eq!(fast.desaturate(limit(-1.0)), still);
-        assert_eq!(fast.desaturate(limit(f32::INFINITY)), fast);
+        assert_eq!(fast.desaturate(limit(f32::NAN)), (still, 0.0));
+        assert_eq!(fast.desaturate(limit(-1.0)), (still, 0.0));
+        assert_eq!(fast.desaturate(limit(f32::INFINITY)), (fast, 1.0));
         let broken = MecanumWheels { rear_left: limit(f32::NAN), ..fast };
-        assert_eq!(broken.desaturate(limit(10.0)), still);
+        assert_eq!(broken.desaturate(limit(10.0)), (still, 0.0));
     }
 }

@@ -8,7 +8,8 @@ use crate::units::Angle;
 /// gyroscope's heading when there is one, otherwise from the wheels. Rounding is carried along (Kahan), so that
 /// 10^6 steps of a millimetre lose nothing.
 ///
-/// Where the gyroscope returns after a gap, its heading is taken as it is. The first one sets the heading.
+/// Where the gyroscope returns after a gap, its heading is taken as it is. The first one sets the heading. A gyroscope whose zero
+/// is not that of the world has an [offset](Self::set_gyro_offset).
 ///
 /// # Examples
 /// ```
@@ -30,6 +31,8 @@ pub struct Odometry {
     heading: Heading,
     /// The gyroscope's heading of the step before, if it had one.
     gyro: Option<Angle>,
+    /// From the gyroscope's heading to that of the world.
+    gyro_offset: Angle,
 }
 
 impl Odometry {
@@ -46,6 +49,32 @@ impl Odometry {
             angle_rad: Sum::new(wrap_pi(angle.as_radians())),
             heading: Heading::new(angle),
             gyro: None,
+            gyro_offset: Angle::ZERO,
+        }
+    }
+
+    /// Sets the angle that is added to each heading of the gyroscope: the heading in the world less that of the gyroscope, when
+    /// both are known.
+    ///
+    /// The pose changes with the next heading, which bends no arc, as after a gap. An angle that is NaN or infinite changes nothing.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::geometry::{Heading, Pose2, Twist};
+    /// use drivetrain::{chassis::Odometry, units::Angle};
+    ///
+    /// // The gyroscope was switched on at 30 degrees; the robot starts at 90 degrees of the field.
+    /// let (start, gyro) = (Angle::from_degrees(90.0), Angle::from_degrees(30.0));
+    /// let mut odometry = Odometry::new(Pose2::new(0.0, 0.0, start));
+    /// odometry.set_gyro_offset(start - gyro);
+    /// odometry.advance(Twist::new(1.0, 0.0, 0.0), Some(Heading::new(gyro)), 0.5);
+    /// let pose = odometry.pose();
+    /// assert!((pose.y_m - 0.5).abs() < 1e-6 && (pose.angle.as_degrees() - 90.0).abs() < 1e-4);
+    /// ```
+    pub const fn set_gyro_offset(&mut self, offset: Angle) {
+        if offset.is_finite() {
+            self.gyro_offset = Angle::from_radians(wrap_pi(offset.as_radians()));
+            self.gyro = None;
         }
     }
 
@@ -54,7 +83,11 @@ impl Odometry {
     /// A heading that is not finite counts as none. A twist that is not finite adds no way and no turn; neither does a
     /// step that is not above zero, NaN, or longer than [`MAX_STEP_S`](Self::MAX_STEP_S): the result is then `false`.
     pub fn advance(&mut self, twist: Twist<Body>, gyro: Option<Heading>, dt_s: f32) -> bool {
-        let gyro = gyro.filter(|heading| heading.is_finite());
+        let gyro = gyro.filter(|heading| heading.is_finite()).map(|heading| {
+            // Most have none, and a heading has its sine and cosine already.
+            let has_offset = self.gyro_offset != Angle::ZERO;
+            if has_offset { Heading::new(heading.angle() + self.gyro_offset) } else { heading }
+        });
         let counts = dt_s > 0.0 && dt_s <= Self::MAX_STEP_S && twist.is_finite();
         let wheels = if counts { twist.over(dt_s) } else { Twist::ZERO.over(0.0) };
         let mut arc = wheels;
@@ -93,6 +126,10 @@ impl Odometry {
     #[must_use]
     pub const fn heading(&self) -> Heading {
         self.heading
+    }
+
+    pub(super) const fn gyro_offset(&self) -> Angle {
+        self.gyro_offset
     }
 
     pub(super) const fn has_gyro(&self) -> bool {
@@ -238,6 +275,34 @@ mod tests {
         odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(90.0), 0.5);
         near(&odometry, 1.0, 0.0, 1e-6);
         odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.5);
+        near(&odometry, 1.0, 0.5, 1e-6);
+    }
+
+    #[test]
+    fn a_gyroscope_with_an_offset_is_one_without_that_started_elsewhere() {
+        for offset in [-400.0_f32, -90.0, 0.0, 30.0, 179.0] {
+            let (mut with, mut without) = (Odometry::default(), Odometry::default());
+            with.set_gyro_offset(Angle::from_degrees(offset));
+            with.set_gyro_offset(Angle::from_radians(f32::NAN));
+            for step in 0..200_u8 {
+                let (gyro, twist) = (f32::from(step) * 7.0, Twist::new(1.0, 0.3, 0.1));
+                with.advance(twist, degrees(gyro), 0.01);
+                without.advance(twist, degrees(gyro + offset), 0.01);
+            }
+            near(&with, without.pose().x_m, without.pose().y_m, 1e-4);
+            let apart = with.pose().angle.as_radians() - without.pose().angle.as_radians();
+            assert!(wrap_pi(apart).abs() < 1e-4, "{offset}: {apart}");
+        }
+    }
+
+    #[test]
+    fn a_new_offset_turns_the_pose_and_bends_no_arc() {
+        let mut odometry = Odometry::default();
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
+        odometry.set_gyro_offset(Angle::from_degrees(90.0));
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
+        near(&odometry, 1.0, 0.0, 1e-6);
+        odometry.advance(Twist::new(1.0, 0.0, 0.0), degrees(0.0), 0.5);
         near(&odometry, 1.0, 0.5, 1e-6);
     }
 

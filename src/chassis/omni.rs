@@ -11,6 +11,31 @@ use crate::units::{Angle, AngularVelocity};
 /// least-squares fit to all wheels. The values of the wheels come in the order in which the wheels were given;
 /// [`three`](Self::three) and [`four`](Self::four) are the usual layouts.
 ///
+/// # The number of wheels at run time
+/// `N` is part of the type: a chassis has exactly the memory, the motors and the count of lost wheels that its wheels need. Places
+/// and directions are values. A program that learns the number from a file has a branch for each number, and one function for
+/// all of them:
+/// ```
+/// use drivetrain::chassis::{Chassis, Omni};
+/// use drivetrain::geometry::{Body, Pose2, Twist};
+/// use drivetrain::units::Angle;
+///
+/// fn run<const N: usize>(wheels: [Pose2<Body>; N]) -> Option<f32> {
+///     let chassis = Chassis::new(Omni::new(0.05, wheels).ok()?);
+///     let wheels = chassis.kinematics().inverse(Twist::new(0.0, 0.0, 1.0));
+///     wheels.first().map(|wheel| wheel.as_rad_per_s())
+/// }
+///
+/// let wheel = |degrees| Pose2::tangential(Angle::from_degrees(degrees), 0.2);
+/// let places = [60.0, 180.0, 300.0].map(wheel); // of a file
+/// let speed = match *places.as_slice() {
+///     [a, b, c] => run([a, b, c]),
+///     [a, b, c, d] => run([a, b, c, d]),
+///     _ => None,
+/// };
+/// assert!((speed.unwrap() - 0.2 / 0.05).abs() < 1e-4);
+/// ```
+///
 /// # Examples
 /// ```
 /// use drivetrain::{chassis::Omni, geometry::{Pose2, Twist}, units::Angle};

@@ -89,13 +89,14 @@ macro_rules! named_wheels {
         impl $name<AngularVelocity> {
             /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
             ///
-            /// A limit that is negative or NaN counts as zero; if any wheel is NaN or infinite, all stop.
+            /// Returns the wheels and the factor, 0 to 1. A limit that is negative or NaN counts as zero; if any wheel is NaN or
+            /// infinite, all stop and the factor is 0.
             #[must_use]
-            pub fn desaturate(self, limit: AngularVelocity) -> Self {
+            pub fn desaturate(self, limit: AngularVelocity) -> (Self, f32) {
                 let mut fastest = Fastest::default();
                 $(fastest.see(self.$wheel);)+
                 let scale = fastest.scale(limit);
-                self.map(|wheel| slowed(wheel, scale))
+                (self.map(|wheel| slowed(wheel, scale)), scale)
             }
         }
     };
@@ -109,7 +110,8 @@ named_wheels! {
     /// use drivetrain::{chassis::MecanumWheels, units::AngularVelocity};
     ///
     /// let rpm = MecanumWheels { front_left: 300.0, front_right: 600.0, rear_left: 0.0, rear_right: -150.0 };
-    /// let limited = rpm.map(AngularVelocity::from_rpm).desaturate(AngularVelocity::from_rpm(450.0));
+    /// let (limited, factor) = rpm.map(AngularVelocity::from_rpm).desaturate(AngularVelocity::from_rpm(450.0));
+    /// assert_eq!(factor, 0.75);
     /// assert!((limited.front_right.as_rpm() - 450.0).abs() < 1e-3);
     /// assert!((limited.rear_right.as_rpm() + 112.5).abs() < 1e-3); // all by the same factor
     /// ```

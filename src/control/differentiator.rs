@@ -70,14 +70,15 @@ impl Differentiator {
 }
 
 impl Differentiator<true> {
-    const LEAST_STEPS: f32 = 1.25;
+    /// Rounding of the two times and of their product takes off up to three parts in 2^24.
+    const LEAST_STEPS: f32 = 1.25 - 3.0 * f32::EPSILON;
 
     /// Takes the acceleration `r` (units of the input per s²), the smoothing width `h0_s` and the longest step, both in seconds,
     /// of the time-optimal law.
     ///
     /// # Errors
-    /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below 1.25 `max_step_s`: at
-    /// 1.0 a step of `3 r h0²` overshoots by 4 %, from 1.15 on none does.
+    /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below 1.25 `max_step_s`. Han's text allows an
+    /// `h0` of one step, but with it a step of the input of `3 r h0²` overshoots by 4 %; from 1.15 on none does.
     pub const fn optimal(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
         check!(positive("r", r));
         check!(positive("h0", h0_s));
@@ -230,8 +231,25 @@ mod tests {
                 "max_step"
             );
         }
-        let narrow = Differentiator::optimal(1.0, 1.2 * DT_S, DT_S).unwrap_err();
-        assert_eq!(narrow, ConfigError::Unstable("h0"));
+        for width in [1.0, 1.2, 1.249_99] {
+            let narrow = Differentiator::optimal(1.0, width * DT_S, DT_S).unwrap_err();
+            assert_eq!(narrow, ConfigError::Unstable("h0"));
+            assert!(narrow.to_string().starts_with("h0: below 1.25 times the longest step"));
+        }
+    }
+
+    /// Each was refused: in `f32`, 1.25 times the step is more than the width, by its last bit.
+    #[test]
+    fn a_width_of_exactly_a_step_and_a_quarter_is_accepted() {
+        for (h0_s, step_s) in [(0.001_25, 0.001), (0.002_5, 0.002), (0.000_625, 0.000_5)] {
+            assert!(Differentiator::optimal(100.0, h0_s, step_s).is_ok(), "{h0_s}");
+        }
+        for micros in 1..=100_000_u32 {
+            let (h0_s, step_s) = (1.25e-6 * f64::from(micros), 1e-6 * f64::from(micros));
+            #[expect(clippy::cast_possible_truncation, reason = "as a user writes it")]
+            let follow = Differentiator::optimal(100.0, h0_s as f32, step_s as f32);
+            assert!(follow.is_ok(), "{micros} µs");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 /// | `dt_s` | kind | what a controller does with it |
 /// |---|---|---|
 /// | above 0, up to `dt_max_s` | normal | its work |
-/// | above `dt_max_s` | [frozen](Self::is_frozen) | integral and derivative stay for this step, the rest follows |
+/// | above `dt_max_s` | [frozen](Self::is_frozen) | integral and derivative stay for this step, the rest follows, the step is counted |
 /// | zero, negative, NaN, infinite | [hold](Self::is_hold) | nothing changes, the last output is returned, the step is counted |
 ///
 /// # Examples
@@ -27,7 +27,8 @@ impl TimeStep {
     /// The longest step in seconds that is believed, unless [`new`](Self::new) says otherwise.
     pub const MAX_S: f32 = 0.1;
 
-    /// Takes the seconds since the step before, of which up to [`MAX_S`](Self::MAX_S) are believed.
+    /// Takes the seconds since the step before, of which up to [`MAX_S`](Self::MAX_S) are believed: for loops of more than 10 Hz.
+    /// A slower one sets its longest step with [`new`](Self::new).
     ///
     /// # Examples
     /// ```

@@ -1,5 +1,7 @@
 use super::CommandFrame;
+use super::command::to_raw;
 use super::feedback::ErrorTable;
+use super::range::Range;
 use crate::encoder::GearRatio;
 use crate::motor::Capability;
 use crate::units::{Current, Voltage};
@@ -46,6 +48,29 @@ impl Facts {
     #[must_use]
     pub const fn rotor_no_load_rpm(&self) -> u16 {
         self.rotor_rpm
+    }
+
+    /// Returns the command word of an output in A, or V in voltage mode: the nearest, within the range of the model. NaN gives 0.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Gm6020Voltage, M3508, Model};
+    ///
+    /// assert_eq!(M3508::FACTS.to_word(10.0), 8192); // 16384 words are 20 A
+    /// assert_eq!(M3508::FACTS.to_word(-25.0), -16_384);
+    /// assert_eq!(M3508::FACTS.of_word(8192), 10.0);
+    /// assert_eq!(Gm6020Voltage::FACTS.of_word(25_000), 24.0); // nominal volts
+    /// ```
+    #[must_use]
+    pub const fn to_word(&self, output: f32) -> i16 {
+        to_raw(output, self.command_raw as f32 / self.command_full_scale, self.command_raw)
+    }
+
+    /// Returns the output in A, or V in voltage mode, of a command word. A word beyond the range of the model counts as its end.
+    #[must_use]
+    pub const fn of_word(&self, word: i16) -> f32 {
+        let word = Range::within(self.command_raw).nearest(word as i32);
+        word as f32 / self.command_raw as f32 * self.command_full_scale
     }
 
     /// Returns command frame and slot of an id, or `None` when the model has no such id.
@@ -235,6 +260,22 @@ mod tests {
                 };
                 assert_eq!(facts.place(id), place, "{} #{id}", facts.name);
             }
+        }
+    }
+
+    #[test]
+    fn every_word_is_an_output_and_back_and_what_is_beyond_is_the_end() {
+        for facts in ALL_FACTS {
+            let most = facts.command_raw;
+            for word in i16::MIN..=i16::MAX {
+                let output = facts.of_word(word);
+                assert!(output.abs() <= facts.command_full_scale, "{} {word}", facts.name);
+                let kept = i32::from(word).clamp(-i32::from(most), most.into());
+                assert_eq!(i32::from(facts.to_word(output)), kept, "{} {word}", facts.name);
+            }
+            let beyond =
+                [f32::MAX, f32::NEG_INFINITY, f32::NAN].map(|output| facts.to_word(output));
+            assert_eq!(beyond, [most, -most, 0], "{}", facts.name);
         }
     }
 

@@ -206,6 +206,7 @@ impl fmt::Display for ConfigError {
             Self::NotPositive(_) => ": must be more than zero, and finite",
             Self::NotAboveZero(_) => ": must be more than zero",
             Self::Reversed(_) => ": the lower end must lie below the upper one",
+            Self::Unstable("h0") => ": below 1.25 times the longest step it overshoots",
             Self::Unstable(_) => ": too fast for this time step",
             Self::NotFinite(_) => ": must be finite",
             Self::Unusable(_) => " is not usable",

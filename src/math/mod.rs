@@ -6,7 +6,7 @@
 //! | [`sqrt`] | square root | half a unit in the last place; 1 unit without `libm` |
 //! | [`atan2`] | angle of a vector, -π..=π | 3.2e-7; 0.005 with `micromath` |
 //! | [`wrap_pi`], [`wrap_tau`] | an angle in [-π, π) or [0, 2π), `const` | 4e-7 up to ±10 000 |
-//! | [`wrap`], [`wrap_positive`] | the same for any period, `const` | the spacing of `f32` at the argument |
+//! | [`wrap`], [`wrap_positive`] | the same for any period, `const` | 0; `wrap_positive` rounds its sum once |
 //!
 //! Nothing here panics, and NaN in gives NaN out. `f32::sin` and its like do not exist without `std`, and the
 //! portable ones cost a thousand instructions on a target without `f64` hardware.

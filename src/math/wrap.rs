@@ -23,7 +23,7 @@ pub const fn wrap_pi(x: f32) -> f32 {
     const LOWER: f32 = -1.781_782e-5;
     let turns = (x * (1.0 / TAU) + ROUND) - ROUND;
     let rest = x - turns * UPPER - turns * LOWER;
-    if rest.abs() < PI { rest } else { at_the_edge(rest, x, TAU) }
+    if rest.abs() < PI { rest } else { at_the_edge(rest, x) }
 }
 
 /// Returns the angle in [0, 2π) that points the same way as `x`, both in radians.
@@ -45,10 +45,9 @@ pub const fn wrap_tau(x: f32) -> f32 {
 
 /// Returns the value in [-`period`/2, `period`/2) that differs from `x` by whole periods.
 ///
-/// Exact as long as the periods taken off are whole in `f32` (any whole number of degrees up to 46 000 turns);
-/// otherwise the error is at most the spacing of `f32` at `x`. Past four million periods, where that spacing is a
-/// quarter of a period and more, the result is some value in the range. NaN and infinity give NaN, and so does a
-/// period that is zero, negative or not finite.
+/// Exact for every finite `x` and every normal `period`. Within one period, and within 4096 periods of at most 12 significant
+/// bits (360.0, 8192.0), it takes one division; beyond, a division of integers for every 8 bits of the quotient, 36 at most. NaN and infinity give
+/// NaN, and so does a period that is zero, negative or not finite.
 ///
 /// # Examples
 /// ```
@@ -57,15 +56,22 @@ pub const fn wrap_tau(x: f32) -> f32 {
 /// assert_eq!(wrap(10.0 - 350.0, 360.0), 20.0); // from 350 to 10 degrees is +20
 /// assert_eq!(wrap(350.0 - 10.0, 360.0), -20.0);
 /// assert_eq!(wrap(180.0, 360.0), -180.0);
+/// assert_eq!(wrap(1e10, 360.0), -80.0); // 27 777 778 turns less 80 degrees
 /// ```
 #[must_use]
 #[inline]
 pub const fn wrap(x: f32, period: f32) -> f32 {
-    let rest = rest(x, period);
-    if rest.abs() < 0.5 * period { rest } else { at_the_edge(rest, x, period) }
+    // The product of two numbers of 12 bits has 24, as many as `f32`.
+    const LOWER_BITS: u32 = 0xFFF;
+    const MOST_TURNS: f32 = 4096.0;
+    let turns = (x / period + ROUND) - ROUND;
+    let rest = x - turns * period;
+    let exact_turns = if period.to_bits() & LOWER_BITS == 0 { MOST_TURNS } else { 1.0 };
+    if turns.abs() <= exact_turns && rest.abs() < 0.5 * period { rest } else { far(x, period) }
 }
 
-/// Returns what [`wrap`] does where that is within half a period, the ends not included; otherwise something that is not.
+/// Returns the value of [`wrap`], to within the spacing of `f32` at `x`, where that is within half a period, the ends not
+/// included; otherwise a value that is not. Fewer instructions than [`wrap`], for ways of a few periods.
 #[inline]
 pub(crate) const fn rest(x: f32, period: f32) -> f32 {
     let turns = (x / period + ROUND) - ROUND;
@@ -74,8 +80,8 @@ pub(crate) const fn rest(x: f32, period: f32) -> f32 {
 
 /// Returns the value in [0, `period`) that differs from `x` by whole periods.
 ///
-/// Errors, NaN, infinity and bad periods as in [`wrap`]. What rounding would put on `period`, such as a tiny negative
-/// value, is 0.
+/// NaN, infinity and bad periods as in [`wrap`]. The result is the `f32` nearest to the exact value; where that is `period` itself,
+/// as for a tiny negative value, it is 0.
 ///
 /// # Examples
 /// ```
@@ -98,20 +104,72 @@ const fn positive(wrapped: f32, period: f32) -> f32 {
 /// The half turn itself, what rounding left on the wrong side of it, and arguments too large to hold a remainder.
 #[cold]
 #[inline(never)]
-const fn at_the_edge(rest: f32, x: f32, period: f32) -> f32 {
+const fn at_the_edge(rest: f32, x: f32) -> f32 {
+    if !x.is_finite() {
+        return f32::NAN;
+    }
+    let near = if rest >= PI {
+        rest - TAU
+    } else if rest < -PI {
+        rest + TAU
+    } else {
+        rest
+    };
+    // Here `x` holds no remainder any more: the spacing of f32 is more than a turn.
+    if near >= -PI && near < PI { near } else { 0.0 }
+}
+
+/// [`wrap`] by long division of the significands, in digits of 8 bits.
+#[cold]
+#[inline(never)]
+const fn far(x: f32, period: f32) -> f32 {
+    const DIGIT: u32 = 8;
     let half = 0.5 * period;
     if !(half > 0.0 && period < f32::INFINITY && x.is_finite()) {
         return f32::NAN;
     }
-    let near = if rest >= half {
+    let ((dividend, x_exponent), (divisor, exponent)) = (parts(x.abs()), parts(period));
+    let mut rest = x.abs();
+    if x_exponent >= exponent {
+        let mut digits = x_exponent - exponent;
+        let mut remainder = remainder(dividend, divisor);
+        while digits > 0 {
+            let shift = if digits < DIGIT { digits } else { DIGIT };
+            remainder = self::remainder(remainder << shift, divisor);
+            digits -= shift;
+        }
+        rest = scaled(remainder, exponent);
+    }
+    let rest = rest.copysign(x);
+    if rest >= half {
         rest - period
     } else if rest < -half {
         rest + period
     } else {
         rest
-    };
-    // Here `x` holds no remainder any more: the spacing of f32 is more than a period.
-    if near >= -half && near < half { near } else { 0.0 }
+    }
+}
+
+/// Returns the significand of a positive number, of 24 bits, and the power of two of its last bit, plus 150.
+const fn parts(value: f32) -> (u32, u32) {
+    const HIDDEN: u32 = 1 << 23;
+    let (exponent, fraction) = (value.to_bits() >> 23, value.to_bits() & (HIDDEN - 1));
+    if exponent == 0 { (fraction, 1) } else { (fraction | HIDDEN, exponent) }
+}
+
+const fn remainder(dividend: u32, divisor: u32) -> u32 {
+    match dividend.checked_rem(divisor) {
+        Some(remainder) => remainder,
+        None => 0, // never: a period is above zero
+    }
+}
+
+/// Puts a number together again from its [`parts`].
+#[expect(clippy::cast_precision_loss, reason = "24 bits")]
+const fn scaled(significand: u32, exponent: u32) -> f32 {
+    // The power of two of 2^-149 to 2^-127 is no normal number.
+    let bits = if exponent > 23 { (exponent - 23) << 23 } else { 1 << (exponent - 1) };
+    significand as f32 * f32::from_bits(bits)
 }
 
 #[cfg(test)]
@@ -178,6 +236,35 @@ mod tests {
         }
     }
 
+    /// At 1e10 the result was 0, and past 46 000 turns it was off by up to the spacing of `f32`.
+    #[test]
+    fn huge_arguments_are_wrapped_exactly() {
+        assert_eq!((wrap(1e10, 360.0), wrap(-1e10, 360.0)), (-80.0, 80.0));
+        assert_eq!((wrap_positive(1e10, 360.0), wrap_positive(-1e10, 360.0)), (280.0, 80.0));
+        // 2^128 less 2^104, in integers of 128 bits.
+        let rest = ((1_u128 << 127) % 360 * 2 + 360 - (1_u128 << 104) % 360) % 360;
+        assert_eq!(
+            f64::from(wrap_positive(f32::MAX, 360.0)),
+            f64::from(u16::try_from(rest).unwrap())
+        );
+        // 2^24 - 1 times 2^253, by 11: the rest is 10.
+        assert_eq!(wrap(f32::MAX, f32::from_bits(11)), -f32::from_bits(1));
+        assert_eq!(wrap(f32::MAX, f32::MIN_POSITIVE), 0.0);
+    }
+
+    /// Of doubles, `%` is exact, and so is each `f32` as a double.
+    fn expected(x: f32, period: f32) -> f64 {
+        let (x, period) = (f64::from(x), f64::from(period));
+        let rest = x % period;
+        if rest >= 0.5 * period {
+            rest - period
+        } else if rest < -0.5 * period {
+            rest + period
+        } else {
+            rest
+        }
+    }
+
     #[test]
     fn wrapped_angles_keep_their_error() {
         let worst = (-2_000_000..=2_000_000_i32)
@@ -201,6 +288,22 @@ mod tests {
             prop_assert!((-0.5 * period..0.5 * period).contains(&wrap(x, period)));
             prop_assert!((0.0..period).contains(&wrap_positive(x, period)));
             prop_assert!((-PI..PI).contains(&wrap_pi(x)) && (0.0..TAU).contains(&wrap_tau(x)));
+        }
+
+        /// Law: the result is the exact remainder, whatever the number of periods.
+        #[test]
+        fn every_finite_argument_is_wrapped_exactly(
+            x in any_x(),
+            period in prop_oneof![
+                Just(360.0_f32), Just(TAU), Just(0.1_f32), 1e-3_f32..1e6, f32::MIN_POSITIVE..f32::MAX, 1e-38_f32..1e-30,
+            ],
+            turns in -5000_i16..5000, part in -0.6_f32..0.6,
+        ) {
+            for x in [x, (f32::from(turns) + part) * period] {
+                if x.is_finite() {
+                    prop_assert_eq!(f64::from(wrap(x, period)), expected(x, period), "{} by {}", x, period);
+                }
+            }
         }
 
         #[test]

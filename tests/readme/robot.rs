@@ -60,7 +60,7 @@ fn robot(
         }
         // Armed means all of them: when one wheel is lost for 100 ms, the others stop as well.
         let wanted = if runner.is_armed() { pilot.twist() } else { Twist::new(0.0, 0.0, 0.0) };
-        let speeds = mecanum.inverse(wanted.to_body(pilot.heading())).desaturate(fastest);
+        let (speeds, _) = mecanum.inverse(wanted.to_body(pilot.heading())).desaturate(fastest);
         _ = runner.device_mut().drive(wheels.zip(speeds).into_array());
         _ = runner.device_mut().set_angle(yaw, Angle::from_degrees(90.0));
         runner.tick(tick); // update, then send

@@ -38,6 +38,7 @@ pub fn call_all() {
     Chassis::<Mecanum>::set_body.call();
     Chassis::<Mecanum>::set_world.call();
     Chassis::<Mecanum>::set_heading.call();
+    Chassis::<Mecanum>::set_gyro_offset.call();
     Chassis::<Mecanum>::stop.call();
     Chassis::<Mecanum>::lock.call();
     Chassis::<Mecanum>::restart.call();
@@ -94,6 +95,7 @@ pub fn call_all() {
     Odometry::pose.call();
     Odometry::heading.call();
     Odometry::set_position_m.call();
+    Odometry::set_gyro_offset.call();
     PowerModel::new.call();
     PowerModel::power_w.call();
     (|model: &PowerModel, wheels: [WheelLoad; 4], limit_w: f32| {

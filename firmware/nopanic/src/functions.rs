@@ -385,6 +385,8 @@ fn dji() {
     Feedback::error.call();
     CommandFrame::id.call();
     Facts::rotor_no_load_rpm.call();
+    Facts::to_word.call();
+    Facts::of_word.call();
     Facts::place.call();
     AttachError::message.call();
     Message::as_str.call();

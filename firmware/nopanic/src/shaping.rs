@@ -70,6 +70,7 @@ pub fn call_all() {
     Profile::end.call();
     SlewLimiter::new.call();
     SlewLimiter::with_max_step.call();
+    SlewLimiter::with_braking.call();
     SlewLimiter::update.call();
     SlewLimiter::reset_to.call();
     SlewLimiter::value.call();

@@ -190,10 +190,11 @@ impl PositionActuator {
         &mut self.cascade
     }
 
-    /// Returns the number of steps that were refused; stays at 65535.
+    /// Returns the number of steps that were refused, and of those too long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        // The speed loop runs in each step that is admitted, and refuses none of them.
+        self.rejected.saturating_add(self.cascade.speed().rejected())
     }
 
     /// The speed that was measured is too old by the time of this step: its filter takes the next one as a first one, and D rests.

@@ -188,7 +188,7 @@ impl SpeedActuator {
         &mut self.pid
     }
 
-    /// Returns the number of steps that were refused; stays at 65535.
+    /// Returns the number of steps that were refused, and of those too long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.pid.rejected()

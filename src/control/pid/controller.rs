@@ -32,7 +32,9 @@ use crate::error::ConfigError;
 ///   It does not matter how long ago the controller was made. [`step_error`](Self::step_error) gives D too: the rate is given.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`](crate::control::TimeStep): the integral and D stay for this step, P and
-///   feed-forward follow, and a tracked setpoint moves on by that maximum.
+///   feed-forward follow, a tracked setpoint moves on by that maximum, and [`rejected`](Self::rejected) grows, except in a first
+///   call. A loop slower than 10 Hz has to set its longest step (`TimeStep::new(dt_s, 0.5)`): with the 0.1 s of
+///   [`TimeStep::of`](crate::control::TimeStep::of) it has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms in turn.
 /// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
 ///   in the next good step: it keeps its value, since the travel of the time that is missing is not that of one step.
 /// * `ki` zero: the integral is zero and stays zero; the memory of the incremental form stays as it is.
@@ -240,7 +242,8 @@ impl Pid {
         }
     }
 
-    /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite; stays at 65535.
+    /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite, and of those too
+    /// long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -426,11 +429,44 @@ mod tests {
         let before = pid.terms();
         assert_eq!(pid.step(5.0, 0.0, &TimeStep::of(10.0)), 10.0 + before.i + before.d);
         assert_eq!(pid.terms(), Terms { p: 10.0, ..before });
-        assert_eq!(pid.rejected(), 0);
+        assert_eq!(pid.rejected(), 1);
         // The step after it works with its own interval only.
         pid.step(5.0, 0.0, &TimeStep::of(DT_S));
         assert_eq!(pid.terms().d, 0.0);
         assert!((pid.terms().i - before.i - 10.0 * 5.0 * DT_S).abs() < 1e-6);
+    }
+
+    /// A loop of 9.9 Hz had no integral, and nothing said so.
+    #[test]
+    fn a_loop_slower_than_its_longest_step_counts_what_it_leaves_out() {
+        for config in [
+            PidConfig::new(0.0, 1.0, 0.0),
+            every_option(),
+            every_option().with_gains(1.0, 0.0, 0.0),
+        ] {
+            let (mut slow, mut jitters, mut configured) = (pid(config), pid(config), pid(config));
+            for step in 0..=100_u16 {
+                slow.step(1.0, 0.0, &TimeStep::of(0.101));
+                jitters.step(
+                    1.0,
+                    0.0,
+                    &TimeStep::of(if step % 2 == 0 { 0.099_95 } else { 0.100_05 }),
+                );
+                configured.step(1.0, 0.0, &TimeStep::new(0.101, 0.5));
+            }
+            assert_eq!((slow.rejected(), jitters.rejected(), configured.rejected()), (100, 50, 0));
+            if config == PidConfig::new(0.0, 1.0, 0.0) {
+                assert_eq!(slow.output(), 0.0);
+                assert!((jitters.output() - 4.9975).abs() < 1e-3, "{}", jitters.output());
+                assert!((configured.output() - 10.1).abs() < 1e-3, "{}", configured.output());
+            }
+        }
+        // A given error too. A first step leaves nothing out, however long.
+        let mut given = pid(PidConfig::new(1.0, 1.0, 1.0));
+        given.step_error(1.0, 0.0, &TimeStep::of(10.0));
+        assert_eq!(given.rejected(), 0);
+        given.step_error(1.0, 0.0, &TimeStep::of(10.0));
+        assert_eq!(given.rejected(), 1);
     }
 
     #[test]

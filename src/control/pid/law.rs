@@ -169,6 +169,9 @@ impl Pid {
                 }
             }
             if GUARDED {
+                if step.is_frozen() && self.error != UNKNOWN {
+                    self.rejected = self.rejected.saturating_add(1);
+                }
                 self.set_options(self.options & !(REST_DERIVATIVE | TRACK_OUTPUT));
             }
             let (lower, upper) = (self.parameters.output_lower, self.parameters.output_upper);

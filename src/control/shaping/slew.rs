@@ -8,7 +8,8 @@ use crate::error::ConfigError;
 /// ```text
 /// value += target - value, but no more than up dt, and no less than -down dt
 /// ```
-/// The rates are in units of the value a second.
+/// The rates are in units of the value a second. For a speed of either sign, [`with_braking`](Self::with_braking) sets the rate
+/// towards zero apart from them.
 ///
 /// # Edge behaviour
 /// Starts from zero, or from what was given to [`reset_to`](Self::reset_to). `dt_s` zero, negative, NaN or infinite, or a target
@@ -31,6 +32,8 @@ use crate::error::ConfigError;
 pub struct SlewLimiter {
     up_per_s: f32,
     down_per_s: f32,
+    /// Towards zero; zero unless it was set.
+    braking_per_s: f32,
     max_step_s: f32,
     value: f32,
     /// What the value could not take yet of the way it may go.
@@ -47,7 +50,38 @@ impl SlewLimiter {
         check!(positive("up", up_per_s));
         check!(positive("down", down_per_s));
         let max_step_s = TimeStep::MAX_S;
-        Ok(Self { up_per_s, down_per_s, max_step_s, value: 0.0, rest: 0.0, rejected: 0 })
+        Ok(Self {
+            up_per_s,
+            down_per_s,
+            braking_per_s: 0.0,
+            max_step_s,
+            value: 0.0,
+            rest: 0.0,
+            rejected: 0,
+        })
+    }
+
+    /// Sets the largest change a second towards zero, more than zero; away from zero, the rise and the fall hold.
+    ///
+    /// In a step that passes zero, the rest of the time is at the rate away from it.
+    ///
+    /// # Errors
+    /// Names `braking` when NaN, infinite, zero or negative.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::control::SlewLimiter;
+    ///
+    /// let mut speed = SlewLimiter::new(2.0, 2.0)?.with_braking(5.0)?; // speeds up by 2, brakes by 5 a second
+    /// speed.reset_to(-1.0);
+    /// assert_eq!(speed.update(1.0, 0.1), -0.5);
+    /// assert_eq!(speed.update(1.0, 0.1), 0.0);
+    /// assert_eq!(speed.update(1.0, 0.1), 0.2);
+    /// # Ok::<(), drivetrain::error::ConfigError>(())
+    /// ```
+    pub const fn with_braking(self, per_s: f32) -> Result<Self, ConfigError> {
+        check!(positive("braking", per_s));
+        Ok(Self { braking_per_s: per_s, ..self })
     }
 
     /// Sets the longest step in seconds that is believed.
@@ -63,8 +97,9 @@ impl SlewLimiter {
     pub const fn update(&mut self, target: f32, dt_s: f32) -> f32 {
         let step = TimeStep::new(dt_s, self.max_step_s);
         if step.admits(target.is_finite(), &mut self.rejected) {
-            let lowest = self.rest - self.down_per_s * step.dt_s;
-            let highest = self.rest + self.up_per_s * step.dt_s;
+            let (is_above, is_below) = (self.value > 0.0, self.value < 0.0);
+            let lowest = self.rest - self.reach(self.down_per_s, is_above, step.dt_s);
+            let highest = self.rest + self.reach(self.up_per_s, is_below, step.dt_s);
             let left = target - self.value;
             let change = limited(left, lowest, highest);
             // Rounding must take it neither past the target nor, with a rest of the way before, back.
@@ -80,6 +115,19 @@ impl SlewLimiter {
             }
         }
         self.value
+    }
+
+    /// Returns how far the value may go in one direction: at `per_s`, but at the braking rate as far as zero.
+    const fn reach(&self, per_s: f32, is_towards_zero: bool, dt_s: f32) -> f32 {
+        if !is_towards_zero || self.braking_per_s <= 0.0 {
+            return per_s * dt_s;
+        }
+        let (way, braked) = (self.value.abs(), self.braking_per_s * dt_s);
+        if braked <= way {
+            return braked;
+        }
+        let left_s = dt_s - way / self.braking_per_s;
+        if left_s > 0.0 { way + per_s * left_s } else { way }
     }
 
     /// Puts the value at `value`. NaN and infinity count as zero.
@@ -112,6 +160,25 @@ mod tests {
         let mut limiter = SlewLimiter::new(1.0, 1.0).unwrap();
         assert_eq!(limiter.update(100.0, 10.0), 0.1);
         assert_eq!(limiter.with_max_step(2.0).unwrap().update(100.0, 10.0), 2.1);
+    }
+
+    #[test]
+    fn braking_has_its_own_rate_in_both_directions_and_none_is_left_out_at_zero() {
+        for direction in [1.0_f32, -1.0] {
+            // 2 up, 3 down, 10 towards zero; a step of 0.1 s.
+            let away = if direction > 0.0 { 0.3 } else { 0.2 };
+            let mut limiter = SlewLimiter::new(2.0, 3.0).unwrap().with_braking(10.0).unwrap();
+            limiter.reset_to(2.5 * direction);
+            for expected in [1.5, 0.5, -0.5 * away, -1.5 * away] {
+                let value = limiter.update(-9.0 * direction, 0.1);
+                assert!((value - expected * direction).abs() < 1e-6, "{value}, {expected}");
+            }
+            // Slower than the rates away from zero, too, and to a stop at zero.
+            let mut limiter = SlewLimiter::new(2.0, 3.0).unwrap().with_braking(0.5).unwrap();
+            limiter.reset_to(0.06 * direction);
+            assert!((limiter.update(0.0, 0.1) - 0.01 * direction).abs() < 1e-6);
+            assert_eq!(limiter.update(0.0, 0.1), 0.0);
+        }
     }
 
     #[test]
@@ -175,10 +242,25 @@ mod tests {
             assert_eq!(SlewLimiter::new(1.0, bad).unwrap_err().parameter(), "down");
             let limiter = SlewLimiter::new(1.0, 1.0).unwrap();
             assert_eq!(limiter.with_max_step(bad).unwrap_err().parameter(), "max_step");
+            assert_eq!(limiter.with_braking(bad).unwrap_err().parameter(), "braking");
         }
     }
 
     proptest! {
+        /// Law: braking at the rate of rise and fall is no braking rate at all.
+        #[test]
+        fn one_rate_for_all_is_the_plain_limiter(
+            rate in 1e-2_f32..1e3, start in -10.0_f32..10.0, targets in prop::collection::vec(-10.0_f32..10.0, 1..30),
+        ) {
+            let mut plain = SlewLimiter::new(rate, rate).unwrap();
+            plain.reset_to(start);
+            let mut braking = plain.with_braking(rate).unwrap();
+            for target in targets {
+                let (expected, value) = (plain.update(target, 0.01), braking.update(target, 0.01));
+                prop_assert!((value - expected).abs() <= 1e-5, "{} instead of {}", value, expected);
+            }
+        }
+
         #[test]
         fn the_value_goes_towards_the_target_and_never_past_it(
             up in 1e-3_f32..1e3, down in 1e-3_f32..1e3, start in -100.0_f32..100.0, target in -100.0_f32..100.0,
