@@ -111,7 +111,7 @@ named_wheels! {
     ///
     /// let rpm = MecanumWheels { front_left: 300.0, front_right: 600.0, rear_left: 0.0, rear_right: -150.0 };
     /// let (limited, factor) = rpm.map(AngularVelocity::from_rpm).desaturate(AngularVelocity::from_rpm(450.0));
-    /// assert_eq!(factor, 0.75);
+    /// assert!((factor - 0.75).abs() < 1e-6);
     /// assert!((limited.front_right.as_rpm() - 450.0).abs() < 1e-3);
     /// assert!((limited.rear_right.as_rpm() + 112.5).abs() < 1e-3); // all by the same factor
     /// ```

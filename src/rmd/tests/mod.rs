@@ -91,6 +91,6 @@ fn bad_configurations_are_refused_with_the_limit() {
     }
     let motor = Motor::new(Model::X8_60, 1, ImpedanceControl::new(1.0).unwrap()).unwrap();
     let error = motor.with_timeout(Duration::from_millis(9)).unwrap_err().to_string();
-    assert_eq!(error, "time-out 9000: 10000 to 60000000 is allowed");
+    assert_eq!(error, "time-out 9000: 10000 to 60000000 are allowed");
     assert!(motor.with_timeout(Duration::from_secs(60)).is_ok());
 }
