@@ -25,8 +25,8 @@
 //! | mode | targets | torque is limited by |
 //! |---|---|---|
 //! | [`ImpedanceControl`](crate::motor::ImpedanceControl): torque frames, the loops run here | torque and [`Impedance`](crate::motor::Impedance); with gains or loops velocity and angle | the torque limit of the mode |
-//! | [`Velocity`] | velocity | the drive alone |
-//! | [`PositionVelocity`] | angle | the drive alone |
+//! | [`Mode::velocity`] | velocity | the drive alone |
+//! | [`Mode::position_velocity`] | angle | the drive alone |
 //!
 //! **Rest is a torque frame with a current of 0** in each mode, and "off" is sent besides, every 100 ms. `0x81` (stop) is never sent: the
 //! drive holds the shaft then. The protocol has no frame that enables a drive, and none that tells whether it is off: any command runs it.
@@ -54,7 +54,7 @@
 //! from 1.
 //!
 //! **A command that is sent back is no feedback.** At exactly 0 °C some feedback reads like a command, and is lost: in torque
-//! mode and at rest that without a current between 0 and 1°, in [`Velocity`] that without a current, in [`PositionVelocity`] that with
+//! mode and at rest that without a current between 0 and 1°, in [`Mode::velocity`] that without a current, in [`Mode::position_velocity`] that with
 //! a small positive current.
 //!
 //! ```
