@@ -5,13 +5,19 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-/// The examples of the pages for those who come from another framework.
+/// The examples of the pages in `docs/`, and of the Chinese ones.
 #[cfg(doctest)]
-mod coming_from {
-    #[doc = include_str!("../docs/coming-from.md")]
-    mod english {}
-    #[doc = include_str!("../docs/coming-from.zh-CN.md")]
+mod pages {
+    #[doc = include_str!("../README.zh-CN.md")]
     mod chinese {}
+    #[doc = include_str!("../docs/coming-from.md")]
+    mod coming_from {}
+    #[doc = include_str!("../docs/coming-from.zh-CN.md")]
+    mod coming_from_chinese {}
+    #[doc = include_str!("../docs/motors.md")]
+    mod motors {}
+    #[doc = include_str!("../docs/robot.md")]
+    mod robot {}
 }
 
 // F0: vocabulary

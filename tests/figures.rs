@@ -12,7 +12,9 @@ mod closed_loop;
 use std::fs;
 use std::path::Path;
 
-const DOCUMENTS: [&str; 3] = ["README.md", "DESIGN.md", "docs/figures.md"];
+/// With the least number of rows that each quotes.
+const DOCUMENTS: [(&str, usize); 4] =
+    [("README.md", 5), ("README.zh-CN.md", 5), ("DESIGN.md", 0), ("docs/figures.md", 40)];
 
 /// Work and figures at opt-level 3, 2 and "s", as text.
 type Row = (String, Vec<String>);
@@ -80,9 +82,9 @@ fn the_closed_loop_gives_the_same_bits_on_the_host_and_on_the_target() {
 #[test]
 fn documents_quote_the_measured_figures() {
     let (root, budget) = (Path::new(env!("CARGO_MANIFEST_DIR")), budget());
-    for name in DOCUMENTS {
+    for (name, rows) in DOCUMENTS {
         let document = fs::read_to_string(root.join(name)).unwrap();
-        assert!(name == "DESIGN.md" || quoted(&document).len() > 10, "{name} quotes no figures");
+        assert!(quoted(&document).len() >= rows, "{name} quotes fewer than {rows} figures");
         let wrong = wrong(&document, &budget);
         assert!(
             wrong.is_empty(),

@@ -203,7 +203,7 @@ fn row(table: &str, name: &str) -> Vec<(f32, f32)> {
 
 #[test]
 fn the_tables_of_the_documents_are_what_the_rule_gives() {
-    for (document, path) in ["README.md", "README.zh-CN.md"].into_iter().enumerate() {
+    for (document, path) in ["docs/gains.md", "docs/guide.zh-CN.md"].into_iter().enumerate() {
         let text = text(path);
         for layout in Layout::ALL {
             let cells = row(&text, layout.rows()[document]);
@@ -222,9 +222,9 @@ fn the_tables_of_the_documents_are_what_the_rule_gives() {
 
 #[test]
 fn with_the_gains_of_the_table_a_step_overshoots_and_runs_back_by_less_than_a_tenth() {
-    let readme = text("README.md");
+    let page = text("docs/gains.md");
     for layout in Layout::ALL {
-        for (mass_kg, gains) in MASSES_KG.into_iter().zip(row(&readme, layout.rows()[0])) {
+        for (mass_kg, gains) in MASSES_KG.into_iter().zip(row(&page, layout.rows()[0])) {
             layout.assert_settles(mass_kg, gains);
         }
     }
@@ -233,13 +233,14 @@ fn with_the_gains_of_the_table_a_step_overshoots_and_runs_back_by_less_than_a_te
 /// Also on three omni wheels, of which each carries nearly three times as much.
 #[test]
 fn the_programs_of_the_readme_drive_20_kg_without_swinging() {
-    let readme = text("README.md");
+    let (readme, page) = (text("README.md"), text("docs/robot.md"));
     let [one_motor, robot] = gains(&readme)[..] else { panic!("one motor, and a robot") };
+    assert_eq!(gains(&page), [robot]);
     for layout in Layout::ALL {
         layout.assert_settles(20.0, robot);
     }
     assert_eq!(one_motor, robot);
-    assert_eq!(robot, row(&readme, "four mecanum wheels")[2]);
+    assert_eq!(robot, row(&text("docs/gains.md"), "four mecanum wheels")[2]);
 }
 
 /// The integral rests while the current is at its limit, so a lower limit adds no swing.

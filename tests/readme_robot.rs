@@ -1,4 +1,4 @@
-//! The robot of the README on the simulator: what arms it, what disarms it, and what stops it.
+//! The robot of `docs/robot.md` on the simulator: what arms it, what disarms it, and what stops it.
 
 #![cfg(test)]
 
@@ -11,8 +11,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 include!("readme/robot.rs");
 
 #[test]
-fn the_program_of_this_test_is_that_of_the_readme() {
-    assert!(include_str!("../README.md").contains(include_str!("readme/robot.rs")));
+fn the_program_of_this_test_is_that_of_the_page() {
+    assert!(include_str!("../docs/robot.md").contains(include_str!("readme/robot.rs")));
 }
 
 /// Follows a plan of the times, in ms, in which the switch is on, and stops and clears at these.

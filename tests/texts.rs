@@ -1,4 +1,4 @@
-//! What errors and handles say: each text names what is wrong, for the person at the serial console.
+//! Texts of errors and handles, each of which names the parameter at fault; and the pages: Chinese beside English, and links.
 
 #![cfg(test)]
 
@@ -11,6 +11,8 @@ use drivetrain::motor::{Claim, MotorName, Role};
 use drivetrain::runner::FrameQueue;
 use drivetrain::time::ExtendedCounter;
 use embedded_can::StandardId;
+use std::fs;
+use std::path::Path;
 
 fn says(text: &impl std::fmt::Display, words: &[&str]) {
     let text = text.to_string();
@@ -88,4 +90,100 @@ fn both_ends_of_a_queue_say_how_many_frames_wait() {
     assert!(sender.push(&frame, drivetrain::time::Instant::START));
     assert_eq!(format!("{sender:?}"), "FrameSender(1 waiting)");
     assert_eq!(format!("{receiver:?}"), "FrameReceiver(1 waiting)");
+}
+
+fn page(path: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+/// Every odd part of a text split at its marks.
+fn between(text: &str, mark: char) -> impl Iterator<Item = &str> {
+    text.split(mark).skip(1).step_by(2)
+}
+
+/// The headings of a page by their level, its table rows by their cells, code and figures, and its blocks of code without comments.
+fn outline(page: &str) -> Vec<String> {
+    let (mut outline, mut is_code) = (Vec::new(), false);
+    for line in page.lines() {
+        if line.starts_with("```") {
+            is_code = !is_code;
+            outline.push(line.to_owned());
+        } else if is_code {
+            outline.push(line.split("//").next().unwrap_or_default().trim_end().to_owned());
+        } else if line.starts_with('#') {
+            outline.push(line.chars().take_while(|sign| *sign == '#').collect());
+        } else if line.starts_with('|') {
+            let mut words: Vec<&str> = between(line, '`').collect();
+            words.extend(
+                line.split(|sign: char| !sign.is_ascii_digit()).filter(|part| !part.is_empty()),
+            );
+            words.sort_unstable();
+            outline.push(format!("{} cells: {}", line.matches('|').count() - 1, words.join(" ")));
+        }
+    }
+    outline
+}
+
+#[test]
+fn the_chinese_readme_has_the_headings_tables_and_code_of_the_english_one() {
+    let (english, chinese) = (outline(&page("README.md")), outline(&page("README.zh-CN.md")));
+    assert!(english.len() > 120, "{} lines", english.len());
+    for (ours, theirs) in english.iter().zip(&chinese) {
+        assert_eq!(ours, theirs);
+    }
+    assert_eq!(english.len(), chinese.len());
+}
+
+#[test]
+fn an_outline_sees_a_heading_a_row_a_figure_and_a_line_of_code_but_no_comment() {
+    let outline_of =
+        |row: &str, code: &str| outline(&format!("# A\n| {row} |\n```\n{code}\n```\n"));
+    let english = outline_of("`arm` | within 10 ms", "arm(); // once");
+    assert_eq!(english, outline_of("`arm` | 10 ms 之内", "arm(); // 一次"));
+    for (row, code) in [
+        ("`arm`, within 10 ms", "arm();"),
+        ("`disarm` | within 10 ms", "arm();"),
+        ("`arm` | within 20 ms", "arm();"),
+        ("`arm` | within 10 ms", "disarm();"),
+    ] {
+        assert_ne!(english, outline_of(row, code));
+    }
+    assert_ne!(outline("# A"), outline("## A"));
+}
+
+#[test]
+fn each_readme_has_at_most_200_lines() {
+    for path in ["README.md", "README.zh-CN.md"] {
+        let lines = page(path).lines().count();
+        assert!(lines <= 200, "{path} has {lines} lines");
+    }
+}
+
+/// The addresses of the links of a page, without those to other sites and to headings.
+fn links(page: &str) -> Vec<&str> {
+    let addresses = page.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+    addresses.filter(|address| !address.is_empty() && !address.contains("://")).collect()
+}
+
+#[test]
+fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let names =
+        |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let docs: Vec<String> = fs::read_dir(root.join("docs")).unwrap().map(names).collect();
+    let pages = docs.iter().filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
+    let mut linked = Vec::new();
+    for path in ["README.md".to_owned(), "README.zh-CN.md".to_owned()].into_iter().chain(pages) {
+        let text = page(&path);
+        for address in links(&text) {
+            let target = root.join(&path).with_file_name(address);
+            assert!(target.exists(), "{path}: {address} is not there");
+            linked.push(target.canonicalize().unwrap());
+        }
+    }
+    for name in docs {
+        let file = root.join("docs").join(&name).canonicalize().unwrap();
+        assert!(linked.contains(&file), "no page links docs/{name}");
+    }
+    assert_eq!(links("[a](docs/a.md#part), [b](https://b), [c](#c)"), ["docs/a.md"]);
 }

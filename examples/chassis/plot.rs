@@ -16,6 +16,8 @@ pub(crate) const MEASURED: RGBColor = RGBColor(30, 80, 180);
 pub(crate) const COLORS: [RGBColor; 4] =
     [TARGET, MEASURED, RGBColor(40, 140, 60), RGBColor(150, 90, 170)];
 const FAULT: RGBColor = RGBColor(245, 225, 160);
+/// Samples of 1 ms between two points of a line: with fewer the picture is several times as large.
+const STEP: usize = 25;
 
 pub(crate) fn write(path: &Path, run: &Run) -> Result<(), Box<dyn Error>> {
     // Created first: a path that cannot be written is an error of the file, not of the drawing.
@@ -58,7 +60,7 @@ impl Currents {
                 (silence.until_s + MARGIN_S).min(end_s),
                 1,
             ),
-            None => ("current of the ESCs, A", 0.0, end_s, 5),
+            None => ("current of the ESCs, A", 0.0, end_s, STEP),
         };
         let within = || {
             let samples = run.samples.iter();
@@ -125,8 +127,8 @@ fn draw_wheel(area: &Area<'_>, run: &Run, wheel: usize, title: &str) -> Result<(
         chart.draw_series(std::iter::once(shade))?;
     }
     chart.configure_mesh().light_line_style(TRANSPARENT).x_labels(11).y_labels(5).draw()?;
-    chart.draw_series(LineSeries::new(targets().step_by(5), &TARGET))?;
-    chart.draw_series(LineSeries::new(measured().step_by(5), &MEASURED))?;
+    chart.draw_series(LineSeries::new(targets().step_by(STEP), &TARGET))?;
+    chart.draw_series(LineSeries::new(measured().step_by(STEP), &MEASURED))?;
     Ok(())
 }
 
@@ -148,7 +150,7 @@ pub(crate) fn draw_map(
         .build_cartesian_2d(low..high, low..high)?;
     chart.configure_mesh().light_line_style(TRANSPARENT).draw()?;
     for (color, line) in lines {
-        chart.draw_series(LineSeries::new(line.iter().step_by(5).copied(), color))?;
+        chart.draw_series(LineSeries::new(line.iter().step_by(STEP).copied(), color))?;
     }
     Ok(())
 }

@@ -118,12 +118,12 @@ def quote(budget):
     """Writes the figures into the documents: the rows that a document has, and all of them into docs/figures.md."""
     budget.pop("host")
     head, rule, *rows = markdown(budget).split("\n")
-    for name in ("README.md", "docs/figures.md"):
+    for name in ("README.md", "README.zh-CN.md", "docs/figures.md"):
         path = HERE.parent.parent / name
         before, rest = path.read_text().split("<!-- figures -->")
         block, after = rest.split("<!-- /figures -->")
         had = {line.split("|")[1] for line in block.splitlines() if line.startswith("|")}
-        kept = [row for row in rows if name != "README.md" or row.split("|")[1] in had]
+        kept = [row for row in rows if name == "docs/figures.md" or row.split("|")[1] in had]
         table = "\n".join([head, rule, *kept])
         path.write_text(f"{before}<!-- figures -->\n{table}\n<!-- /figures -->{after}")
 

@@ -8,7 +8,7 @@ use drivetrain::runner::{EmergencyStop, Nb, Runner};
 use drivetrain::time::Clock;
 use drivetrain::units::{Angle, AngularVelocity};
 
-const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0); // A per rad/s, A per rad: 20 kg, see "Gains" below
+const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0); // A per rad/s, A per rad: 20 kg, see docs/gains.md
 const ANGLE: PidConfig = PidConfig::new(15.0, 0.0, 0.0).with_output_limit(4.0); // rad/s per rad, at most 4 rad/s
 const RATE: PidConfig = PidConfig::new(1.0, 5.0, 0.0); // V per rad/s, V per rad
 
