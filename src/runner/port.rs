@@ -2,7 +2,7 @@
 
 #[cfg(feature = "queue")]
 use super::FrameReceiver;
-use super::statistics::increment;
+use super::statistics::{Tally, increment};
 use super::{BusCondition, Runner};
 use crate::frame::CanFrame;
 use crate::motor::{Devices, Ingest};
@@ -117,14 +117,6 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
 /// look older by the time that the others take.
 const FRAMES_A_READING: usize = 16;
 
-/// The frames of one call that are no feedback in 8 bytes: what else there is follows from their number, and costs no counter.
-#[derive(Default)]
-struct Tally {
-    /// Not of 8 bytes with an 11-bit id.
-    others: u32,
-    rejected: u32,
-}
-
 /// A bound on the frames of one tick, for devices that would offer frames for ever.
 const FRAMES_A_TICK: usize = 64;
 
@@ -147,7 +139,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
         let mut tally = Tally::default();
-        let mut frames = 0;
+        // Frames of other kinds are not among those that a reading of the clock is for.
+        let (mut frames, mut foreign) = (0, 0);
         for _ in 0..budget {
             match self.port.try_receive(&mut frame) {
                 Received::Frame => {
@@ -160,8 +153,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     }
                 }
                 Received::Foreign => {
-                    frames += 1;
-                    (tally.others, tally.rejected) = (tally.others + 1, tally.rejected + 1);
+                    foreign += 1;
                     increment(&mut self.statistics.unrelated);
                 }
                 Received::Empty => break,
@@ -169,7 +161,10 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             }
         }
         self.enter(frames, &tally);
-        frames
+        // Those since the last reading.
+        let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
+        self.watch.standstill.receive(waited);
+        frames + foreign
     }
 
     #[cold]
@@ -238,6 +233,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             }
         }
         self.enter(frames, &tally);
+        self.watch.standstill.receive(frames);
         frames
     }
 
@@ -246,6 +242,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let mut tally = Tally::default();
         let outcome = self.take(frame, now, &mut tally);
         self.enter(1, &tally);
+        self.watch.standstill.receive(1);
         outcome
     }
 
@@ -270,7 +267,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     #[expect(clippy::cast_possible_truncation, reason = "a budget of 2^32 frames takes a day")]
     fn enter(&mut self, frames: usize, tally: &Tally) {
         let frames = frames as u32;
-        self.watch.standstill.receive(frames);
         self.meter.count_whole(frames.saturating_sub(tally.others));
         let taken = frames.saturating_sub(tally.rejected);
         self.statistics.taken = self.statistics.taken.saturating_add(taken);
@@ -465,6 +461,45 @@ mod tests {
             assert_eq!(evicted, handed_back, "{length}");
             assert_eq!(s.offered, s.sent + s.refused + s.send_errors.total());
             assert!(!runner.is_bus_down());
+        }
+    }
+
+    /// Gives frames of several lengths, all of the id 0x201.
+    struct Lengths(Vec<usize>);
+
+    impl embedded_can::nb::Can for Lengths {
+        type Frame = FdFrame;
+        type Error = ErrorKind;
+        fn transmit(&mut self, _: &FdFrame) -> nb::Result<Option<FdFrame>, ErrorKind> {
+            Ok(None)
+        }
+        fn receive(&mut self) -> nb::Result<FdFrame, ErrorKind> {
+            let length = self.0.pop().ok_or(nb::Error::WouldBlock)?;
+            let id = embedded_can::StandardId::new(0x201).unwrap();
+            Ok(FdFrame(id.into(), std::vec![0; length]))
+        }
+    }
+
+    #[test]
+    fn a_frame_of_another_kind_leaves_the_time_of_the_frames_after_it_as_it_is() {
+        for place in [0, 1, 8, 16] {
+            let clock = ManualClock::new(Instant::from_micros(10_000_000));
+            let mut bus = Bus::new();
+            let wheel = bus.attach(Config::<M3508>::at_once(1)).unwrap();
+            _ = bus.ingest_raw(0x201, &[0; 8], clock.now());
+            bus.arm(clock.now()).unwrap();
+            bus.update(Tick::new(clock.now(), 0.001));
+            clock.advance(crate::time::Duration::from_millis(1));
+            let mut lengths = std::vec![8; 18];
+            lengths[17 - place] = 12;
+            let mut runner = Runner::new(Nb(Lengths(lengths)), &clock, bus);
+            assert_eq!(runner.poll(64), 18);
+            let s = runner.statistics();
+            assert_eq!((s.received, s.taken, s.unrelated), (18, 17, 1), "{place}");
+            runner.tick(Tick::new(clock.now(), 0.001));
+            let bus = runner.device();
+            assert!(bus.is_motor_armed(wheel), "{place}");
+            assert_eq!(bus.link(wheel), Some(crate::motor::Link::Online), "{place}");
         }
     }
 }

@@ -129,6 +129,14 @@ impl ErrorCounts {
     }
 }
 
+/// The frames of one call that are no feedback in 8 bytes: what else there is follows from their number, and costs no counter.
+#[derive(Default)]
+pub(super) struct Tally {
+    /// Not of 8 bytes with an 11-bit id.
+    pub(super) others: u32,
+    pub(super) rejected: u32,
+}
+
 /// How full a bus was in the last window of a second or a little more, by the frames that the runner sent and received.
 ///
 /// Frames are counted by their length: without stuff bits, and with as many as can be. What the bus carried lies

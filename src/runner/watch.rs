@@ -265,8 +265,9 @@ impl Standstill {
     }
 
     /// Notes received frames: time passed.
-    pub(super) const fn receive(&mut self, frames: u32) {
-        self.frames = self.frames.saturating_add(frames);
+    #[expect(clippy::cast_possible_truncation, reason = "2^32 frames take a day")]
+    pub(super) const fn receive(&mut self, frames: usize) {
+        self.frames = self.frames.saturating_add(frames as u32);
     }
 
     /// Notes a reading of the clock.

@@ -188,3 +188,29 @@ fn a_drive_that_was_on_before_is_switched_on_and_asked_again() {
     assert_eq!((run.bytes()[0], motor.is_enabled()), (0x88, Some(false)));
     assert_eq!(motor.enable(1).unwrap().bytes()[0], 0x9A);
 }
+
+/// The question that enabled the drive and the one that takes the place of a command have the same bytes.
+#[test]
+fn a_question_that_the_bus_gives_back_while_driving_opens_nothing_anew() {
+    let mut bench = Bench::armed(Model::MF9025_16T, torque());
+    bench.steps(400, |bench| _ = bench.own.set_torque(1.0));
+    let mut given_back = 0;
+    for _ in 0..100 {
+        _ = bench.own.set_torque(1.0);
+        bench.now_us += 1_000;
+        let now = bench.now();
+        bench.own.update(Tick::new(now, 0.001));
+        while let Some(frame) = bench.own.next_frame(0) {
+            if frame.bytes()[0] == 0xA1 {
+                let counts = i16::from_le_bytes([frame.bytes()[4], frame.bytes()[5]]);
+                assert!(counts > 380, "{counts} of 387 after {given_back} questions");
+                let answer = bench.drive.hear(&frame).unwrap();
+                _ = Devices::ingest(&mut bench.own, &answer, now);
+            } else {
+                given_back += 1;
+                assert!(Devices::requeue(&mut bench.own, &frame));
+            }
+        }
+    }
+    assert!(given_back > 2, "{given_back}");
+}

@@ -35,6 +35,9 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let left = self.look(tick.now());
         let drives = self.guard.drives(tick.now());
         let may_drive = drives && !(step.is_hold() && self.held.is_none());
+        // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
+        self.switched.take_if(|_| self.power.is_confirmed());
+        self.rested.take_if(|_| self.command.is_some());
         self.has_posted = false;
         let was_on = self.power.is_on();
         self.switch(may_drive, tick.now());
@@ -47,10 +50,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         let has_other = self.has_posted || inquiry.is_some();
         let gives_way = is_at_rest && self.rested.is_some() && has_other;
         self.offer(if gives_way { inquiry } else { command });
-        self.rested = None;
-        if is_at_rest && !gives_way {
-            self.rested = command.filter(|frame| !frame.is_remote());
-        }
+        self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
     }
 
     #[inline]

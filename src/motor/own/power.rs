@@ -114,6 +114,11 @@ impl Power {
         self.on && self.seen != Some(false)
     }
 
+    /// Tells whether the drive says that it is enabled, as it is to be.
+    pub(super) fn is_confirmed(&self) -> bool {
+        self.on && self.seen == Some(true)
+    }
+
     fn turn(&mut self, on: bool) {
         *self = Self {
             on,

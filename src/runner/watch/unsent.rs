@@ -4,8 +4,9 @@ use super::{BUS_LOST_AFTER, Watch};
 use crate::runner::BusCondition;
 use crate::time::{Duration, Instant};
 
-/// A frame that the device does not offer any more is not waited for.
-const FORGOTTEN_AFTER: Duration = Duration::from_secs(1);
+/// A frame that the device does not offer any more is not waited for: neither after this time nor after so many ticks, in which each
+/// of many devices has its turn. A frame that is sent seldom, such as the limits of a drive, may be refused once.
+const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
@@ -21,6 +22,8 @@ pub(super) struct Unsent {
     /// Whether it was called back after it had waited for a whole tick: then it was not sent, though the driver takes it.
     returns: bool,
     tries: u8,
+    /// Ticks since it was offered.
+    idle: u8,
 }
 
 impl Watch {
@@ -33,6 +36,7 @@ impl Watch {
                 *place = None;
             } else {
                 (unsent.accepted, unsent.offered, unsent.tries) = (Some(now), now, 0);
+                unsent.idle = 0;
             }
         }
     }
@@ -47,7 +51,7 @@ impl Watch {
             // The frame of an earlier tick was taken and stayed.
             (unsent.since, unsent.returns) = (now, false);
         }
-        unsent.offered = now;
+        (unsent.offered, unsent.idle) = (now, 0);
         unsent.tries = unsent.tries.saturating_add(1);
         unsent.tries
     }
@@ -55,7 +59,7 @@ impl Watch {
     /// Notes a frame that the driver had taken and gave back.
     pub(in crate::runner) fn evicted(&mut self, header: u32, now: Instant) {
         match self.unsent.iter_mut().flatten().find(|it| it.header == header) {
-            Some(unsent) => (unsent.accepted, unsent.offered) = (None, now),
+            Some(unsent) => (unsent.accepted, unsent.offered, unsent.idle) = (None, now, 0),
             None => self.begin(header, now),
         }
     }
@@ -78,6 +82,7 @@ impl Watch {
                 accepted: None,
                 returns: false,
                 tries: 1,
+                idle: 0,
             });
             self.has_unsent = true;
         }
@@ -90,7 +95,10 @@ impl Watch {
             unsent.since = now.min(unsent.since);
             unsent.offered = now.min(unsent.offered);
             let stays_sent = unsent.accepted.is_some_and(|before| before != now);
-            if stays_sent || now.since(unsent.offered) >= FORGOTTEN_AFTER {
+            let is_forgotten =
+                now.since(unsent.offered) >= FORGOTTEN_AFTER.0 || unsent.idle >= FORGOTTEN_AFTER.1;
+            unsent.idle = unsent.idle.saturating_add(1);
+            if stays_sent || is_forgotten {
                 *place = None;
             } else if unsent.accepted.is_none() || unsent.returns {
                 lost |= now.since(unsent.since) >= BUS_LOST_AFTER;
@@ -102,5 +110,35 @@ impl Watch {
         }
         self.edges.end(BusCondition::Down, now);
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive's limits, each 101 ms, refused each time: the frames of the other devices pass.
+    #[test]
+    fn a_frame_that_is_sent_seldom_and_refused_each_time_is_no_lost_bus() {
+        let mut watch = Watch::new();
+        for ms in 1..1_000 {
+            let now = Instant::from_micros(1_000 * ms);
+            if ms % 101 == 1 {
+                watch.refused(0x0C5, now);
+            }
+            assert!(!watch.finish(now), "{ms} ms");
+        }
+    }
+
+    /// Thirty devices take turns, and the driver takes no frame: each frame is offered in each thirtieth tick.
+    #[test]
+    fn turns_of_many_devices_do_not_hide_a_lost_bus() {
+        let mut watch = Watch::new();
+        let lost = (1..300_u32).find(|ms| {
+            let now = Instant::from_micros(1_000 * u64::from(*ms));
+            watch.refused(0x100 + ms % 30, now);
+            watch.finish(now)
+        });
+        assert!(lost.is_some_and(|ms| (100..150).contains(&ms)), "{lost:?}");
     }
 }
