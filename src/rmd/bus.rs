@@ -71,7 +71,7 @@ pub struct Motor {
     /// The last control command or rest.
     last: Command,
     resets: bool,
-    /// The holding brake was released, and has not been confirmed to be locked since.
+    /// The holding brake may be open: it was released, maybe before this program began, and not confirmed to be locked since.
     is_open: bool,
     asks_angle: bool,
 }
@@ -102,7 +102,7 @@ impl Motor {
             questions: Questions::new(Command::REST),
             last: Command::REST,
             resets: false,
-            is_open: false,
+            is_open: true,
             asks_angle: false,
         })
     }
