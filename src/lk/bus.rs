@@ -277,6 +277,13 @@ impl OwnMotor for Motor {
         })
     }
 
+    /// No error is cleared before Off was sent.
+    fn unsent(&mut self, frame: &CanFrame) {
+        let [is_off, is_run] = [Command::Off, Command::Run].map(|it| it.encode() == *frame.bytes());
+        self.echoes = self.echoes.saturating_sub((is_off || is_run).into());
+        self.clears &= !is_off;
+    }
+
     fn is_enabled(&self) -> Option<bool> {
         let lacks_angle = self.mode.needs_angle() && self.is_wanted && self.ahead.is_none();
         Some(self.is_on && !lacks_angle)

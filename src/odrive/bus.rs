@@ -176,6 +176,13 @@ impl OwnMotor for Motor {
         Some(stay.unwrap_or_else(|| request(self.node, ESTIMATES)))
     }
 
+    /// Limits that were not sent come before the next command.
+    fn unsent(&mut self, frame: &CanFrame) {
+        if *frame == self.limits_of(self.limits.0) {
+            self.limits.1 = LIMITS_EACH;
+        }
+    }
+
     /// While the drive is being enabled, only a heartbeat after the request counts.
     fn is_enabled(&self) -> Option<bool> {
         let is_starting = matches!(self.phase, Phase::Starting(_));

@@ -314,6 +314,14 @@ impl OwnMotor for Motor {
         Some(self.frame_of(command))
     }
 
+    /// A reset and a time-out that were not sent are sent again.
+    fn unsent(&mut self, frame: &CanFrame) {
+        let command = *frame.bytes();
+        self.resets |= command == Command::Reset.encode();
+        let timeout = self.timeout.map(|ms| Command::SetTimeout(ms).encode());
+        self.writes -= u8::from(self.writes > 0 && timeout == Some(command));
+    }
+
     fn is_enabled(&self) -> Option<bool> {
         Some(self.enabling.is_on)
     }

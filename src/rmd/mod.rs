@@ -53,7 +53,7 @@
 //! [`Motor::reset_drive`] alone, since the protocol has no frame that clears them. The code of an error is the place of its lowest bit,
 //! from 1.
 //!
-//! **A command that is sent back is no feedback.** At exactly 0 °C some feedback reads like a command, and is lost: in torque
+//! **A command that is sent back is no feedback.** Feedback with a temperature of exactly 0 °C may read like a command, and is lost then: in torque
 //! mode and at rest that without a current between 0 and 1°, in [`Mode::velocity`] that without a current, in [`Mode::position_velocity`] that with
 //! a small positive current.
 //!

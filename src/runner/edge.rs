@@ -8,7 +8,8 @@ use crate::time::{ConditionEdge, Duration, Instant};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum BusCondition {
-    /// The driver has not taken some command frame for 100 ms: everything was disarmed. Ends when it takes them all.
+    /// Some command frame was not sent for 100 ms, refused or given back by the driver: everything was disarmed. Ends when all are
+    /// sent.
     Down,
     /// Feedback was heard once, and none from any motor for 100 ms. Ends with the first.
     Silent,

@@ -270,7 +270,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Tells whether the driver has not taken some command frame for 100 ms; over when it takes them all.
+    /// Tells whether some command frame was not sent for 100 ms, refused or given back by the driver; over when all are sent.
     #[must_use]
     pub const fn is_bus_down(&self) -> bool {
         self.has(BusCondition::Down)

@@ -35,7 +35,7 @@ pub struct Statistics {
     pub evicted: u32,
     /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
     pub evicted_unrelated: u32,
-    /// Command frames that newer ones replaced before the driver took them; wraps. See
+    /// Command frames that newer ones replaced before they were sent; wraps. See
     /// [`Devices::superseded`](crate::motor::Devices::superseded).
     pub superseded: u32,
     /// Received frames that a queue dropped before they came here.

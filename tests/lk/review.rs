@@ -214,3 +214,17 @@ fn a_question_that_the_bus_gives_back_while_driving_opens_nothing_anew() {
     }
     assert!(given_back > 2, "{given_back}");
 }
+
+/// A drive with an error that can be cleared goes on turning until it is off.
+#[test]
+fn off_goes_before_an_error_is_cleared_also_when_the_driver_gave_it_back() {
+    let mut motor = Motor::new(Model::MF9025_16T, 1, torque()).unwrap();
+    assert!(motor.decode_answer(&frame([0x9A, 30, 0x60, 0x09, 0, 0, 0, 8])));
+    for _ in 0..5 {
+        let off = motor.disable().unwrap();
+        assert_eq!(off.bytes()[0], 0x80);
+        motor.unsent(&off);
+    }
+    let sent = [motor.disable(), motor.disable(), motor.disable()];
+    assert_eq!(sent.map(|frame| frame.unwrap().bytes()[0]), [0x80, 0x9B, 0x80]);
+}

@@ -21,6 +21,8 @@ pub(crate) struct Bench {
     pub(crate) is_cut: bool,
     /// Nothing with this number comes from the drive.
     pub(crate) lost: Option<u32>,
+    /// The driver gives each frame with this number back.
+    pub(crate) refused: Option<u32>,
 }
 
 pub(crate) fn motor(mode: impl Into<Mode>, firmware: Firmware) -> Motor {
@@ -38,7 +40,15 @@ impl Bench {
         let constant = Model::D6374.torque_constant();
         let drive = OdriveDrive::new(3, is_0_6, constant, gear).with_periods(0.1, 0.002);
         let own = Own::new(motor);
-        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, lost: None }
+        Self {
+            own,
+            drive,
+            now_us: 1_000,
+            frames: Vec::new(),
+            is_cut: false,
+            lost: None,
+            refused: None,
+        }
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -60,7 +70,9 @@ impl Bench {
         self.frames.clear();
         while let Some(frame) = self.own.next_frame(0) {
             self.frames.push(frame);
-            if !self.is_cut {
+            if self.refused == Some(frame.header() & 0x1F) {
+                assert!(self.own.requeue(&frame));
+            } else if !self.is_cut {
                 let answer = self.drive.hear(&frame);
                 self.answer(answer);
             }

@@ -598,3 +598,25 @@ fn whenever_it_is_disarmed_no_torque_follows_the_next_frames() {
         }
     }
 }
+
+#[test]
+fn limits_that_the_driver_gives_back_come_before_the_next_command() {
+    let mut wheel = Bench::armed(Mode::velocity(2.0), Firmware::V0_6);
+    let mut run = |refused, steps| {
+        wheel.refused = refused;
+        let mut limits = 0;
+        wheel.steps(steps, |bench| {
+            _ = bench.own.set_velocity((), velocity(5.0));
+            let is_driven = bench.drive.state() == Heartbeat::CLOSED_LOOP;
+            let numbers = bench.frames.iter().map(|frame| frame.header() & 0x1F);
+            limits += numbers.filter(|number| *number == 0x0F && is_driven).count();
+        });
+        limits
+    };
+    assert!(run(None, 600) > 3);
+    // The regular turn of the limits comes within 100 commands; from then on each frame is one.
+    let refused = run(Some(0x0F), 150);
+    assert!((50..=150).contains(&refused), "{refused}");
+    let after = run(None, 50);
+    assert_eq!(after, 1);
+}

@@ -14,13 +14,15 @@ pub(crate) struct Bench {
     /// The frames of the last update.
     pub(crate) frames: Vec<CanFrame>,
     pub(crate) is_cut: bool,
+    /// The driver gives each frame with this code back.
+    pub(crate) refused: Option<u8>,
 }
 
 impl Bench {
     pub(crate) fn new(model: Model, mode: impl Into<Mode>) -> Self {
         let own = Own::new(Motor::new(model, 1, mode).unwrap());
         let drive = RmdDrive::new(1, model.torque_constant());
-        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false }
+        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, refused: None }
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -34,7 +36,11 @@ impl Bench {
         self.frames.clear();
         while let Some(frame) = self.own.next_frame(0) {
             self.frames.push(frame);
-            if self.is_cut {
+            let is_refused = self.refused == Some(frame.bytes()[0]);
+            if is_refused {
+                assert!(self.own.requeue(&frame));
+            }
+            if self.is_cut || is_refused {
                 continue;
             }
             if let Some(answer) = self.drive.hear(&frame) {

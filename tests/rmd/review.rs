@@ -239,3 +239,37 @@ fn nothing_heard_before_enables_the_drive() {
     motor.disable();
     assert_eq!(motor.is_enabled(), Some(false));
 }
+
+#[test]
+fn a_time_out_that_the_driver_gives_back_is_written_when_the_driver_takes_it() {
+    let mut bench = Bench::armed(MODEL, torque());
+    bench.refused = Some(0xB3);
+    bench.steps(400, |bench| {
+        _ = bench.own.set_torque(1.0);
+        assert!(bench.drive.shaft().torque_nm().abs() < 1e-9);
+    });
+    assert_eq!((bench.drive.timeout_ms(), bench.own.motor().wrong_setting()), (0, None));
+    bench.refused = None;
+    bench.steps(400, |bench| _ = bench.own.set_torque(1.0));
+    assert_eq!(bench.drive.timeout_ms(), 100);
+    assert!(bench.drive.shaft().torque_nm() > 0.9);
+}
+
+#[test]
+fn a_reset_that_the_driver_gives_back_is_sent_again() {
+    let mut bench = Bench::new(MODEL, torque());
+    bench.steps(100, |_| {});
+    bench.own.motor_mut().reset_drive();
+    bench.refused = Some(0x76);
+    let mut resets = 0;
+    let mut count = |bench: &mut Bench| {
+        resets += bench.frames.iter().filter(|frame| frame.bytes()[0] == 0x76).count();
+    };
+    bench.steps(500, &mut count);
+    bench.refused = None;
+    bench.steps(500, &mut count);
+    bench.steps(500, |bench| {
+        assert!(bench.frames.iter().all(|frame| frame.bytes()[0] != 0x76));
+    });
+    assert!(resets > 3, "{resets}");
+}

@@ -1,13 +1,10 @@
 //! The motor as a device of the runner.
 
-use super::route::Route;
 use super::{Impedance, Order, Own, OwnMotor, Target};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
-use crate::motor::{
-    CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, Severity, Vitals, WrongSetting,
-};
+use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::Angle;
 use embedded_can::Frame;
@@ -38,6 +35,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
         self.switched.take_if(|_| self.power.is_confirmed());
         self.rested.take_if(|_| self.command.is_some());
+        self.withdraw(|own| &mut own.command);
         self.has_posted = false;
         let was_on = self.power.is_on();
         self.switch(may_drive, tick.now());
@@ -73,16 +71,17 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         }
         // Of an id that several motors send, only the frames that this one sent.
         let is_known = [self.switched, self.last].contains(&Some(*frame));
-        let mut commands = self
-            .motor
-            .claims()
-            .into_iter()
-            .filter(|claim| claim.role() == Role::Command && (is_known || !claim.is_shared()));
+        let may_send = |claim: Claim| {
+            let is_its = is_known || !claim.is_shared();
+            claim.role() == Role::Command && is_its && claim.covers(frame.id())
+        };
         let is_own = match frame.is_remote() {
             true => is_known,
-            false => commands.any(|claim| claim.covers(frame.id())),
+            false => self.motor.claims().into_iter().any(may_send),
         };
-        self.superseded = self.superseded.wrapping_add(u32::from(is_own));
+        if is_own {
+            self.leave_out(frame);
+        }
         // Rest that was not sent gives way to no other frame.
         self.rested = self.rested.filter(|rest| rest != frame);
         is_own
@@ -157,48 +156,6 @@ impl<M: OwnMotor> CanDevice for Own<M> {
     }
 }
 
-/// Received frames.
-impl<M: OwnMotor> Own<M> {
-    /// Takes a frame with an id of the feedback.
-    fn take(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if self.motor.decode_answer(frame) {
-            return Ingest::Taken;
-        }
-        let outcome = self.motor.decode(frame);
-        if outcome == Ingest::Taken {
-            self.watch.hear(&self.guard, now);
-            self.guard.hear(now);
-            self.hear_power(now);
-        }
-        outcome
-    }
-
-    #[inline(never)]
-    fn take_by_claims(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if frame.is_remote() {
-            return Ingest::Unrelated;
-        }
-        if self.route.is_unknown() {
-            self.route = Route::of(|| self.motor.claims());
-        }
-        let (mut is_feedback, mut command) = (false, None);
-        for claim in self.motor.claims().into_iter().filter(|claim| claim.covers(frame.id())) {
-            match claim.role() {
-                Role::Feedback => is_feedback = true,
-                // What others send on a shared id may be for another drive.
-                Role::Command if claim.is_shared() => {}
-                Role::Command => command = Some(claim),
-            }
-        }
-        let outcome = if is_feedback { self.take(frame, now) } else { Ingest::Unrelated };
-        if outcome == Ingest::Unrelated && command.is_some() {
-            self.rival = command;
-            self.watch.hear_rival(now);
-        }
-        outcome
-    }
-}
-
 /// The update, step by step.
 impl<M: OwnMotor> Own<M> {
     /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
@@ -208,17 +165,6 @@ impl<M: OwnMotor> Own<M> {
             self.guard.relax();
         }
         share
-    }
-
-    /// Takes what the drive reports of its power.
-    fn hear_power(&mut self, now: Instant) {
-        if !self.power.hear(self.motor.is_enabled(), now) {
-            return;
-        }
-        let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
-        _ = self.watch.look(&mut self.guard, || vitals, now);
-        self.guard.relax_until_armed();
-        self.motor.forget_settings();
     }
 
     /// Returns a question for a setting. The question takes the place of a frame of rest after another one, so an update with a
@@ -252,7 +198,7 @@ impl<M: OwnMotor> Own<M> {
         if stays && !may_drive {
             if self.switching.is_some() {
                 self.power.give_back();
-                self.replace(|own| &mut own.switching, None);
+                self.withdraw(|own| &mut own.switching);
             }
             return;
         }
@@ -279,6 +225,7 @@ impl<M: OwnMotor> Own<M> {
             self.has_posted = true;
             return;
         }
+        self.withdraw(|own| &mut own.switching);
         let frame = self.motor.enable(self.enabling);
         self.enabling = self.enabling.saturating_add(1);
         if frame.is_some() {
@@ -288,16 +235,16 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn disable(&mut self) {
+        self.withdraw(|own| &mut own.switching);
         let frame = self.motor.disable();
         self.rest_disables = frame.is_none();
         self.post(frame);
     }
 
-    /// Offers a frame for the drive's power, instead of the one before.
-    fn post(&mut self, frame: Option<CanFrame>) {
-        self.switched = frame;
+    /// Offers a frame for the drive's power.
+    const fn post(&mut self, frame: Option<CanFrame>) {
+        (self.switched, self.switching) = (frame, frame);
         self.has_posted = frame.is_some();
-        self.replace(|own| &mut own.switching, frame);
     }
 
     /// The drive did not follow before: its output opens from zero, and its angle starts from where the shaft is.
@@ -386,15 +333,19 @@ impl<M: OwnMotor> Own<M> {
     }
 
     fn offer(&mut self, command: Option<CanFrame>) {
-        self.replace(|own| &mut own.command, command);
+        self.withdraw(|own| &mut own.command);
+        self.command = command;
     }
 
-    fn replace(
-        &mut self,
-        place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>,
-        frame: Option<CanFrame>,
-    ) {
-        let before = core::mem::replace(place(self), frame);
-        self.superseded = self.superseded.wrapping_add(u32::from(before.is_some()));
+    /// Takes back a frame that still waits for the bus.
+    fn withdraw(&mut self, place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>) {
+        if let Some(frame) = place(self).take() {
+            self.leave_out(&frame);
+        }
+    }
+
+    fn leave_out(&mut self, frame: &CanFrame) {
+        self.superseded = self.superseded.wrapping_add(1);
+        self.motor.unsent(frame);
     }
 }

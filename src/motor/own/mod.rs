@@ -5,6 +5,7 @@ mod impedance;
 mod motor;
 mod order;
 mod power;
+mod receive;
 mod route;
 mod settings;
 

@@ -78,6 +78,15 @@ pub trait OwnMotor {
         None
     }
 
+    /// Learns that a frame of this motor was not sent: the driver refused it, gave it back, or a newer one took its place. Nothing
+    /// is done unless said otherwise.
+    ///
+    /// [`Own`](super::Own) calls this before it asks for the next frame of the same kind. Commands and frames of rest come again
+    /// anyway; a motor that sends a frame only now and then, or frames in an order, takes the turn back here.
+    fn unsent(&mut self, frame: &CanFrame) {
+        _ = frame;
+    }
+
     /// Returns whether the drive is enabled, by its last feedback; `None`, unless said otherwise, if it does not say.
     fn is_enabled(&self) -> Option<bool> {
         None
