@@ -3,8 +3,7 @@
 use super::enabling::Enabling;
 use super::model::AMPERES_PER_COUNT;
 use super::track::Track;
-use super::{Command, Feedback, Mode, Model, State};
-use crate::error::ConfigError;
+use super::{Command, Feedback, Motor, State};
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
 use crate::lk::command::{id_of, is_command};
@@ -15,7 +14,6 @@ use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
     Vitals, WrongSetting,
 };
-use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 
 /// The ids of commands and of answers, without the id of the drive.
@@ -24,129 +22,13 @@ const IDS: (u16, u16) = (0x140, 0x240);
 /// The places of the question for the angle among 32 commands.
 const ANGLES: [u8; 2] = [8, 24];
 
-/// The time-out of the drive, in ms, unless the program sets another one.
-const TIMEOUT_MS: u32 = 100;
-
 /// So often the time-out is written before the drive counts as one that does not take it: its memory wears.
 const WRITES: u8 = 8;
 
 /// The first byte of a report that the time-out of the drive has expired.
 const EXPIRED: u8 = 0xF1;
 
-/// A motor of this family, in one control mode: see the [module](super).
-///
-/// # Examples
-/// ```
-/// use drivetrain::motor::{Claim, OwnMotor};
-/// use drivetrain::rmd::{Mode, Model, Motor};
-/// use drivetrain::units::AngularVelocity;
-///
-/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
-/// let motor = Motor::new(Model::X8_120, 3, mode)?;
-/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
-/// assert_eq!(claims, ["command of RMD-X8-120 #3 on 0x143", "feedback of RMD-X8-120 #3 on 0x243"]);
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy)]
-pub struct Motor {
-    model: Model,
-    id: u8,
-    is_reversed: bool,
-    mode: Mode,
-    /// In ms; `None` to leave the drive's as it is.
-    timeout: Option<u32>,
-    /// The time-out that the drive answered.
-    timeout_found: Option<u32>,
-    /// How often it was written without an answer.
-    writes: u8,
-    drive: Option<Feedback>,
-    track: Option<Track>,
-    state: Option<State>,
-    /// The angle was read since the settings were forgotten.
-    has_angle: bool,
-    enabling: Enabling,
-    /// How many commands were made since the last feedback or the last angle.
-    silent: u8,
-    questions: Questions<Command>,
-    /// The last control command or rest.
-    last: Command,
-    resets: bool,
-    /// The holding brake may be open: it was released, maybe before this program began, and not confirmed to be locked since.
-    is_open: bool,
-    asks_angle: bool,
-}
-
 impl Motor {
-    /// Takes the model, the id of the drive, 1 to 32, and the control mode.
-    ///
-    /// # Errors
-    /// Names the value that is not allowed: [`ConfigError::Unsupported`] for a velocity with a torque limit.
-    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
-        ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
-        let mode = mode.into();
-        mode.check(&model.scale())?;
-        Ok(Self {
-            model,
-            id,
-            is_reversed: false,
-            mode,
-            timeout: Some(TIMEOUT_MS),
-            timeout_found: None,
-            writes: 0,
-            drive: None,
-            track: None,
-            state: None,
-            has_angle: false,
-            enabling: Enabling::default(),
-            silent: 0,
-            questions: Questions::new(Command::REST),
-            last: Command::REST,
-            resets: false,
-            is_open: true,
-            asks_angle: false,
-        })
-    }
-
-    /// Turns the positive direction round: angle, velocity and torque.
-    #[must_use]
-    pub const fn reversed(self) -> Self {
-        Self { is_reversed: !self.is_reversed, ..self }
-    }
-
-    /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
-    ///
-    /// # Errors
-    /// Names the time that is not allowed.
-    pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        let micros =
-            ConfigError::check_micros("time-out", timeout.micros_u32(), 10_000, 60_000_000)?;
-        Ok(Self { timeout: Some(micros / 1_000), ..self })
-    }
-
-    /// Leaves the time-out of the drive as it is: a drive without one goes on with its last command when the cable is cut.
-    #[must_use]
-    pub const fn without_timeout(self) -> Self {
-        Self { timeout: None, ..self }
-    }
-
-    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
-    #[must_use]
-    pub const fn feedback(&self) -> Option<&Feedback> {
-        self.drive.as_ref()
-    }
-
-    /// Returns the last state of the drive; `None` before the first, and after its feedback was lost.
-    #[must_use]
-    pub const fn state(&self) -> Option<&State> {
-        self.state.as_ref()
-    }
-
-    /// Asks the drive to start anew, once, when it has been switched off: some errors go away by that alone. It is silent for more
-    /// than a second then, and may count its angle from another zero. A holding brake is locked meanwhile.
-    pub const fn reset_drive(&mut self) {
-        self.resets = true;
-    }
-
     fn frame_of(&self, command: Command) -> CanFrame {
         CanFrame::of(id_of(IDS.0, self.id), command.encode())
     }

@@ -1,3 +1,127 @@
-//! The control mode: that of `lk`, with the scales of the output shaft.
+//! The motor and its settings; the control mode is that of `lk`, with the scales of the output shaft.
 
+use super::enabling::Enabling;
+use super::track::Track;
+use super::{Command, Feedback, Model, State};
+use crate::error::ConfigError;
 pub use crate::lk::Mode;
+use crate::lk::questions::Questions;
+use crate::time::Duration;
+
+/// The time-out of the drive, in ms, unless the program sets another one.
+const TIMEOUT_MS: u32 = 100;
+
+/// A motor of this family, in one control mode: see the [module](super).
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::{Claim, OwnMotor};
+/// use drivetrain::rmd::{Mode, Model, Motor};
+/// use drivetrain::units::AngularVelocity;
+///
+/// let mode = Mode::velocity(AngularVelocity::from_rpm(60.0));
+/// let motor = Motor::new(Model::X8_120, 3, mode)?;
+/// let claims: Vec<String> = motor.claims().into_iter().map(|claim| claim.to_string()).collect();
+/// assert_eq!(claims, ["command of RMD-X8-120 #3 on 0x143", "feedback of RMD-X8-120 #3 on 0x243"]);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Motor {
+    pub(super) model: Model,
+    pub(super) id: u8,
+    pub(super) is_reversed: bool,
+    pub(super) mode: Mode,
+    /// In ms; `None` to leave the drive's as it is.
+    pub(super) timeout: Option<u32>,
+    /// The time-out that the drive answered.
+    pub(super) timeout_found: Option<u32>,
+    /// How often it was written without an answer.
+    pub(super) writes: u8,
+    pub(super) drive: Option<Feedback>,
+    pub(super) track: Option<Track>,
+    pub(super) state: Option<State>,
+    /// The angle was read since the settings were forgotten.
+    pub(super) has_angle: bool,
+    pub(super) enabling: Enabling,
+    /// How many commands were made since the last feedback or the last angle.
+    pub(super) silent: u8,
+    pub(super) questions: Questions<Command>,
+    /// The last control command or rest.
+    pub(super) last: Command,
+    pub(super) resets: bool,
+    /// The holding brake may be open: it was released, maybe before this program began, and not confirmed to be locked since.
+    pub(super) is_open: bool,
+    pub(super) asks_angle: bool,
+}
+
+impl Motor {
+    /// Takes the model, the id of the drive, 1 to 32, and the control mode.
+    ///
+    /// # Errors
+    /// Names the value that is not allowed: [`ConfigError::Unsupported`] for a velocity with a torque limit.
+    pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
+        ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
+        let mode = mode.into();
+        mode.check(&model.scale())?;
+        Ok(Self {
+            model,
+            id,
+            is_reversed: false,
+            mode,
+            timeout: Some(TIMEOUT_MS),
+            timeout_found: None,
+            writes: 0,
+            drive: None,
+            track: None,
+            state: None,
+            has_angle: false,
+            enabling: Enabling::default(),
+            silent: 0,
+            questions: Questions::new(Command::REST),
+            last: Command::REST,
+            resets: false,
+            is_open: true,
+            asks_angle: false,
+        })
+    }
+
+    /// Turns the positive direction round: angle, velocity and torque.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self { is_reversed: !self.is_reversed, ..self }
+    }
+
+    /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
+    ///
+    /// # Errors
+    /// Names the time that is not allowed.
+    pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
+        let micros =
+            ConfigError::check_micros("time-out", timeout.micros_u32(), 10_000, 60_000_000)?;
+        Ok(Self { timeout: Some(micros / 1_000), ..self })
+    }
+
+    /// Leaves the time-out of the drive as it is: a drive without one goes on with its last command when the cable is cut.
+    #[must_use]
+    pub const fn without_timeout(self) -> Self {
+        Self { timeout: None, ..self }
+    }
+
+    /// Returns the last feedback of the drive, in the units and the direction of the drive; `None` before the first.
+    #[must_use]
+    pub const fn feedback(&self) -> Option<&Feedback> {
+        self.drive.as_ref()
+    }
+
+    /// Returns the last state of the drive; `None` before the first, and after its feedback was lost.
+    #[must_use]
+    pub const fn state(&self) -> Option<&State> {
+        self.state.as_ref()
+    }
+
+    /// Asks the drive to start anew, once, when it has been switched off: some errors go away by that alone. It is silent for more
+    /// than a second then, and may count its angle from another zero. A holding brake is locked meanwhile.
+    pub const fn reset_drive(&mut self) {
+        self.resets = true;
+    }
+}

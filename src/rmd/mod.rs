@@ -94,8 +94,7 @@ mod model;
 mod tests;
 mod track;
 
-pub use bus::Motor;
 pub use command::Command;
-pub use config::Mode;
+pub use config::{Mode, Motor};
 pub use feedback::{Feedback, State};
 pub use model::Model;
