@@ -68,9 +68,9 @@ fn pid(mut input: Input) {
             224..=231 => {
                 let (error, rate, dt_s) = (input.float(), input.float(), input.step_s());
                 let range = pid.get().config().output_range();
-                pid.step(range, Pid::rejected, |pid| {
-                    let step = TimeStep::of(dt_s);
-                    pid.step_error(error, rate, &step)
+                let left_out = is_left_out(&[error, rate], dt_s);
+                pid.step_counted(range, left_out, Pid::rejected, |pid| {
+                    pid.step_error(error, rate, &TimeStep::of(dt_s))
                 });
             }
             232..=237 => {
@@ -101,6 +101,11 @@ fn pid(mut input: Input) {
     }
 }
 
+/// Tells whether a step is counted and taken all the same: its time is too long for the integral, its samples are good.
+fn is_left_out(samples: &[f32], dt_s: f32) -> bool {
+    TimeStep::of(dt_s).is_frozen() && samples.iter().all(|sample| sample.is_finite())
+}
+
 /// A bad sample leaves every term as it is (I5), and D rests in the next good step: it keeps its value.
 fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
     let before = (*pid.get(), pid.differs());
@@ -109,7 +114,8 @@ fn update(pid: &mut Observed<Pid>, [setpoint, measured, dt_s]: [f32; 3]) {
         [terms.p, terms.i, terms.d, terms.feed_forward].map(f32::to_bits)
     };
     let range = pid.get().config().output_range();
-    let taken = pid.step(range, Pid::rejected, |pid: &mut Pid| {
+    let left_out = is_left_out(&[setpoint, measured], dt_s);
+    let taken = pid.step_counted(range, left_out, Pid::rejected, |pid: &mut Pid| {
         pid.step(setpoint, measured, &TimeStep::of(dt_s))
     });
     let ([.., before_d, _], [.., d, _]) = (bits(&before.0), bits(pid.get()));
@@ -147,9 +153,11 @@ fn speed_actuator(mut input: Input) {
         match input.byte() {
             0..=231 => {
                 let (setpoint, speed, dt_s) = (input.float(), input.float(), input.step_s());
-                let taken = actuator.step(range, SpeedActuator::rejected, |actuator| {
-                    actuator.step(setpoint, speed, &TimeStep::of(dt_s))
-                });
+                let left_out = is_left_out(&[setpoint, speed], dt_s);
+                let taken =
+                    actuator.step_counted(range, left_out, SpeedActuator::rejected, |actuator| {
+                        actuator.step(setpoint, speed, &TimeStep::of(dt_s))
+                    });
                 // D rests, and the filter before it starts anew.
                 if !taken && !TimeStep::of(dt_s).is_hold() {
                     actuator.rests();
@@ -189,13 +197,20 @@ fn position_actuator(mut input: Input) {
             0..=231 => {
                 let (setpoint, angle, speed) = (input.float(), input.float(), input.float());
                 let dt_s = input.step_s();
-                let taken = actuator.step(range, PositionActuator::rejected, |actuator| {
-                    if options & 4 == 0 {
-                        actuator.step(setpoint, angle, speed, &TimeStep::of(dt_s))
-                    } else {
-                        actuator.step_error(setpoint, speed, &TimeStep::of(dt_s))
-                    }
-                });
+                let angle_counts = if options & 4 == 0 { angle } else { 0.0 };
+                let left_out = is_left_out(&[setpoint, angle_counts, speed], dt_s);
+                let taken = actuator.step_counted(
+                    range,
+                    left_out,
+                    PositionActuator::rejected,
+                    |actuator| {
+                        if options & 4 == 0 {
+                            actuator.step(setpoint, angle, speed, &TimeStep::of(dt_s))
+                        } else {
+                            actuator.step_error(setpoint, speed, &TimeStep::of(dt_s))
+                        }
+                    },
+                );
                 // D rests also in the next step of the outer loop, which may be many steps away.
                 if !taken && !TimeStep::of(dt_s).is_hold() {
                     actuator.forgive();
