@@ -1,0 +1,141 @@
+"""Uses the page as a visitor does, in headless Chromium: try.py PAGE.html NATIVE_PROGRAM [PICTURE.png]
+
+Speaks to chromedriver by the WebDriver protocol. Fails when the page does not do what it says.
+"""
+
+import base64
+import json
+import pathlib
+import subprocess
+import sys
+import time
+import urllib.request
+
+# A machine that is busy may be slow: what is waited for has this long.
+PATIENCE_S = 60
+OPTIONS = [
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--window-size=1400,1500", "--lang=en",
+]
+
+
+class Browser:
+    def __init__(self):
+        self.process = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        port = None
+        for line in self.process.stdout:
+            if "started successfully on port" in line:
+                port = line.rsplit(" ", 1)[1].strip().rstrip(".")
+                break
+        if port is None:
+            raise SystemExit("playground: chromedriver does not start")
+        self.url = f"http://127.0.0.1:{port}/session"
+        capabilities = {"alwaysMatch": {"browserName": "chrome", "goog:chromeOptions": {"args": OPTIONS}, "goog:loggingPrefs": {"browser": "ALL"}}}
+        self.url += "/" + self.call("POST", "", {"capabilities": capabilities})["sessionId"]
+
+    def call(self, method, path, body=None):
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.url + path, data, {"Content-Type": "application/json"}, method=method)
+        with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+            return json.load(answer)["value"]
+
+    def run(self, script):
+        return self.call("POST", "/execute/sync", {"script": script, "args": []})
+
+    def text(self, selector):
+        return self.run(f"return document.querySelector({json.dumps(selector)}).textContent")
+
+    def click(self, selector):
+        element = self.call("POST", "/element", {"using": "css selector", "value": selector})
+        self.call("POST", f"/element/{next(iter(element.values()))}/click", {})
+
+    def keys(self, *actions):
+        keys = [{"type": kind, "value": value} for kind, value in actions]
+        self.call("POST", "/actions", {"actions": [{"type": "key", "id": "keyboard", "actions": keys}]})
+
+    def until(self, what, holds):
+        end = time.monotonic() + PATIENCE_S
+        while not holds():
+            if time.monotonic() > end:
+                raise SystemExit(f"playground: {what} was not seen; status: {self.text('#status')}; log:\n{self.text('#log')}")
+            time.sleep(0.1)
+        print(f"seen: {what}")
+
+    def quit(self):
+        self.call("DELETE", "")
+        self.process.terminate()
+
+
+def main(page, native, picture=None):
+    browser = Browser()
+    try:
+        browse(browser, pathlib.Path(page).resolve().as_uri(), native, picture)
+    finally:
+        browser.quit()
+
+
+def browse(browser, url, native, picture):
+    browser.call("POST", "/url", {"url": url})
+    where = lambda: browser.run("const p = samples.at(-1); return p ? [p.x, p.y, p.armed, p.heading] : [0, 0, false, 0]")
+    browser.until("a robot that waits", lambda: browser.text("#status").startswith("not armed"))
+    browser.until("feedback of four motors", lambda: all(f"motor {n}:" in browser.text("#frames") for n in range(1, 5)))
+    browser.click("#switch")
+    browser.until("an armed robot", lambda: browser.text("#status").startswith("armed"))
+    browser.keys(("keyDown", "w"))
+    browser.until("half a metre ahead", lambda: where()[0] > 0.5)
+    browser.keys(("keyDown", "q"))
+    browser.until("a turn to the left", lambda: where()[3] > 0.3)
+
+    browser.click("[data-trouble=plug]")
+    browser.until("a robot that is relaxed without its plug", lambda: browser.text("#status").startswith("relaxed"))
+    browser.click("[data-trouble=plug]")
+    browser.until("a log that says so", lambda: "not driven" in browser.text("#log") or "began" in browser.text("#log"))
+    browser.until("feedback again", lambda: browser.run("return samples.at(-1).wheels.every((wheel) => Number.isFinite(wheel.measured))"))
+    if not browser.text("#status").startswith("relaxed"):
+        raise SystemExit("playground: the robot drives again without a gesture")
+    browser.click("#switch")
+    browser.until("a switch that is off", lambda: browser.text("#status").startswith("not armed"))
+    browser.until("a pause", lambda: browser.run("return samples.length > 30 && samples.slice(-30).every((one) => !one.on)"))
+    browser.click("#switch")
+    browser.until("a robot that is armed again", lambda: browser.text("#status").startswith("armed"))
+    before = where()
+    browser.until("and drives", lambda: abs(where()[0] - before[0]) + abs(where()[1] - before[1]) > 0.2)
+    if picture:
+        pathlib.Path(picture).write_bytes(base64.b64decode(browser.call("GET", "/screenshot")))
+    browser.keys(("keyUp", "w"), ("keyUp", "q"))
+
+    browser.click("[data-trouble=second-master]")
+    browser.until("a second master in the log", lambda: "second master" in browser.text("#log"))
+    browser.click("[data-trouble=second-master]")
+
+    browser.run("const layout = document.querySelector('#layout'); layout.value = 'omni'; layout.dispatchEvent(new Event('change'))")
+    browser.until("three omni wheels", lambda: browser.run("return samples.length > 5 && samples.at(-1).wheels.length === 3"))
+
+    browser.click("#tour")
+    browser.until("the hash of the tour", lambda: browser.text("#result") != "")
+    expected = subprocess.run([native], capture_output=True, text=True, check=True).stdout.split()[0]
+    if expected not in browser.text("#result"):
+        raise SystemExit(f"playground: the frames of the tour differ: {expected} natively, here: {browser.text('#result')}")
+    print(f"seen: the same frames as natively, {expected}")
+    replay(browser, native)
+
+    browser.click("#language")
+    browser.until("Chinese", lambda: browser.text("#switch").startswith("开关"))
+    browser.until("how fast it is", lambda: browser.run("return Boolean(document.body.dataset.pace)"))
+    print(f"pace: {browser.run('return document.body.dataset.pace')} times real time")
+    errors = [entry["message"] for entry in browser.call("POST", "/se/log", {"type": "browser"}) if entry["level"] == "SEVERE"]
+    if errors:
+        raise SystemExit("playground: the browser reports\n" + "\n".join(errors))
+
+
+def replay(browser, native):
+    """A script of what was done by hand, run natively, has the hash that the page shows."""
+    script, shown = browser.run("return [robot.script(), robot.hash()]")
+    run = subprocess.run([native, "/dev/stdin"], input=script, capture_output=True, text=True)
+    if not run.stdout.startswith(shown):
+        raise SystemExit(f"playground: the script of the page gives {run.stdout}{run.stderr} natively, {shown} here:\n{script}")
+    print(f"seen: the script of the page gives {shown} natively too")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
