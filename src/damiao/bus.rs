@@ -7,8 +7,8 @@ use super::{Feedback, Model, Register, Status};
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
-    Settings, Severity, Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
+    Preparation, Role, Settings, Severity, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -62,9 +62,9 @@ pub struct Motor {
     settings: Settings<Register, { CHECKED.len() }>,
     /// Counts the frames that enable or disable.
     specials: u8,
-    /// How far the drive has confirmed its time-out since it was to be enabled.
-    timeout: Confirmation,
 }
+
+register_questions!();
 
 impl Motor {
     /// Takes the model, the id of the drive, 1 to 15, and the control mode. The master id is `id + 0x10`, as the manual advises.
@@ -84,7 +84,6 @@ impl Motor {
             drive: None,
             settings: Settings::new(CHECKED),
             specials: 0,
-            timeout: Confirmation::None,
         })
     }
 
@@ -116,32 +115,10 @@ impl Motor {
         self.drive.as_ref()
     }
 
-    /// Asks the drive for a register. While the motor is disarmed the frame goes out within some 10 ms, and again until
-    /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
-    pub const fn read(&mut self, register: Register) {
-        self.settings.request(Inquiry::Read(register));
-    }
-
-    /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read).
-    ///
-    /// # Errors
-    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the register.
-    pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        register.check(value)?;
-        self.settings.request(Inquiry::Write(register, value));
-        Ok(())
-    }
-
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
     /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
     pub const fn store(&mut self) {
         self.settings.request(Inquiry::Store);
-    }
-
-    /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the register and its value in the drive.
-    #[must_use]
-    pub const fn register(&self) -> Option<(Register, f32)> {
-        self.settings.answer()
     }
 
     const fn command_id(&self) -> u16 {
@@ -153,20 +130,19 @@ impl Motor {
         CanFrame::of(standard(self.command_id()), command.encode(self.model.ranges()))
     }
 
-    /// Returns the value that a register has to have.
-    fn expected(&self, register: Register) -> f32 {
+    /// Returns the manual's name of a register, and the value that it has to have.
+    fn expected(&self, register: Register) -> (&'static str, f32) {
         match register {
-            Register::PositionRange => self.model.pmax_rad(),
-            Register::VelocityRange => self.model.vmax_rad_per_s(),
-            Register::TorqueRange => self.model.tmax_nm(),
-            Register::Timeout => self.timeout_units as f32,
-            _ => self.mode.number().into(),
+            Register::PositionRange => ("PMAX", self.model.pmax_rad()),
+            Register::VelocityRange => ("VMAX", self.model.vmax_rad_per_s()),
+            Register::TorqueRange => ("TMAX", self.model.tmax_nm()),
+            _ => ("CTRL_MODE", self.mode.0.number.into()),
         }
     }
 
     /// Tells whether a value in the drive is the expected one.
     fn is_right(&self, register: Register, found: f32) -> bool {
-        let expected = self.expected(register);
+        let (_, expected) = self.expected(register);
         (found - expected).abs() <= RANGE_TOLERANCE * expected
     }
 }
@@ -204,8 +180,7 @@ impl OwnMotor for Motor {
     }
 
     fn velocity(&self) -> AngularVelocity {
-        let velocity = self.drive.map_or(0.0, |drive| drive.measured.velocity_rad_per_s);
-        AngularVelocity::from_rad_per_s(velocity)
+        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.velocity())
     }
 
     fn angle(&self) -> Option<Angle> {
@@ -213,7 +188,7 @@ impl OwnMotor for Motor {
     }
 
     fn rest(&mut self) -> CanFrame {
-        if self.mode.has_rest() {
+        if self.mode.0.is_impedance() {
             CanFrame::of(standard(self.id.into()), self.model.ranges().encode(&mit::Command::REST))
         } else {
             self.off()
@@ -229,31 +204,26 @@ impl OwnMotor for Motor {
     }
 
     fn reset(&mut self) {
-        self.mode.reset();
+        self.mode.0.reset();
     }
 
     /// First what is not known of the settings, then the time-out, written and read back, then the frame that enables: each of
     /// them needs all of that anew, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        if let Some(unknown) = self.settings.complete() {
-            return Some(inquiry(self.id, unknown));
-        }
-        let timeout = self.expected(Register::Timeout);
-        let asked = match self.timeout {
-            Confirmation::None => Inquiry::Write(Register::Timeout, timeout),
-            Confirmation::Written => Inquiry::Read(Register::Timeout),
-            Confirmation::Read => {
-                self.timeout = Confirmation::None;
+        let timeout = Preparation::exact(Register::Timeout, self.timeout_units as f32);
+        let asked = self.settings.prepare([timeout]);
+        Some(match asked {
+            Some(asked) => inquiry(self.id, asked),
+            None => {
                 self.settings.forget();
-                return Some(self.special(mit::ENABLE));
+                self.special(mit::ENABLE)
             }
-        };
-        Some(inquiry(self.id, self.settings.ask(asked)))
+        })
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
-        self.timeout = Confirmation::None;
-        self.mode.has_rest().then(|| self.off())
+        self.settings.prepare_anew();
+        self.mode.0.is_impedance().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
@@ -266,7 +236,6 @@ impl OwnMotor for Motor {
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
-        self.timeout = Confirmation::None;
         self.settings.inquire().map(|asked| inquiry(self.id, asked))
     }
 
@@ -275,43 +244,26 @@ impl OwnMotor for Motor {
         if frame.length() != 8 || !is_answer(data, self.id) {
             return false;
         }
-        let Some(asked) = self.settings.asked() else { return true };
-        let Some(value) = value(data, self.id, asked) else { return true };
-        self.settings.take(asked, value);
-        let is_right = value.to_bits() == self.expected(Register::Timeout).to_bits();
-        match asked {
-            Inquiry::Write(Register::Timeout, _) if is_right => {
-                self.timeout = Confirmation::Written;
-            }
-            Inquiry::Read(Register::Timeout) if is_right => self.timeout = Confirmation::Read,
-            Inquiry::Read(Register::Timeout) => self.timeout = Confirmation::None,
-            _ => {}
+        if let Some(asked) = self.settings.asked()
+            && let Some(value) = value(data, self.id, asked)
+        {
+            self.settings.take(asked, value);
         }
         true
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_right = |register, found| self.is_right(register, found);
-        self.settings.wrong(is_right).map(|(register, found)| WrongSetting {
-            motor: self.name(),
-            setting: name_of(register),
-            expected: self.expected(register),
-            found,
-        })
+        self.settings.wrong_setting(self.name(), is_right, |register| self.expected(register))
     }
 
     fn forget_settings(&mut self) {
         self.settings.forget();
-        self.timeout = Confirmation::None;
     }
 
     fn capabilities(&self) -> Capabilities {
-        self.mode
-            .capabilities()
-            .with(Capability::Feedback)
-            .with(Capability::Temperature)
-            .with(Capability::ErrorCodes)
-            .with(Capability::AbsoluteAngle)
+        let known = self.mode.0.capabilities().with(Capability::Temperature);
+        known.with(Capability::ErrorCodes).with(Capability::AbsoluteAngle)
     }
 
     fn vitals(&self) -> Vitals {
@@ -320,7 +272,7 @@ impl OwnMotor for Motor {
             temperature_c: Some(drive.driver_c.max(drive.rotor_c).into()),
             error: drive.status.is_error().then_some(Severity::Fault),
             error_code: drive.status.error_code(),
-            effort: self.mode.effort(),
+            effort: self.mode.0.effort(),
             speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
             current: drive.measured.torque_nm / self.model.tmax_nm(),
         }
@@ -342,22 +294,5 @@ impl Motor {
         let is_bare = self.specials & 1 == 0;
         let id = if is_bare { self.id.into() } else { self.command_id() };
         CanFrame::of(standard(id), data)
-    }
-}
-
-/// How far the drive has confirmed its time-out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Confirmation {
-    None,
-    Written,
-    Read,
-}
-
-const fn name_of(register: Register) -> &'static str {
-    match register {
-        Register::PositionRange => "PMAX",
-        Register::VelocityRange => "VMAX",
-        Register::TorqueRange => "TMAX",
-        _ => "CTRL_MODE",
     }
 }

@@ -86,7 +86,9 @@ pub(super) fn refresh(id: u8) -> CanFrame {
 pub(super) fn inquiry(id: u8, inquiry: Inquiry<Register>) -> CanFrame {
     let (verb, number, value) = match inquiry {
         Inquiry::Read(register) => (0x33, register.number(), [0; 4]),
-        Inquiry::Write(register, value) => (0x55, register.number(), register.bytes_of(value)),
+        Inquiry::Write(register, value) => {
+            (0x55, register.number(), register.form().bytes_of(value))
+        }
         Inquiry::Store => (0xAA, 1, [0; 4]),
     };
     let [a, b, c, d] = value;

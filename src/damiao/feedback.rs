@@ -2,7 +2,7 @@
 
 use super::Register;
 use crate::motor::Inquiry;
-use crate::units::Angle;
+use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::{self, Ranges};
 
 /// What a drive reports with each frame.
@@ -45,6 +45,10 @@ impl Feedback {
     #[must_use]
     pub const fn angle(&self) -> Option<Angle> {
         if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
+    }
+
+    pub(super) const fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(self.measured.velocity_rad_per_s)
     }
 
     /// Reads a feedback frame; `None` if its status is none that a drive has.
@@ -128,7 +132,7 @@ pub(super) fn value(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Optio
     };
     let [low, high, verb, number, value @ ..] = *data;
     let is_answer = (low, high, verb, number) == (id, 0, asked, register.number());
-    is_answer.then(|| register.value_of(value))
+    is_answer.then(|| register.form().value_of(value))
 }
 
 /// Tells whether a frame reads like an answer about a register of a drive, awaited or not: of a tool, or come twice.

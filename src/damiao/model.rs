@@ -1,8 +1,7 @@
 //! Facts of the models, as a table that a program can extend.
 
 use crate::error::ConfigError;
-use crate::motor::Impedance;
-use crate::units::{Angle, AngularVelocity};
+use crate::motor::{mit_model, models};
 use crate::wire::mit::Ranges;
 
 /// A model of motor: its name and the ranges of its fields, which are registers of the drive.
@@ -45,34 +44,22 @@ pub struct Model {
     ranges: Ranges,
 }
 
-macro_rules! models {
-    ($($model:ident $name:literal $pmax:literal $vmax:literal $tmax:literal,)+) => {
-        impl Model {
-            $(
-                #[doc = concat!("The ", $name, ".")]
-                pub const $model: Self = Self::known($name, $pmax, $vmax, $tmax);
-            )+
-
-            /// The models of the table.
-            pub const ALL: &[Self] = &[$(Self::$model),+];
-        }
-    };
-}
-
 models! {
-    J3507 "DM-J3507" 12.566 50.0 5.0,
-    J4310 "DM-J4310" 12.5 30.0 10.0,
-    J4310P "DM-J4310P" 12.5 50.0 10.0,
-    J4340 "DM-J4340" 12.5 10.0 28.0,
-    J4340P "DM-J4340P" 12.5 10.0 28.0,
-    J6006 "DM-J6006" 12.5 45.0 20.0,
-    J8006 "DM-J8006" 12.5 45.0 40.0,
-    J8009 "DM-J8009" 12.5 45.0 54.0,
-    J10010 "DM-J10010" 12.5 20.0 200.0,
-    J10010L "DM-J10010L" 12.5 25.0 200.0,
-    H3510 "DM-H3510" 12.5 280.0 1.0,
-    H6215 "DM-H6215" 12.5 45.0 10.0,
+    J3507 "DM-J3507" 12.566 50.0 5.0;
+    J4310 "DM-J4310" 12.5 30.0 10.0;
+    J4310P "DM-J4310P" 12.5 50.0 10.0;
+    J4340 "DM-J4340" 12.5 10.0 28.0;
+    J4340P "DM-J4340P" 12.5 10.0 28.0;
+    J6006 "DM-J6006" 12.5 45.0 20.0;
+    J8006 "DM-J8006" 12.5 45.0 40.0;
+    J8009 "DM-J8009" 12.5 45.0 54.0;
+    J10010 "DM-J10010" 12.5 20.0 200.0;
+    J10010L "DM-J10010L" 12.5 25.0 200.0;
+    H3510 "DM-H3510" 12.5 280.0 1.0;
+    H6215 "DM-H6215" 12.5 45.0 10.0;
 }
+
+mit_model!(4_095);
 
 impl Model {
     /// Describes a model that the table does not have, or a drive that is set otherwise: its registers PMAX in rad, VMAX in rad/s
@@ -93,62 +80,6 @@ impl Model {
     }
 
     const fn known(name: &'static str, pmax: f32, vmax: f32, tmax: f32) -> Self {
-        Self { name, ranges: Ranges::of(pmax, vmax, tmax) }
-    }
-
-    /// Returns the name, as errors print it.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        self.name
-    }
-
-    /// Returns the ranges of the fields.
-    #[must_use]
-    pub const fn ranges(&self) -> &Ranges {
-        &self.ranges
-    }
-
-    /// Returns the largest value of each MIT field.
-    #[must_use]
-    pub const fn most(&self) -> Impedance {
-        let (stiffness, damping) = self.ranges.gains();
-        Impedance {
-            angle: Angle::from_radians(self.pmax_rad()),
-            velocity: AngularVelocity::from_rad_per_s(self.vmax_rad_per_s()),
-            stiffness,
-            damping,
-            torque_nm: self.tmax_nm(),
-        }
-    }
-
-    /// Returns the value of a count of each MIT field.
-    #[must_use]
-    pub const fn count(&self) -> Impedance {
-        let (stiffness, damping) = self.ranges.gains();
-        Impedance {
-            angle: Angle::from_radians(2.0 * self.pmax_rad() / 65_535.0),
-            velocity: AngularVelocity::from_rad_per_s(2.0 * self.vmax_rad_per_s() / 4_095.0),
-            stiffness: stiffness / 4_095.0,
-            damping: damping / 4_095.0,
-            torque_nm: 2.0 * self.tmax_nm() / 4_095.0,
-        }
-    }
-
-    /// Returns the largest position of the fields, in rad.
-    #[must_use]
-    pub const fn pmax_rad(&self) -> f32 {
-        self.ranges.position_rad()
-    }
-
-    /// Returns the largest velocity of the fields, in rad/s.
-    #[must_use]
-    pub const fn vmax_rad_per_s(&self) -> f32 {
-        self.ranges.velocity_rad_per_s()
-    }
-
-    /// Returns the largest torque of the fields, in Nm.
-    #[must_use]
-    pub const fn tmax_nm(&self) -> f32 {
-        self.ranges.torque_nm()
+        Self { name, ranges: Ranges::of([pmax, vmax, tmax], [500.0, 5.0]) }
     }
 }

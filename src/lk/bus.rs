@@ -1,15 +1,14 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{id_of, is_command};
-use super::config::{Goal, Mode};
+use super::config::Mode;
 use super::model::{MOST_COUNTS, RAD_PER_DEGREE};
-use super::questions::Questions;
 use super::{Command, Feedback, Model, State};
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
-    Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
+    Questions, Role, Severity, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -130,22 +129,23 @@ impl Motor {
         (self.rotor * TURN) >> 16
     }
 
-    /// Returns the command for a goal; `None` if the drive cannot be told.
-    fn command(&self, goal: Goal) -> Option<Command> {
+    /// Returns the command for a goal with a limit; `None` if the drive cannot be told.
+    fn command(&self, goal: Goal, limit: u16) -> Option<Command> {
         let to_rotor = 100.0 * self.model.gear() / RAD_PER_DEGREE;
         match goal {
             Goal::Torque(torque_nm) => {
                 let counts = self.turned(torque_nm) / self.model.torque_per_count();
                 Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
             }
-            Goal::Velocity(velocity, limit) => {
+            Goal::Velocity(velocity) => {
                 Some(Command::Velocity(whole(self.turned(velocity) * to_rotor), limit))
             }
-            Goal::Way(way, limit) => {
+            Goal::Way(way) => {
                 let way = i64::from(whole(self.turned(way) * to_rotor));
                 let angle = self.ahead? + self.rotor_angle() + way;
                 Some(Command::Position(i32::try_from(angle).ok()?, limit))
             }
+            Goal::Impedance(_) => None,
         }
     }
 
@@ -190,8 +190,8 @@ impl OwnMotor for Motor {
         }
         let data = frame.bytes();
         let [code, ..] = *data;
-        let is_answer = [0x9C, 0xA1, self.mode.code()].contains(&code);
-        if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
+        let is_answer = [0x9C, 0xA1, self.mode.0.number].contains(&code);
+        if !is_answer || is_command(data, self.mode.limit(1.0, &self.model.scale())) {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
@@ -226,10 +226,11 @@ impl OwnMotor for Motor {
     /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
     /// from the angle until that has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
-        let needs_angle = self.mode.needs_angle();
-        let shaft = (self.angle(), self.velocity());
-        let goal = self.mode.goal(order, shaft, &self.model.scale());
-        let command = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
+        let needs_angle = self.mode.0.is_angle();
+        let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
+        let goal = self.mode.0.goal(order, shaft, scale.max_velocity);
+        let limit = self.mode.limit(order.share, &scale);
+        let command = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
         self.silent = if needs_angle { self.silent.saturating_add(1) } else { 0 };
         if self.silent > SILENT {
             return self.frame_of(Command::ReadAngle);
@@ -244,7 +245,7 @@ impl OwnMotor for Motor {
     }
 
     fn reset(&mut self) {
-        self.mode.reset();
+        self.mode.0.reset();
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
     }
 
@@ -285,7 +286,7 @@ impl OwnMotor for Motor {
     }
 
     fn is_enabled(&self) -> Option<bool> {
-        let lacks_angle = self.mode.needs_angle() && self.is_wanted && self.ahead.is_none();
+        let lacks_angle = self.mode.0.is_angle() && self.is_wanted && self.ahead.is_none();
         Some(self.is_on && !lacks_angle)
     }
 
@@ -303,7 +304,7 @@ impl OwnMotor for Motor {
             self.state = Some(state);
             return true;
         }
-        if let Some(angle) = Feedback::decode_angle(data).filter(|_| self.mode.needs_angle()) {
+        if let Some(angle) = Feedback::decode_angle(data).filter(|_| self.mode.0.is_angle()) {
             self.take_angle(angle);
             return true;
         }
@@ -327,9 +328,8 @@ impl OwnMotor for Motor {
     }
 
     fn capabilities(&self) -> Capabilities {
-        let capabilities = self.mode.capabilities();
-        let known = capabilities.with(Capability::Feedback).with(Capability::Temperature);
-        known.with(Capability::ErrorCodes)
+        let capabilities = self.mode.0.capabilities().with(Capability::Temperature);
+        capabilities.with(Capability::ErrorCodes)
     }
 
     fn vitals(&self) -> Vitals {
@@ -339,7 +339,7 @@ impl OwnMotor for Motor {
             temperature_c: Some(drive.temperature_c.into()),
             error: (errors != 0).then_some(Severity::Fault),
             error_code: errors,
-            effort: self.mode.effort(),
+            effort: self.mode.0.effort(),
             speed: self.model.speed_share(self.velocity().as_rad_per_s()),
             current: self.turned(f32::from(drive.current) / MOST_COUNTS),
         }

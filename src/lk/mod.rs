@@ -78,7 +78,6 @@ pub(crate) mod command;
 pub(crate) mod config;
 mod feedback;
 pub(crate) mod model;
-pub(crate) mod questions;
 #[cfg(test)]
 mod tests;
 

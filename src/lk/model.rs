@@ -1,6 +1,7 @@
 //! Facts of the models, as a table that a program can extend.
 
 use crate::error::{ConfigError, check};
+use crate::motor::models;
 
 /// The largest current of a command, in counts.
 pub(super) const MOST_COUNTS: f32 = 2_048.0;
@@ -60,31 +61,11 @@ pub struct Model {
     encoder_bits: u8,
 }
 
-macro_rules! models {
-    ($($model:ident $name:literal $series:ident $gear:literal $constant:literal $bits:literal,)+) => {
-        impl Model {
-            $(
-                #[doc = concat!("The ", $name, ".")]
-                pub const $model: Self = Self {
-                    name: $name,
-                    series: Series::$series,
-                    gear: $gear,
-                    torque_constant: $constant,
-                    encoder_bits: $bits,
-                };
-            )+
-
-            /// The models of the table.
-            pub const ALL: &[Self] = &[$(Self::$model),+];
-        }
-    };
-}
-
 models! {
-    MF9025_16T "MF9025-16T" Mf 1.0 0.32 16,
-    MF9025_35T "MF9025-35T" Mf 1.0 0.81 16,
-    MG4005E_I10 "MG4005E-i10" Mg 10.0 0.6 16,
-    MG5010E_I10 "MG5010E-i10" Mg 10.0 1.0 16,
+    MF9025_16T "MF9025-16T" Series::Mf 1.0 0.32 16;
+    MF9025_35T "MF9025-35T" Series::Mf 1.0 0.81 16;
+    MG4005E_I10 "MG4005E-i10" Series::Mg 10.0 0.6 16;
+    MG5010E_I10 "MG5010E-i10" Series::Mg 10.0 1.0 16;
 }
 
 impl Model {
@@ -106,7 +87,11 @@ impl Model {
         check!(ConfigError::check_range("gear", gear, 1.0, 1_000.0));
         check!(ConfigError::check_range("torque constant", torque_constant, 0.001, 1_000.0));
         check!(ConfigError::check_range("encoder bits", encoder_bits as f32, 14.0, 16.0));
-        Ok(Self { name, series, gear, torque_constant, encoder_bits })
+        Ok(Self::known(name, series, gear, torque_constant, encoder_bits))
+    }
+
+    const fn known(name: &'static str, series: Series, gear: f32, constant: f32, bits: u8) -> Self {
+        Self { name, series, gear, torque_constant: constant, encoder_bits: bits }
     }
 
     /// Returns the name, as errors print it.

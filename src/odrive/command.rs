@@ -2,6 +2,7 @@
 
 use super::Firmware;
 use crate::frame::CanFrame;
+use crate::motor::Form;
 use embedded_can::{Frame, Id, StandardId};
 
 /// The number of the heartbeat.
@@ -68,33 +69,36 @@ impl Command {
     /// Writes the frame for a node, 0 to 63; the upper bits of a larger one are left out.
     #[must_use]
     pub fn frame(self, node: u8) -> CanFrame {
-        match self {
-            Self::Stop => CanFrame::of(id(node, 0x02), []),
-            Self::AxisState(state) => CanFrame::of(id(node, 0x07), state.to_le_bytes()),
+        let (number, first, second) = match self {
+            Self::Stop => return CanFrame::of(id(node, 0x02), []),
+            Self::ClearErrors => return CanFrame::of(id(node, 0x18), [0]),
+            Self::AxisState(state) => (0x07, state.to_le_bytes(), None),
             Self::ControllerMode(control, input) => {
-                words(node, 0x0B, control.to_le_bytes(), input.to_le_bytes())
+                (0x0B, control.to_le_bytes(), Some(input.to_le_bytes()))
             }
             Self::Position(position, velocity, torque) => {
                 let [a, b] = thousandths(velocity).to_le_bytes();
                 let [c, d] = thousandths(torque).to_le_bytes();
-                words(node, 0x0C, position.to_le_bytes(), [a, b, c, d])
+                (0x0C, position.to_le_bytes(), Some([a, b, c, d]))
             }
-            Self::Velocity(velocity, torque) => floats(node, 0x0D, velocity, torque),
-            Self::Torque(torque) => CanFrame::of(id(node, 0x0E), torque.to_le_bytes()),
-            Self::Limits(velocity, current) => floats(node, 0x0F, velocity, current),
-            Self::TrajectoryVelocity(limit) => CanFrame::of(id(node, 0x11), limit.to_le_bytes()),
-            Self::TrajectoryAcceleration(up, down) => floats(node, 0x12, up, down),
-            Self::ClearErrors => CanFrame::of(id(node, 0x18), [0]),
+            Self::Velocity(velocity, torque) => floats(0x0D, velocity, Some(torque)),
+            Self::Torque(torque) => floats(0x0E, torque, None),
+            Self::Limits(velocity, current) => floats(0x0F, velocity, Some(current)),
+            Self::TrajectoryVelocity(limit) => floats(0x11, limit, None),
+            Self::TrajectoryAcceleration(up, down) => floats(0x12, up, Some(down)),
+        };
+        let ([a, b, c, d], id) = (first, id(node, number));
+        match second {
+            Some([e, f, g, h]) => CanFrame::of(id, [a, b, c, d, e, f, g, h]),
+            None => CanFrame::of(id, first),
         }
     }
 }
 
-fn floats(node: u8, number: u8, first: f32, second: f32) -> CanFrame {
-    words(node, number, first.to_le_bytes(), second.to_le_bytes())
-}
+type Words = (u8, [u8; 4], Option<[u8; 4]>);
 
-fn words(node: u8, number: u8, [a, b, c, d]: [u8; 4], [e, f, g, h]: [u8; 4]) -> CanFrame {
-    CanFrame::of(id(node, number), [a, b, c, d, e, f, g, h])
+fn floats(number: u8, first: f32, second: Option<f32>) -> Words {
+    (number, first.to_le_bytes(), second.map(f32::to_le_bytes))
 }
 
 /// Rounds to nearest and saturates; NaN is zero.
@@ -116,14 +120,19 @@ pub(super) fn request(node: u8, number: u8) -> CanFrame {
 /// byte 0            1 .. 2       3   4 ..
 /// 0 read, 1 write   endpoint     0   value, low byte first
 /// ```
-pub(super) fn endpoint(node: u8, number: u16, value: Option<&[u8; 4]>, length: usize) -> CanFrame {
-    let [low, high] = number.to_le_bytes();
-    let id = id(node, ASK_ENDPOINT);
-    match (value, length) {
+pub(super) fn endpoint(node: u8, number: u16, form: Form, value: Option<f32>) -> CanFrame {
+    let ([low, high], id) = (number.to_le_bytes(), id(node, ASK_ENDPOINT));
+    match (value.map(|value| form.bytes_of(value)), form) {
         (None, _) => CanFrame::of(id, [0, low, high, 0]),
-        (Some([a, ..]), 1) => CanFrame::of(id, [1, low, high, 0, *a]),
-        (Some([a, b, c, d]), _) => CanFrame::of(id, [1, low, high, 0, *a, *b, *c, *d]),
+        (Some([a, b, c, d]), Form::F32) => CanFrame::of(id, [1, low, high, 0, a, b, c, d]),
+        (Some([a, ..]), _) => CanFrame::of(id, [1, low, high, 0, a]),
     }
+}
+
+/// Returns the form of an endpoint: the watchdog's time is a float, all others have one byte.
+pub(super) const fn form_of(number: u16, endpoints: &[(u16, f32); 4]) -> Form {
+    let [_, _, (timeout, _), _] = *endpoints;
+    if number == timeout { Form::F32 } else { Form::U8 }
 }
 
 /// Returns the id of a message: `node * 32 + number`.

@@ -1,5 +1,7 @@
 //! The codec of what a drive sends.
 
+use crate::motor::lowest_bit;
+
 /// The generation of the firmware, which decides what a heartbeat means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -92,22 +94,17 @@ impl Heartbeat {
     #[must_use]
     pub const fn decode(data: &[u8; 8], firmware: Firmware) -> Option<Self> {
         let [a, b, c, d, state, x, y, z] = *data;
-        let axis_error = u32::from_le_bytes([a, b, c, d]);
-        match firmware {
-            Firmware::V0_5 => {
-                if x > 1 || y > 1 || z & 0x7E != 0 {
-                    return None;
-                }
-                let has_errors = [x == 1, y == 1, z & 1 == 1];
-                let is_done = z & 0x80 != 0;
-                Some(Self { axis_error, state, has_errors, procedure_result: 0, is_done })
-            }
-            Firmware::V0_6 => {
-                let is_done = y & 1 == 1;
-                let has_errors = [false; 3];
-                Some(Self { axis_error, state, has_errors, procedure_result: x, is_done })
-            }
+        let is_old = matches!(firmware, Firmware::V0_5);
+        if is_old && (x > 1 || y > 1 || z & 0x7E != 0) {
+            return None;
         }
+        Some(Self {
+            axis_error: u32::from_le_bytes([a, b, c, d]),
+            state,
+            has_errors: if is_old { [x == 1, y == 1, z & 1 == 1] } else { [false; 3] },
+            procedure_result: if is_old { 0 } else { x },
+            is_done: if is_old { z & 0x80 != 0 } else { y & 1 == 1 },
+        })
     }
 
     /// Returns the number of an error, 0 where there is none: 1 to 32 for the lowest bit of the axis error, 33 to 35 for an error of
@@ -119,7 +116,7 @@ impl Heartbeat {
             (0, [true, ..]) => 33,
             (0, [_, true, _]) => 34,
             (0, _) => 35,
-            (error, _) => bit_of(error),
+            (error, _) => lowest_bit(error),
         }
     }
 
@@ -131,12 +128,6 @@ impl Heartbeat {
         };
         self.axis_error & bit != 0
     }
-}
-
-/// Returns the number of the lowest bit, from 1; 0 for no bit.
-#[expect(clippy::cast_possible_truncation, reason = "at most 32")]
-pub(super) const fn bit_of(error: u32) -> u8 {
-    if error == 0 { 0 } else { error.trailing_zeros() as u8 + 1 }
 }
 
 /// Reads the value of an endpoint from an answer of 5 to 8 bytes; `None` for that of another one.

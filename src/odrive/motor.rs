@@ -1,11 +1,11 @@
 //! The motor: what a program configures, and what it may ask and request.
 
-use super::config::{Endpoints, Mode, Setting};
+use super::config::{Endpoints, Mode};
 use super::enabling::Phase;
 use super::{Feedback, Firmware, Heartbeat, Model};
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
-use crate::motor::Settings;
+use crate::motor::{Settings, Told};
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
@@ -33,9 +33,15 @@ pub struct Motor {
     /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
     pub(super) gear: f32,
     pub(super) mode: Mode,
-    /// The endpoints, and the watchdog in s.
-    pub(super) endpoints: Option<(Endpoints, f32)>,
-    pub(super) settings: Settings<Setting, { Setting::ALL.len() }>,
+    /// The numbers of the endpoints, and the values that they have to have.
+    pub(super) endpoints: Option<[(u16, f32); 4]>,
+    pub(super) settings: Settings<u16, 4>,
+    pub(super) state: State,
+}
+
+/// What a motor has heard and sent.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct State {
     /// The last estimates; `None` before the first.
     pub(super) drive: Option<Feedback>,
     /// The last heartbeat; `None` before the first, and when it is too old.
@@ -49,16 +55,15 @@ pub struct Motor {
     pub(super) refused: Option<(u8, u8)>,
     /// Since the last estimates, while driven.
     pub(super) age_s: f32,
-    /// Since the last heartbeat, while driven.
+    /// Since the last heartbeat.
     pub(super) silence_s: f32,
-    /// Inquiries since the last heartbeat, while at rest.
     pub(super) inquiries: u8,
     /// The last command was a request for estimates.
     pub(super) has_polled: bool,
     /// Frames of rest since the last estimates.
     pub(super) rests: u8,
-    /// The share in the last limits that were sent, in parts, and the commands since.
-    pub(super) limits: (u8, u8),
+    /// The share in the last limits, in parts.
+    pub(super) limits: Told,
     /// How often errors are still to be cleared.
     pub(super) clears: u8,
     pub(super) stops: bool,
@@ -90,21 +95,8 @@ impl Motor {
             gear: 1.0,
             mode,
             endpoints: None,
-            settings: Settings::new(Setting::ALL),
-            drive: None,
-            heartbeat: None,
-            errors: (0, 0),
-            phase: Phase::Off,
-            enabling: None,
-            refused: None,
-            age_s: 0.0,
-            silence_s: 0.0,
-            inquiries: 0,
-            has_polled: false,
-            rests: 0,
-            limits: (0, 0),
-            clears: 0,
-            stops: false,
+            settings: Settings::new([0; 4]),
+            state: State::default(),
         })
     }
 
@@ -138,36 +130,38 @@ impl Motor {
         }
         let micros =
             ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;
-        Ok(Self { endpoints: Some((endpoints, micros as f32 * 1e-6)), ..self })
+        let values = endpoints.values(&self.mode, micros as f32 * 1e-6);
+        let settings = Settings::new(values.map(|(number, _)| number));
+        Ok(Self { endpoints: Some(values), settings, ..self })
     }
 
     /// Returns the last encoder estimates; `None` before the first.
     #[must_use]
     pub const fn feedback(&self) -> Option<&Feedback> {
-        self.drive.as_ref()
+        self.state.drive.as_ref()
     }
 
     /// Returns the last heartbeat; `None` before the first, and if it is older than half a second.
     #[must_use]
     pub const fn heartbeat(&self) -> Option<&Heartbeat> {
-        self.heartbeat.as_ref()
+        self.state.heartbeat.as_ref()
     }
 
     /// Returns the active errors of firmware 0.6 and the reason for which it disarmed last, a bit each, as asked for at rest.
     #[must_use]
     pub const fn errors(&self) -> (u32, u32) {
-        self.errors
+        self.state.errors
     }
 
     /// Has the drive clear its errors, in 0.5 those of both axes, while the motor is disarmed: three times, 10 ms apart. Nothing else
     /// clears them, for an encoder that failed once may fail again. A motor that is driven forgets the request.
     pub const fn clear_errors(&mut self) {
-        self.clears = 3;
+        self.state.clears = 3;
     }
 
     /// Has the drive disarm with an error, beside the emergency stop of the bus: with each update, until a heartbeat has that error.
     /// The drive stays disarmed, whatever it is sent, until its errors are [cleared](Self::clear_errors).
     pub const fn stop(&mut self) {
-        self.stops = true;
+        self.state.stops = true;
     }
 }

@@ -7,12 +7,10 @@ use super::{Command, Feedback, Motor, State};
 use crate::frame::CanFrame;
 use crate::lk::bus::{SILENT, whole};
 use crate::lk::command::{id_of, is_command};
-use crate::lk::config::Goal;
 use crate::lk::model::RAD_PER_DEGREE;
-use crate::lk::questions::Questions;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
-    Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Goal, Ingest, Malformed, MotorName, Order, OwnMotor,
+    Questions, Role, Severity, Vitals, WrongSetting, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 
@@ -38,28 +36,29 @@ impl Motor {
         if self.is_reversed { -value } else { value }
     }
 
-    /// Returns the command for a goal; `None` if the drive cannot be told.
-    fn command(&self, goal: Goal) -> Option<Command> {
+    /// Returns the command for a goal with a limit; `None` if the drive cannot be told.
+    fn command(&self, goal: Goal, limit: u16) -> Option<Command> {
         let counts = 100.0 / RAD_PER_DEGREE;
         match goal {
             Goal::Torque(torque_nm) => {
                 let counts = self.turned(torque_nm) / self.model.scale().torque_per_count;
                 Some(Command::Torque(i16::try_from(whole(counts)).ok()?))
             }
-            Goal::Velocity(velocity, _) => {
+            Goal::Velocity(velocity) => {
                 Some(Command::Velocity(whole(self.turned(velocity) * counts)))
             }
-            Goal::Way(way, limit) => {
+            Goal::Way(way) => {
                 let angle = self.track?.counts() + i64::from(whole(self.turned(way) * counts));
                 Some(Command::Position(i32::try_from(angle).ok()?, limit))
             }
+            Goal::Impedance(_) => None,
         }
     }
 
     /// The frame that has to be answered before the drive may be driven: a torque does not release the holding brake, and a
     /// position counts from the angle.
     const fn preparation(&self) -> Option<Command> {
-        match self.mode.code() {
+        match self.mode.0.number {
             0xA1 => Some(Command::ReleaseBrake),
             0xA4 => Some(Command::ReadAngle),
             _ => None,
@@ -86,7 +85,7 @@ impl Motor {
         if self.has_angle && self.track.is_some_and(|track| track.is_far_from(angle)) {
             self.doubt();
         } else {
-            self.enabling.is_prepared |= self.mode.needs_angle();
+            self.enabling.is_prepared |= self.mode.0.is_angle();
         }
         self.track = Some(Track::new(angle, drive.angle_deg));
         (self.has_angle, self.silent) = (true, 0);
@@ -108,8 +107,8 @@ impl OwnMotor for Motor {
             return Ingest::Malformed(Malformed::Length(frame.length()));
         }
         let data = frame.bytes();
-        let is_answer = [0x9C, 0xA1, self.mode.code()].contains(&data[0]);
-        if !is_answer || is_command(data, self.mode.limit(&self.model.scale())) {
+        let is_answer = [0x9C, 0xA1, self.mode.0.number].contains(&data[0]);
+        if !is_answer || is_command(data, self.mode.limit(1.0, &self.model.scale())) {
             return Ingest::Unrelated;
         }
         let Some(feedback) = Feedback::decode(data) else { return Ingest::Unrelated };
@@ -144,10 +143,11 @@ impl OwnMotor for Motor {
             let way = 100.0 * f32::from(drive.velocity_dps) * order.step.dt_s();
             track.advance(way, drive.angle_deg);
         }
-        let shaft = (self.angle(), self.velocity());
-        let goal = self.mode.goal(order, shaft, &self.model.scale());
-        self.last = goal.and_then(|goal| self.command(goal)).unwrap_or(Command::REST);
-        self.silent = self.silent.saturating_add(self.mode.needs_angle().into());
+        let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
+        let goal = self.mode.0.goal(order, shaft, scale.max_velocity);
+        let limit = self.mode.limit(order.share, &scale);
+        self.last = goal.and_then(|goal| self.command(goal, limit)).unwrap_or(Command::REST);
+        self.silent = self.silent.saturating_add(self.mode.0.is_angle().into());
         if self.silent > SILENT {
             return self.frame_of(Command::ReadAngle);
         }
@@ -159,7 +159,7 @@ impl OwnMotor for Motor {
     }
 
     fn reset(&mut self) {
-        self.mode.reset();
+        self.mode.0.reset();
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
     }
 
@@ -229,7 +229,7 @@ impl OwnMotor for Motor {
             0x92 => {
                 Feedback::decode_angle(data).into_iter().for_each(|angle| self.take_angle(angle))
             }
-            0x77 => self.enabling.is_prepared |= self.mode.code() == 0xA1,
+            0x77 => self.enabling.is_prepared |= self.mode.0.number == 0xA1,
             0xB3 => self.timeout_found = Some(u32::from_le_bytes([a, b, c, d])),
             0x78 => self.is_open = false,
             0x80 => self.enabling.is_off = !self.enabling.is_wanted,
@@ -264,12 +264,10 @@ impl OwnMotor for Motor {
     }
 
     fn capabilities(&self) -> Capabilities {
-        let capabilities = self.mode.capabilities();
-        let known = capabilities.with(Capability::Feedback).with(Capability::Temperature);
-        known.with(Capability::ErrorCodes)
+        let capabilities = self.mode.0.capabilities().with(Capability::Temperature);
+        capabilities.with(Capability::ErrorCodes)
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "16 bits")]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.drive else { return Vitals::default() };
         let (errors, supply_v) =
@@ -280,8 +278,8 @@ impl OwnMotor for Motor {
         Vitals {
             temperature_c: Some(drive.temperature_c.into()),
             error: (errors != 0).then_some(Severity::Fault),
-            error_code: if errors == 0 { 0 } else { errors.trailing_zeros() as u8 + 1 },
-            effort: self.mode.effort(),
+            error_code: lowest_bit(errors.into()),
+            effort: self.mode.0.effort(),
             speed: if supply_v > 0.0 { speed / supply_v } else { 0.0 },
             current: self.turned(current / self.model.max_current_a()),
         }

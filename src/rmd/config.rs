@@ -5,7 +5,7 @@ use super::track::Track;
 use super::{Command, Feedback, Model, State};
 use crate::error::ConfigError;
 pub use crate::lk::Mode;
-use crate::lk::questions::Questions;
+use crate::motor::Questions;
 use crate::time::Duration;
 
 /// The time-out of the drive, in ms, unless the program sets another one.

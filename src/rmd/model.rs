@@ -2,6 +2,7 @@
 
 use crate::error::{ConfigError, check};
 use crate::lk::model::Scale;
+use crate::motor::models;
 
 /// The current of a count, in A (manual, "torque closed loop").
 pub(super) const AMPERES_PER_COUNT: f32 = 0.01;
@@ -42,35 +43,17 @@ pub struct Model {
     max_current_a: f32,
 }
 
-macro_rules! models {
-    ($($model:ident $name:literal $constant:literal $current:literal,)+) => {
-        impl Model {
-            $(
-                #[doc = concat!("The ", $name, ".")]
-                pub const $model: Self = Self {
-                    name: $name,
-                    torque_constant: $constant,
-                    max_current_a: $current,
-                };
-            )+
-
-            /// The models of the table.
-            pub const ALL: &[Self] = &[$(Self::$model),+];
-        }
-    };
-}
-
 models! {
-    X2_7 "RMD-X2-7" 0.8 8.1,
-    X4_10 "RMD-X4-10" 0.8 19.5,
-    X4_36 "RMD-X4-36" 1.9 21.5,
-    X6_40 "RMD-X6-40" 3.46 5.2,
-    X8_60 "RMD-X8-60" 7.5 4.0,
-    X8_90 "RMD-X8-90" 2.5 10.0,
-    X8_120 "RMD-X8-120" 2.4 43.8,
-    X10_100 "RMD-X10-100" 7.46 6.7,
-    X12_320 "RMD-X12-320" 3.3 100.0,
-    X15_450 "RMD-X15-450" 5.8 69.2,
+    X2_7 "RMD-X2-7" 0.8 8.1;
+    X4_10 "RMD-X4-10" 0.8 19.5;
+    X4_36 "RMD-X4-36" 1.9 21.5;
+    X6_40 "RMD-X6-40" 3.46 5.2;
+    X8_60 "RMD-X8-60" 7.5 4.0;
+    X8_90 "RMD-X8-90" 2.5 10.0;
+    X8_120 "RMD-X8-120" 2.4 43.8;
+    X10_100 "RMD-X10-100" 7.46 6.7;
+    X12_320 "RMD-X12-320" 3.3 100.0;
+    X15_450 "RMD-X15-450" 5.8 69.2;
 }
 
 impl Model {
@@ -91,7 +74,11 @@ impl Model {
             AMPERES_PER_COUNT,
             327.0
         ));
-        Ok(Self { name, torque_constant, max_current_a })
+        Ok(Self::known(name, torque_constant, max_current_a))
+    }
+
+    const fn known(name: &'static str, torque_constant: f32, max_current_a: f32) -> Self {
+        Self { name, torque_constant, max_current_a }
     }
 
     /// Returns the name, as errors print it.

@@ -2,14 +2,13 @@
 
 use super::command::{Command, extended};
 use super::config::Mode;
-use super::feedback::{Answer, answer, laps, register, report_code};
-use super::setup::Setup;
+use super::feedback::{FAULTS, VALUE, answer, register, report_code};
 use super::{Feedback, Model, Register, Status};
 use crate::error::{ConfigError, check};
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor, Role,
-    Severity, Vitals, WrongSetting,
+    Capabilities, Capability, Claim, Ingest, Inquiry, Laps, Malformed, MotorName, Order, OwnMotor,
+    Preparation, Role, Settings, Severity, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -56,15 +55,21 @@ pub struct Motor {
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     /// How many times the range of the feedback the shaft is away from the turns that it can report.
-    laps: i32,
+    laps: Laps,
     /// The faults of the last report.
     reported: u32,
     /// Faults were cleared since then.
     has_cleared: bool,
-    setup: Setup,
+    settings: Settings<Register, 3>,
+    /// A command that waits for the drive to rest.
+    once: Option<Command>,
+    /// Counts questions.
+    questions: u8,
     /// Counts the frames that disable since the drive reported a fault.
     turn: u8,
 }
+
+register_questions!();
 
 impl Motor {
     /// Takes the model, the id of the drive, 1 to 127, and the run mode. The id of the host is 0xFD.
@@ -83,10 +88,12 @@ impl Motor {
             timeout_units: TIMEOUT_UNITS,
             mode,
             drive: None,
-            laps: 0,
+            laps: Laps::default(),
             reported: 0,
             has_cleared: false,
-            setup: Setup::new([Register::RunMode, Register::MechanicalPosition, last]),
+            settings: Settings::new([Register::RunMode, Register::MechanicalPosition, last]),
+            once: None,
+            questions: 0,
             turn: 0,
         })
     }
@@ -127,23 +134,6 @@ impl Motor {
         self.reported
     }
 
-    /// Asks the drive for a parameter. While the motor is disarmed the frame goes out within some 10 ms, and again until
-    /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
-    pub const fn read(&mut self, register: Register) {
-        self.setup.settings.request(Inquiry::Read(register));
-    }
-
-    /// Writes a parameter of the drive, until the supply is lost, and reads it back; while the motor is disarmed, as
-    /// [`read`](Self::read).
-    ///
-    /// # Errors
-    /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the parameter.
-    pub fn write(&mut self, register: Register, value: f32) -> Result<(), ConfigError> {
-        register.check(value)?;
-        self.setup.settings.request(Inquiry::Write(register, value));
-        Ok(())
-    }
-
     /// Has the drive keep its parameters over a loss of the supply; while the motor is disarmed.
     /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
     ///
@@ -153,14 +143,14 @@ impl Motor {
         if !self.model.can_store() {
             return Err(ConfigError::Unsupported("frame to store parameters"));
         }
-        self.setup.settings.request(Inquiry::Store);
+        self.settings.request(Inquiry::Store);
         Ok(())
     }
 
     /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A RobStride keeps the zero over a loss of
     /// the supply if it is [stored](Self::store), a CyberGear does not.
     pub const fn set_zero(&mut self) {
-        self.setup.once = Some(Command::SetZero);
+        self.once = Some(Command::SetZero);
     }
 
     /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once. This motor then hears no more
@@ -173,61 +163,37 @@ impl Motor {
         if id == self.host {
             return Err(ConfigError::Conflict("id"));
         }
-        self.setup.once = Some(Command::SetId(id));
+        self.once = Some(Command::SetId(id));
         Ok(())
-    }
-
-    /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the parameter and its value in the drive, NaN if
-    /// the drive does not have it.
-    #[must_use]
-    pub const fn register(&self) -> Option<(Register, f32)> {
-        self.setup.settings.answer()
     }
 
     fn frame_of(&self, command: Command) -> CanFrame {
         command.encode(&self.model, self.host, self.id)
     }
 
-    /// Returns what the drive has to confirm before it is enabled: first its time-out.
-    fn preparation(&self) -> Option<(Register, f32)> {
-        match (self.setup.prepared, self.model.has_timeout()) {
-            (0, true) => Some((Register::Timeout, self.timeout_units as f32)),
-            (index, has_timeout) => self.mode.preparation(index - usize::from(has_timeout)),
-        }
-    }
-
-    /// Returns the value that a parameter has to have; of the position the end of its range.
-    fn expected(&self, register: Register) -> f32 {
+    /// Returns the manual's name of a parameter, and the value that it has to have; of the position the end of its range.
+    fn expected(&self, register: Register) -> (&'static str, f32) {
         match register {
-            Register::RunMode => self.mode.number(&self.model).into(),
-            Register::Timeout => self.timeout_units as f32,
-            _ => self.model.pmax_rad(),
+            Register::RunMode => ("run_mode", self.mode.number(&self.model).into()),
+            Register::Timeout => ("canTimeout", self.timeout_units as f32),
+            _ => ("mechPos", self.model.pmax_rad()),
         }
     }
 
     /// Tells whether a value in the drive is right. The time-out only has to be there: it is written later.
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
-            Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
-            Register::MechanicalPosition if self.mode.needs_angle() => {
+            Register::RunMode => found.to_bits() == self.expected(register).1.to_bits(),
+            Register::MechanicalPosition if self.mode.control.is_angle() => {
                 found.abs() < self.model.pmax_rad()
             }
             _ => found.is_finite(),
         }
     }
 
-    /// Tells whether the drive is in another mode, as far as it says.
-    fn has_wrong_mode(&self) -> bool {
-        let is_right =
-            |register, found| register != Register::RunMode || self.is_right(register, found);
-        matches!(self.setup.settings.wrong(is_right), Some((Register::RunMode, Some(_))))
-    }
-
     fn has_fault(&self) -> bool {
-        self.reported != 0
-            || self
-                .drive
-                .is_some_and(|drive| drive.faults != 0 || drive.status == Status::Calibration)
+        let has_fault = |drive: Feedback| drive.faults != 0 || drive.status == Status::Calibration;
+        self.reported != 0 || self.drive.is_some_and(has_fault)
     }
 
     /// Disables the drive; where it reports a fault, each second frame since then clears that.
@@ -267,7 +233,7 @@ impl OwnMotor for Motor {
         let pmax = self.model.pmax_rad();
         let before = self.drive.map(|drive| drive.measured.position_rad);
         let way = before.map_or(0.0, |before| feedback.measured.position_rad - before);
-        self.laps = self.laps.saturating_add(i32::from(way < -pmax) - i32::from(way > pmax));
+        self.laps.advance(way, pmax);
         if self.has_cleared && feedback.faults == 0 {
             (self.reported, self.has_cleared) = (0, false);
         }
@@ -276,30 +242,23 @@ impl OwnMotor for Motor {
     }
 
     fn velocity(&self) -> AngularVelocity {
-        let velocity = self.drive.map_or(0.0, |drive| drive.measured.velocity_rad_per_s);
-        AngularVelocity::from_rad_per_s(velocity)
+        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.velocity())
     }
 
     /// Beyond the range of the feedback there is none: a RobStride reports the rest of a lap then.
     fn angle(&self) -> Option<Angle> {
-        self.drive.filter(|_| self.laps == 0)?.angle()
+        self.drive.filter(|_| self.laps.is_none())?.angle()
     }
 
     fn rest(&mut self) -> CanFrame {
-        match self.mode.rest() {
-            Some(command) => self.frame_of(command),
-            None => self.off(),
-        }
+        let rest = self.mode.rest().map(|rest| self.frame_of(rest));
+        rest.unwrap_or_else(|| self.off())
     }
 
     fn control(&mut self, order: Order) -> CanFrame {
-        let angle = self.angle();
-        let command =
-            self.drive.and_then(|drive| self.mode.command(order, (angle, &drive), &self.model));
-        match command {
-            Some(command) => self.frame_of(command),
-            None => self.rest(),
-        }
+        let shaft = (self.angle(), self.velocity());
+        let command = self.drive.and_then(|_| self.mode.command(order, shaft, &self.model));
+        command.map(|command| self.frame_of(command)).unwrap_or_else(|| self.rest())
     }
 
     fn reset(&mut self) {
@@ -309,75 +268,81 @@ impl OwnMotor for Motor {
     /// First what is not known of the settings, then the preparations, each written and read back, then the frame that enables:
     /// all of that anew each time, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        let command = self.setup.next(self.preparation());
-        if command == Command::Enable {
+        let (timeout, mode) = (self.timeout_units as f32, self.mode.preparations());
+        let timeout = Preparation::exact(Register::Timeout, timeout);
+        let timeout = Some(timeout).filter(|_| self.model.has_timeout());
+        let asked = self.settings.prepare(timeout.into_iter().chain(mode.into_iter().flatten()));
+        if asked.is_none() {
             self.mode.reset();
+            self.settings.forget();
         }
-        Some(self.frame_of(command))
+        Some(self.frame_of(asked.map_or(Command::Enable, Command::of)))
     }
 
     fn disable(&mut self) -> Option<CanFrame> {
-        self.setup.prepare_anew();
+        self.settings.prepare_anew();
         self.mode.rest().is_some().then(|| self.off())
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        self.drive.map(|drive| self.frame_of(self.mode.stay((self.angle(), &drive))))
+        self.drive.map(|drive| self.frame_of(self.mode.stay((self.angle(), drive.velocity()))))
     }
 
     fn is_enabled(&self) -> Option<bool> {
         self.drive.map(|drive| drive.status == Status::Run)
     }
 
+    /// Every fourth time a drive in another run mode is told that of the configuration: it starts in the operation mode. A drive answers
+    /// a write with its feedback, so what the application writes is read back.
     fn inquire(&mut self) -> Option<CanFrame> {
-        let number = self.has_wrong_mode().then(|| self.expected(Register::RunMode));
-        self.setup.inquire(number).map(|command| self.frame_of(command))
+        if let Some(command) = self.once.take() {
+            self.settings.forget();
+            return Some(self.frame_of(command));
+        }
+        self.questions = self.questions.wrapping_add(1);
+        let (_, mode) = self.expected(Register::RunMode);
+        let is_other = self.settings.found(Register::RunMode).is_some_and(|found| found != mode);
+        if is_other && self.questions.is_multiple_of(4) {
+            return Some(self.frame_of(Command::Write(Register::RunMode, mode)));
+        }
+        let asked = self.settings.inquire()?;
+        let asked = self.settings.reading_back(asked);
+        Some(self.frame_of(Command::of(asked)))
     }
 
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
-        match answer(frame) {
-            Some(Answer::Value(index, bytes)) => {
-                if let Some(register) = register(index) {
-                    let value = bytes.map_or(f32::NAN, |bytes| register.value_of(bytes));
-                    if register == Register::MechanicalPosition {
-                        self.laps = laps(value, self.model.pmax_rad());
-                    }
-                    self.setup.take(register, value, self.preparation());
+        let Some((kind, is_known, [a, b, c, d, value @ ..])) = answer(frame) else { return false };
+        match kind {
+            VALUE => {
+                let Some(register) = register(u16::from_le_bytes([a, b])) else { return true };
+                let value = if is_known { register.form().value_of(value) } else { f32::NAN };
+                if register == Register::MechanicalPosition {
+                    self.laps = Laps::of(value, self.model.pmax_rad());
+                }
+                if let Some(asked) = self.settings.awaited(register) {
+                    self.settings.take(asked, value);
                 }
             }
-            Some(Answer::Faults(faults)) => (self.reported, self.has_cleared) = (faults, false),
-            Some(Answer::Version) => {}
-            None => return false,
+            FAULTS => {
+                (self.reported, self.has_cleared) = (u32::from_le_bytes([a, b, c, d]), false);
+            }
+            _ => {}
         }
         true
     }
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_right = |register, found| self.is_right(register, found);
-        self.setup.settings.wrong(is_right).map(|(register, found)| WrongSetting {
-            motor: self.name(),
-            setting: match register {
-                Register::RunMode => "run_mode",
-                Register::Timeout => "canTimeout",
-                _ => "mechPos",
-            },
-            expected: self.expected(register),
-            found,
-        })
+        self.settings.wrong_setting(self.name(), is_right, |register| self.expected(register))
     }
 
     fn forget_settings(&mut self) {
-        self.setup.settings.forget();
-        self.setup.prepare_anew();
+        self.settings.forget();
     }
 
     fn capabilities(&self) -> Capabilities {
-        self.mode
-            .capabilities()
-            .with(Capability::Feedback)
-            .with(Capability::Temperature)
-            .with(Capability::ErrorCodes)
-            .with(Capability::AbsoluteAngle)
+        let known = self.mode.control.capabilities().with(Capability::Temperature);
+        known.with(Capability::ErrorCodes).with(Capability::AbsoluteAngle)
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
@@ -391,7 +356,7 @@ impl OwnMotor for Motor {
             temperature_c: Some(drive.temperature_c as i16),
             error: self.has_fault().then_some(Severity::Fault),
             error_code,
-            effort: self.mode.effort(),
+            effort: self.mode.control.effort(),
             speed: drive.measured.velocity_rad_per_s / self.model.vmax_rad_per_s(),
             current: drive.measured.torque_nm / self.model.tmax_nm(),
         }

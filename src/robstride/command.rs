@@ -2,6 +2,7 @@
 
 use super::{Model, Register};
 use crate::frame::CanFrame;
+use crate::motor::Inquiry;
 use crate::wire::mit;
 use embedded_can::{ExtendedId, Id};
 
@@ -50,14 +51,22 @@ pub enum Command {
 }
 
 impl Command {
+    pub(super) const fn of(inquiry: Inquiry<Register>) -> Self {
+        match inquiry {
+            Inquiry::Read(register) => Self::Read(register),
+            Inquiry::Write(register, value) => Self::Write(register, value),
+            Inquiry::Store => Self::Store,
+        }
+    }
+
     /// Writes the frame of a host to a motor.
     #[must_use]
     pub fn encode(self, model: &Model, host: u8, id: u8) -> CanFrame {
         let one = [1, 0, 0, 0, 0, 0, 0, 0];
         let (kind, middle, data) = match self {
             Self::Operation(command) => {
-                let (torque, data) = operation(&command, model);
-                (1, torque, data)
+                let (data, torque) = model.ranges().encode_wide(&command);
+                (1, torque.to_be_bytes(), data)
             }
             Self::Enable => (3, [0, host], [0; 8]),
             Self::Disable => (4, [0, host], [0; 8]),
@@ -66,39 +75,13 @@ impl Command {
             Self::SetId(new) => (7, [new, host], one),
             Self::Read(register) => (17, [0, host], parameter(register, [0; 4])),
             Self::Write(register, value) => {
-                (18, [0, host], parameter(register, register.bytes_of(value)))
+                (18, [0, host], parameter(register, register.form().bytes_of(value)))
             }
             Self::Store => (22, [0, host], [1, 2, 3, 4, 5, 6, 7, 8]),
         };
         let [high, low] = middle;
         CanFrame::of(extended(u32::from_be_bytes([kind, high, low, id])), data)
     }
-}
-
-/// Truncates to counts, as the vendor's code does; if any field is NaN, the whole command is rest.
-fn operation(command: &mit::Command, model: &Model) -> ([u8; 2], [u8; 8]) {
-    let fields = [
-        command.position_rad,
-        command.velocity_rad_per_s,
-        command.kp,
-        command.kd,
-        command.torque_nm,
-    ];
-    let [position, velocity, kp, kd, torque] =
-        if fields.iter().any(|field| field.is_nan()) { [0.0; 5] } else { fields };
-    let around_zero = |value: f32, end: f32| counts(value + end, 2.0 * end).to_be_bytes();
-    let (most_kp, most_kd) = model.ranges().gains();
-    let [a, b] = around_zero(position, model.pmax_rad());
-    let [c, d] = around_zero(velocity, model.vmax_rad_per_s());
-    let [e, f] = counts(kp, most_kp).to_be_bytes();
-    let [g, h] = counts(kd, most_kd).to_be_bytes();
-    (around_zero(torque, model.tmax_nm()), [a, b, c, d, e, f, g, h])
-}
-
-/// Returns a share of 65535, truncated.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-fn counts(value: f32, span: f32) -> u16 {
-    if value >= span { u16::MAX } else { (value * 65_535.0 / span) as u16 }
 }
 
 fn parameter(register: Register, [a, b, c, d]: [u8; 4]) -> [u8; 8] {

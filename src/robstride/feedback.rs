@@ -3,7 +3,8 @@
 use super::command::{kind_of, raw_of};
 use super::{Model, Register};
 use crate::frame::CanFrame;
-use crate::units::Angle;
+use crate::motor::lowest_bit;
+use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit;
 
 /// What a drive reports with each answer.
@@ -58,17 +59,11 @@ impl Feedback {
         }
         let status = Status::of(state >> 6)?;
         let [a, b, c, d, e, f, g, h] = *frame.bytes();
-        let value =
-            |bytes, end: f32| f32::from(u16::from_be_bytes(bytes)) * (2.0 * end) / 65_535.0 - end;
         Some(Self {
             status,
             faults: state & 0x3F,
             id,
-            measured: mit::Feedback {
-                position_rad: value([a, b], model.pmax_rad()),
-                velocity_rad_per_s: value([c, d], model.vmax_rad_per_s()),
-                torque_nm: value([e, f], model.tmax_nm()),
-            },
+            measured: model.ranges().decode_wide(&[a, b, c, d, e, f]),
             is_at_end: matches!([a, b], [0, 0] | [0xFF, 0xFF]),
             temperature_c: f32::from(i16::from_be_bytes([g, h])) / 10.0,
         })
@@ -80,10 +75,14 @@ impl Feedback {
         if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
     }
 
+    pub(super) const fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(self.measured.velocity_rad_per_s)
+    }
+
     /// Returns the number of the lowest fault, 16 to 21 as the manual counts the bits of the id; 0 without a fault.
     #[must_use]
     pub const fn fault_code(&self) -> u8 {
-        if self.faults == 0 { 0 } else { 16 + lowest(self.faults as u32) }
+        if self.faults == 0 { 0 } else { 15 + lowest_bit(self.faults as u32) }
     }
 }
 
@@ -102,63 +101,36 @@ pub enum Status {
 
 impl Status {
     const fn of(bits: u8) -> Option<Self> {
-        Some(match bits {
-            0 => Self::Reset,
-            1 => Self::Calibration,
-            2 => Self::Run,
-            _ => return None,
-        })
+        match bits {
+            0 => Some(Self::Reset),
+            1 => Some(Self::Calibration),
+            2 => Some(Self::Run),
+            _ => None,
+        }
     }
 }
 
-/// Something that a drive says beside its feedback.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Answer {
-    /// The value of the parameter with an index; `None` if the drive cannot read it.
-    Value(u16, Option<[u8; 4]>),
-    /// Its faults, as the manual counts their bits.
-    Faults(u32),
-    /// Its firmware, which another node has asked for: the id is that of feedback.
-    Version,
-}
+/// The types of what a drive says beside its feedback: a parameter, its faults as the manual counts their bits, and its firmware, which
+/// another node has asked for, with the type of feedback.
+pub(super) const VALUE: u8 = 17;
+pub(super) const FAULTS: u8 = 21;
+const VERSION: [u8; 3] = [0x00, 0xC4, 0x56];
 
-/// Reads a frame that is no feedback.
-pub(super) fn answer(frame: &CanFrame) -> Option<Answer> {
-    let raw = raw_of(frame)?;
-    let [_, status, ..] = raw.to_be_bytes();
-    let [a, b, c, d, value @ ..] = *frame.bytes();
-    if frame.length() != 8 {
-        return None;
-    }
-    match kind_of(raw) {
-        2 if [a, b, c] == [0x00, 0xC4, 0x56] => Some(Answer::Version),
-        17 => Some(Answer::Value(u16::from_le_bytes([a, b]), (status == 0).then_some(value))),
-        21 => Some(Answer::Faults(u32::from_le_bytes([a, b, c, d]))),
-        _ => None,
-    }
+/// Reads a frame that is no feedback: its type, whether the drive knows what it was asked for, and the data.
+pub(super) fn answer(frame: &CanFrame) -> Option<(u8, bool, [u8; 8])> {
+    let (raw, data) = (raw_of(frame)?, *frame.bytes());
+    let ([_, status, ..], kind) = (raw.to_be_bytes(), kind_of(raw));
+    let is_version = kind == 2 && data.starts_with(&VERSION);
+    let is_answer = frame.length() == 8 && (is_version || matches!(kind, VALUE | FAULTS));
+    is_answer.then_some((kind, status == 0, data))
 }
 
 /// Returns the code of a report of faults: 32 and the number of the lowest bit; 0 without a fault.
 pub(super) const fn report_code(faults: u32) -> u8 {
-    if faults == 0 { 0 } else { 32 + lowest(faults) }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "at most 32")]
-const fn lowest(bits: u32) -> u8 {
-    bits.trailing_zeros() as u8
+    if faults == 0 { 0 } else { 31 + lowest_bit(faults) }
 }
 
 /// Returns the register with an index.
 pub(super) fn register(index: u16) -> Option<Register> {
     Register::ALL.iter().copied().find(|register| register.index() == index)
-}
-
-/// Returns how many times the range of the feedback a position is away from it.
-#[expect(clippy::cast_possible_truncation, reason = "saturates")]
-pub(super) fn laps(position_rad: f32, pmax: f32) -> i32 {
-    if position_rad.abs() <= pmax {
-        return 0;
-    }
-    let turns = ((position_rad.abs() + pmax) / (2.0 * pmax)) as i32;
-    if position_rad > 0.0 { turns } else { -turns }
 }

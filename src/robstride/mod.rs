@@ -83,7 +83,6 @@ mod config;
 mod feedback;
 mod model;
 mod register;
-mod setup;
 #[cfg(test)]
 mod tests;
 

@@ -1,8 +1,7 @@
 //! Facts of the models, as a table that a program can extend.
 
 use crate::error::ConfigError;
-use crate::motor::Impedance;
-use crate::units::{Angle, AngularVelocity};
+use crate::motor::{mit_model, models};
 use crate::wire::mit::Ranges;
 
 /// A model of motor: its name, the ranges of its fields, and its largest current.
@@ -55,30 +54,18 @@ pub struct Model {
 
 const FOUR_PI: f32 = 4.0 * core::f32::consts::PI;
 
-macro_rules! models {
-    ($($model:ident $name:literal $vmax:literal $tmax:literal $kp:literal $kd:literal $current:literal $is_cybergear:literal,)+) => {
-        impl Model {
-            $(
-                #[doc = concat!("The ", $name, ".")]
-                pub const $model: Self = Self::known($name, [$vmax, $tmax, $kp, $kd], $current, $is_cybergear);
-            )+
-
-            /// The models of the table.
-            pub const ALL: &[Self] = &[$(Self::$model),+];
-        }
-    };
-}
-
 models! {
-    RS00 "RS00" 33.0 14.0 500.0 5.0 16.0 false,
-    RS01 "RS01" 44.0 17.0 500.0 5.0 23.0 false,
-    RS02 "RS02" 44.0 17.0 500.0 5.0 16.0 false,
-    RS03 "RS03" 20.0 60.0 5000.0 100.0 43.0 false,
-    RS04 "RS04" 15.0 120.0 5000.0 100.0 90.0 false,
-    RS05 "RS05" 50.0 5.5 500.0 5.0 11.0 false,
-    RS06 "RS06" 50.0 36.0 5000.0 100.0 57.0 false,
-    CYBERGEAR "CyberGear" 30.0 12.0 500.0 5.0 23.0 true,
+    RS00 "RS00" [33.0, 14.0, 500.0, 5.0] 16.0 false;
+    RS01 "RS01" [44.0, 17.0, 500.0, 5.0] 23.0 false;
+    RS02 "RS02" [44.0, 17.0, 500.0, 5.0] 16.0 false;
+    RS03 "RS03" [20.0, 60.0, 5000.0, 100.0] 43.0 false;
+    RS04 "RS04" [15.0, 120.0, 5000.0, 100.0] 90.0 false;
+    RS05 "RS05" [50.0, 5.5, 500.0, 5.0] 11.0 false;
+    RS06 "RS06" [50.0, 36.0, 5000.0, 100.0] 57.0 false;
+    CYBERGEAR "CyberGear" [30.0, 12.0, 500.0, 5.0] 23.0 true;
 }
+
+mit_model!(65_535);
 
 impl Model {
     /// Describes a RobStride that the table does not have: its ranges, and its largest current in A. The ranges of kp and kd are 500 and
@@ -98,7 +85,6 @@ impl Model {
         }
     }
 
-    /// Ranges that `Ranges::with_gains` refuses are found by a test.
     const fn known(
         name: &'static str,
         ranges: [f32; 4],
@@ -106,11 +92,7 @@ impl Model {
         is_cybergear: bool,
     ) -> Self {
         let [vmax, tmax, kp, kd] = ranges;
-        let ranges = Ranges::of(FOUR_PI, vmax, tmax);
-        let ranges = match ranges.with_gains(kp, kd) {
-            Ok(ranges) => ranges,
-            Err(_) => ranges,
-        };
+        let ranges = Ranges::of([FOUR_PI, vmax, tmax], [kp, kd]);
         Self { name, ranges, current_a, is_cybergear }
     }
 
@@ -136,59 +118,6 @@ impl Model {
             Ok(ranges) => Ok(Self { ranges, ..self }),
             Err(error) => Err(error),
         }
-    }
-
-    /// Returns the name, as errors print it.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        self.name
-    }
-
-    /// Returns the ranges of the fields.
-    #[must_use]
-    pub const fn ranges(&self) -> &Ranges {
-        &self.ranges
-    }
-
-    /// Returns the largest value of each field of the operation mode.
-    #[must_use]
-    pub const fn most(&self) -> Impedance {
-        self.scaled(1.0, 1.0)
-    }
-
-    /// Returns the value of a count of each field of the operation mode.
-    #[must_use]
-    pub const fn count(&self) -> Impedance {
-        self.scaled(2.0 / 65_535.0, 1.0 / 65_535.0)
-    }
-
-    const fn scaled(&self, signed: f32, gain: f32) -> Impedance {
-        let (stiffness, damping) = self.ranges.gains();
-        Impedance {
-            angle: Angle::from_radians(self.pmax_rad() * signed),
-            velocity: AngularVelocity::from_rad_per_s(self.vmax_rad_per_s() * signed),
-            stiffness: stiffness * gain,
-            damping: damping * gain,
-            torque_nm: self.tmax_nm() * signed,
-        }
-    }
-
-    /// Returns the largest position of the fields, in rad.
-    #[must_use]
-    pub const fn pmax_rad(&self) -> f32 {
-        self.ranges.position_rad()
-    }
-
-    /// Returns the largest velocity of the fields, in rad/s.
-    #[must_use]
-    pub const fn vmax_rad_per_s(&self) -> f32 {
-        self.ranges.velocity_rad_per_s()
-    }
-
-    /// Returns the largest torque of the fields, in Nm.
-    #[must_use]
-    pub const fn tmax_nm(&self) -> f32 {
-        self.ranges.torque_nm()
     }
 
     /// Returns the largest current, in A.

@@ -3,14 +3,13 @@
 use super::command::{HOST, SHORT_MESSAGE, extended, question};
 use super::config::{At, Mode, Rest};
 use super::feedback::fault;
-use super::tachometer::Tachometer;
 use super::{Feedback, Model};
 use crate::encoder;
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Malformed, MotorName, Order, OwnMotor, Role, Severity,
-    Vitals, WrongSetting,
+    Tachometer, Vitals, WrongSetting,
 };
 use crate::units::{Angle, AngularVelocity};
 use embedded_can::{Frame, Id};
@@ -82,7 +81,7 @@ impl Motor {
         model.check()?;
         mode.check(&model)?;
         Ok(Self {
-            tachometer: Tachometer::new(&model),
+            tachometer: model.tachometer(),
             model,
             id,
             mode,
@@ -221,7 +220,7 @@ impl OwnMotor for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         let at = At {
             model: &self.model,
-            velocity_rad_per_s: self.velocity().as_rad_per_s(),
+            velocity: self.velocity(),
             angle: self.angle(),
             duty: self.model.signed(self.feedback.duty.unwrap_or_default()),
         };

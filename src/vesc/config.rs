@@ -2,10 +2,10 @@
 
 use super::Model;
 use super::command::Command;
-use crate::control::{Cascade, Pid, PidConfig};
+use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
-use crate::math::{wrap_pi, wrap_tau};
-use crate::motor::{Capabilities, Capability, Order, Target};
+use crate::math::wrap_tau;
+use crate::motor::{Capabilities, Capability, Order, Target, TorqueLoops};
 use crate::units::{Angle, AngularVelocity};
 
 /// A control mode of the drive.
@@ -38,7 +38,7 @@ enum Kind {
 /// Where the output shaft is, by the last feedback.
 pub(super) struct At<'a> {
     pub(super) model: &'a Model,
-    pub(super) velocity_rad_per_s: f32,
+    pub(super) velocity: AngularVelocity,
     pub(super) angle: Option<Angle>,
     pub(super) duty: f32,
 }
@@ -76,31 +76,21 @@ impl Rest {
 /// The loops of current control, which are ours.
 #[derive(Debug, Clone, Copy)]
 struct CurrentControl {
-    loops: Option<Cascade>,
+    loops: Option<TorqueLoops>,
     has_angle: bool,
 }
 
 impl CurrentControl {
     fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-        let Order { target, share, step } = order;
-        let (model, velocity) = (at.model, at.velocity_rad_per_s);
+        let (model, share) = (at.model, order.share);
         let most = model.torque_limit_nm();
         let limit = most * share;
-        let wanted = match (target, &mut self.loops) {
+        let wanted = match (order.target, &mut self.loops) {
             (Target::Torque(torque), _) => torque,
-            (Target::Velocity(target), Some(loops)) => {
-                let target = within(target, model.max_velocity);
-                loops.speed_mut().step(target, velocity, &step)
-            }
-            (Target::Angle(target), Some(loops)) if self.has_angle => {
-                loops.step(wrap_pi((target - at.angle?).as_radians()), velocity, &step)
-            }
-            _ => return None,
+            (Target::Angle(_), _) if !self.has_angle => return None,
+            (_, loops) => loops.as_mut()?.step(order, (at.angle, at.velocity), limit)?,
         };
-        if let Some(loops) = &mut self.loops {
-            loops.speed_mut().keep_integral_between(-limit, limit);
-        }
-        let torque = wanted.min(limit).max(-limit);
+        let torque = kept(wanted, limit);
         // Rounding of the quotient must not take it past the limit.
         let current = kept(model.current_of(torque), model.current_limit_a * share);
         Some((Command::Current(current), Some(torque / most)))
@@ -116,14 +106,12 @@ struct DutyControl {
 
 impl DutyControl {
     fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-        let Order { target, share, step } = order;
-        let Target::Velocity(target) = target else { return None };
-        let target = within(target, at.model.max_velocity);
+        let Order { target: Target::Velocity(target), share, step } = order else { return None };
         let reported = kept(at.duty, self.limit);
         let near = self.limit * share;
         let lowest = (reported - near).max(-self.limit);
         let highest = (reported + near).min(self.limit);
-        let wanted = self.speed.step(target, at.velocity_rad_per_s, &step);
+        let wanted = self.speed.step(target.as_rad_per_s(), at.velocity.as_rad_per_s(), &step);
         self.speed.keep_integral_between(lowest, highest);
         let duty = wanted.min(highest).max(lowest);
         Some((Command::Duty(at.model.signed(duty)), Some(duty / self.limit)))
@@ -140,9 +128,9 @@ impl Mode {
     /// Current control that takes velocities too, by a loop of ours from rad/s to Nm.
     ///
     /// # Errors
-    /// As [`Cascade::new`].
+    /// As [`Cascade::new`](crate::control::Cascade::new).
     pub fn current_with_speed_loop(speed: PidConfig) -> Result<Self, ConfigError> {
-        let loops = Cascade::new(PidConfig::new(0.0, 0.0, 0.0), speed)?;
+        let loops = TorqueLoops::new(PidConfig::new(0.0, 0.0, 0.0), speed)?;
         Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: false })))
     }
 
@@ -150,9 +138,9 @@ impl Mode {
     /// six steps for an electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
     ///
     /// # Errors
-    /// As [`Cascade::new`].
+    /// As [`Cascade::new`](crate::control::Cascade::new).
     pub fn current_with_loops(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
-        let loops = Cascade::new(position, speed)?;
+        let loops = TorqueLoops::new(position, speed)?;
         Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: true })))
     }
 
@@ -224,6 +212,15 @@ impl Mode {
 
     /// Returns the command and its share of the largest effort, where that is not the drive's business; `None` to rest.
     pub(super) fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
+        let target = match order.target {
+            Target::Velocity(velocity) => {
+                let limit = at.model.max_velocity.as_rad_per_s();
+                let velocity = kept(velocity.as_rad_per_s(), limit);
+                Target::Velocity(AngularVelocity::from_rad_per_s(velocity))
+            }
+            target => target,
+        };
+        let order = Order { target, ..order };
         match &mut self.0 {
             Kind::Current(control) => control.command(order, at),
             Kind::Duty(control) => control.command(order, at),
@@ -242,25 +239,18 @@ impl Mode {
 }
 
 fn velocity(standstill: Rest, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-    let Order { target, share, step: _ } = order;
-    let Target::Velocity(target) = target else { return None };
-    let target = within(target, at.model.max_velocity);
-    let speed = at.model.erpm_of(AngularVelocity::from_rad_per_s(target));
+    let Order { target: Target::Velocity(target), share, .. } = order else { return None };
+    let speed = at.model.erpm_of(target);
     // Less than a whole number on the wire is a speed of 0.
     let stands = speed.abs() < 1.0;
     Some((if stands { standstill.command(share) } else { Command::Speed(speed) }, None))
 }
 
 fn position(order: Order, at: &At) -> Option<(Command, Option<f32>)> {
-    let Order { target, share: _, step: _ } = order;
-    let Target::Angle(target) = target else { return None };
+    let Order { target: Target::Angle(target), .. } = order else { return None };
     at.angle?;
     let angle = Angle::from_radians(wrap_tau(at.model.signed(target.as_radians())));
     Some((Command::Position(angle.as_degrees()), None))
-}
-
-fn within(target: AngularVelocity, limit: AngularVelocity) -> f32 {
-    kept(target.as_rad_per_s(), limit.as_rad_per_s())
 }
 
 const fn kept(value: f32, limit: f32) -> f32 {

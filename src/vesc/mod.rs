@@ -81,7 +81,6 @@ mod command;
 mod config;
 mod feedback;
 mod model;
-mod tachometer;
 #[cfg(test)]
 mod tests;
 

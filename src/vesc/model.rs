@@ -2,6 +2,7 @@
 
 use crate::encoder::GearRatio;
 use crate::error::ConfigError;
+use crate::motor::Tachometer;
 use crate::units::AngularVelocity;
 use core::f32::consts::TAU;
 
@@ -79,6 +80,14 @@ impl Model {
         self.pole_pairs as f32 * self.gear.as_f32()
     }
 
+    /// Takes a model that has been checked.
+    pub(super) fn tachometer(&self) -> Tachometer {
+        let turn = TACHO * u32::from(self.pole_pairs) * u32::from(self.gear.rotor());
+        let output = i32::from(self.gear.output());
+        let output = if self.is_reversed { -output } else { output };
+        Tachometer::new(turn.cast_signed(), output)
+    }
+
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         ConfigError::check_limit("pole_pairs", self.pole_pairs.into(), 255.0)?;
         ConfigError::check_limit("torque_constant_nm_per_a", self.torque_constant_nm_per_a, 1e6)?;
@@ -104,7 +113,7 @@ impl Model {
 }
 
 /// Counts of the tachometer for one electrical turn.
-pub(super) const TACHO: u32 = 6;
+const TACHO: u32 = 6;
 
 /// The largest current of a configuration, in A: far beyond any drive, and exact in mA.
 const MOST_AMPERES: f32 = 1_000.0;

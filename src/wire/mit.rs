@@ -147,14 +147,14 @@ impl Ranges {
         }
     }
 
-    /// Takes ranges that are known to be valid.
-    pub(crate) const fn of(position_rad: f32, velocity_rad_per_s: f32, torque_nm: f32) -> Self {
+    /// Takes ranges that are known to be valid: the three of [`new`](Self::new), and the largest gains.
+    pub(crate) const fn of([position, velocity, torque]: [f32; 3], [kp, kd]: [f32; 2]) -> Self {
         Self {
-            position: Range { lower: -position_rad, upper: position_rad },
-            velocity: Range { lower: -velocity_rad_per_s, upper: velocity_rad_per_s },
-            kp: Range::KP,
-            kd: Range::KD,
-            torque: Range { lower: -torque_nm, upper: torque_nm },
+            position: Range { lower: -position, upper: position },
+            velocity: Range { lower: -velocity, upper: velocity },
+            kp: Range { lower: 0.0, upper: kp },
+            kd: Range { lower: 0.0, upper: kd },
+            torque: Range { lower: -torque, upper: torque },
         }
     }
 
@@ -199,20 +199,46 @@ impl Ranges {
     /// counts less torque.
     #[must_use]
     pub const fn encode(&self, command: &Command) -> [u8; 8] {
-        let (Some(position), Some(velocity), Some(kp), Some(kd), Some(torque)) = (
-            self.position.counts(command.position_rad, TOP_16),
-            self.velocity.counts(command.velocity_rad_per_s, TOP_12),
-            self.kp.counts(command.kp, TOP_12),
-            self.kd.counts(command.kd, TOP_12),
-            self.torque.counts(command.torque_nm, TOP_12),
-        ) else {
-            return self.encode(&Command::REST);
-        };
+        let [position, velocity, kp, kd, torque] = self.counts(command, TOP_12);
         let first = position << 16 | velocity << 4 | kp >> 8;
         let second = kp << 24 | kd << 12 | torque;
         let is_special = first == u32::MAX && matches!(second, 0xFFFF_FFFB..=0xFFFF_FFFE);
         let second = if is_special { HIGHEST_SECOND } else { second };
         ((first as u64) << 32 | second as u64).to_be_bytes()
+    }
+
+    /// Returns the counts of all fields, those of a position of 16 bits.
+    const fn counts(&self, command: &Command, top: u16) -> [u32; 5] {
+        let (Some(position), Some(velocity), Some(kp), Some(kd), Some(torque)) = (
+            self.position.counts(command.position_rad, TOP_16),
+            self.velocity.counts(command.velocity_rad_per_s, top),
+            self.kp.counts(command.kp, top),
+            self.kd.counts(command.kd, top),
+            self.torque.counts(command.torque_nm, top),
+        ) else {
+            return self.counts(&Command::REST, top);
+        };
+        [position, velocity, kp, kd, torque]
+    }
+
+    /// Writes a command as [`encode`](Self::encode), with 16 bits a field: the data of position, velocity, kp and kd, and the torque, which
+    /// some drives have in the id.
+    pub(crate) const fn encode_wide(&self, command: &Command) -> ([u8; 8], u16) {
+        let [position, velocity, kp, kd, torque] = self.counts(command, TOP_16);
+        let (first, second) = (position << 16 | velocity, kp << 16 | kd);
+        let [.., high, low] = torque.to_be_bytes();
+        let data = ((first as u64) << 32 | second as u64).to_be_bytes();
+        (data, u16::from_be_bytes([high, low]))
+    }
+
+    /// Reads feedback with 16 bits a field.
+    pub(crate) const fn decode_wide(&self, data: &[u8; 6]) -> Feedback {
+        let [a, b, c, d, e, f] = *data;
+        Feedback {
+            position_rad: self.position.value(u16::from_be_bytes([a, b]), TOP_16),
+            velocity_rad_per_s: self.velocity.value(u16::from_be_bytes([c, d]), TOP_16),
+            torque_nm: self.torque.value(u16::from_be_bytes([e, f]), TOP_16),
+        }
     }
 
     /// Reads a command, as a drive does.

@@ -37,6 +37,6 @@ fn an_integer_register_holds_whole_numbers_only() {
         (Register::TorqueRange, 0.5, true),
         (Register::TorqueRange, f32::NAN, false),
     ] {
-        assert_eq!(register.holds(value), holds, "{register:?} {value}");
+        assert_eq!(register.form().holds(value), holds, "{register:?} {value}");
     }
 }

@@ -1,11 +1,12 @@
 //! Impedance: a target, and the control of a drive that follows one.
 
-use super::{Order, Target};
-use crate::control::{Cascade, PidConfig, TimeStep, limited};
+use super::{Order, Shaft, Target, TorqueLoops};
+use crate::control::{PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
+use crate::wire::mit::{self, Ranges};
 
 /// A spring and a damper at the output shaft, and a torque beside them: what a joint of an arm or a leg is given.
 ///
@@ -46,6 +47,28 @@ impl Impedance {
         torque_nm: 0.0,
     };
 
+    /// Returns the largest value of each field of a frame.
+    pub(crate) const fn most(ranges: &Ranges) -> Self {
+        Self::of(ranges, 1.0, 1.0, 1.0)
+    }
+
+    /// Returns the value of a count of each field, which goes to `top`; to 65535 that of the angle.
+    pub(crate) const fn count(ranges: &Ranges, top: u16) -> Self {
+        let top = top as f32;
+        Self::of(ranges, 2.0 / 65_535.0, 2.0 / top, 1.0 / top)
+    }
+
+    const fn of(ranges: &Ranges, angle: f32, signed: f32, gain: f32) -> Self {
+        let (stiffness, damping) = ranges.gains();
+        Self {
+            angle: Angle::from_radians(ranges.position_rad() * angle),
+            velocity: AngularVelocity::from_rad_per_s(ranges.velocity_rad_per_s() * signed),
+            stiffness: stiffness * gain,
+            damping: damping * gain,
+            torque_nm: ranges.torque_nm() * signed,
+        }
+    }
+
     /// Tells whether each value is finite, and stiffness and damping are not negative.
     #[must_use]
     pub const fn is_finite(&self) -> bool {
@@ -56,6 +79,19 @@ impl Impedance {
             && self.torque_nm.is_finite()
             && self.stiffness >= 0.0
             && self.damping >= 0.0
+    }
+}
+
+impl From<Impedance> for mit::Command {
+    fn from(impedance: Impedance) -> Self {
+        let Impedance { angle, velocity, stiffness, damping, torque_nm } = impedance;
+        Self {
+            position_rad: angle.as_radians(),
+            velocity_rad_per_s: velocity.as_rad_per_s(),
+            kp: stiffness,
+            kd: damping,
+            torque_nm,
+        }
     }
 }
 
@@ -87,7 +123,7 @@ impl Impedance {
 pub struct ImpedanceControl {
     torque_limit_nm: f32,
     gains: Option<(f32, f32)>,
-    loops: Option<Cascade>,
+    loops: Option<TorqueLoops>,
     effort: f32,
 }
 
@@ -125,7 +161,8 @@ impl ImpedanceControl {
     /// As [`Cascade::new`].
     pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let limit = self.torque_limit_nm;
-        Ok(Self { loops: Some(Cascade::new(position, speed.with_output_limit(limit))?), ..self })
+        let loops = TorqueLoops::new(position, speed.with_output_limit(limit))?;
+        Ok(Self { loops: Some(loops), ..self })
     }
 
     /// Returns the torque limit in Nm.
@@ -163,7 +200,7 @@ impl ImpedanceControl {
     ) -> Option<Impedance> {
         self.effort = 0.0;
         let limit = self.torque_limit_nm * share;
-        let wanted = self.wanted(target, angle, velocity, limit, &step)?;
+        let wanted = self.wanted(Order { target, share, step }, (angle, velocity))?;
         let torque_nm = limited(wanted.torque_nm, -limit, limit);
         if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
             self.effort = torque_nm / self.torque_limit_nm;
@@ -202,6 +239,21 @@ impl ImpedanceControl {
         })
     }
 
+    /// Returns the torque in Nm for a drive that follows torques; `None` to rest. Nothing has an end but the velocity.
+    pub(crate) fn torque(&mut self, order: Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
+        let most = Impedance {
+            angle: Angle::from_radians(UNLIMITED),
+            velocity: AngularVelocity::from_rad_per_s(most_velocity),
+            stiffness: UNLIMITED,
+            damping: UNLIMITED,
+            torque_nm: self.torque_limit_nm,
+        };
+        let (angle, velocity) = shaft;
+        self.step(order, angle, velocity, &most, &Impedance::FREE)?;
+        let limit = self.torque_limit_nm * order.share;
+        Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
+    }
+
     /// Brings the loops to rest.
     pub const fn reset(&mut self) {
         self.effort = 0.0;
@@ -211,49 +263,32 @@ impl ImpedanceControl {
     }
 
     /// Returns the impedance that a target stands for.
-    fn wanted(
-        &mut self,
-        target: Target,
-        angle: Option<Angle>,
-        velocity: AngularVelocity,
-        limit: f32,
-        step: &TimeStep,
-    ) -> Option<Impedance> {
-        let way_to = |target: Angle| Some(wrap_pi((target - angle?).as_radians()));
-        match target {
-            Target::Torque(torque_nm) => Some(Impedance { torque_nm, ..Impedance::FREE }),
-            Target::Impedance(impedance) => Some(impedance),
-            Target::Velocity(target) => match (&mut self.loops, self.gains) {
-                (Some(loops), _) => {
-                    let (target, velocity) = (target.as_rad_per_s(), velocity.as_rad_per_s());
-                    let torque_nm = loops.speed_mut().step(target, velocity, step);
-                    Some(followed(loops, torque_nm, limit))
-                }
-                (None, Some((_, damping))) => {
-                    Some(Impedance { velocity: target, damping, ..Impedance::FREE })
-                }
-                (None, None) => None,
-            },
-            Target::Angle(target) => match (&mut self.loops, self.gains) {
-                (Some(loops), _) => {
-                    let torque_nm = loops.step(way_to(target)?, velocity.as_rad_per_s(), step);
-                    Some(followed(loops, torque_nm, limit))
-                }
-                (None, Some((stiffness, damping))) => {
-                    let angle = angle? + Angle::from_radians(way_to(target)?);
-                    Some(Impedance { angle, stiffness, damping, ..Impedance::FREE })
-                }
-                (None, None) => None,
-            },
+    fn wanted(&mut self, order: Order, (angle, velocity): Shaft) -> Option<Impedance> {
+        let torque = |torque_nm| Impedance { torque_nm, ..Impedance::FREE };
+        if let Some(loops) = &mut self.loops {
+            let limit = self.torque_limit_nm * order.share;
+            if let Some(torque_nm) = loops.step(order, (angle, velocity), limit) {
+                return Some(torque(torque_nm));
+            }
+        }
+        match (order.target, self.gains.filter(|_| self.loops.is_none())) {
+            (Target::Torque(torque_nm), _) => Some(torque(torque_nm)),
+            (Target::Impedance(impedance), _) => Some(impedance),
+            (Target::Velocity(velocity), Some((_, damping))) => {
+                Some(Impedance { velocity, damping, ..Impedance::FREE })
+            }
+            (Target::Angle(target), Some((stiffness, damping))) => {
+                let angle = angle?;
+                let angle = angle + Angle::from_radians(wrap_pi((target - angle).as_radians()));
+                Some(Impedance { angle, stiffness, damping, ..Impedance::FREE })
+            }
+            _ => None,
         }
     }
 }
 
-/// Returns the torque of the loops, whose integral keeps within what is left of the output range.
-fn followed(loops: &mut Cascade, torque_nm: f32, limit: f32) -> Impedance {
-    loops.speed_mut().keep_integral_between(-limit, limit);
-    Impedance { torque_nm, ..Impedance::FREE }
-}
+/// The largest angle, stiffness and damping of a torque that is calculated here.
+const UNLIMITED: f32 = 1e9;
 
 /// Returns a gain in whole counts, of which a count of what it multiplies makes no more than an eighth of the limit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]

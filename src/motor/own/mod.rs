@@ -2,17 +2,31 @@
 
 mod device;
 mod impedance;
+mod mode;
 mod motor;
 mod order;
 mod power;
+mod questions;
 mod receive;
+mod registers;
 mod route;
 mod settings;
+mod told;
+mod torque_loops;
+mod turns;
 
 pub use impedance::{Impedance, ImpedanceControl};
 pub use motor::OwnMotor;
 pub use order::{Order, Target};
 pub use settings::{Inquiry, Settings};
+
+pub(crate) use mode::{ControlMode, Goal, Shaft, inside};
+pub(crate) use questions::Questions;
+pub(crate) use registers::{Form, lowest_bit, mit_model, models, register_questions, registers};
+pub(crate) use settings::Preparation;
+pub(crate) use told::Told;
+pub(crate) use torque_loops::TorqueLoops;
+pub(crate) use turns::{Laps, Tachometer};
 
 use super::{
     AngleDrive, Capabilities, Capability, Claim, Devices, Guard, Health, HealthConfig, Link,

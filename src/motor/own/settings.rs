@@ -1,5 +1,7 @@
 //! The dialogue with a drive about its settings.
 
+use crate::motor::{MotorName, WrongSetting};
+
 /// A question to a drive about a setting, `R` by the protocol's own name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -36,19 +38,93 @@ pub struct Settings<R, const N: usize> {
     asked: Option<Inquiry<R>>,
     request: Option<Inquiry<R>>,
     answer: Option<(R, f32)>,
+    /// What was written on the way to an enabled drive, and is to be read back.
+    preparing: Option<Preparation<R>>,
+    /// How many preparations the drive has confirmed.
+    prepared: u8,
+    /// The next frame about a setting that the application writes reads it.
+    is_written: bool,
+}
+
+/// A setting that is written, and read back, each time before a drive is enabled. The drive confirms it by a value from `least` to `value`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Preparation<R> {
+    pub(crate) setting: R,
+    pub(crate) value: f32,
+    pub(crate) least: f32,
+}
+
+impl<R> Preparation<R> {
+    /// The drive has to have this value.
+    pub(crate) const fn exact(setting: R, value: f32) -> Self {
+        Self { setting, value, least: value }
+    }
+
+    /// The drive may have a limit of its own that is lower.
+    pub(crate) const fn limit(setting: R, value: f32) -> Self {
+        Self { setting, value, least: 0.0 }
+    }
 }
 
 impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     /// Takes the settings that have to be as configured; none is known.
     #[must_use]
     pub const fn new(checked: [R; N]) -> Self {
-        Self { checked, found: [None; N], turn: 0, asked: None, request: None, answer: None }
+        Self {
+            checked,
+            found: [None; N],
+            turn: 0,
+            asked: None,
+            request: None,
+            answer: None,
+            preparing: None,
+            prepared: 0,
+            is_written: false,
+        }
     }
 
     /// Forgets all values: the drive was away. What the application asks for stays.
     pub const fn forget(&mut self) {
         self.found = [None; N];
         self.asked = None;
+        self.prepare_anew();
+    }
+
+    /// Forgets what the drive has confirmed on the way to be enabled.
+    pub(crate) const fn prepare_anew(&mut self) {
+        (self.preparing, self.prepared, self.is_written) = (None, 0, false);
+    }
+
+    /// Returns the next question on the way to an enabled drive: for what is not known, then for each preparation, written and read back.
+    /// `None` when the drive is ready to be enabled; then [`forget`](Self::forget), for it may lose its supply until the next time.
+    pub(crate) fn prepare(
+        &mut self,
+        preparations: impl IntoIterator<Item = Preparation<R>>,
+    ) -> Option<Inquiry<R>> {
+        if let Some(unknown) = self.complete() {
+            return Some(unknown);
+        }
+        if let Some(written) = self.preparing {
+            return Some(self.ask(Inquiry::Read(written.setting)));
+        }
+        self.preparing = preparations.into_iter().nth(self.prepared.into());
+        let Preparation { setting, value, .. } = self.preparing?;
+        Some(self.ask(Inquiry::Write(setting, value)))
+    }
+
+    /// Turns each second write of a setting into a question for it: for a drive that answers no write.
+    pub(crate) fn reading_back(&mut self, inquiry: Inquiry<R>) -> Inquiry<R> {
+        let Inquiry::Write(setting, _) = inquiry else { return inquiry };
+        self.is_written = !self.is_written;
+        if self.is_written { inquiry } else { Inquiry::Read(setting) }
+    }
+
+    /// Returns the question whose answer is awaited, if it is about this setting.
+    pub(crate) fn awaited(&self, setting: R) -> Option<Inquiry<R>> {
+        self.asked.filter(|asked| match asked {
+            Inquiry::Read(awaited) | Inquiry::Write(awaited, _) => *awaited == setting,
+            Inquiry::Store => false,
+        })
     }
 
     /// Takes a question of the application, in the place of one that waits.
@@ -71,6 +147,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
 
     /// Returns the next question: for what is not known, then for each value in turn.
     pub fn inquire(&mut self) -> Option<Inquiry<R>> {
+        (self.preparing, self.prepared) = (None, 0);
         let turn = usize::from(self.turn);
         self.turn = self.turn.wrapping_add(1);
         if let (Some(request), false) = (self.request, turn.is_multiple_of(2)) {
@@ -93,6 +170,12 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         inquiry
     }
 
+    /// Returns the value of a setting that has to be as configured; `None` if it is not known.
+    pub(crate) fn found(&self, setting: R) -> Option<f32> {
+        let place = self.checked.iter().position(|checked| *checked == setting)?;
+        *self.found.get(place)?
+    }
+
     /// Returns the question whose answer is awaited.
     #[must_use]
     pub const fn asked(&self) -> Option<Inquiry<R>> {
@@ -111,10 +194,28 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
                 *found = Some(value);
             }
         }
+        if let (Some(written), Inquiry::Read(_)) = (self.preparing, inquiry)
+            && written.setting == setting
+        {
+            self.preparing = None;
+            self.prepared += u8::from((written.least..=written.value).contains(&value));
+        }
         if self.request == Some(inquiry) {
             (self.request, self.answer) = (None, Some((setting, value)));
         }
         true
+    }
+
+    /// Returns the first setting of a motor that is not right or not known. `expected` has the name and the value of each.
+    pub(crate) fn wrong_setting(
+        &self,
+        motor: MotorName,
+        is_right: impl Fn(R, f32) -> bool,
+        expected: impl Fn(R) -> (&'static str, f32),
+    ) -> Option<WrongSetting> {
+        let (wrong, found) = self.wrong(is_right)?;
+        let (setting, expected) = expected(wrong);
+        Some(WrongSetting { motor, setting, expected, found })
     }
 
     /// Returns the first setting that is not right or not known, with its value in the drive.

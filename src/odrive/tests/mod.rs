@@ -1,9 +1,9 @@
 //! The codecs, with bytes of the protocol's documentation.
 
 use super::command::{endpoint, request};
-use super::config::Setting;
-use super::feedback::{bit_of, endpoint_value};
+use super::feedback::endpoint_value;
 use super::*;
+use crate::motor::{Form, lowest_bit};
 
 /// can-protocol.csv of 0.5.6; the bytes of 0x07, 0x0C and 0x0D are those of `tests/data/wire`.
 #[test]
@@ -48,12 +48,10 @@ fn a_request_is_a_remote_frame_of_the_length_of_its_message() {
 /// The example of the documentation of 0.6: `struct.pack('<BHB', ...)` and the value in its own length.
 #[test]
 fn an_endpoint_is_asked_for_and_written_as_in_the_example_of_the_documentation() {
-    assert_eq!(std::format!("{:?}", endpoint(0, 0x1234, None, 0)), "004 [4] 00 34 12 00");
-    let (length, bytes) = Setting::EnableWatchdog.bytes(1.0);
-    let write = endpoint(0, 0x0102, Some(&bytes), length);
+    assert_eq!(std::format!("{:?}", endpoint(0, 0x1234, Form::U8, None)), "004 [4] 00 34 12 00");
+    let write = endpoint(0, 0x0102, Form::U8, Some(1.0));
     assert_eq!(std::format!("{write:?}"), "004 [5] 01 02 01 00 01");
-    let (length, bytes) = Setting::WatchdogTimeout.bytes(0.1);
-    let write = endpoint(0, 0x0102, Some(&bytes), length);
+    let write = endpoint(0, 0x0102, Form::F32, Some(0.1));
     assert_eq!(std::format!("{write:?}"), "004 [8] 01 02 01 00 CD CC CC 3D");
     let answer = [0, 0x34, 0x12, 0, 1, 0, 0, 0];
     assert_eq!(endpoint_value(&answer, 5, 0x1234), Some([1, 0, 0, 0]));
@@ -81,7 +79,7 @@ fn an_error_code_is_the_lowest_bit_from_1_and_beside_it_the_module() {
     assert_eq!(code([0, 0, 0, 0, 1, 1, 1, 1]), 33);
     assert_eq!(code([0, 0, 0, 0, 1, 0, 1, 0]), 34);
     assert_eq!(code([0, 0, 0, 0, 1, 0, 0, 1]), 35);
-    assert_eq!(bit_of(0), 0);
+    assert_eq!(lowest_bit(0), 0);
 }
 
 #[test]

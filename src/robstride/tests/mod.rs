@@ -1,6 +1,6 @@
 //! Facts of the models and the codecs.
 
-use super::feedback::{Answer, answer, register};
+use super::feedback::{FAULTS, VALUE, answer, register};
 use super::*;
 use crate::motor::Impedance;
 use crate::wire::mit;
@@ -108,12 +108,9 @@ fn frames_have_the_bytes_of_the_manual() {
 fn a_parameter_that_cannot_be_read_has_no_value() {
     let frame = |raw, data| crate::frame::CanFrame::of(command::extended(raw), data);
     let data = [0x28, 0x70, 0, 0, 0xD0, 0x07, 0, 0];
-    assert_eq!(
-        answer(&frame(0x1100_01FD, data)),
-        Some(Answer::Value(0x7028, Some([0xD0, 7, 0, 0])))
-    );
-    assert_eq!(answer(&frame(0x1101_01FD, data)), Some(Answer::Value(0x7028, None)));
-    assert_eq!(answer(&frame(0x1500_01FD, data)), Some(Answer::Faults(0x7028)));
+    assert_eq!(answer(&frame(0x1100_01FD, data)), Some((VALUE, true, data)));
+    assert_eq!(answer(&frame(0x1101_01FD, data)), Some((VALUE, false, data)));
+    assert_eq!(answer(&frame(0x1500_01FD, data)), Some((FAULTS, true, data)));
     assert_eq!(answer(&frame(0x0280_01FD, data)), None);
     assert_eq!((register(0x7028), register(0x7003)), (Some(Register::Timeout), None));
 }
@@ -131,9 +128,10 @@ fn an_integer_parameter_holds_whole_numbers_of_its_width_only() {
         (Register::TorqueLimit, 0.5, true),
         (Register::TorqueLimit, f32::NAN, false),
     ] {
-        assert_eq!(register.holds(value), holds, "{register:?} {value}");
+        assert_eq!(register.form().holds(value), holds, "{register:?} {value}");
     }
-    assert_eq!(Register::RunMode.value_of([5, 0xFF, 0xFF, 0xFF]).to_bits(), 5.0_f32.to_bits());
+    let value = Register::RunMode.form().value_of([5, 0xFF, 0xFF, 0xFF]);
+    assert_eq!(value.to_bits(), 5.0_f32.to_bits());
 }
 
 /// An RS03 with the kp of another drive would be ten times as stiff as asked.

@@ -1,6 +1,5 @@
 //! The count of turns, ids and lengths.
 
-use super::tachometer::Tachometer;
 use super::*;
 use crate::encoder::GearRatio;
 use crate::error::ConfigError;
@@ -25,7 +24,7 @@ fn m3508() -> Model {
 
 #[test]
 fn the_tachometer_wraps_and_no_count_is_lost() {
-    let mut shaft = Tachometer::new(&MODEL);
+    let mut shaft = MODEL.tachometer();
     shaft.take(i32::MAX);
     let before = shaft.position();
     shaft.take(i32::MIN + 41); // 42 counts on: one turn
@@ -40,7 +39,7 @@ fn the_tachometer_wraps_and_no_count_is_lost() {
 fn turns_through_a_gear_are_exact_after_a_million_of_them() {
     let model = m3508();
     for (model, sign) in [(model, 1), (Model { is_reversed: true, ..model }, -1)] {
-        let mut shaft = Tachometer::new(&model);
+        let mut shaft = model.tachometer();
         // 3591 turns of the rotor are 187 of the output shaft.
         let mut count = 0_i32;
         for _ in 0..14_000 {
@@ -50,7 +49,7 @@ fn turns_through_a_gear_are_exact_after_a_million_of_them() {
         }
         assert_eq!(shaft.position().turns(), sign * 187 * 14_000);
         // The same in steps that end within turns.
-        let mut small = Tachometer::new(&model);
+        let mut small = model.tachometer();
         let mut at = 0;
         while at < count / 1_000 {
             at = (at + 997).min(count / 1_000);
@@ -74,7 +73,7 @@ fn the_longest_products_of_the_tachometer_stay_within_32_bits() {
         matches!(Motor::new(long, 1, Mode::position()), Err(ConfigError::Limit { parameter, .. }) if parameter.contains("gear"))
     );
     for model in [model, Model { is_reversed: true, ..model }] {
-        let mut shaft = Tachometer::new(&model);
+        let mut shaft = model.tachometer();
         for count in [i32::MAX, i32::MIN, 0, i32::MIN, -1, 1, i32::MAX] {
             shaft.take(count);
             let phase = shaft.position().angle().as_turns();

@@ -1,4 +1,4 @@
-//! Questions that take the place of commands, for drives that send one answer for each frame: those of `rmd` too.
+//! Questions that take the place of commands, for drives that send one answer for each frame.
 
 /// Each so many commands the questions begin anew: 32 ms at 1 kHz.
 const ROUND: u8 = 32;

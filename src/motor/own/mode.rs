@@ -1,0 +1,198 @@
+//! The control mode of a drive: an impedance, or a loop of the drive's own.
+
+use super::{Impedance, ImpedanceControl, Order, Target};
+use crate::control::limited;
+use crate::error::ConfigError;
+use crate::math::wrap_pi;
+use crate::motor::{Capabilities, Capability};
+use crate::units::{Angle, AngularVelocity};
+use crate::wire::mit;
+
+/// Angle and velocity of the output shaft; no angle where it is not known.
+pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
+
+/// A goal of the output shaft for one step, within the limits of the mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Goal {
+    /// What a drive in MIT mode follows.
+    Impedance(mit::Command),
+    /// A torque in Nm.
+    Torque(f32),
+    /// A velocity in rad/s.
+    Velocity(f32),
+    /// An angle so many rad away.
+    Way(f32),
+}
+
+/// A control mode: the number of the protocol, what the drive follows, and the limits that a program states.
+///
+/// A family says with `number` what its frames are, and with each limit whether the drive is told of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ControlMode {
+    pub(crate) number: u8,
+    follows: Follows,
+    velocity_limit: Option<AngularVelocity>,
+    torque_limit_nm: Option<f32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Follows {
+    Impedance(ImpedanceControl),
+    /// With the share of the limit that the last goal was.
+    Torque(f32),
+    Velocity,
+    Angle,
+}
+
+impl ControlMode {
+    pub(crate) const fn impedance(number: u8, control: ImpedanceControl) -> Self {
+        let torque_limit_nm = Some(control.torque_limit_nm());
+        let follows = Follows::Impedance(control);
+        Self { number, follows, velocity_limit: None, torque_limit_nm }
+    }
+
+    /// The drive follows torques that nothing computes here.
+    pub(crate) const fn torque(number: u8, torque_limit_nm: f32) -> Self {
+        let torque_limit_nm = Some(torque_limit_nm);
+        Self { number, follows: Follows::Torque(0.0), velocity_limit: None, torque_limit_nm }
+    }
+
+    /// The drive's own loop follows velocities.
+    pub(crate) const fn velocity(
+        number: u8,
+        velocity_limit: Option<AngularVelocity>,
+        torque_limit_nm: Option<f32>,
+    ) -> Self {
+        Self { number, follows: Follows::Velocity, velocity_limit, torque_limit_nm }
+    }
+
+    /// The drive's own loops go to angles.
+    pub(crate) const fn angle(
+        number: u8,
+        velocity_limit: Option<AngularVelocity>,
+        torque_limit_nm: Option<f32>,
+    ) -> Self {
+        Self { number, follows: Follows::Angle, velocity_limit, torque_limit_nm }
+    }
+
+    pub(crate) const fn is_impedance(&self) -> bool {
+        matches!(self.follows, Follows::Impedance(_))
+    }
+
+    pub(crate) const fn is_angle(&self) -> bool {
+        matches!(self.follows, Follows::Angle)
+    }
+
+    /// Returns the velocity limit in rad/s; infinite where there is none.
+    pub(crate) const fn most_velocity(&self) -> f32 {
+        match self.velocity_limit {
+            Some(limit) => limit.as_rad_per_s(),
+            None => f32::INFINITY,
+        }
+    }
+
+    pub(crate) const fn torque_limit_nm(&self) -> Option<f32> {
+        self.torque_limit_nm
+    }
+
+    /// # Errors
+    /// A limit that is not above 0 and within so many rad/s, or not from `least_nm` to so many Nm.
+    pub(crate) fn check(
+        &self,
+        most_velocity: f32,
+        least_nm: f32,
+        most_nm: f32,
+    ) -> Result<(), ConfigError> {
+        if let Some(limit) = self.velocity_limit {
+            let limit = limit.as_rad_per_s();
+            ConfigError::check_limit("velocity limit in rad/s", limit, most_velocity)?;
+        }
+        match self.torque_limit_nm {
+            Some(limit) if least_nm > 0.0 => {
+                ConfigError::check_range("torque limit in Nm", limit, least_nm, most_nm)
+            }
+            Some(limit) => ConfigError::check_limit("torque limit in Nm", limit, most_nm),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the targets that it takes, and that it has feedback.
+    pub(crate) fn capabilities(&self) -> Capabilities {
+        let capabilities = match &self.follows {
+            Follows::Impedance(control) => control.capabilities(),
+            Follows::Torque(_) => Capabilities::of(&[Capability::Torque]),
+            Follows::Velocity => Capabilities::of(&[Capability::Velocity]),
+            Follows::Angle => Capabilities::of(&[Capability::Angle]),
+        };
+        capabilities.with(Capability::Feedback)
+    }
+
+    /// Returns the goal of a drive that follows torques; `None` to rest. The velocity of the shaft is known up to so many rad/s.
+    pub(crate) fn goal(&mut self, order: Order, shaft: Shaft, known: f32) -> Option<Goal> {
+        match &mut self.follows {
+            Follows::Impedance(control) => control.torque(order, shaft, known).map(Goal::Torque),
+            _ => self.own_goal(order, shaft),
+        }
+    }
+
+    /// Returns the goal of a drive that follows an impedance, whose fields have these ends and counts; `None` to rest.
+    #[inline]
+    pub(crate) fn impedance_goal(
+        &mut self,
+        order: Order,
+        (angle, velocity): Shaft,
+        most: &Impedance,
+        count: &Impedance,
+    ) -> Option<Goal> {
+        match &mut self.follows {
+            Follows::Impedance(control) => {
+                let sent = control.step(order, angle, velocity, most, count)?;
+                Some(Goal::Impedance(sent.into()))
+            }
+            _ => self.own_goal(order, (angle, velocity)),
+        }
+    }
+
+    fn own_goal(&mut self, order: Order, (angle, _): Shaft) -> Option<Goal> {
+        match (&mut self.follows, order.target) {
+            (Follows::Torque(effort), Target::Torque(torque_nm)) => {
+                let most = self.torque_limit_nm?;
+                let limit = most * order.share;
+                let torque_nm = limited(torque_nm, -limit, limit);
+                *effort = torque_nm / most;
+                Some(Goal::Torque(torque_nm))
+            }
+            (Follows::Velocity, Target::Velocity(velocity)) => {
+                let limit = self.most_velocity();
+                Some(Goal::Velocity(limited(velocity.as_rad_per_s(), -limit, limit)))
+            }
+            (Follows::Angle, Target::Angle(target)) => {
+                Some(Goal::Way(wrap_pi((target - angle?).as_radians())))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
+    pub(crate) fn effort(&self) -> f32 {
+        match &self.follows {
+            Follows::Impedance(control) => control.effort(),
+            Follows::Torque(effort) => *effort,
+            Follows::Velocity | Follows::Angle => 0.0,
+        }
+    }
+
+    pub(crate) const fn reset(&mut self) {
+        match &mut self.follows {
+            Follows::Impedance(control) => control.reset(),
+            Follows::Torque(effort) => *effort = 0.0,
+            Follows::Velocity | Follows::Angle => {}
+        }
+    }
+}
+
+/// Returns the angle so far away from a position, within the range of a drive. At the very end a position is none any more.
+pub(crate) fn inside(position: f32, way: f32, range: f32) -> f32 {
+    let end = range * 0.9995;
+    limited(position + way, -end, end)
+}
