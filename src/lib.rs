@@ -32,9 +32,10 @@ pub mod control;
 pub mod encoder;
 pub mod geometry;
 
-// F2: what every motor and every chassis has in common; byte protocols
+// F2: what every motor, every chassis and every shooter has in common; byte protocols
 pub mod chassis;
 pub mod motor;
+pub mod shooter;
 pub mod wire;
 
 // F3: device families and their simulation

@@ -33,7 +33,8 @@ fn with_arguments() -> Vec<String> {
     let examples = fs::read_dir(examples()).unwrap().map(|entry| entry.unwrap().path());
     let takes_some = |path: &PathBuf| {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
-        let asks = [format!("arguments::of(\"{name}\")"), format!("course::output(\"{name}\")")];
+        let asks = ["arguments::of", "course::output", "picture::path"]
+            .map(|function| format!("{function}(\"{name}\")"));
         let found = texts(path).iter().any(|text| asks.iter().any(|ask| text.contains(ask)));
         found.then(|| name.to_owned())
     };
@@ -56,10 +57,13 @@ fn an_argument_that_is_not_utf_8_is_named_and_ends_each_example_with_code_2() {
     let expected = [
         "arm",
         "candump",
+        "capacitor",
         "chassis",
         "faults",
         "gimbal",
+        "observer",
         "omni",
+        "shooter",
         "snake",
         "socketcan",
         "swerve",
@@ -110,6 +114,9 @@ fn a_usage_error_is_said_and_ends_each_example_with_code_2() {
         ("arm", ["one.svg", "two.svg"]),
         ("omni", ["one.svg", "two.svg"]),
         ("swerve", ["one.svg", "two.svg"]),
+        ("capacitor", ["one.svg", "two.svg"]),
+        ("observer", ["one.svg", "two.svg"]),
+        ("shooter", ["one.svg", "two.svg"]),
         ("tune", ["one.svg", "two.svg"]),
     ] {
         let output = program(name).args(arguments).output().unwrap();
@@ -152,7 +159,7 @@ fn each_example_whose_output_nobody_reads_ends_quietly() {
     let rest = fs::read_dir(examples()).unwrap().map(|entry| entry.unwrap().path());
     let prints = rest.filter(|path| texts(path).iter().any(|text| text.contains("console::line")));
     let mut known: Vec<_> = names.map(str::to_owned).into_iter().chain(with_arguments()).collect();
-    known.extend(["arguments", "course"].map(str::to_owned));
+    known.extend(["arguments", "course", "picture"].map(str::to_owned));
     for path in prints {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
         assert!(known.iter().any(|known| known == name), "{name} prints");

@@ -8,6 +8,9 @@ mod scenario;
 #[path = "../examples/chassis/justfloat.rs"]
 mod justfloat;
 
+#[path = "../examples/chassis/serial.rs"]
+mod serial;
+
 #[path = "../examples/chassis/silence.rs"]
 mod silence;
 
@@ -30,12 +33,13 @@ use drivetrain::wire::vofa::JustFloat;
 
 use modes::Drive;
 use scenario::{Run, Sample, Scenario, Trouble};
+use serial::Script;
 use verdict::Verdict;
 
 const MODES: [Mode; 4] = [Mode::FollowGimbal, Mode::Rotor, Mode::Independent, Mode::Relax];
 
 fn run(seed: u64, fault: Option<Trouble>) -> Run {
-    Scenario { seconds: 10.0, seed, fault }.run(|_| {}, |_| {}).unwrap()
+    Scenario { seconds: 10.0, seed, fault, serial: None }.run(|_| {}, |_| {}).unwrap()
 }
 
 fn between(run: &Run, from_s: f32, to_s: f32) -> impl Iterator<Item = &Sample> {
@@ -136,7 +140,7 @@ const NAMES: [&str; 4] = ["front left", "front right", "rear left", "rear right"
 /// With each part of the square shorter, the bus goes off while the robot speeds up.
 #[test]
 fn a_bus_that_is_lost_while_the_robot_speeds_up_leaves_more_current() {
-    let scenario = Scenario { seconds: 4.0, seed: 1, fault: Some(Trouble::BusOff) };
+    let scenario = Scenario { seconds: 4.0, seed: 1, fault: Some(Trouble::BusOff), serial: None };
     let run = scenario.run(|_| {}, |_| {}).unwrap();
     let silence = run.silence.unwrap();
     assert!(silence.kept_a.into_iter().all(|(least, most)| least.abs().min(most.abs()) > 5.0));
@@ -280,4 +284,44 @@ fn the_rotor_goes_where_the_gimbal_looks_and_no_wheel_is_too_fast() {
     let speeds = samples.iter().flat_map(|sample| sample.wheel_rpm.into_array());
     let fastest = speeds.fold(0.0_f32, |fastest, rpm| fastest.max(rpm.abs()));
     assert!((430.0..475.0).contains(&fastest), "{fastest} rpm"); // the limit is 450
+}
+
+/// Runs with lines over the serial port.
+fn with_serial(seconds: f32, text: &str) -> Run {
+    let serial = Some(Script::parse(text).unwrap());
+    Scenario { seconds, seed: 1, fault: None, serial }.run(|_| {}, |_| {}).unwrap()
+}
+
+#[test]
+fn gains_over_the_serial_port_hold_from_then_on_and_bad_ones_change_nothing() {
+    // The first side of the square begins at 0.5 s; a soft loop without integral falls behind.
+    let soft = with_serial(4.0, "0.1 wheel_kp=0.5\n0.1 wheel_ki=0\n");
+    let usual = with_serial(4.0, "");
+    let refused =
+        with_serial(4.0, "0.1 wheel_kp=0.1\n0.1 wheel_ki=nan\n0.2 kp=3\n0.3 wheel_kp=1.x\n");
+    let worst = |run: &Run| {
+        let error = |sample: &Sample| sample.target_rpm.front_left - sample.measured_rpm.front_left;
+        run.samples.iter().map(|sample| error(sample).abs()).fold(0.0, f32::max)
+    };
+    assert!(worst(&soft) > 3.0 * worst(&usual), "{} {}", worst(&soft), worst(&usual));
+    assert_eq!(worst(&refused).to_bits(), worst(&usual).to_bits());
+    let (_, counts) = refused.serial.unwrap();
+    assert_eq!((counts.accepted, counts.out_of_range), (0, 2));
+    assert_eq!((counts.unknown, counts.malformed), (1, 1));
+}
+
+#[test]
+fn a_turn_over_the_serial_port_expires_and_an_answer_tells_the_table() {
+    let run = with_serial(4.0, "1.0 turn=1.0\n1.1 ?\n");
+    let heading = |time_s: f32| {
+        let sample = run.samples.iter().find(|sample| sample.time_s >= time_s).unwrap();
+        sample.heading_rad
+    };
+    // 500 ms at 1 rad/s, and then no more of it.
+    assert!(heading(0.99).abs() < 0.02, "{}", heading(0.99));
+    assert!((heading(1.8) - 0.5).abs() < 0.06, "{}", heading(1.8));
+    assert!((heading(3.0) - heading(1.8)).abs() < 0.05);
+    let (answers, counts) = run.serial.unwrap();
+    assert!(answers.contains("2 turn=1.000 from -1.000 to 1.000 rad/s"), "{answers}");
+    assert_eq!(counts.accepted, 2);
 }

@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 use drivetrain::control::{
-    Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, Profile, TimeStep, TuningRule,
-    fhan,
+    Biquad, Differentiator, LoadObserver, LowPass, MotionLimits, Pid, PidConfig, Profile, TimeStep,
+    TuningRule, fhan,
 };
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
@@ -174,4 +174,23 @@ fn gains_by_the_rules_of_the_papers() {
         compared += 1;
     }
     assert_eq!(compared, 10);
+}
+
+/// The sequence is that of python-control, which placed the poles and simulated the estimator: `data/observer/compute.py`.
+#[test]
+fn load_observer_by_python_control() {
+    let mut running: Option<((f32, f32), LoadObserver)> = None;
+    let mut compared = 0;
+    for (_, row) in rows(include_str!("data/observer/observer.csv")) {
+        let key = (row[0], row[1]);
+        if running.is_none_or(|(at, _)| at != key) {
+            running = Some((key, LoadObserver::new(row[0], row[1]).unwrap()));
+        }
+        let Some((_, observer)) = &mut running else { unreachable!() };
+        observer.update(row[4], row[3], row[2]);
+        assert_close(observer.velocity_rad_per_s(), row[5], 1e-5, "speed");
+        assert_close(observer.load_nm(), row[6], 5e-5, "load");
+        compared += 1;
+    }
+    assert_eq!(compared, 340);
 }

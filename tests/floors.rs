@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 21] = [
+const FLOORS: [(&str, u32); 22] = [
     ("error", 0),
     ("units", 2),
     ("time", 1),
@@ -18,6 +18,7 @@ const FLOORS: [(&str, u32); 21] = [
     ("motor", 20),
     ("wire", 19),
     ("chassis", 21),
+    ("shooter", 21),
     ("damiao", 30),
     ("dji", 30),
     ("lk", 30),

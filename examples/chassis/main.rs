@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release --example chassis -- [--seconds S] [--output FILE.svg] [--csv FILE] [--justfloat FILE]
 //!                                          [--candump FILE] [--seed N] [--fault silent-motor|lost-frames|bus-off]
+//!                                          [--serial FILE]
 //!                                          [--mode follow|rotor|independent|relax] [--power-limit W]
 //! ```
 //!
@@ -20,6 +21,7 @@ mod options;
 mod plot;
 mod report;
 mod scenario;
+mod serial;
 mod silence;
 mod verdict;
 
@@ -28,6 +30,7 @@ use log::Log;
 use modes::Drive;
 use options::{Options, Request};
 use scenario::Scenario;
+use serial::Script;
 use std::error::Error;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
@@ -60,7 +63,13 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let show_progress = std::io::stderr().is_terminal();
     let start = Instant::now();
-    let scenario = Scenario { seconds: options.seconds, seed: options.seed, fault: options.fault };
+    let script = |path| Ok::<_, Box<dyn Error>>(Script::parse(&std::fs::read_to_string(path)?)?);
+    let scenario = Scenario {
+        seconds: options.seconds,
+        seed: options.seed,
+        fault: options.fault,
+        serial: options.serial.as_ref().map(script).transpose()?,
+    };
     let mut log = Log::create(options.candump.as_deref())?;
     let show = |share| {
         if show_progress {

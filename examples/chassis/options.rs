@@ -9,6 +9,7 @@ pub(crate) const USAGE: &str = "usage: chassis [options]
   --output FILE     where the plot goes (default chassis.svg)
   --csv FILE        writes every sample as a row, too
   --justfloat FILE  writes targets and speeds (rpm) as VOFA+ JustFloat frames of 8 channels, too
+  --serial FILE     sends its lines, as in '2.5 wheel_kp=1.0', to the robot at their times in s: wheel_kp, wheel_ki, turn, ?
   --candump FILE    writes every frame on the bus as a line of candump, too
   --seed N          chooses phases and chances of the simulation (default 1)
   --fault NAME      silent-motor, lost-frames or bus-off
@@ -22,6 +23,7 @@ pub(crate) struct Options {
     pub(crate) output: PathBuf,
     pub(crate) csv: Option<PathBuf>,
     pub(crate) justfloat: Option<PathBuf>,
+    pub(crate) serial: Option<PathBuf>,
     pub(crate) candump: Option<PathBuf>,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
@@ -49,6 +51,7 @@ impl Options {
             output: PathBuf::from("chassis.svg"),
             csv: None,
             justfloat: None,
+            serial: None,
             candump: None,
             seed: 1,
             fault: None,
@@ -69,6 +72,7 @@ impl Options {
                 "--output" => options.output = value()?.into(),
                 "--csv" => options.csv = Some(value()?.into()),
                 "--justfloat" => options.justfloat = Some(value()?.into()),
+                "--serial" => options.serial = Some(value()?.into()),
                 "--candump" => options.candump = Some(value()?.into()),
                 "--seed" => {
                     let text = value()?;
@@ -98,10 +102,14 @@ impl Options {
                 other => return Err(format!("unknown option {other}")),
             }
         }
-        let of_the_square =
-            options.fault.is_some() || options.csv.is_some() || options.justfloat.is_some();
+        let of_the_square = options.fault.is_some()
+            || options.csv.is_some()
+            || options.justfloat.is_some()
+            || options.serial.is_some();
         if options.mode.is_some() && of_the_square {
-            return Err("--fault, --csv and --justfloat are not for a drive with --mode".into());
+            return Err(
+                "--fault, --csv, --justfloat and --serial are not for a drive with --mode".into()
+            );
         }
         Ok(Request::Run(options))
     }

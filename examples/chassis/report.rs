@@ -3,6 +3,7 @@
 use super::scenario::{Run, Sample};
 use super::silence::Silence;
 use drivetrain::chassis::MecanumWheels;
+use drivetrain::wire::parameters::ParameterCounts;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
@@ -40,6 +41,14 @@ pub(crate) fn table(run: &Run) -> String {
         );
     }
     _ = writeln!(text, "path         {path_max:.3} m off at most, {path_end:.3} m at the end");
+    if let Some((answers, counts)) = &run.serial {
+        text.push_str(answers);
+        let ParameterCounts { accepted, out_of_range, unknown, malformed } = counts;
+        _ = writeln!(
+            text,
+            "serial       {accepted} lines accepted, {out_of_range} out of range, {unknown} unknown, {malformed} malformed"
+        );
+    }
     let statistics = &run.statistics;
     _ = writeln!(
         text,

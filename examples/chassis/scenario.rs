@@ -1,5 +1,6 @@
 //! The robot, its tasks, and the result of a run.
 
+use super::serial::{Script, SerialPort};
 use super::silence::{CommandWatch, Silence};
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
@@ -13,13 +14,14 @@ use drivetrain::sim::{
 };
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
+use drivetrain::wire::parameters::ParameterCounts;
 use std::error::Error;
 
 pub(crate) const WHEEL_RADIUS_M: f32 = 0.076;
 pub(crate) const FRONT_LEFT_M: Vec2 = Vec2::new(0.20, 0.18);
 /// A per rad/s and A per rad of the output shaft. Twice what `WheelTuning` reckons for 20 kg, and more of the integral, for a plan
 /// that has to be kept: a step overshoots by some 9 %.
-const SPEED: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
+pub(crate) const SPEED: PidConfig = PidConfig::new(4.0, 24.0, 0.0);
 const CRUISE_M_S: f32 = 1.0;
 const SPIN_RAD_S: f32 = 3.0;
 /// The motors on the right are mounted the other way around.
@@ -75,6 +77,8 @@ pub(crate) struct Scenario {
     pub(crate) seconds: f32,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
+    /// What a PC sends over the serial port.
+    pub(crate) serial: Option<Script>,
 }
 
 /// One millisecond.
@@ -103,6 +107,8 @@ pub(crate) struct Run {
     pub(crate) trouble: Option<(Trouble, f32, f32)>,
     /// The longest time in which the trouble kept all commands from the ESCs.
     pub(crate) silence: Option<Silence>,
+    /// What the robot answered over the serial port, and how many lines it took.
+    pub(crate) serial: Option<(String, ParameterCounts)>,
 }
 
 impl Scenario {
@@ -134,6 +140,11 @@ impl Scenario {
             refused_to_arm: 0,
             trouble,
             silence: None,
+            serial: None,
+        };
+        let mut serial = match &self.serial {
+            Some(script) => Some(SerialPort::new(script, self.seed)?),
+            None => None,
         };
         let mut planned = (0.0, 0.0);
         while world.now() < end {
@@ -147,7 +158,11 @@ impl Scenario {
             let Some(tick) = robot.due() else { continue };
             let time_s = seconds_of(tick.now());
             let heading = heading(&world);
-            let wanted = plan.twist(time_s);
+            let mut wanted = plan.twist(time_s);
+            if let Some(serial) = &mut serial {
+                let turn = serial.poll(robot.device_mut(), wheels, tick.now())?;
+                wanted = wanted.with_wz(wanted.wz_rad_s + turn);
+            }
             planned =
                 (planned.0 + wanted.vx_m_s * tick.dt_s(), planned.1 + wanted.vy_m_s * tick.dt_s());
             let targets = mecanum.inverse(wanted.to_body(heading));
@@ -163,6 +178,7 @@ impl Scenario {
         }
         progress(1.0);
         run.silence = commands.and_then(|commands| commands.finish(end, &run.samples));
+        run.serial = serial.map(SerialPort::finish);
         run.traffic = world.traffic(Line::Can1);
         run.statistics = robot.statistics();
         Ok(run)

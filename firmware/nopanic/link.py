@@ -31,7 +31,7 @@ FORBIDDEN = re.compile(
 # Not callable on these targets: with `std` or for the host only.
 SKIPPED = {"StdClock"}
 # Writes decimals with core::fmt, which has panic paths of its own.
-FORMATTING = {"text_line"}
+FORMATTING = {"text_line", "describe"}
 # What a macro calls the type that it makes, in the sources; and how the list names one of them.
 MACROS = {"quantity": r"\$quantity", "name": r"\$name"}
 SKIPPED_FOLDERS = {"sim"}

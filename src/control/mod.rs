@@ -16,6 +16,7 @@
 //! | single wrong samples | the median of a [`Window`] of 3 | |
 //! | a disturbance of a known period | the mean of a [`Window`] of that many samples | |
 //! | the rate of a noisy signal | [`Differentiator`] | |
+//! | what pushes, brakes or blocks a shaft; a speed with less noise and no lag | [`LoadObserver`] | a bandwidth of 200 rad/s |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
 //! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
@@ -44,6 +45,7 @@ mod differentiator;
 mod error;
 mod filter;
 mod number;
+mod observer;
 mod pid;
 mod shaping;
 mod step;
@@ -53,6 +55,7 @@ pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
 pub(crate) use number::limited;
+pub use observer::LoadObserver;
 
 pub(crate) use pid::Input;
 pub use pid::{Pid, PidConfig, Terms};

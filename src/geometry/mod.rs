@@ -37,6 +37,7 @@
 //! ```
 
 mod arc;
+mod attitude;
 mod error;
 mod frame;
 mod point;
@@ -50,6 +51,7 @@ mod transform3;
 mod twist;
 mod vector;
 
+pub use attitude::{Attitude, AttitudeSource};
 pub use frame::{Body, Gimbal, World};
 pub use point::{Point2, Point3};
 pub use pose::Pose2;

@@ -7,8 +7,6 @@ use crate::frame::CanFrame;
 use crate::motor::Capability;
 use crate::units::{AngularVelocity, Current};
 
-/// The longest time that the ESC's firmware is late with a frame. An estimate.
-const JITTER_NS: u32 = 10_000;
 /// A seeded clock is at most this far off, in millionths: a common crystal. An estimate.
 const CLOCK_PPM: u32 = 50;
 
@@ -83,7 +81,7 @@ impl Esc {
             sent: [0; 8],
             replies: 0,
         };
-        esc.due_ns = esc.grid_ns + u64::from(esc.random.below(JITTER_NS));
+        esc.due_ns = esc.next_due();
         Some(esc)
     }
 
@@ -94,7 +92,7 @@ impl Esc {
             (Some(forgets_angle), None) => {
                 self.command = 0;
                 self.grid_ns = now_ns + u64::from(self.random.below(1_000_000));
-                self.due_ns = self.grid_ns + u64::from(self.random.below(JITTER_NS));
+                self.due_ns = self.next_due();
                 if forgets_angle {
                     self.zero = self.rotor.counts(0.0);
                 }
@@ -152,14 +150,15 @@ impl Esc {
         tampering: &Tampering,
     ) -> Option<CanFrame> {
         self.grid_ns += self.period_ns;
-        self.due_ns = self.grid_ns + u64::from(self.random.below(JITTER_NS));
+        self.due_ns = self.next_due();
         if tampering.silent {
             return None;
         }
         let [mut angle_high, mut angle_low, mut speed_high, mut speed_low, ..] = self.sent;
         if !tampering.stuck {
             [angle_high, angle_low] = self.angle(since_step_s).to_be_bytes();
-            [speed_high, speed_low] = nearest_i16(self.rotor.rotor_rpm()).to_be_bytes();
+            [speed_high, speed_low] =
+                nearest_i16(self.rotor.rotor_rpm() + self.noise_rpm()).to_be_bytes();
         }
         let scale = f32::from(self.facts.current_raw) / self.facts.current_full_scale_a;
         let [current_high, current_low] = nearest_i16(self.rotor.current() * scale).to_be_bytes();
@@ -190,6 +189,18 @@ impl Esc {
             }
             None => Some(frame),
         }
+    }
+
+    /// Draws when the next frame leaves: up to the jitter after its ideal time.
+    fn next_due(&mut self) -> u64 {
+        let jitter_ns = self.config.jitter.micros_u32().unwrap_or(0).saturating_mul(1_000);
+        self.grid_ns + u64::from(self.random.below(jitter_ns))
+    }
+
+    /// Draws the error of the next speed in rpm of the rotor.
+    fn noise_rpm(&mut self) -> f32 {
+        let most = self.config.speed_noise_rpm;
+        if most > 0.0 { self.random.within(most) } else { 0.0 }
     }
 
     fn angle(&self, since_step_s: f32) -> u16 {
@@ -389,7 +400,7 @@ mod tests {
             let _frame = feedback(&mut esc);
         }
         let elapsed = esc.due().unwrap() - first;
-        assert!(elapsed.abs_diff(10_000 * 1_000_040) <= u64::from(JITTER_NS), "{elapsed}");
+        assert!(elapsed.abs_diff(10_000 * 1_000_040) <= 10_000, "{elapsed}");
     }
 
     #[test]
@@ -403,7 +414,7 @@ mod tests {
                 let _frame = feedback(&mut esc);
             }
             let elapsed = esc.due().unwrap() - first;
-            assert!(elapsed.abs_diff(100 * expected * 1_000) <= u64::from(JITTER_NS));
+            assert!(elapsed.abs_diff(100 * expected * 1_000) <= 10_000);
         }
     }
 

@@ -54,6 +54,8 @@ pub struct MotorConfig {
     pub(crate) clock_ppm: Option<i16>,
     pub(crate) legacy_full_scale: bool,
     pub(crate) period: Duration,
+    pub(crate) jitter: Duration,
+    pub(crate) speed_noise_rpm: f32,
 }
 
 impl MotorConfig {
@@ -95,6 +97,8 @@ impl MotorConfig {
             clock_ppm: None,
             legacy_full_scale: false,
             period: Duration::from_millis(1),
+            jitter: Duration::from_micros(10),
+            speed_noise_rpm: 0.0,
         }
     }
 
@@ -167,6 +171,22 @@ impl MotorConfig {
         let micros = if micros < 100 { 100 } else { micros };
         let micros = if micros > 1_000_000 { 1_000_000 } else { micros };
         Self { period: Duration::from_micros(micros), ..self }
+    }
+
+    /// Sets by how much a feedback frame is late at most, 10 µs by default (an estimate) and at most 10 ms. The time is drawn anew for
+    /// each frame, and does not add up.
+    #[must_use]
+    pub const fn with_feedback_jitter(self, most: Duration) -> Self {
+        let micros = if most.as_micros() > 10_000 { 10_000 } else { most.as_micros() };
+        Self { jitter: Duration::from_micros(micros), ..self }
+    }
+
+    /// Adds noise of at most so many rpm, evenly distributed, to the rotor speed of the feedback; what is not a positive number
+    /// counts as none. The true speed stays as it is.
+    #[must_use]
+    pub const fn with_speed_noise_rpm(self, most: f32) -> Self {
+        let most = if most > 0.0 && most < 1e4 { most } else { 0.0 };
+        Self { speed_noise_rpm: most, ..self }
     }
 
     /// Sets by how many millionths the ESC's period is too long; by default the seed chooses within ±50.

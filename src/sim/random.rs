@@ -31,6 +31,13 @@ impl Random {
         ((self.next_u32() as u64 * bound as u64) >> 32) as u32
     }
 
+    /// Returns a number within ±`most`, evenly distributed.
+    pub(crate) fn within(&mut self, most: f32) -> f32 {
+        // 24 bits are exact in f32.
+        let drawn = (self.next_u32() >> 8) as f32 * (1.0 / 8_388_608.0);
+        most * (drawn - 1.0)
+    }
+
     /// Tells yes with the given probability: never at 0 and below, always at 1 and above, never for NaN.
     pub(crate) fn chance(&mut self, probability: f32) -> bool {
         // 24 bits are exact in f32.

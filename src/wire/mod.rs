@@ -9,6 +9,7 @@
 //! | [`dbus`] | DR16 receiver of a remote control | 18 bytes between pauses | none: plausibility | x | |
 //! | [`vt13`] | remote control of the video link, VT03 and VT13 | 21 bytes | CRC-16/MCRF4XX, low byte first | x | |
 //! | [`referee`] | referee system of the RoboMaster | 9 + length | CRC-8 of the header; CRC-16/MCRF4XX, low byte first | x | x |
+//! | [`parameters`] | a person, or a plotting tool, that sets gains and targets | a line of text | ranges | x | x |
 //! | [`vofa`] | plotting tool on a computer | 4 bytes a channel + tail | none | x | x |
 //! | [`candump`] | SocketCAN's log | a line of text | none | x | x |
 //! | [`mit`] | motors in MIT mode | the 8 bytes of a CAN frame | that of CAN | x | x |
@@ -49,6 +50,7 @@ pub mod feetech;
 pub mod hipnuc;
 pub mod host_link;
 pub mod mit;
+pub mod parameters;
 pub mod referee;
 pub mod supercap;
 pub mod vofa;

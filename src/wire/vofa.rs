@@ -74,22 +74,34 @@ pub fn text_line<'a>(
     values: &[f32],
     out: &'a mut [u8],
 ) -> Result<&'a [u8], EncodeError> {
-    let mut line = Line { out, length: 0 };
+    let mut line = Line::new(out);
     // `Line` takes everything, so that writing to it cannot fail.
     let _ = line.write_str(name);
     for (index, value) in values.iter().enumerate() {
         let _ = write!(line, "{}{value:.3}", if index == 0 { ':' } else { ',' });
     }
     let _ = line.write_char('\n');
-    let Line { out, length } = line;
-    let given = out.len();
-    out.get(..length).ok_or(EncodeError::BufferTooSmall { needed: length, given })
+    line.finish()
 }
 
 /// Keeps what fits, and counts all of it.
-struct Line<'a> {
+#[derive(Debug)]
+pub(super) struct Line<'a> {
     out: &'a mut [u8],
     length: usize,
+}
+
+impl<'a> Line<'a> {
+    pub(super) const fn new(out: &'a mut [u8]) -> Self {
+        Self { out, length: 0 }
+    }
+
+    /// Returns the line, or how long it is when it does not fit.
+    pub(super) fn finish(self) -> Result<&'a [u8], EncodeError> {
+        let Self { out, length } = self;
+        let given = out.len();
+        out.get(..length).ok_or(EncodeError::BufferTooSmall { needed: length, given })
+    }
 }
 
 impl Write for Line<'_> {

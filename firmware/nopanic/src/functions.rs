@@ -46,6 +46,7 @@ pub fn call_all() {
     crate::robstride::call_all();
     crate::snake::call_all();
     crate::shaping::call_all();
+    crate::shooter::call_all();
     crate::wire::call_all();
     #[cfg(feature = "panics")]
     f32::clamp.call();

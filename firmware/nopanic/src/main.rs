@@ -19,6 +19,7 @@ mod pwm;
 mod rmd;
 mod robstride;
 mod shaping;
+mod shooter;
 mod snake;
 mod vesc;
 mod wire;

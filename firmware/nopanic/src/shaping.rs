@@ -59,6 +59,12 @@ pub fn call_all() {
     Window::<8>::reset.call();
     Window::<8>::rejected.call();
     Pid::interrupt.call();
+    LoadObserver::new.call();
+    LoadObserver::update.call();
+    LoadObserver::reset_to.call();
+    LoadObserver::velocity_rad_per_s.call();
+    LoadObserver::load_nm.call();
+    LoadObserver::rejected.call();
     FeedForward::new.call();
     FeedForward::effort.call();
     MotionLimits::new.call();

@@ -84,3 +84,38 @@ fn the_check_runs_in_the_compiler_and_takes_what_physics_takes() {
     const TAKEN: [bool; 3] = [takes(10.0), takes(3_600.0), takes(4_000.0)];
     assert_eq!(TAKEN, [true, true, false]);
 }
+
+/// A loop in raw units needs no type of its own: the same loop in A per rad/s sends the same words.
+#[test]
+fn a_speed_loop_in_words_per_rpm_and_its_conversion_send_the_same_words() {
+    use crate::dji::WordGains;
+    let (kp, ki) = (8.0_f64, 5.0);
+    let wheel = Config::<M3508>::new(1).with_opening(Duration::ZERO);
+    let gains = WordGains::per_rotor_rpm(8.0, 5.0, 0.0).speed_loop(&wheel);
+    let mut bus: Bus = Bus::new();
+    let motor = bus.attach(wheel.speed_loop(gains)).unwrap();
+    let (target_rpm, mut sum, mut before, mut worst) = (100.0_f64, 0.0, None, 0.0_f64);
+    for ms in 1..=2_000 {
+        let now = Instant::from_micros(1_000 * ms);
+        // A rotor that comes up to speed and swings around it.
+        let rpm = (1_920.0 * (1.0 - (-(ms as f64) / 300.0).exp()) + 40.0 * (ms as f64 / 9.0).sin())
+            as i16;
+        let [high, low] = rpm.to_be_bytes();
+        let frame = CanFrame::standard(0x201, [0, 0, high, low, 0, 0, 30, 0]).unwrap();
+        _ = bus.ingest(&frame, now);
+        if ms == 1 {
+            bus.arm(now).unwrap();
+        }
+        bus.set_velocity(motor, AngularVelocity::from_rpm(100.0)).unwrap();
+        bus.update(Tick::new(now, 0.001));
+        let word =
+            bus.next_frame().map(|frame| i16::from_be_bytes([frame.bytes()[0], frame.bytes()[1]]));
+        let error = target_rpm * 3591.0 / 187.0 - f64::from(rpm);
+        // By the trapezoid, as the controller of this crate.
+        sum += 0.001 * (error + before.unwrap_or(error)) / 2.0;
+        before = Some(error);
+        let raw = (kp * error + ki * sum).round();
+        worst = worst.max((f64::from(word.unwrap()) - raw).abs());
+    }
+    assert!(worst <= 1.0, "{worst} words");
+}

@@ -1,9 +1,11 @@
 //! Orientation: from the quaternion on the wire, and as the angles that firmware calls roll, pitch and yaw.
 
 use super::Imu;
-use crate::geometry::Rotation3;
+use crate::geometry::{Attitude, AttitudeSource, Rotation3};
 use crate::math::{atan2, sqrt};
+use crate::time::Instant;
 use crate::units::Angle;
+use crate::wire::Receiver;
 
 /// Takes w, x, y, z; `None` when they are further than 10 % from length 1, or not finite.
 pub(super) fn normalised(quaternion: [f32; 4]) -> Option<Rotation3> {
@@ -43,6 +45,13 @@ impl Imu {
             2.0 * (w * x + y * z),
             (2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z)),
         )
+    }
+}
+
+impl<const N: usize> AttitudeSource for Receiver<Imu, N> {
+    fn attitude(&self, now: Instant) -> Option<Attitude> {
+        let imu = self.latest(now)?;
+        Some(Attitude { rotation: imu.attitude, rates: imu.angular_velocity })
     }
 }
 

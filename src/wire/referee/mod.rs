@@ -60,7 +60,7 @@
 mod payload;
 mod receiver;
 
-pub use payload::{PowerHeat, RobotState, ShotData};
+pub use payload::{BarrelHeat, PowerHeat, RobotState, ShotData};
 pub use receiver::Referee;
 
 use super::field::{Reader, Writer};

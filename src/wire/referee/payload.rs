@@ -62,6 +62,19 @@ pub struct PowerHeat {
     pub heat_42mm: u16,
 }
 
+/// Heat of a barrel, with the limit and the cooling that hold for it.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BarrelHeat {
+    /// Heat now.
+    pub heat: u16,
+    /// Heat above which the robot is punished.
+    pub limit: u16,
+    /// Heat by which the barrel cools each second.
+    pub cooling_per_s: u16,
+}
+
 /// A shot: message `0207`.
 ///
 /// ```text

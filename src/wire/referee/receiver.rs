@@ -1,4 +1,4 @@
-use super::{MAX_FRAME, RefereeMessage};
+use super::{BarrelHeat, MAX_FRAME, RefereeMessage};
 use crate::time::{ConditionEdge, Duration, Instant};
 use crate::wire::deadline::Deadline;
 use crate::wire::{Counts, Deframer, Silence};
@@ -9,7 +9,10 @@ const MOST_BUFFER_J: u16 = 300;
 /// The same controller switches itself off when it is told a higher limit.
 const HIGHEST_LIMIT_W: u16 = 250;
 
-/// Reads the referee system, and says which power limit and which buffer energy hold now.
+/// A heat limit or a cooling above this is not believed. A bound of this crate: robots have a few hundred.
+const HIGHEST_HEAT: u16 = 2_000;
+
+/// Reads the referee system, and says which power limit, buffer energy and barrel heat hold now.
 ///
 /// | what is heard | power limit | buffer energy |
 /// |---|---|---|
@@ -47,6 +50,9 @@ pub struct Referee {
     highest_limit_w: u16,
     limit_w: LowerOfTwo,
     buffer_j: LowerOfTwo,
+    heat_limit: LowerOfTwo,
+    cooling_per_s: LowerOfTwo,
+    heat_17mm: u16,
 }
 
 impl Referee {
@@ -62,6 +68,9 @@ impl Referee {
             highest_limit_w: HIGHEST_LIMIT_W,
             limit_w: LowerOfTwo::new(Duration::from_millis(500)),
             buffer_j: LowerOfTwo::new(Duration::from_millis(250)),
+            heat_limit: LowerOfTwo::new(Duration::from_millis(500)),
+            cooling_per_s: LowerOfTwo::new(Duration::from_millis(500)),
+            heat_17mm: 0,
         }
     }
 
@@ -74,7 +83,13 @@ impl Referee {
     /// Sets the ages at which the power limit and the buffer energy are lost.
     #[must_use]
     pub const fn with_deadlines(self, limit: Duration, buffer: Duration) -> Self {
-        Self { limit_w: LowerOfTwo::new(limit), buffer_j: LowerOfTwo::new(buffer), ..self }
+        Self {
+            limit_w: LowerOfTwo::new(limit),
+            heat_limit: LowerOfTwo::new(limit),
+            cooling_per_s: LowerOfTwo::new(limit),
+            buffer_j: LowerOfTwo::new(buffer),
+            ..self
+        }
     }
 
     /// Returns the next message of `input`, as [`Deframer::read`] does; `now` is when the bytes arrived.
@@ -84,9 +99,12 @@ impl Referee {
         match message {
             RefereeMessage::Robot(state) => {
                 self.limit_w.note(state.chassis_power_limit_w, self.highest_limit_w, now);
+                self.heat_limit.note(state.barrel_heat_limit, HIGHEST_HEAT, now);
+                self.cooling_per_s.note(state.barrel_cooling_per_s, HIGHEST_HEAT, now);
             }
             RefereeMessage::Power(power) => {
-                self.buffer_j.note(power.buffer_energy_j, MOST_BUFFER_J, now)
+                self.buffer_j.note(power.buffer_energy_j, MOST_BUFFER_J, now);
+                self.heat_17mm = power.heat_17mm;
             }
             RefereeMessage::Shot(_) | RefereeMessage::Raw(_) => {}
         }
@@ -109,6 +127,45 @@ impl Referee {
     #[must_use]
     pub fn buffer_energy_j(&self, now: Instant) -> Option<f32> {
         self.buffer_j.value(now).map(f32::from)
+    }
+
+    /// Returns heat, limit and cooling of the first 17 mm barrel, for [`shooter`](crate::shooter); `None` while one of both messages is
+    /// silent, or came once only.
+    ///
+    /// Limit and cooling are the lower of the last two that were heard, the heat is the last. A limit or a cooling above 2000 is not
+    /// believed.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::time::Instant;
+    /// use drivetrain::wire::referee::{BarrelHeat, Referee, encode};
+    ///
+    /// let mut referee = Referee::new(45);
+    /// let now = Instant::START;
+    /// let state = [3, 1, 200, 0, 200, 0, 40, 0, 100, 0, 80, 0, 0b111]; // cools by 40 in 1 s, 100 at most
+    /// let heat = [0, 0, 0, 0, 0, 0, 0, 0, 60, 0, 70, 0, 0, 0]; // heat 70
+    /// for (command, data) in [(0x0201, &state[..]), (0x0202, &heat), (0x0201, &state)] {
+    ///     let mut frame = [0; 32];
+    ///     let mut received = encode(command, 0, data, &mut frame)?;
+    ///     assert!(referee.read(&mut received, now).is_some());
+    /// }
+    /// assert_eq!(referee.heat_17mm(now), None); // each counts from the second frame on
+    /// let mut frame = [0; 32];
+    /// let mut received = encode(0x0202, 0, &heat, &mut frame)?;
+    /// assert!(referee.read(&mut received, now).is_some());
+    /// let expected = BarrelHeat { heat: 70, limit: 100, cooling_per_s: 40 };
+    /// assert_eq!(referee.heat_17mm(now), Some(expected));
+    /// # Ok::<(), drivetrain::wire::EncodeError>(())
+    /// ```
+    #[must_use]
+    pub fn heat_17mm(&self, now: Instant) -> Option<BarrelHeat> {
+        // The heat comes in the message of the buffer energy.
+        self.buffer_j.value(now)?;
+        Some(BarrelHeat {
+            heat: self.heat_17mm,
+            limit: self.heat_limit.value(now)?,
+            cooling_per_s: self.cooling_per_s.value(now)?,
+        })
     }
 
     /// Returns whether a power limit that is believed came in time.

@@ -4,6 +4,9 @@
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
 //! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU
 //! falls silent while one is held, the robot stops until both are let go.
+//!
+//! A PC may set the gains of the wheels while the robot runs: lines such as `wheel_kp=2.5` on a serial port, see
+//! [`Pilot::hear_debug_port`].
 #![cfg_attr(not(test), no_std)]
 
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
@@ -14,6 +17,7 @@ use drivetrain::time::{ConditionEdge, Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote, Switch};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
+use drivetrain::wire::parameters::{Parameter, ParameterCounts, Parameters};
 use drivetrain::wire::{Receiver, Silence};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
@@ -34,6 +38,14 @@ const FASTEST_WHEEL: AngularVelocity = AngularVelocity::from_rpm(400.0);
 const FASTEST_M_S: f32 = 1.5;
 const FASTEST_RAD_S: f32 = 4.0;
 const IMU_DEADLINE: Duration = Duration::from_millis(50);
+
+/// The gains that a PC may set, by their place in the table. A wheel that is lifted keeps still with each of them.
+const KP: usize = 0;
+const KI: usize = 1;
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::setting("wheel_kp", "A per rad/s", 0.2, 4.0),
+    Parameter::setting("wheel_ki", "A per rad", 0.0, 10.0),
+];
 
 /// What the remote control asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +76,7 @@ pub struct Pilot {
     chassis: Chassis<Mecanum>,
     dbus: Dbus,
     imu: Receiver<Imu, MAX_FRAME>,
+    parameters: Parameters<2>,
     switch: Switch,
     forward: Forward,
 }
@@ -89,7 +102,9 @@ impl Pilot {
         chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
         let imu = Receiver::new(IMU_DEADLINE);
         let (switch, forward) = (Switch::Absent, Forward::Chassis);
-        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, switch, forward })
+        let parameters =
+            Parameters::new(PARAMETERS).map_err(|_| "a parameter that cannot work")?;
+        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, parameters, switch, forward })
     }
 
     /// Takes bytes of the remote control that arrived at `now`.
@@ -100,6 +115,27 @@ impl Pilot {
     /// Takes bytes of the IMU that arrived at `now`.
     pub fn hear_imu(&mut self, mut bytes: &[u8], now: Instant) {
         while self.imu.read(&mut bytes, now).is_some() {}
+    }
+
+    /// Takes bytes of a PC that arrived at `now`, and gives the wheels the gains that they set, without a jump of the output.
+    ///
+    /// No board reads a serial port for it yet. A board that does calls this between two ticks, and may show what is returned.
+    pub fn hear_debug_port(
+        &mut self,
+        bus: &mut Bus,
+        mut bytes: &[u8],
+        now: Instant,
+    ) -> ParameterCounts {
+        while self.parameters.read(&mut bytes, now).is_some() {
+            let (kp, ki, kd) = SPEED.gains();
+            let kp = self.parameters.value(KP, now).unwrap_or(kp);
+            let ki = self.parameters.value(KI, now).unwrap_or(ki);
+            for wheel in self.wheels.into_array() {
+                // Refused for a wheel that was detached only, which never happens here.
+                _ = bus.set_speed_loop(wheel, SPEED.with_gains(kp, ki, kd));
+            }
+        }
+        self.parameters.counts()
     }
 
     /// Hands over who was heard and lost since, for the log.
@@ -165,6 +201,7 @@ fn at_rest(remote: &Remote) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drivetrain::frame::CanFrame;
 
     /// A frame with all channels at rest but the first, and the right switch at `switch`.
     fn frame(channel: u64, switch: u64) -> [u8; 18] {
@@ -201,6 +238,48 @@ mod tests {
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
         assert_eq!(wishes(&[frame(1024, UP)]), Wish::Rest, "at power-on");
         assert_eq!(wishes(&[frame(1024, UP), frame(1024, MIDDLE)]), Wish::Rest);
+    }
+
+    /// The first word that a wheel at rest is sent for a target of 1 rad/s.
+    fn word(lines: &[u8]) -> i16 {
+        let now = Instant::START + Duration::from_secs(1);
+        let mut bus = Bus::new();
+        let mut pilot = Pilot::new(&mut bus).unwrap();
+        for id in 0x201..=0x204 {
+            let frame = CanFrame::standard(id, [0, 0, 0, 0, 0, 0, 25, 0]).unwrap();
+            _ = bus.ingest(&frame, now);
+        }
+        bus.update(Tick::new(now, 0.001));
+        bus.arm(now).unwrap();
+        pilot.hear_debug_port(&mut bus, lines, now);
+        let mut word = 0;
+        // The range opens within 0.2 s.
+        for ms in 1..=300 {
+            let now = now + Duration::from_millis(ms);
+            for id in 0x201..=0x204 {
+                let frame = CanFrame::standard(id, [0, 0, 0, 0, 0, 0, 25, 0]).unwrap();
+                _ = bus.ingest(&frame, now);
+            }
+            let wheel = pilot.wheels.front_left;
+            let target = if ms < 300 { 0.0 } else { 1.0 };
+            bus.set_velocity(wheel, AngularVelocity::from_rad_per_s(target)).unwrap();
+            bus.update(Tick::new(now, 0.001));
+            while let Some(frame) = bus.next_frame() {
+                word = i16::from_be_bytes([frame.bytes()[2], frame.bytes()[3]]);
+            }
+        }
+        word
+    }
+
+    #[test]
+    fn a_gain_over_the_debug_port_acts_and_a_bad_one_does_not() {
+        let usual = word(b"");
+        assert!((1_570..1_590).contains(&usual), "1.9 A: {usual}");
+        let half = word(b"wheel_kp=0.9625\nwheel_ki=0\n");
+        assert!((786..=790).contains(&half), "{half}");
+        for bad in [&b"wheel_kp=400\n"[..], b"wheel_kp=nan\n", b"wheel_kq=1\n", b"wheel_kp=0.5"] {
+            assert_eq!(word(bad), usual);
+        }
     }
 
     /// A frame of the IMU at a yaw of 180°; its time goes on, otherwise it would count as frozen.

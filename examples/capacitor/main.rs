@@ -1,0 +1,74 @@
+//! A burst from a super-capacitor under a referee's 60 W, on the simulator: referee system, buffer, capacitor, wheels.
+//!
+//! ```text
+//! cargo run --release --example capacitor [FILE.svg]
+//! ```
+//!
+//! The limit and the charge of the buffer come as frames of the referee system, the charge of the capacitor as CAN frames of its
+//! controller. The pilot holds the key for a burst from 4 s to 10 s. Fails when buffer or capacitor fall below their reserve, or when the
+//! burst does not bring more power.
+
+mod drive;
+#[path = "../picture/mod.rs"]
+mod picture;
+mod supply;
+
+use drive::{BUFFER_RESERVE_J, BURST_S, BURST_W, Lost, RESERVE_J, Sample, least, mean};
+use picture::{BLUE, GREY, RED, console};
+use std::error::Error;
+use supply::{CAPACITOR_J, LIMIT_W};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = picture::path("capacitor");
+    let samples = drive::run(true, Lost::default())?;
+    plot(&path, &samples)?;
+    let before = mean(&samples, (2.0, BURST_S.0), |sample| sample.chassis_w);
+    // The charge nears its reserve with a time constant of 0.5 s, so the burst is strong at its beginning.
+    let burst = mean(&samples, (BURST_S.0, BURST_S.0 + 3.0), |sample| sample.chassis_w);
+    let (buffer, capacitor) =
+        (least(&samples, |sample| sample.buffer_j), least(&samples, |sample| sample.capacitor_j));
+    console::line(format_args!("limit        {LIMIT_W} W; a burst of at most {BURST_W} W more"));
+    console::line(format_args!(
+        "power        {before:.0} W before the burst, {burst:.0} W in its first 3 s"
+    ));
+    console::line(format_args!(
+        "buffer       {buffer:.1} J at least, {BUFFER_RESERVE_J} J are kept"
+    ));
+    console::line(format_args!(
+        "capacitor    {capacitor:.0} J of {CAPACITOR_J} J at least, {RESERVE_J} J are kept"
+    ));
+    console::line(format_args!("{path}"));
+    if buffer < BUFFER_RESERVE_J || capacitor < RESERVE_J - 10.0 || burst < before + 20.0 {
+        return Err("a reserve was not kept, or the burst brought no power".into());
+    }
+    Ok(())
+}
+
+fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
+    let charts: [picture::Chart<'_, Sample>; 4] = [
+        ("speed, m/s", 0.0, 3.0, &[(BLUE, |sample| sample.speed_m_s)]),
+        (
+            "power, W (grey: allowed, blue: chassis, red: from the supply)",
+            -100.0,
+            260.0,
+            &[
+                (GREY, |sample| sample.allowed_w),
+                (BLUE, |sample| sample.chassis_w),
+                (RED, |sample| sample.supply_w),
+            ],
+        ),
+        (
+            "buffer of the referee system, J (grey: reserve)",
+            0.0,
+            65.0,
+            &[(GREY, |_| BUFFER_RESERVE_J), (RED, |sample| sample.buffer_j)],
+        ),
+        (
+            "capacitor, J (grey: reserve)",
+            0.0,
+            CAPACITOR_J,
+            &[(GREY, |_| RESERVE_J), (RED, |sample| sample.capacitor_j)],
+        ),
+    ];
+    picture::draw(path, samples, |sample| sample.time_s, &charts)
+}

@@ -1,0 +1,267 @@
+use super::state::LoaderFeedback;
+use crate::encoder::Position;
+use core::f32::consts::TAU;
+
+/// A shot counts when so much of a chamber's way is left.
+const COUNTED_SHARE: f32 = 0.1;
+/// The next shot may be let go when so much of a chamber's way is left: the loader then need not slow down between them.
+const NEXT_SHARE: f32 = 0.5;
+/// A loader stands when it is slower than this share of its target.
+const STANDS_SHARE: f32 = 0.2;
+/// The longest time for the way back.
+const BACK_S: f32 = 0.2;
+/// The way back, in chambers.
+const BACK_SHARE: f32 = 0.5;
+
+/// How a step of the loader ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Feed {
+    /// No shot is on its way.
+    Idle,
+    /// Turns to its goal at so many rad/s.
+    Forward(f32),
+    /// Turns back at so many rad/s.
+    Back(f32),
+    /// Stood again after the last try.
+    Jammed,
+}
+
+/// A chamber of the grid, as turns and chambers since the first: a count of chambers would have to be divided, by 64 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Chamber {
+    turns: i64,
+    within: u8,
+}
+
+impl Chamber {
+    const FIRST: Self = Self { turns: 0, within: 0 };
+
+    /// Returns the one that is so many further on.
+    const fn after(self, more: u8, chambers: u8) -> Self {
+        let mut chamber = self;
+        let mut left = more;
+        while left > 0 {
+            left -= 1;
+            let is_last = chamber.within.saturating_add(1) >= chambers;
+            chamber.turns = chamber.turns.saturating_add(is_last as i64);
+            chamber.within = if is_last { 0 } else { chamber.within + 1 };
+        }
+        chamber
+    }
+
+    /// Returns the one that is so many before.
+    const fn before(self, less: u8, chambers: u8) -> Self {
+        let mut chamber = self;
+        let mut left = less;
+        while left > 0 {
+            left -= 1;
+            let is_first = chamber.within == 0;
+            chamber.turns = chamber.turns.saturating_sub(is_first as i64);
+            chamber.within = if is_first { chambers.saturating_sub(1) } else { chamber.within - 1 };
+        }
+        chamber
+    }
+}
+
+/// The chambers of the loader, counted from where it stood first. The grid is exact over any number of turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Loader {
+    chambers: u8,
+    tries_allowed: u8,
+    home: Option<Position>,
+    /// The last chamber that is past, and how many are to follow: shots that were let go.
+    counted: Chamber,
+    waiting: u8,
+    stood_s: f32,
+    /// What is left of the time for the way back, and the way left when it began.
+    back: Option<(f32, f32)>,
+    tries: u8,
+}
+
+impl Loader {
+    pub(super) const fn new(chambers: u8, tries_allowed: u8) -> Self {
+        Self {
+            chambers,
+            tries_allowed,
+            home: None,
+            counted: Chamber::FIRST,
+            waiting: 0,
+            stood_s: 0.0,
+            back: None,
+            tries: 0,
+        }
+    }
+
+    /// Drops what is on its way.
+    pub(super) fn stop(&mut self) {
+        self.waiting = 0;
+        self.stood_s = 0.0;
+        self.back = None;
+        self.tries = 0;
+    }
+
+    /// Begins where the loader stands. The grid stays, so a chamber that was begun is finished by the next shot; if the loader is far
+    /// from where it was, the grid begins anew.
+    pub(super) fn start(&mut self, position: Position) {
+        self.stop();
+        let passed = COUNTED_SHARE - self.way_rad(position, self.counted) / self.pitch_rad();
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let whole = passed as i32 - i32::from(passed < 0.0);
+        match (u8::try_from(whole.unsigned_abs()), self.home.is_some()) {
+            (Ok(chambers), true) if whole >= 0 => self.counted = self.ahead(chambers),
+            (Ok(chambers), true) => self.counted = self.counted.before(chambers, self.chambers),
+            _ => (self.home, self.counted) = (Some(position), Chamber::FIRST),
+        }
+    }
+
+    pub(super) const fn tries(&self) -> u8 {
+        self.tries
+    }
+
+    pub(super) const fn is_feeding(&self) -> bool {
+        self.waiting > 0
+    }
+
+    /// Tells whether one more shot may be let go without the loader losing its way.
+    pub(super) fn takes_next(&self, position: Position) -> bool {
+        self.back.is_none()
+            && self.way_rad(position, self.ahead(self.waiting)) < NEXT_SHARE * self.pitch_rad()
+    }
+
+    pub(super) const fn admit(&mut self) {
+        self.waiting = self.waiting.saturating_add(1);
+    }
+
+    /// Turns to the chamber that is due. Returns what to do, and how many shots were counted.
+    pub(super) fn step(
+        &mut self,
+        feedback: &LoaderFeedback,
+        (feed, gain_per_s, jam_s): (f32, f32, f32),
+        dt_s: f32,
+    ) -> (Feed, u32) {
+        let pitch = self.pitch_rad();
+        let mut counted = 0;
+        while self.is_feeding()
+            && self.way_rad(feedback.position, self.ahead(1)) <= COUNTED_SHARE * pitch
+        {
+            self.counted = self.ahead(1);
+            self.waiting -= 1;
+            counted += 1;
+            (self.stood_s, self.back, self.tries) = (0.0, None, 0);
+        }
+        if !self.is_feeding() {
+            self.stood_s = 0.0;
+            return (Feed::Idle, counted);
+        }
+        let way = self.way_rad(feedback.position, self.ahead(self.waiting));
+        if let Some((left_s, from)) = self.back {
+            let left_s = left_s - dt_s;
+            let is_done = left_s <= 0.0 || way - from >= BACK_SHARE * pitch;
+            self.back = (!is_done).then_some((left_s, from));
+            return (Feed::Back(-feed), counted);
+        }
+        let target = (gain_per_s * way).min(feed);
+        let stands = feedback.velocity.as_rad_per_s() < STANDS_SHARE * target;
+        self.stood_s = if stands { self.stood_s + dt_s } else { 0.0 };
+        if self.stood_s < jam_s {
+            return (Feed::Forward(target), counted);
+        }
+        self.stood_s = 0.0;
+        if self.tries >= self.tries_allowed {
+            return (Feed::Jammed, counted);
+        }
+        self.tries += 1;
+        self.back = Some((BACK_S, way));
+        (Feed::Back(-feed), counted)
+    }
+
+    const fn pitch_rad(&self) -> f32 {
+        TAU / self.chambers as f32
+    }
+
+    const fn ahead(&self, more: u8) -> Chamber {
+        self.counted.after(more, self.chambers)
+    }
+
+    /// Returns the way from a position to a chamber in rad; positive if it lies ahead. Far away it saturates.
+    fn way_rad(&self, position: Position, chamber: Chamber) -> f32 {
+        const FAR: i64 = 1 << 20;
+        let Some(home) = self.home else { return 0.0 };
+        let turns = chamber.turns.saturating_add(home.turns()).saturating_sub(position.turns());
+        let turns = i32::try_from(turns.clamp(-FAR, FAR)).unwrap_or(0);
+        let angle = home.angle().as_radians() - position.angle().as_radians();
+        turns as f32 * TAU + angle + f32::from(chamber.within) * self.pitch_rad()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{Angle, AngularVelocity};
+
+    #[test]
+    fn the_grid_is_exact_after_a_million_turns() {
+        let mut loader = Loader::new(7, 3);
+        let start = Angle::from_degrees(359.0);
+        loader.start(Position::new(-3, start));
+        for turns in [0, 1, 1_000_000, 1 << 40] {
+            let there = Position::new(-3 + turns, start);
+            loader.counted = Chamber { turns, within: 0 };
+            assert!(loader.way_rad(there, loader.counted).abs() < 1e-6);
+            for more in 1..=21 {
+                let way = loader.way_rad(there, loader.ahead(more));
+                assert!((way - f32::from(more) * TAU / 7.0).abs() < 1e-5, "{more}: {way}");
+            }
+        }
+        assert_eq!(loader.ahead(8).within, 1);
+    }
+
+    fn at(degrees: f32, rad_per_s: f32) -> LoaderFeedback {
+        LoaderFeedback {
+            position: Position::from_angle(Angle::from_degrees(degrees)),
+            velocity: AngularVelocity::from_rad_per_s(rad_per_s),
+        }
+    }
+
+    const RATES: (f32, f32, f32) = (5.0, 20.0, 0.1);
+
+    #[test]
+    fn a_shot_counts_at_nine_tenths_of_its_way_and_the_next_may_follow_at_half() {
+        let mut loader = Loader::new(8, 3); // 45 degrees
+        loader.start(at(10.0, 0.0).position);
+        assert_eq!(loader.step(&at(10.0, 0.0), RATES, 0.001), (Feed::Idle, 0));
+        loader.admit();
+        assert!(!loader.takes_next(at(30.0, 5.0).position));
+        assert!(loader.takes_next(at(33.0, 5.0).position));
+        assert_eq!(loader.step(&at(50.0, 5.0), RATES, 0.001).1, 0);
+        assert_eq!(loader.step(&at(51.0, 5.0), RATES, 0.001), (Feed::Idle, 1));
+        loader.admit();
+        assert_eq!(loader.step(&at(51.0, 0.0), RATES, 0.001), (Feed::Forward(5.0), 0));
+    }
+
+    #[test]
+    fn a_loader_that_was_turned_by_hand_goes_on_to_the_next_chamber_of_its_grid() {
+        let mut loader = Loader::new(8, 3);
+        loader.start(at(0.0, 0.0).position);
+        for (degrees, way) in [
+            (0.0, 45.0),
+            (20.0, 25.0),
+            (40.0, 5.0),
+            (41.0, 49.0),
+            (135.0, 45.0),
+            (-10.0, 10.0),
+            (-200.0, 20.0),
+        ] {
+            let position = at(degrees, 0.0).position;
+            loader.start(position);
+            let next = loader.way_rad(position, loader.ahead(1)).to_degrees();
+            assert!((next - way).abs() < 1e-3, "{degrees}: {next}");
+        }
+        // The motor lost its turns: it counts from where it stands.
+        let far = Position::new(-5_000, Angle::from_degrees(17.0));
+        loader.start(far);
+        assert!((loader.way_rad(far, loader.ahead(1)).to_degrees() - 45.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,54 @@
+//! A shooter for balls: two friction wheels and a loader that counts, clears a jam, and keeps the heat limit of the barrel.
+//!
+//! ```text
+//!  pilot ── Order ──┐                                     ┌── speed of both wheels
+//!  motors ─ feedback ┼──> Shooter::update (each tick) ────┤
+//!  referee ── heat ─┘                                     └── speed of the loader
+//! ```
+//!
+//! The module knows no bus and no motor: it takes feedback and returns target speeds ([`ShooterTargets`]). A motor of any family
+//! fits that offers a velocity loop and a position of its shaft over many turns.
+//!
+//! | state | wheels | loader | left when |
+//! |---|---|---|---|
+//! | [`Rest`](ShooterState::Rest) | 0 | 0 | an order other than `Rest`, while armed |
+//! | [`SpinningUp`](ShooterState::SpinningUp) | speed | 0 | both wheels are within 1 % for 20 ms |
+//! | [`Ready`](ShooterState::Ready) | speed | 0 | a shot is let go |
+//! | [`Feeding`](ShooterState::Feeding) | speed | turns to the next chamber | the shot is counted, or the loader stands for 100 ms |
+//! | [`Clearing`](ShooterState::Clearing) | speed | turns half a chamber back | the way back is done, or 200 ms |
+//! | [`Cooling`](ShooterState::Cooling) | speed | 0 | the next shot fits below the heat limit |
+//! | [`Fault`](ShooterState::Fault) | 0 | 0 | the order is `Rest`, or the robot is disarmed |
+//!
+//! A shot is let go when the wheels are within 1 % and its heat fits. Heat counts from then on, before the referee system reports
+//! it, so a burst does not run into the limit during the 100 ms between two reports.
+//!
+//! ```
+//! use drivetrain::shooter::{Order, Shooter, ShooterConfig, ShooterFeedback, ShooterState};
+//! use drivetrain::time::{Instant, Tick};
+//! use drivetrain::units::AngularVelocity;
+//!
+//! let wheels = AngularVelocity::from_rpm(6_000.0);
+//! let mut shooter = Shooter::new(ShooterConfig::new(wheels, 8, 10.0))?; // 8 chambers, 10 shots in 1 s
+//! let tick = Tick::new(Instant::from_micros(1_000), 0.001);
+//!
+//! let disarmed = ShooterFeedback::default();
+//! let targets = shooter.update(Order::Fire(1), &disarmed, tick);
+//! assert_eq!((targets.wheels.as_rpm(), targets.loader.as_rpm()), (0.0, 0.0));
+//! assert_eq!(shooter.state(), ShooterState::Rest);
+//! # Ok::<(), drivetrain::error::ConfigError>(())
+//! ```
+//!
+//! Limits: a shot is counted by the way of the loader, so a chamber without a ball counts too; the speed of the ball is not
+//! regulated. Attach one of two wheels that turn against each other as `reversed`: both have one target here.
+
+mod config;
+mod heat;
+mod loader;
+mod machine;
+mod state;
+
+pub use config::ShooterConfig;
+pub use machine::Shooter;
+pub use state::{
+    LoaderFeedback, Order, ShooterFault, ShooterFeedback, ShooterState, ShooterTargets,
+};
