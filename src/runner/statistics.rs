@@ -1,11 +1,11 @@
-//! What a runner counts: frames, errors, and how full the bus is.
+//! Counters of a runner: frames, errors, and the load of the bus.
 
 use crate::frame::CanFrame;
 use crate::motor::BusLoad;
 use crate::time::{Duration, Instant};
 use embedded_can::ErrorKind;
 
-/// What a runner has counted since it was made; every counter saturates.
+/// Counters of a runner since its creation; every counter saturates.
 ///
 /// Received frames add up: `received = taken + unrelated + malformed`. Offered frames add up:
 /// `offered = sent + refused + send_errors.total()`.
@@ -13,40 +13,41 @@ use embedded_can::ErrorKind;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Statistics {
-    /// Frames that the driver delivered, or that were given to `ingest`.
+    /// Frames delivered by the driver or given to `ingest`.
     pub received: u32,
-    /// Frames that the device took as feedback.
+    /// Frames taken by the device as feedback.
     pub taken: u32,
     /// Frames of others, handed back.
     pub unrelated: u32,
-    /// Frames with a motor's id in a form that is not its feedback; not used.
+    /// Frames with a motor's id but not in the form of its feedback; not used.
     pub malformed: u32,
     /// Errors of the driver when asked for a frame.
     pub receive_errors: ErrorCounts,
     /// Frames offered to the driver.
     pub offered: u32,
-    /// Frames that the driver took.
+    /// Frames taken by the driver.
     pub sent: u32,
-    /// Frames that the driver had no place for. Kept, and offered again with newer values.
+    /// Frames without a place in the driver. Kept, and offered again with newer values.
     pub refused: u32,
     /// Errors of the driver when offered a frame. The frame is kept as well.
     pub send_errors: ErrorCounts,
-    /// Own frames that the driver gave back, for others of higher priority or because they were called back. Kept as well.
+    /// Own frames given back by the driver, for frames of higher priority or because they were called back. Kept as well.
     pub evicted: u32,
-    /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
+    /// Frames of others given back by the driver for ours. Handed back, unless they are not classic CAN frames of at most 8
+    /// bytes.
     pub evicted_unrelated: u32,
-    /// Command frames that newer ones replaced before they were sent; wraps. See
+    /// Command frames replaced by newer frames before they were sent; wraps. See
     /// [`Devices::superseded`](crate::motor::Devices::superseded).
     pub superseded: u32,
-    /// Received frames that a queue dropped before they came here.
+    /// Received frames dropped by a queue before the runner saw them.
     pub lost: u32,
-    /// Periods without a tick: that passed before the program asked, or whose step it did not run.
+    /// Periods without a tick: passed before the program asked, or with a step not run by the program.
     pub overruns: u32,
-    /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
+    /// Number of times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
-    /// Ticks whose time was that of the one before, those included that are due because the clock stands.
+    /// Ticks with the same time as the tick before, including ticks due because the clock stands.
     pub clock_standstills: u32,
-    /// Times that the clock went back.
+    /// Number of times that the clock went back.
     pub clock_reversals: u32,
 }
 
@@ -57,7 +58,7 @@ pub struct Statistics {
 pub struct ErrorCounts {
     /// The receive buffer overflowed.
     pub overrun: u32,
-    /// A bit on the bus was not the one sent.
+    /// A bit on the bus differed from the bit sent.
     pub bit: u32,
     /// The bit stuffing was wrong.
     pub stuff: u32,
@@ -67,7 +68,7 @@ pub struct ErrorCounts {
     pub form: u32,
     /// Nobody acknowledged the frame.
     pub acknowledge: u32,
-    /// Any other error, bus-off included: `embedded-can` has no kind for it.
+    /// Any other error, bus-off included: `embedded-can` has no kind for these.
     pub other: u32,
 }
 
@@ -92,7 +93,7 @@ impl Statistics {
         clock_reversals: 0,
     };
 
-    /// Returns the counters with the sums, which are not counted by themselves.
+    /// Returns the counters, with the sums that have no counter of their own.
     pub(super) const fn with_sums(self) -> Self {
         let received = self.taken.saturating_add(self.unrelated).saturating_add(self.malformed);
         let offered = self.sent.saturating_add(self.refused);
@@ -129,7 +130,7 @@ impl ErrorCounts {
     }
 }
 
-/// The frames of one call that are no feedback in 8 bytes: what else there is follows from their number, and costs no counter.
+/// The frames of one call other than feedback in 8 bytes: their total gives the number of feedback frames, without a counter.
 #[derive(Default)]
 pub(super) struct Tally {
     /// Not of 8 bytes with an 11-bit id.
@@ -137,15 +138,15 @@ pub(super) struct Tally {
     pub(super) rejected: u32,
 }
 
-/// How full a bus was in the last window of a second or a little more, by the frames that the runner sent and received.
+/// Load of a bus in the last window of a second or a little more, by the frames that the runner sent and received.
 ///
-/// Frames are counted by their length: without stuff bits, and with as many as can be. What the bus carried lies
-/// between the two. Compare it with what [`BusLoad`] reckons from the motors' rates: a measured load above that
-/// means that somebody else talks, or that an ESC is set to another rate.
+/// Frames are counted by their length: without stuff bits, and with the most stuff bits possible. The real load lies
+/// between the two. Compare it with the load calculated by [`BusLoad`] from the rates of the motors: if the measured
+/// load is above, another node sends, or an ESC has another rate.
 ///
 /// # Limits
-/// **Frames that the controller's filter drops are not seen**, and neither are those that were lost in an overrun, nor
-/// error frames and repetitions. A sent frame counts when the driver takes it, and no longer when it is given back.
+/// **Frames dropped by the filter of the controller are not counted**, nor are frames lost in an overrun, error frames
+/// and repetitions. A sent frame counts when the driver takes it, and no longer when the driver gives it back.
 ///
 /// # Examples
 /// ```
@@ -167,8 +168,8 @@ pub struct MeasuredLoad {
 }
 
 impl MeasuredLoad {
-    /// Takes the bit rate in bits a second, of which 0 counts as 1; and what was counted in a second: frames, bits without
-    /// stuff bits, bits with as many as can be.
+    /// Takes the bit rate in bits a second, where 0 counts as 1, and the counts of one second: frames, bits without stuff
+    /// bits, bits with the most stuff bits possible.
     #[must_use]
     pub const fn new(bit_rate: u32, frames: u32, nominal_bits: u32, worst_case_bits: u32) -> Self {
         Self {
@@ -215,7 +216,7 @@ const WINDOW: Duration = Duration::from_secs(1);
 pub(super) struct Meter {
     bit_rate: u32,
     since: Option<Instant>,
-    /// Standard data frames of 8 bytes, which nearly all are.
+    /// Standard data frames of 8 bytes: nearly all frames.
     whole: u32,
     /// All others, and their bits.
     others: u32,
@@ -265,7 +266,7 @@ impl Meter {
         self.worst_case = self.worst_case.saturating_add(worst_case);
     }
 
-    /// Takes back a frame that was counted and never left.
+    /// Removes a counted frame that never left.
     pub(super) const fn discount(&mut self, frame: &CanFrame) {
         if frame.is_whole() {
             self.whole = self.whole.saturating_sub(1);
@@ -277,7 +278,7 @@ impl Meter {
         self.worst_case = self.worst_case.saturating_sub(worst_case);
     }
 
-    /// Closes the window when it is over.
+    /// Closes the window at its end.
     #[inline]
     pub(super) fn finish(&mut self, now: Instant) {
         match self.since {
