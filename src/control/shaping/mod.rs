@@ -1,4 +1,4 @@
-//! Setpoints that a mechanism can follow, and the effort it takes to follow them.
+//! Setpoints within the reach of a mechanism, and the effort to follow them.
 //!
 //! | type | bounds | use it when |
 //! |---|---|---|

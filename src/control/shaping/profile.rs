@@ -70,13 +70,15 @@ pub struct ProfileState {
 ///        /        \          tv  full speed
 ///       tj ta tj tv tj ta tj     distance = peak speed (2 tj + ta + tv)
 /// ```
-/// A short move has no part at full speed, and a shorter one no part at full acceleration either. It is planned once and
-/// then asked for any moment; the second half mirrors the first, so the end is exact.
+/// A short move has no part at full speed, and a shorter move no part at full acceleration either. A profile is planned
+/// once and then evaluated at any moment; the second half mirrors the first, so the end is exact.
 ///
 /// # Edge behaviour
-/// It has no state: any moment may be asked for first, and after any pause. Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
-/// at exactly the end. A move of no length lasts 0 s, and so does one that would be over within 1e-38 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
-/// shorter than `f32` can tell (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps its limit.
+/// A profile has no state: any moment may be evaluated first, and after any pause. Before the start, and for a time of NaN, the
+/// profile is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest at exactly the end. A move of no length
+/// lasts 0 s, and so does a move shorter than 1e-38 s. A move whose length or duration is beyond `f32` is an error. A rise
+/// shorter than the resolution of `f32` (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps
+/// its limit.
 ///
 /// # Examples
 /// ```
@@ -108,8 +110,8 @@ impl Profile {
     /// Plans the move from `start` to `end`.
     ///
     /// # Errors
-    /// Names the limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
-    /// move is longer, or takes longer, than `f32` can tell.
+    /// Names a limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
+    /// length or duration of the move is beyond `f32`.
     pub fn plan(start: f32, end: f32, limits: &MotionLimits) -> Result<Self, ConfigError> {
         limits.validate()?;
         finite("start", start)?;
