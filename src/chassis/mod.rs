@@ -1,7 +1,7 @@
 //! From a motion of the body to wheel speeds and back, for every wheel layout.
 //!
-//! Axes, signs and units are those drawn in [`geometry`](crate::geometry): x forward, y left, counter-clockwise
-//! positive. A positive wheel velocity rolls forward; on an omni wheel, along the direction it was given.
+//! Axes, signs and units are drawn in [`geometry`](crate::geometry): x forward, y left, counter-clockwise positive. A
+//! positive wheel velocity rolls forward; on an omni wheel, along its given direction.
 //!
 //! | layout | wheels | remarks |
 //! |---|---|---|
@@ -11,9 +11,9 @@
 //! | [`Differential`] | an array: left, right | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
-//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ConfigError`](crate::error::ConfigError).
-//! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
-//! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
+//! A layout is made once from its dimensions; the constructor refuses an impossible layout with a
+//! [`ConfigError`](crate::error::ConfigError). If there are more wheels than unknowns, `forward` is the least-squares fit, and
+//! [`slip_m_s`](Kinematics::slip_m_s) measures the contradiction between the wheels.
 //!
 //! ```text
 //! Modes ──> Chassis: command ──> acceleration limit ──> inverse ──> wheel limit ──> steering ──> wheel targets

@@ -14,15 +14,15 @@ pub enum Mode {
     /// No motion is wanted: the motors should be relaxed.
     #[default]
     Relax,
-    /// The command is in the frame of the gimbal, and the chassis turns until it faces the same way.
+    /// The command is in the frame of the gimbal, and the chassis turns into the direction of the gimbal.
     FollowGimbal,
-    /// The command is in the frame of the gimbal, and the chassis spins under it.
+    /// The command is in the frame of the gimbal, and the chassis spins under the gimbal.
     Rotor,
     /// The command is in the frame of the chassis, its turn included.
     Independent,
 }
 
-/// What the modes are made from.
+/// Configuration of the modes.
 ///
 /// # Examples
 /// ```
@@ -54,7 +54,7 @@ pub struct ModeConfig {
 }
 
 impl ModeConfig {
-    /// Takes the loop that turns the chassis after the gimbal: from rad to rad/s. It works on the circle by itself.
+    /// Takes the loop that turns the chassis after the gimbal: from rad to rad/s. The period of the circle is set here.
     ///
     /// The rotor spins at 6 rad/s; the gimbal's yaw may be missing for 0.03 s; a change takes 0.2 s.
     #[must_use]
@@ -105,7 +105,7 @@ impl ModeConfig {
         Self { relaxes_without_gimbal: true, ..self }
     }
 
-    /// Sets over how many seconds the motion goes over from one mode to the next, zero or more.
+    /// Sets the time in seconds of the transition from one mode to the next, zero or more.
     #[must_use]
     pub const fn with_transition(self, transition_s: f32) -> Self {
         Self { transition_s, ..self }
@@ -114,10 +114,10 @@ impl ModeConfig {
 
 /// Turns the driver's command into a motion of the body, by mode.
 ///
-/// The yaw is the turn of the gimbal against the chassis, counter-clockwise positive, any number of turns.
-/// A change of mode resets the loop and goes over to the new motion evenly in 0.2 s, so that nothing jumps.
-/// Without the yaw for longer than the timeout, and from the start when there never was one, the modes that need it are
-/// replaced as configured; [`take_edge`](Self::take_edge) tells.
+/// The yaw is the angle of the gimbal relative to the chassis, counter-clockwise positive, any number of turns. A
+/// change of mode resets the loop and moves evenly to the new motion in 0.2 s, without a jump. If the yaw is missing
+/// for longer than the timeout, or from the start, modes that need the yaw are replaced as configured;
+/// [`take_edge`](Self::take_edge) reports the replacement.
 ///
 /// # Examples
 /// ```
@@ -154,7 +154,7 @@ impl Modes {
     /// Takes the configuration; the mode is [`Mode::Relax`].
     ///
     /// # Errors
-    /// Names the value that cannot be used.
+    /// Names the invalid value.
     pub fn new(config: ModeConfig) -> Result<Self, ConfigError> {
         let named = [
             (config.rotor_rad_s, "the rotor's base"),
@@ -190,7 +190,7 @@ impl Modes {
         })
     }
 
-    /// Chooses the mode. The same one again changes nothing.
+    /// Sets the mode. The present mode again changes nothing.
     pub fn set_mode(&mut self, mode: Mode) {
         if mode == self.mode {
             return;
@@ -207,34 +207,34 @@ impl Modes {
         }
     }
 
-    /// Returns the mode that was chosen.
+    /// Returns the chosen mode.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// Returns the mode that acts: another one while the gimbal's yaw is missing.
+    /// Returns the acting mode: the replacement while the gimbal's yaw is missing.
     #[must_use]
     pub const fn acting(&self) -> Mode {
         self.acting
     }
 
-    /// Returns the mode that took over because the gimbal's yaw was lost, or because it is back; the oldest change first.
+    /// Returns the mode that took over because the gimbal's yaw was lost or is back; the oldest change first.
     ///
     /// A lost yaw gives the replacement, [`Mode::Independent`] or [`Mode::Relax`]; a yaw that is back gives the chosen mode.
-    /// Each change is returned once. Call it until it returns `None`.
+    /// Each change is returned once. Call this until `None`.
     pub const fn take_edge(&mut self) -> Option<Mode> {
         let [first, second] = self.edges;
         self.edges = [second, None];
         first
     }
 
-    /// Returns the motion that the command means in this mode; `None` when the motors should be relaxed.
+    /// Returns the motion of the command in this mode; `None` when the motors should be relaxed.
     ///
-    /// A `gimbal_yaw` that is not finite counts as none. A command that is NaN or infinite, or so large that its motion
-    /// overflows, counts as standing still.
-    /// A `dt_s` that is zero, negative, NaN or infinite counts as zero. From the 100th such call in a row on the clock is
-    /// dead: the motion is zero, and a yaw that is missing counts as lost. When time is back the motion starts from rest.
+    /// A `gimbal_yaw` that is not finite counts as missing. A command that is NaN or infinite, or so large that its
+    /// motion overflows, counts as standing still. A `dt_s` that is zero, negative, NaN or infinite counts as zero. From
+    /// the 100th such call in a row on the clock is dead: the motion is zero, and a missing yaw counts as lost. When time
+    /// is back the motion starts from rest.
     pub fn update(
         &mut self,
         command: Twist<Gimbal>,
@@ -281,7 +281,7 @@ impl Modes {
         }
     }
 
-    /// The chosen mode, or what replaces it.
+    /// The chosen mode, or its replacement.
     fn allowed(&mut self) -> Mode {
         if !matches!(self.mode, Mode::FollowGimbal | Mode::Rotor) {
             self.gimbal_lost = false;
@@ -319,7 +319,7 @@ impl Modes {
         let config = &self.config;
         let speed = config.rotor_rad_s + config.swing_rad_s * sin_cos(self.swing_rad).0;
         let phase = wrap_tau(self.swing_rad + config.swing_frequency_rad_s * dt_s);
-        // After a step that overflows the swing begins again: NaN would stay.
+        // After an overflowing step the swing begins again: NaN would stay.
         self.swing_rad = if phase.is_finite() { phase } else { 0.0 };
         if self.clockwise { -speed } else { speed }
     }

@@ -2,7 +2,7 @@ use super::error::not_negative;
 use crate::error::ConfigError;
 use crate::math::sqrt;
 
-/// What one wheel is asked for: torque at its shaft, and the speed it turns at.
+/// Load of one wheel: torque at its shaft, and its speed.
 ///
 /// # Examples
 /// ```
@@ -17,7 +17,7 @@ use crate::math::sqrt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelLoad {
-    /// Torque in N m, or any measure in proportion to it that the model was fitted with, such as a current in A.
+    /// Torque in N m, or the measure in proportion to it to which the model was fitted, such as a current in A.
     pub torque: f32,
     /// Speed in rad/s. Of the same sign as the torque when driving, of the other when braking.
     pub speed_rad_s: f32,
@@ -26,8 +26,8 @@ pub struct WheelLoad {
 /// The electric power of a motor: `P = k0 + k1 torque speed + k2 torque^2 + k3 speed^2`, in W.
 ///
 /// With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
-/// winding, `k3` the friction and iron loss, `k0` what the electronics take. Fit them for your motors, by
-/// [`PowerFit`](super::PowerFit) if you like.
+/// winding, `k3` the friction and iron loss, `k0` the power of the electronics. Fit the coefficients to the motors in
+/// use, for example by [`PowerFit`](super::PowerFit).
 ///
 /// # Examples
 /// ```
@@ -49,7 +49,7 @@ pub struct PowerModel {
     pub(super) k3: f32,
 }
 
-/// The coefficients as they stand in a file, where anybody may have changed them.
+/// The coefficients as stored in a file, where they may have been changed.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 #[serde(rename = "PowerModel")]
@@ -86,9 +86,9 @@ impl TryFrom<Stored> for PowerModel {
 pub struct PowerCut {
     /// The factor for the torque of every wheel, 0..=1.
     pub scale: f32,
-    /// What the model expects all wheels to take then, in W.
+    /// Expected power of all wheels at this factor, in W.
     pub power_w: f32,
-    /// Whether that is within the limit. It is not when the losses alone are above it; the power is then the least possible.
+    /// Whether the power is within the limit. If the losses alone are above the limit, the power is the least possible.
     pub within: bool,
 }
 
@@ -106,7 +106,7 @@ impl PowerModel {
         })
     }
 
-    /// Returns the power of one wheel in W; negative when it feeds back more than it loses.
+    /// Returns the power of one wheel in W; negative when the wheel feeds back more than its losses.
     #[must_use]
     pub const fn power_w(&self, load: WheelLoad) -> f32 {
         let WheelLoad { torque, speed_rad_s } = load;
@@ -116,11 +116,11 @@ impl PowerModel {
             + self.k3 * speed_rad_s * speed_rad_s
     }
 
-    /// Returns the largest common factor of all torques, at most 1, with which the total stays within `limit_w`.
+    /// Returns the largest common factor of all torques, at most 1, with the total power within `limit_w`.
     ///
-    /// The total is a parabola in the factor, and this is its exact root. Equal wheels stay equal, and a braking
-    /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and one of infinity cuts nothing. If a
-    /// load is NaN or infinite, the factor is zero.
+    /// The total is a parabola in the factor, and the factor is its exact root. Equal wheels stay equal, and a braking
+    /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and an infinite limit cuts nothing. If
+    /// a load is NaN or infinite, the factor is zero.
     ///
     /// # Examples
     /// ```
@@ -148,13 +148,13 @@ impl PowerModel {
         let scale =
             if total(1.0) <= limit_w { 1.0 } else { largest_root(square, linear, fixed - limit_w) };
         let power_w = total(scale);
-        // The root is exact to rounding of what is added up there.
+        // The root is exact to the rounding of the sums there.
         let rounding = 1e-5 * (fixed + scale * (linear.abs() + scale * square));
         PowerCut { scale, power_w, within: power_w <= limit_w + rounding }
     }
 }
 
-/// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given that it is above zero at 1; without any, the
+/// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given a value above zero at 1; without any, the
 /// `s` of the least value. `square` is zero or more.
 fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     // The squares of large loads overflow; above zero at 1, one of the three is not zero.
@@ -162,7 +162,7 @@ fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     let (square, linear, rest) = (square / most, linear / most, rest / most);
     let discriminant = linear * linear - 4.0 * square * rest;
     let scale = if rest > 0.0 && (linear >= 0.0 || discriminant < 0.0) {
-        // Never low enough: the bottom of the parabola, which lies at or below zero when nothing is fed back.
+        // Never low enough: the bottom of the parabola, at or below zero when nothing is fed back.
         if linear < 0.0 && square > 0.0 { -0.5 * linear / square } else { 0.0 }
     } else if linear > 0.0 {
         // The usual formula would cancel.
@@ -172,7 +172,7 @@ fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     } else {
         1.0
     };
-    // Written so that NaN becomes zero.
+    // In this form NaN becomes zero.
     if scale >= 1.0 {
         1.0
     } else if scale > 0.0 {
@@ -238,13 +238,14 @@ mod tests {
         // 10 W electronics, limit 8 W, braking by 6 W, 1 W heat: 10 - 6 s + s^2 <= 8 from 0.354 on.
         let model = PowerModel::new(10.0, 1.0, 1.0, 0.0).unwrap();
         assert_eq!(model.cut([load(1.0, -6.0)], 8.0).scale, 1.0);
-        // With 16 W of heat too much of it is as bad as too little: 10 - 12 s + 16 s^2 <= 8 up to 0.5.
+        // With 16 W of heat too much torque is as bad as too little: 10 - 12 s + 16 s^2 <= 8 up to
+        // 0.5.
         let model = PowerModel::new(10.0, 1.0, 16.0, 0.0).unwrap();
         let cut = model.cut([load(1.0, -12.0)], 8.0);
         assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within, "{cut:?}");
     }
 
-    // They were let through whole: the discriminant overflowed.
+    // The loads passed whole: the discriminant overflowed.
     #[test]
     fn loads_whose_squares_overflow_are_cut_to_the_root_all_the_same() {
         let model = PowerModel::new(1000.0, 1.0, 1.0, 0.0).unwrap();
@@ -252,7 +253,8 @@ mod tests {
         assert!((cut.scale - 0.3).abs() < 1e-6, "{cut:?}");
     }
 
-    // It was called within: the slack for rounding was that of the loads before the cut.
+    // The power counted as within: the slack for rounding was calculated from the loads before the
+    // cut.
     #[test]
     fn losses_above_the_limit_are_not_called_within_because_the_loads_are_large() {
         let cut = model().cut([load(1e6, 1e3)], 80.0);
