@@ -4,15 +4,15 @@ use super::{Point3, Rotation3, Vec3};
 use crate::error::ConfigError;
 use core::marker::PhantomData;
 
-/// Where the frame `From` stands in the frame `To`, in space; applied to a point in `From` it gives the point in `To`.
+/// Place of the frame `From` in the frame `To`, in space; applied to a point in `From`, gives the point in `To`.
 ///
-/// It is also the pose of a thing in space: [`rotation`](Self::rotation) is its orientation, [`translation_m`](Self::translation_m)
-/// its position, [`relative_to`](Self::relative_to) the same as seen from another pose.
+/// A transform is also the pose of a thing in space: [`rotation`](Self::rotation) is its orientation,
+/// [`translation_m`](Self::translation_m) its position, [`relative_to`](Self::relative_to) the same as seen from another pose.
 ///
 /// The turn is kept as a matrix, which is cheaper to apply than a quaternion. After 10^6 compositions its rows are some per
 /// cent off. With [`normalized`](Self::normalized) once in a thousand they stay right, and 10^6 composed steps add up to
-/// less than 0.04 rad and 5e-3 of the largest distance on the way; a [`Rotation3`] is ten times as exact.
-/// Read with `serde`, rows that are off by more than 1e-3 are refused.
+/// less than 0.04 rad and 5e-3 of the largest distance on the way; a [`Rotation3`] is ten times as exact. In reading with
+/// `serde`, rows with an error above 1e-3 are refused.
 ///
 /// # Examples
 /// ```

@@ -151,7 +151,7 @@ macro_rules! linear {
 }
 pub(super) use linear;
 
-/// Makes a value copyable whatever its frames are: they are names only.
+/// Makes a value copyable for all frames: these are names only.
 macro_rules! copy {
     ($name:ident <$($frame:ident),+>) => {
         impl<$($frame),+> Clone for $name<$($frame),+> {
