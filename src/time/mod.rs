@@ -1,4 +1,4 @@
-//! Time as an argument: instants, durations, and where they come from.
+//! Time as an argument: instants, durations, and their sources.
 //!
 //! | item | what it is |
 //! |---|---|
