@@ -20,7 +20,7 @@
 //!                    odometry <── forward <───────────────────────────────────────────────────── wheel speeds
 //! ```
 //!
-//! | on top of a layout | what it does |
+//! | on top of a layout | function |
 //! |---|---|
 //! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
 //! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
@@ -74,10 +74,10 @@ pub use drive::{ModuleMotors, WheelDrive};
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::ChassisLimits;
 pub use mecanum::Mecanum;
-pub use mode::{Mode, ModeConfig, Modes};
+pub use mode::{ChassisMode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::Omni;
-pub use power::{PowerCut, PowerModel, WheelLoad};
+pub use power::{PowerModel, WheelLoad};
 pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
 pub use status::ChassisStatus;

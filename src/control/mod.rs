@@ -17,9 +17,9 @@
 //! | a disturbance of a known period | the mean of a [`Window`] of that many samples | |
 //! | the rate of a noisy signal | [`Differentiator`] | |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
-//! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
+//! | gains for an unknown plant | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
-//! # What they all do
+//! # Common behaviour
 //! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. Each
 //!   type states the effect of a very long `dt_s`; for the controllers see [`TimeStep`].
 //! * If a setpoint or measurement is NaN or infinite, the last output is returned and the sample is counted. The next good
@@ -42,7 +42,7 @@
 
 mod actuator;
 mod differentiator;
-mod error;
+pub(crate) mod error;
 mod filter;
 mod number;
 mod pid;

@@ -1,7 +1,8 @@
 use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 
-/// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
+/// Load of a bus: the share of its bit rate taken by its frames, without stuff bits and with the most possible. Calculated here,
+/// or [measured](crate::runner::Runner::measured_load) by a runner.
 ///
 /// Counts standard data frames, each with the pause of three bits after it; for the 8 bytes that DJI motors use:
 ///
@@ -97,6 +98,17 @@ impl BusLoad {
             bit_rate: if bit_rate == 0 { 1 } else { bit_rate },
             nominal_bits_per_s: 0,
             worst_bits_per_s: 0,
+        }
+    }
+
+    /// Takes the bit rate and the counts of one second: frames, bits without stuff bits, bits with the most stuff bits
+    /// possible.
+    pub(crate) const fn measured(bit_rate: u32, frames: u32, nominal: u32, worst: u32) -> Self {
+        Self {
+            frames_per_s: frames,
+            nominal_bits_per_s: nominal as u64,
+            worst_bits_per_s: worst as u64,
+            ..Self::new(bit_rate)
         }
     }
 

@@ -56,7 +56,7 @@ pub use devices::Devices;
 pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
-pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
+pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub use measured::Measured;

@@ -138,76 +138,6 @@ pub(super) struct Tally {
     pub(super) rejected: u32,
 }
 
-/// Load of a bus in the last window of a second or a little more, by the frames that the runner sent and received.
-///
-/// Frames are counted by their length: without stuff bits, and with the most stuff bits possible. The real load lies
-/// between the two. Compare it with the load calculated by [`BusLoad`] from the rates of the motors: if the measured
-/// load is above, another node sends, or an ESC has another rate.
-///
-/// # Limits
-/// **Frames dropped by the filter of the controller are not counted**, nor are frames lost in an overrun, error frames
-/// and repetitions. A sent frame counts when the driver takes it, and no longer when the driver gives it back.
-///
-/// # Examples
-/// ```
-/// use drivetrain::runner::MeasuredLoad;
-///
-/// // Four motors and one command frame at 1 kHz, as `Runner::measured_load` may return it.
-/// let load = MeasuredLoad::new(1_000_000, 5_000, 555_000, 675_000);
-/// assert_eq!((load.nominal(), load.worst_case()), (0.555, 0.675));
-/// assert_eq!(load.to_string(), "56 % to 68 %");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MeasuredLoad {
-    bit_rate: u32,
-    frames_per_s: u32,
-    nominal_bits_per_s: u32,
-    worst_case_bits_per_s: u32,
-}
-
-impl MeasuredLoad {
-    /// Takes the bit rate in bits a second, where 0 counts as 1, and the counts of one second: frames, bits without stuff
-    /// bits, bits with the most stuff bits possible.
-    #[must_use]
-    pub const fn new(bit_rate: u32, frames: u32, nominal_bits: u32, worst_case_bits: u32) -> Self {
-        Self {
-            bit_rate: if bit_rate == 0 { 1 } else { bit_rate },
-            frames_per_s: frames,
-            nominal_bits_per_s: nominal_bits,
-            worst_case_bits_per_s: worst_case_bits,
-        }
-    }
-
-    /// Returns the number of frames a second.
-    #[must_use]
-    pub const fn frames_per_s(&self) -> u32 {
-        self.frames_per_s
-    }
-
-    /// Returns the load without stuff bits; 1 is a full bus.
-    #[must_use]
-    pub const fn nominal(&self) -> f32 {
-        self.nominal_bits_per_s as f32 / self.bit_rate as f32
-    }
-
-    /// Returns the load with as many stuff bits as can be; 1 is a full bus.
-    #[must_use]
-    pub const fn worst_case(&self) -> f32 {
-        self.worst_case_bits_per_s as f32 / self.bit_rate as f32
-    }
-}
-
-/// Writes both loads in percent, rounded up.
-impl core::fmt::Display for MeasuredLoad {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let percent = |bits: u32| (u64::from(bits) * 100).div_ceil(u64::from(self.bit_rate));
-        let (low, high) = (self.nominal_bits_per_s, self.worst_case_bits_per_s);
-        write!(f, "{} % to {} %", percent(low), percent(high))
-    }
-}
-
 /// The shortest window.
 const WINDOW: Duration = Duration::from_secs(1);
 
@@ -222,7 +152,7 @@ pub(super) struct Meter {
     others: u32,
     nominal: u32,
     worst_case: u32,
-    last: Option<MeasuredLoad>,
+    last: Option<BusLoad>,
 }
 
 impl Meter {
@@ -302,7 +232,7 @@ impl Meter {
         let worst_case =
             self.whole.saturating_mul(BusLoad::WORST_CASE_BITS).saturating_add(self.worst_case);
         let [frames, nominal, worst_case] = [frames, nominal, worst_case].map(a_second);
-        self.last = Some(MeasuredLoad::new(self.bit_rate, frames, nominal, worst_case));
+        self.last = Some(BusLoad::measured(self.bit_rate, frames, nominal, worst_case));
         self.restart(now);
     }
 
@@ -312,7 +242,7 @@ impl Meter {
         (self.nominal, self.worst_case) = (0, 0);
     }
 
-    pub(super) const fn last(&self) -> Option<MeasuredLoad> {
+    pub(super) const fn last(&self) -> Option<BusLoad> {
         self.last
     }
 }
@@ -327,7 +257,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn a_window_that_lasts_longer_is_no_fuller_for_it() {
+    fn a_longer_window_gives_the_same_load() {
         let frame = CanFrame::standard(0x200, [0; 8]).unwrap();
         let mut meter = Meter::new();
         meter.set_bit_rate(500_000);
@@ -338,19 +268,19 @@ mod tests {
         assert_eq!(meter.last(), None);
         meter.count(&frame);
         meter.finish(Instant::from_micros(3_000_007));
-        let expected = MeasuredLoad::new(500_000, 1_000, 111_000, 135_000);
+        let expected = BusLoad::measured(500_000, 1_000, 111_000, 135_000);
         assert_eq!(meter.last(), Some(expected));
     }
 
     #[test]
     fn absurd_numbers_saturate() {
-        let load = MeasuredLoad::new(0, u32::MAX, u32::MAX, u32::MAX);
+        let load = BusLoad::measured(0, u32::MAX, u32::MAX, u32::MAX);
         assert!(load.worst_case().is_finite() && load.frames_per_s() == u32::MAX);
-        assert_eq!(load.to_string(), "429496729500 % to 429496729500 %");
+        assert_eq!(load.to_string(), "4294967295 % to 4294967295 %");
         let mut meter = Meter::new();
         meter.finish(Instant::from_micros(5));
         meter.finish(Instant::from_micros(1));
         meter.finish(Instant::from_micros(u64::MAX));
-        assert_eq!(meter.last(), Some(MeasuredLoad::new(1_000_000, 0, 0, 0)));
+        assert_eq!(meter.last(), Some(BusLoad::new(1_000_000)));
     }
 }
