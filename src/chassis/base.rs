@@ -268,7 +268,7 @@ impl<K: Kinematics> Chassis<K> {
         self.odometry.pose()
     }
 
-    /// Puts the chassis at a pose; the motion goes on. The next heading of a gyroscope takes the place of the pose's angle.
+    /// Puts the chassis at a pose; the motion continues. The next heading of a gyroscope takes the place of the pose's angle.
     ///
     /// A pose that is NaN or infinite changes nothing, and is counted in [`ChassisStatus::rejected`].
     pub fn set_pose(&mut self, pose: Pose2<World>) {
@@ -588,7 +588,7 @@ mod tests {
     }
 
     #[test]
-    fn one_lost_wheel_is_flagged_and_the_pose_goes_on_two_hold_it() {
+    fn a_lost_wheel_is_flagged_and_the_pose_continues_two_lost_wheels_hold_the_pose() {
         let mut chassis = Chassis::new(mecanum());
         let rolling = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
         chassis.update(MecanumWheels { rear_left: None, ..rolling }, TICK);
@@ -679,7 +679,7 @@ mod tests {
     }
 
     #[test]
-    fn wheels_beyond_all_numbers_leave_no_slip_that_is_none() {
+    fn wheels_beyond_all_numbers_leave_a_finite_slip() {
         for speed in [1e38, f32::MAX] {
             let mut chassis = Chassis::new(mecanum());
             let mut wheels = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(speed)));
@@ -721,7 +721,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_of_nan_is_counted_and_the_chassis_stays_where_it_is() {
+    fn a_pose_of_nan_is_counted_and_changes_nothing() {
         let mut chassis = Chassis::new(mecanum());
         let pose = Pose2::new(1.0, 2.0, Angle::from_degrees(30.0));
         chassis.set_pose(pose);
@@ -946,7 +946,7 @@ mod tests {
     }
 
     #[test]
-    fn a_module_that_does_not_steer_does_not_drive_and_the_others_do() {
+    fn a_module_off_its_angle_does_not_drive_and_the_others_do() {
         let mut modules = Modules::new();
         modules.motors.steerings.broken = 2;
         modules.go(1.0, 0.0);
@@ -972,7 +972,7 @@ mod tests {
     }
 
     #[test]
-    fn modules_that_were_turned_by_hand_while_relaxed_stay_where_they_are() {
+    fn modules_turned_by_hand_while_relaxed_keep_their_angles() {
         let by_hand = [20.0, 30.0, 40.0, 50.0];
         let turned = by_hand.map(|degrees| Angle::from_degrees(degrees) + ZERO);
         let mut modules = Modules::new();

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_just_taken_is_still_read_back() {
+    fn the_worst_accepted_geometry_is_read_back() {
         let omni = [4.5, 4.0, 3.5, 3.0].map(three).into_iter().find_map(Result::ok);
         let omni = omni.unwrap();
         let motion = Twist::new(0.5, -0.25, 1.0);

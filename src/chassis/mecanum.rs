@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lifted_wheel_shows_as_slip_and_rolling_shows_none() {
+    fn a_lifted_wheel_shows_as_slip_and_rolling_wheels_do_not() {
         let mecanum = usual();
         let rolling = mecanum.inverse(Twist::new(0.5, -0.25, 1.0));
         assert!(mecanum.slip_m_s(rolling) < 1e-6);

@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_in_a_million_steps_ends_where_it_began() {
+    fn a_circle_in_a_million_steps_ends_at_its_start() {
         let mut odometry = Odometry::default();
         for _ in 0..1_000_000 {
             odometry.advance(Twist::new(TAU, 0.0, TAU), None, 1e-6);
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kilometre_in_millimetres_loses_none() {
+    fn a_kilometre_in_millimetres_loses_no_millimetre() {
         let mut odometry = Odometry::default();
         for _ in 0..1_000_000 {
             odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.001);

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn idling_with_a_full_buffer_winds_nothing_up_that_would_empty_it() {
+    fn idling_with_a_full_buffer_winds_nothing_up() {
         for (kp, ki) in [(2.0, 0.5), (2.0, 10.0), (0.5, 5.0), (20.0, 1.0), (3.0, 0.0)] {
             for gains in
                 [PidConfig::new(kp, ki, 0.0), PidConfig::new(kp, ki, 0.0).with_output_limit(120.0)]
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_integral_gain_brings_the_charge_back_to_the_reserve_with_a_model_that_is_wrong() {
+    fn an_integral_gain_restores_the_reserve_despite_a_wrong_model() {
         for (kp, ki) in [(2.0, 0.5), (2.0, 2.0), (3.0, 1.0)] {
             let (lowest, last) = idle_then_throttle(PidConfig::new(kp, ki, 0.0), 1.1);
             assert!(lowest > 15.0 && (last - 20.0).abs() < 0.1, "{kp} {ki}: {lowest} {last}");
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_buffer_that_was_empty_for_a_minute_is_spent_again_when_it_is_full() {
+    fn a_buffer_empty_for_a_minute_is_spent_again_when_full() {
         let mut buffer = PowerBuffer::new(20.0, PidConfig::new(2.0, 0.5, 0.0)).unwrap();
         for _ in 0..60_000 {
             assert!(buffer.allowance_w(80.0, Some(0.0), 0.001) >= 0.0);

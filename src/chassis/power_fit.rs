@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_counted_and_left_out() {
+    fn measurements_that_are_not_finite_are_counted_and_left_out() {
         let mut fit = start();
         let before = fit.model();
         fit.learn([WheelLoad { torque: f32::NAN, speed_rad_s: 0.0 }], 1.0);
@@ -187,7 +187,7 @@ mod tests {
     // One such reading made a model of NaN, read as no losses: the power limit passed everything
     // for ever.
     #[test]
-    fn readings_beyond_all_numbers_leave_no_model_that_is_none() {
+    fn readings_beyond_all_numbers_leave_a_finite_model() {
         let mut fit = start();
         for (torque, speed_rad_s, measured_w) in
             [(1.0, 1.0, 3e38), (1.0, 2.0, -3e38), (2.0, 1.0, -3e38), (1e8, 1.0, 3e38)]

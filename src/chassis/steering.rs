@@ -114,7 +114,7 @@ impl<const N: usize> Swerve<N> {
     ///   The hysteresis keeps a command at 90 degrees from flipping the module to and fro.
     /// * A module away from its target angle drives with the cosine of its error, so it does not push sideways.
     /// * At zero command a module stands still and keeps its angle, also for a wanted state that is NaN or infinite.
-    /// * The returned angles are near the measured angles, whatever their number of turns: no unwinding.
+    /// * The returned angles are near the measured angles, for any number of turns: no unwinding.
     /// * A module without a measured angle stands still, because its direction of push is unknown. The module keeps its
     ///   angle; a module never measured has no angle to keep, and gets the wanted angle, which its motor refuses.
     ///

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn two_modules_are_enough_and_one_is_not() {
+    fn two_modules_are_enough_and_a_single_module_is_refused() {
         let swerve = Swerve::new(0.05, CORNERS).unwrap();
         let motion = Twist::new(0.5, -0.25, 1.0);
         let mut partial = swerve.inverse(motion).map(Some);

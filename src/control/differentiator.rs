@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_pause_counts_as_the_longest_step_for_the_optimal_one_too() {
+    fn a_long_pause_counts_as_the_longest_step_for_the_optimal_law_too() {
         let new = || Differentiator::optimal(10.0, WIDTH_S, DT_S).unwrap();
         let (mut paused, mut steady) = (new(), new());
         for _ in 0..20 {

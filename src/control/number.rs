@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_f32_it_stays_at_the_largest_number_and_comes_back_at_once() {
+    fn a_differentiator_beyond_f32_stays_at_the_largest_number_and_returns_at_once() {
         for way in [1.0_f32, -1.0] {
             let mut sum = Sum::from(f32::MAX.copysign(way));
             for change in [f32::MAX, f32::INFINITY, 1e32] {

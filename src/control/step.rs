@@ -1,6 +1,6 @@
 /// The time since the step before, validated once for all loops of a tick.
 ///
-/// | `dt_s` | kind | what a controller does with it |
+/// | `dt_s` | kind | reaction of a controller |
 /// |---|---|---|
 /// | above 0, up to `dt_max_s` | normal | its work |
 /// | above `dt_max_s` | [frozen](Self::is_frozen) | integral and derivative stay for this step, the rest follows, the step is counted |
@@ -65,7 +65,7 @@ impl TimeStep {
         self.dt_s
     }
 
-    /// Tells whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
+    /// Returns whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
     #[must_use]
     pub const fn is_hold(&self) -> bool {
         self.dt_s <= 0.0
@@ -80,7 +80,7 @@ impl TimeStep {
         admitted
     }
 
-    /// Tells whether integral and derivative stay for this step: `dt_s` was above the maximum.
+    /// Returns whether integral and derivative stay for this step: `dt_s` was above the maximum.
     #[must_use]
     pub const fn is_frozen(&self) -> bool {
         self.dt_s > 0.0 && self.per_dt > f32::MAX
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_longest_step_that_is_none_holds_all_and_one_that_is_nan_freezes_none() {
+    fn a_longest_step_of_zero_holds_all_steps_and_a_longest_step_of_nan_freezes_no_step() {
         for dt_max_s in [0.0, -0.1, f32::NEG_INFINITY] {
             let step = TimeStep::new(0.001, dt_max_s);
             assert!(step.is_hold() && !step.is_frozen(), "{dt_max_s}");

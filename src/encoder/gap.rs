@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_speed_may_have_done_in_between_is_allowed_for_and_no_more() {
+    fn a_possible_change_of_speed_in_between_is_accepted_and_no_more() {
         // From 0 to 3000 rpm in 4 ms, or back: 819.2 counts on the mean, and as many for an early or a late change;
         // 101.1 for a rise and fall in between; 409.6 for 1 ms at the faster speed: 1329.9.
         for (before, after) in [(0, 3000), (3000, 0)] {

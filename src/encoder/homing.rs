@@ -15,7 +15,7 @@ pub enum Homing {
 }
 
 impl Homing {
-    /// Tells whether an absolute angle may be commanded.
+    /// Returns whether an absolute angle may be commanded.
     #[must_use]
     pub const fn is_known(self) -> bool {
         matches!(self, Self::Absolute | Self::Homed)

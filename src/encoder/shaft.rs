@@ -365,7 +365,7 @@ impl Position {
         Angle::from_turns(self.as_turns())
     }
 
-    /// Tells whether the angle is neither NaN nor infinite.
+    /// Returns whether the angle is neither NaN nor infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.angle.is_finite()
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_way_is_at_most_half_a_turn_and_there_it_is_down() {
+    fn the_shortest_way_is_at_most_half_a_turn_and_half_a_turn_leads_down() {
         for (from, to, way) in [
             (0, 100, 100_i16),
             (0, 8092, -100),
@@ -603,7 +603,7 @@ mod position_tests {
     }
 
     #[test]
-    fn beyond_two_to_the_31_turns_it_saturates_on_a_whole_turn() {
+    fn a_position_beyond_two_to_the_31_turns_saturates_on_a_whole_turn() {
         for (degrees, turns) in [(3e12, 1 << 31), (-3e12, -1 << 31), (-f32::MAX, -1 << 31)] {
             let position = Position::from_angle(Angle::from_degrees(degrees));
             assert_eq!(position, Position::from_turns(turns), "{degrees}");

@@ -176,7 +176,7 @@ impl CanFrame {
         self.key
     }
 
-    /// Tells whether this is a standard data frame of 8 bytes.
+    /// Returns whether this is a standard data frame of 8 bytes.
     #[inline]
     pub(crate) const fn is_whole(&self) -> bool {
         self.key <= 0x7FF

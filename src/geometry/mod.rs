@@ -14,7 +14,7 @@
 //!
 //! These axes hold for the whole crate: the body frame of a chassis, and any other frame that carries a name.
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Vec2`], [`Vec3`] | plain numbers along the axes, without a frame |
 //! | [`Point2`], [`Point3`] | a place in a frame |

@@ -93,7 +93,7 @@ impl Rotation2 {
 
     /// Returns the turn at the fraction `t` of the shorter way from `self` to `other`.
     ///
-    /// `t` = 0 gives `self`, 1 gives `other`; values outside go on in the same direction.
+    /// `t` = 0 gives `self`, 1 gives `other`; values outside continue in the same direction.
     #[must_use]
     pub fn interpolate(self, other: Self, t: f32) -> Self {
         let step = self.inverse().compose(other).angle() * t;
@@ -158,7 +158,7 @@ impl Heading {
         self.rotation
     }
 
-    /// Tells whether the angle is neither NaN nor infinite.
+    /// Returns whether the angle is neither NaN nor infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.angle.is_finite()

@@ -306,7 +306,7 @@ mod tests {
     const ROUNDING: f64 = 1e-6;
 
     #[test]
-    fn at_gimbal_lock_roll_is_zero_yaw_takes_all_and_near_it_the_turn_is_the_same() {
+    fn at_gimbal_lock_roll_is_zero_and_yaw_takes_all_and_nearby_the_turn_is_the_same() {
         for away in [0.0, 1e-7, 1e-6, 2e-6, 3e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
             for (side, roll, yaw) in grid() {
                 let (roll, yaw) = (0.2617 * roll, 0.2619 * yaw);

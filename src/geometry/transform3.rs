@@ -240,7 +240,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_transform_after_its_inverse_and_before_it_changes_nothing(t in transforms()) {
+        fn a_transform_composed_with_its_inverse_in_either_order_changes_nothing(t in transforms()) {
             let nothing = t.inverse().compose(t);
             prop_assert!(nothing.translation_m().norm() < 2e-5);
             prop_assert!(nothing.rotation().angle().as_radians() < 5e-6);
@@ -258,7 +258,7 @@ mod tests {
         }
 
         #[test]
-        fn a_chain_takes_a_point_where_its_links_take_it_in_turn(
+        fn a_chain_moves_a_point_as_its_links_in_turn(
             a in transforms(), b in loops(), x in -10.0_f32..10.0, y in -10.0_f32..10.0, z in -10.0_f32..10.0
         ) {
             let point = Point3::<Body>::new(x, y, z);

@@ -53,7 +53,7 @@ impl<F> Twist<F> {
         Self::new(self.vx_m_s, self.vy_m_s, wz_rad_s)
     }
 
-    /// Tells whether no part is NaN or infinite.
+    /// Returns whether no part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.vx_m_s.is_finite() && self.vy_m_s.is_finite() && self.wz_rad_s.is_finite()

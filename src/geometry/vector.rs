@@ -71,7 +71,7 @@ impl Vec2 {
         sqrt(self.dot(self))
     }
 
-    /// Tells whether neither part is NaN or infinite.
+    /// Returns whether neither part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite()
@@ -110,7 +110,7 @@ impl Vec3 {
         sqrt(self.dot(self))
     }
 
-    /// Tells whether no part is NaN or infinite.
+    /// Returns whether no part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()

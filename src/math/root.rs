@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_root_is_nan_and_the_ends_stay() {
+    fn a_negative_square_root_is_nan_and_the_ends_stay() {
         for root in [sqrt, newton] {
             assert!(
                 root(-1e-30).is_nan()

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_an_angle_is_nan() {
+    fn the_wrap_of_nan_and_infinity_is_nan() {
         for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             assert!(wrap_pi(x).is_nan() && wrap_tau(x).is_nan());
             assert!(wrap(x, 360.0).is_nan() && wrap_positive(x, 360.0).is_nan());

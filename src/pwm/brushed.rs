@@ -90,7 +90,7 @@ pub struct Brushed<P, D> {
     target: Target,
     way: Way,
     output: f32,
-    /// The last update set a duty of its own; the loop goes on from there.
+    /// The last update set a duty of its own; the loop continues from there.
     was_direct: bool,
     /// An update without a step may set the output once more.
     may_hold: bool,
@@ -192,7 +192,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         self.guard.clear_emergency_stop();
     }
 
-    /// Tells whether targets are taken.
+    /// Returns whether targets are taken.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
         self.guard.is_armed()

@@ -10,14 +10,14 @@
 //!                    └──────────┘
 //! ```
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`RcPwm`], [`RcConfig`] | an ESC or servo that listens to the length of a pulse |
 //! | [`Brushed`], [`BrushedConfig`] | a DC motor with a bridge, and an encoder where it has one |
 //! | [`Direction`]: an array of one pin, or a tuple of two | how the bridge is told which way |
 //! | [`HealthConfig`](crate::motor::HealthConfig) | when a brushed motor with an encoder counts as stalled, or runs away |
 //! | [`BrushedError`] | which pin failed |
-//! | [`ConfigError`](crate::error::ConfigError) | what is wrong with a configuration |
+//! | [`ConfigError`](crate::error::ConfigError) | fault of a configuration |
 //!
 //! The motors follow the rules of all motors here, by the same [`Guard`](crate::motor::Guard): disarmed at the start; a
 //! target that is old, NaN or infinite, a bad time step, time that stands or goes back, lost feedback and an emergency

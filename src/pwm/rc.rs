@@ -239,7 +239,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         self.guard.clear_emergency_stop();
     }
 
-    /// Tells whether targets are taken.
+    /// Returns whether targets are taken.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
         self.guard.is_armed()

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_came_and_went_unread_is_its_first_beginning_and_its_last_end() {
+    fn an_unread_condition_that_came_and_went_keeps_its_first_beginning_and_its_last_end() {
         let mut edges = Edges::new();
         for round in 0..3 {
             edges.begin(DOWN, at_ms(100 * round));
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_condition_is_over_when_it_did_not_come_for_a_second() {
+    fn a_repeated_condition_ends_after_a_second_without_an_incident() {
         let mut edges = Edges::new();
         for ms in (0..5_000).step_by(900) {
             edges.begin(OVERRUN, at_ms(ms));

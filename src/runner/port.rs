@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn an_evicted_frame_of_others_is_counted_also_where_it_is_too_long_to_be_handed_back() {
+    fn an_evicted_frame_of_others_is_counted_even_if_too_long_to_be_handed_back() {
         for (length, handed_back) in [(8, 1), (12, 0), (64, 0)] {
             let clock = ManualClock::new(Instant::from_micros(1_000));
             let mut bus = Bus::new();
@@ -483,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_another_kind_leaves_the_time_of_the_frames_after_it_as_it_is() {
+    fn a_frame_of_another_kind_does_not_change_the_time_of_the_frames_after() {
         for place in [0, 1, 8, 16] {
             let clock = ManualClock::new(Instant::from_micros(10_000_000));
             let mut bus = Bus::new();

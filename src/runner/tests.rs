@@ -245,7 +245,7 @@ fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
 }
 
 #[test]
-fn a_frame_that_is_not_offered_any_more_is_not_waited_for() {
+fn a_frame_no_longer_offered_does_not_count_as_unsent() {
     let clock = ManualClock::new(Instant::from_micros(1_000));
     let (mut runner, _) = driving(&clock);
     runner.port_mut().0.stuck = Some(0x1FF);
@@ -471,7 +471,7 @@ fn without_an_abort_a_pulled_plug_leaves_a_stale_frame_a_mailbox() {
 }
 
 #[test]
-fn with_an_abort_what_leaves_after_a_pulled_plug_is_of_the_last_tick() {
+fn with_an_abort_frames_after_a_pulled_plug_are_of_the_last_tick() {
     let (left, down) = pulled(|can| NbAbort(Nb(can)), |port| &mut port.0.0, 150);
     assert_eq!(left, [0], "zeros, once");
     assert!(

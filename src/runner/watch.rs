@@ -27,7 +27,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// | the same | 1 ms | 0.1 s |
     /// | the same | 10 ms | 0.2 s |
     /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
-    /// | wakes up each ms | 1 µs | 1 s; 2 s if it is never early or late |
+    /// | wakes up each ms | 1 µs | 1 s; 2 s if never early or late |
     /// | the same | 1 ms | 2 s |
     /// | the same | of a clock that has never moved | 200 s |
     /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_was_not_run_stays_due_and_the_next_one_covers_both() {
+    fn a_step_not_run_stays_due_and_the_next_step_covers_both() {
         let clock = ManualClock::default();
         let mut runner = driving(&clock);
         clock.set(at_us(11_000));
@@ -392,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_by_hand_takes_the_place_of_the_one_that_is_due() {
+    fn a_step_by_hand_replaces_the_due_step() {
         let clock = ManualClock::default();
         let mut runner = driving(&clock);
         clock.set(at_us(11_000));

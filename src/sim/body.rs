@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn no_contact_however_it_lies_adds_energy() {
+    fn no_contact_in_any_direction_adds_energy() {
         // Slip in all directions at once, more than the floor holds and less.
         for speed in [0.1, 30.0] {
             for contacts in [mecanum(), tyres([0.0; 4]), tyres([0.0, 30.0, 60.0, 170.0])] {

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_that_makes_no_sense_is_named() {
+    fn an_invalid_parameter_is_named() {
         let motor = MotorKey::new(0).unwrap();
         let config = ChassisConfig::new(&four(motor));
         assert_eq!(config.validate(), Ok(()));

@@ -283,7 +283,7 @@ impl Engine {
         let connected = self.faults.is_connected(line, now_ns);
         match sender {
             Sender::Controller if !connected => {
-                // Cut off in the middle: the frame is for nobody, and still waits.
+                // Cut off in the middle: no node receives the frame, which stays pending.
                 let wire = self.wire_mut(line);
                 wire.mailboxes.give_up();
                 return wire.finish(now_ns, false);

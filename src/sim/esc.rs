@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn without_commands_the_last_one_holds_unless_told_otherwise() {
+    fn without_commands_the_last_command_holds_unless_configured_otherwise() {
         let timeout = Duration::from_millis(20);
         let config = MotorConfig::new(Model::M3508, 1);
         for (config, later) in [(config, 1000), (config.with_command_timeout(timeout), 0)] {
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn the_free_running_clock_keeps_its_rate_whatever_the_jitter() {
+    fn the_free_running_clock_keeps_its_rate_under_any_jitter() {
         let config = MotorConfig::new(Model::M3508, 1).with_clock_ppm(40);
         let mut esc = Esc::new(config, 9, 3, 0).unwrap();
         let first = esc.due().unwrap();

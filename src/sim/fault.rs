@@ -17,7 +17,7 @@ use embedded_can::{Frame, Id};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Frames take their time on the wire and reach nobody.
+    /// Frames take their time on the wire and reach no node.
     LostFrames {
         /// The bus.
         line: Line,
@@ -58,7 +58,7 @@ pub enum Fault {
         /// Time between two frames; at least 1 µs. The bus limits the resulting rate.
         period: Duration,
     },
-    /// The ESC sends no feedback, or the joint answers nothing, and goes on otherwise.
+    /// The ESC sends no feedback, or the joint answers nothing; all else works.
     Silent(MotorKey),
     /// There is no supply: no feedback, no current, nothing heard. Afterwards the motor starts afresh, a joint disabled.
     PowerLoss {
@@ -70,7 +70,7 @@ pub enum Fault {
     },
     /// Angle and speed in the feedback stay constant.
     StuckEncoder(MotorKey),
-    /// The ESC sends the same feedback again and again, and goes on otherwise.
+    /// The ESC sends the same feedback again and again; all else works.
     FrozenFeedback(MotorKey),
     /// Nothing turns the shaft.
     BlockedShaft(MotorKey),

@@ -231,7 +231,7 @@ impl Wire {
         self.filter = (id, mask);
     }
 
-    /// Tells whether the acceptance filter lets a frame through.
+    /// Returns whether the acceptance filter lets a frame through.
     fn accepts(&self, frame: &CanFrame) -> bool {
         let (id, mask) = self.filter;
         // The header of anything but a standard data frame is above all ids.

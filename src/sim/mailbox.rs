@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_higher_priority_evicts_the_lowest_and_an_equal_or_lower_one_is_refused() {
+    fn a_higher_priority_evicts_the_lowest_and_an_equal_or_lower_priority_is_refused() {
         let mut mailboxes = filled([0x300, 0x100, 0x200]);
         assert_eq!(mailboxes.offer(frame(0x300, 1)), Offer::Refused);
         assert_eq!(mailboxes.offer(frame(0x301, 1)), Offer::Refused);

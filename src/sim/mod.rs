@@ -15,7 +15,7 @@
 //!  └──────────────┘   └──────────────────────────────────────────────────┘
 //! ```
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Simulation`] | the three buses, up to 16 motors and 12 joints, and the time |
 //! | [`MotorConfig`], [`JointConfig`] | a motor to attach, or a joint of a snake robot with its drive |
@@ -23,10 +23,10 @@
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
 //! | [`SerialLine`] | a serial line that takes its time, and damages bytes |
 //! | [`Controller`] | the driver's end of a bus |
-//! | [`Fault`] | what goes wrong, and when |
+//! | [`Fault`] | a fault and its window of time |
 //! | [`SimError`] | why something is refused, or a call of the driver failed |
 //! | [`Transmission`], [`Sender`], [`Traffic`] | every frame on a [`Line`] with its time, as a line of candump; bus load and counters |
-//! | [`contract`] | whether a device, yours too, keeps what it promises |
+//! | [`contract`] | check of a device, also of the application, against its promises |
 //! | [`frame_bits`], [`nominal_bits`], [`worst_case_bits`] | how long a frame is on the wire |
 //!
 //! ```
@@ -50,7 +50,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What is exact and what is not
+//! # Accuracy
 //! Exact: frame lengths with stuff bits and checksum, arbitration, mailbox rules, slots, scales, rounding; the same
 //! seed and the same calls give the same states, bit for bit, on every target. Documented: torque constants, gears and
 //! no-load speeds. **Estimates**: inertia, friction, winding, heat, jitter of the ESC, and its reaction when commands

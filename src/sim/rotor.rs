@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn the_power_of_a_held_shaft_is_heat_and_at_full_speed_it_is_what_friction_takes() {
+    fn the_power_of_a_held_shaft_is_heat_and_at_full_speed_that_of_friction() {
         for model in MODELS {
             let facts = model.facts();
             let mut held = rotor(model);

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_add_up_whatever_the_noise_does() {
+    fn bytes_add_up_under_any_noise() {
         let mut line = SerialLine::new(115_200, 3);
         line.set_flipped(0.1);
         line.set_dropped(0.05);

@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn one_seed_is_one_story_however_time_is_cut_and_another_seed_is_another() {
+    fn one_seed_is_one_history_for_any_split_of_time_and_another_seed_is_another() {
         let story_of_7 = story(7, 100);
         assert!(story_of_7.lines().count() > 200 && story_of_7.contains("lost"));
         assert_eq!(story_of_7, story(7, 100));
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_forgot_its_angle_counts_from_there() {
+    fn a_drive_that_lost_its_angle_counts_from_the_present_angle() {
         let world = Simulation::new(1);
         let wheel = world.attach(m3508(1).with_rotor_angle(1_000)).unwrap();
         let loss = Fault::PowerLoss { motor: wheel, forgets_angle: true };
@@ -521,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_takes_what_the_ids_leave_it() {
+    fn a_flood_takes_the_time_left_by_higher_priorities() {
         let world = Simulation::new(2);
         world.attach(m3508(1)).unwrap();
         let frame = CanFrame::standard(0x7FF, [0x55; 8]).unwrap();

@@ -38,7 +38,7 @@ macro_rules! linear {
                 Self(self.0.abs())
             }
 
-            /// Tells whether the value is neither NaN nor infinite.
+            /// Returns whether the value is neither NaN nor infinite.
             #[must_use]
             pub const fn is_finite(self) -> bool {
                 self.0.is_finite()

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_between_two_frames_is_seen_though_nobody_asked_meanwhile() {
+    fn a_loss_between_two_frames_is_latched_without_a_reading_meanwhile() {
         let mut deadline = Deadline::new(Duration::from_millis(10));
         deadline.meet(ms(0));
         assert_eq!(deadline.edge(ms(0)), Some(edge(false, ms(0))));

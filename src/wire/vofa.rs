@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_does_not_fit_says_how_long_it_is() {
+    fn the_error_of_a_long_line_has_its_length() {
         let error = text_line("speed", &[1.0, f32::NAN], &mut [0; 10]).unwrap_err();
         assert_eq!(
             error,

@@ -115,7 +115,7 @@ mod tests {
     const SPEED: PidConfig = PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0);
 
     #[test]
-    fn it_is_one_loop_after_the_other() {
+    fn a_cascade_equals_one_loop_after_the_other() {
         let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
         let (mut position, mut speed) = (Pid::new(POSITION).unwrap(), Pid::new(SPEED).unwrap());
         for sample in 0..50_u8 {
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_that_is_wrong_is_named_by_its_parameter() {
+    fn the_invalid_loop_is_named_by_its_parameter() {
         let wrong = PidConfig::new(1.0, -1.0, 0.0);
         assert_eq!(Cascade::new(wrong, SPEED).unwrap_err().parameter(), "ki");
         assert_eq!(Cascade::new(POSITION, wrong).unwrap_err().parameter(), "ki");

@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn it_brings_an_inertia_to_its_angle_in_both_directions() {
+    fn a_position_actuator_brings_an_inertia_to_its_angle_in_both_directions() {
         for target in [1.0, -1.0] {
             let mut actuator = config().with_outer_divider(2).unwrap();
             let (mut angle, mut speed) = (0.0_f32, 0.0_f32);
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn taking_over_gives_the_output_that_was_and_then_moves_from_there() {
+    fn taking_over_starts_from_the_last_output() {
         for divider in [1, 3] {
             let speed =
                 SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)).unwrap();
@@ -433,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_error_or_speed_leaves_the_given_rate_of_the_angle_as_it_is() {
+    fn a_bad_error_or_speed_keeps_the_given_rate_of_the_angle() {
         let damper = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
         let config = PositionActuator::new(PidConfig::new(0.0, 0.0, 1.0), damper).unwrap();
         let mut actuator = config;

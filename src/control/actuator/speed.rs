@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn without_filters_it_is_its_pid() {
+    fn a_speed_actuator_without_filters_equals_its_pid() {
         let config = PidConfig::new(1.0, 2.0, 0.01).with_output_limit(5.0);
         let mut actuator = SpeedActuator::new(config).unwrap();
         let mut pid = Pid::new(config).unwrap();

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stands_still_no_further_off_than_the_documentation_says() {
+    fn a_low_pass_stands_still_within_the_documented_distance() {
         for (cutoff_hz, part) in [(1.0, 1e-5), (1e-3, 1e-2)] {
             let mut filter = LowPass::new(cutoff_hz).unwrap();
             filter.reset_to(100.0 * (1.0 - 2.0 * part));

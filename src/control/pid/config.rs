@@ -196,7 +196,7 @@ impl PidConfig {
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
     ///
     /// For speed loops: the effort to overcome dry friction (in units of the output), and the effort for a unit of speed. The
-    /// setpoint is taken as `measurement + e`: on a circle, the setpoint next to the measurement, whatever its turn. A setpoint
+    /// setpoint is taken as `measurement + e`: on a circle, the setpoint next to the measurement, in any turn. A setpoint
     /// removed from the error by rounding counts as zero. A step with a given error has no feed-forward.
     #[must_use]
     pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {

@@ -273,7 +273,7 @@ impl Pid {
         limited(value, self.parameters.output_lower, self.parameters.output_upper)
     }
 
-    /// Tells whether the memory may hold a value.
+    /// Returns whether the memory may hold a value.
     pub(super) const fn has_memory(&self) -> bool {
         self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
     }
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dt_that_is_no_time_holds_the_output_and_is_counted() {
+    fn an_invalid_dt_holds_the_output_and_is_counted() {
         for config in [PidConfig::new(2.0, 10.0, 0.1), every_option()] {
             let mut pid = pid(config);
             pid.step(3.0, 1.0, &TimeStep::of(DT_S));
@@ -440,7 +440,7 @@ mod tests {
 
     /// A loop of 9.9 Hz had no integral, and nothing said so.
     #[test]
-    fn a_loop_slower_than_its_longest_step_counts_what_it_leaves_out() {
+    fn a_loop_slower_than_its_longest_step_counts_the_steps_left_out() {
         for config in [
             PidConfig::new(0.0, 1.0, 0.0),
             every_option(),
@@ -766,7 +766,7 @@ mod tests {
     }
 
     #[test]
-    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+    fn an_increment_below_half_a_spacing_is_lost_and_a_larger_increment_is_kept() {
         // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
         for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
             let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0));
@@ -889,7 +889,7 @@ mod tests {
     }
 
     #[test]
-    fn back_calculation_drains_what_the_limit_cuts_off() {
+    fn back_calculation_drains_the_part_cut_off_by_the_limit() {
         let config =
             PidConfig::new(1.0, 100.0, 0.0).with_output_limit(10.0).with_back_calculation(0.01);
         let mut pid = pid(config);
@@ -1037,7 +1037,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_configuration_comes_back_as_it_was_given(
+        fn the_configuration_is_returned_unchanged(
             config in any_config(), separation in 0.1_f32..100.0, edges in (0.0_f32..40.0, 41.0_f32..100.0),
         ) {
             let rates = config.with_integral_separation(separation).with_variable_integral(edges.0, edges.1);
@@ -1160,7 +1160,7 @@ mod tests {
         }
 
         #[test]
-        fn at_the_limit_a_plain_controller_does_what_one_with_options_does(
+        fn at_the_limit_a_plain_controller_equals_a_controller_with_options(
             gains in (0.0_f32..10.0, 0.0_f32..100.0, 0.0_f32..0.01),
             windup in 0_u8..3,
             samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0), 2..60),
@@ -1286,7 +1286,7 @@ mod incremental {
     }
 
     #[test]
-    fn it_leaves_the_limit_at_once() {
+    fn the_incremental_form_leaves_the_limit_at_once() {
         let mut pid = pid(incremental(0.0, 100.0, 0.0).with_output_limit(10.0));
         for _ in 0..10_000 {
             pid.step(9.0, 0.0, &TimeStep::of(DT_S));
@@ -1336,7 +1336,7 @@ mod incremental {
     }
 
     #[test]
-    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+    fn an_increment_below_half_a_spacing_is_lost_and_a_larger_increment_is_kept() {
         // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
         for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
             let mut pid = pid(incremental(0.0, 1.0, 0.0));
@@ -1417,7 +1417,7 @@ mod incremental {
     }
 
     #[test]
-    fn without_ki_the_incremental_form_keeps_its_memory_and_the_positional_one_has_none() {
+    fn without_ki_the_incremental_form_keeps_its_memory_and_the_positional_form_has_no_memory() {
         let step = TimeStep::of(DT_S);
         for (config, kept) in
             [(PidConfig::new(2.0, 0.0, 0.1), 0.0), (incremental(2.0, 0.0, 0.1), 1.0)]
@@ -1504,7 +1504,7 @@ mod incremental {
 
     proptest! {
         #[test]
-        fn with_tracking_it_is_a_differentiator_in_front_of_the_controller(
+        fn tracking_equals_a_differentiator_in_front_of_the_controller(
             r in 1.0_f32..500.0, gains in (0.0_f32..10.0, 0.0_f32..10.0, 0.0_f32..0.1), incremental in any::<bool>(),
             samples in prop::collection::vec((-50.0_f32..50.0, -1.0_f32..1.0, 1_u16..2000), 1..80),
         ) {
@@ -1521,7 +1521,7 @@ mod incremental {
         }
 
         #[test]
-        fn a_tracked_setpoint_never_overshoots_whatever_its_speed_and_the_time_step(
+        fn a_tracked_setpoint_never_overshoots_at_any_speed_and_time_step(
             r in 1e-3_f32..1e6, target in -1e6_f32..1e6, steps in prop::collection::vec(1_u32..=200_000, 1..200),
         ) {
             let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_tracking(r));
@@ -1532,7 +1532,7 @@ mod incremental {
         }
 
         #[test]
-        fn with_limits_it_equals_the_positional_form_with_conditional_integration(
+        fn the_incremental_form_with_limits_equals_the_positional_form_with_conditional_integration(
             kp in 0_u8..16, ki in 0_u8..64, kd in 0_u8..8, limit in 1_u8..60,
             samples in prop::collection::vec((-50_i8..50, -50_i8..50), 1..80),
         ) {
@@ -1553,7 +1553,7 @@ mod incremental {
         }
 
         #[test]
-        fn without_limits_it_equals_the_positional_form(
+        fn the_incremental_form_without_limits_equals_the_positional_form(
             kp in 0.0_f32..10.0, ki in 0.0_f32..10.0, kd in 0.0_f32..0.1,
             samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0, 1_u8..10), 1..50),
         ) {
@@ -1600,13 +1600,13 @@ mod limited_beyond {
     }
 
     #[test]
-    fn a_loop_that_is_told_what_passed_does_not_wind_up() {
+    fn a_loop_told_the_passed_output_does_not_wind_up() {
         assert!(after_a_second(false) > 100.0);
         assert!((after_a_second(true) - 3.1).abs() < 1e-4); // P and the 2 that passed, and a step's growth
     }
 
     #[test]
-    fn the_sign_stays_and_what_is_no_number_takes_all() {
+    fn the_sign_stays_and_a_share_of_nan_removes_the_whole_output() {
         let mut pid = Pid::new(PidConfig::new(0.0, 100.0, 0.0)).unwrap();
         for _ in 0..=100 {
             pid.step(-1.0, 0.0, &TimeStep::of(0.001));

@@ -274,7 +274,7 @@ impl Pid {
         (proportional, growth)
     }
 
-    /// Tells whether the output has limits.
+    /// Returns whether the output has limits.
     #[inline]
     pub(crate) const fn is_limited(&self) -> bool {
         self.parameters.output_upper < f32::MAX
@@ -294,7 +294,7 @@ impl Pid {
         self.parameters.ki * step.half_dt_s * (error + self.error)
     }
 
-    /// Tells whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
+    /// Returns whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
     #[inline]
     const fn is_short(&self, way: f32) -> bool {
         passes(way, self.way_gate)

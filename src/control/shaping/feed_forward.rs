@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_odd() {
+    fn the_time_optimal_acceleration_is_odd() {
         let feed_forward = FeedForward::new(0.3, 0.05, 0.01).unwrap();
         for (velocity, acceleration) in [(3.0, 1.0), (-3.0, 1.0), (0.0, 2.0), (0.0, 0.0)] {
             let forward = feed_forward.effort(velocity, acceleration);

@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acceleration_or_a_jerk_near_the_largest_number_leaves_the_speed_limit_as_it_is() {
+    fn an_acceleration_or_a_jerk_near_the_largest_number_keeps_the_speed_limit() {
         for huge in [1e30, 1e38, 3e38, f32::MAX] {
             for limits in [
                 MotionLimits::new(1.0, huge),
@@ -329,7 +329,7 @@ mod tests {
 
     /// The fuzzer found a speed above its limit: the time of the move had three digits left.
     #[test]
-    fn a_move_that_is_shorter_than_f32_can_tell_is_over_at_once() {
+    fn a_move_shorter_than_the_resolution_of_f32_is_over_at_once() {
         for (end, velocity) in [(5.6e-44, 0.0316), (1e-45, 1e-6), (-1e-39, 1.0)] {
             let limits = MotionLimits::new(velocity, f32::MAX);
             let profile = Profile::plan(0.0, end, &limits).unwrap();
@@ -341,7 +341,7 @@ mod tests {
 
     /// The fuzzer found a speed of minus infinity: a ratio overflowed, and the time at full acceleration was below zero.
     #[test]
-    fn a_jerk_near_zero_leaves_the_speed_limit_as_it_is() {
+    fn a_jerk_near_zero_keeps_the_speed_limit() {
         for (acceleration, jerk) in [(6e-9, 1e-45), (1.0, 1e-39), (f32::MAX, 1e-39), (1e30, 1e-8)] {
             let limits = MotionLimits::new(2.7, acceleration).with_jerk(jerk);
             let profile = Profile::plan(3e38, -1.0, &limits).unwrap();
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn before_the_start_and_at_no_time_it_rests_at_the_start() {
+    fn before_the_start_and_at_a_time_of_nan_a_profile_rests_at_the_start() {
         let profile = Profile::plan(1.0, 2.0, &S_CURVE).unwrap();
         for time_s in [0.0, -1.0, f32::NAN, f32::NEG_INFINITY] {
             assert_eq!(
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_planned_is_named() {
+    fn an_impossible_move_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             for (limits, name) in [
                 (MotionLimits::new(bad, 1.0), "velocity"),

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn braking_has_its_own_rate_in_both_directions_and_none_is_left_out_at_zero() {
+    fn braking_has_its_own_rate_in_both_directions_and_no_time_is_lost_at_zero() {
         for direction in [1.0_f32, -1.0] {
             // 2 up, 3 down, 10 towards zero; a step of 0.1 s.
             let away = if direction > 0.0 { 0.3 } else { 0.2 };
@@ -198,7 +198,7 @@ mod tests {
 
     /// The fuzzer found both: a rest of the sum greater than the next step, and a product that underflowed.
     #[test]
-    fn rounding_neither_takes_it_back_nor_lets_it_jump() {
+    fn rounding_neither_reverses_the_value_nor_makes_a_jump() {
         for (start, fall) in [(0.3, 1.9), (0.4, 0.9), (0.6, 2.7)] {
             let mut limiter = SlewLimiter::new(1e-30, fall).unwrap().with_max_step(1.0).unwrap();
             limiter.reset_to(start);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn from_one_end_of_f32_to_the_other_it_stays_finite() {
+    fn a_way_from_one_end_of_f32_to_the_other_stays_finite() {
         let mut limiter = SlewLimiter::new(f32::MAX, 1.0).unwrap();
         limiter.reset_to(f32::MIN);
         let mut last = f32::MIN;

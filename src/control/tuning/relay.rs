@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn it_finds_the_ultimate_gain_and_period_of_three_lags() {
+    fn relay_tuning_finds_the_ultimate_gain_and_period_of_three_lags() {
         let mut plant = ThreeLags { states: [0.0; 3], gain: 2.0, lag_s: 0.1 };
         let (gain, period_s) = swing(relay(1.0, 0.0), &mut plant).ultimate().unwrap();
         // The describing function is good to some percent.

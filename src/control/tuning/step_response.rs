@@ -111,7 +111,7 @@ impl StepResponse {
         }
     }
 
-    /// Tells whether the time is over.
+    /// Returns whether the time is over.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.passed.value() >= self.duration_s
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_measured_is_named() {
+    fn an_invalid_step_response_is_named() {
         let none = StepResponse::new(1.0, 1.0, 1.0, 0.02).unwrap_err();
         assert_eq!(none.to_string(), "target: must differ from the start");
         assert_eq!(StepResponse::new(f32::NAN, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");

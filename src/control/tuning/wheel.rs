@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_overshoots_by_what_the_damping_says_and_not_much_more_with_three_times_the_inertia() {
+    fn a_step_overshoots_as_the_damping_predicts_and_little_more_at_three_times_the_inertia() {
         for (inertias, expected) in [(1.0, 1.048), (3.0, 1.12), (0.5, 1.03)] {
             let highest = highest(inertias, 0);
             assert!((highest - expected).abs() < 0.01, "{inertias}: {highest}");
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn three_milliseconds_late_it_is_stable_on_a_twentieth_of_the_inertia() {
+    fn a_loop_three_milliseconds_late_is_stable_on_a_twentieth_of_the_inertia() {
         // Another half of a millisecond is in the step itself.
         for inertias in [1.0, 0.2, 0.05] {
             assert!(highest(inertias, 3) < 2.0, "{inertias}");
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_field_that_makes_no_sense_is_named() {
+    fn the_first_invalid_field_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             for (wheel, name) in [
                 (WheelTuning { mass_kg: bad, ..WHEEL }, "mass_kg"),

@@ -36,7 +36,7 @@ impl Told {
         Ok(told)
     }
 
-    /// Tells whether a change was among them.
+    /// Returns whether a change was among them.
     fn has(&self, motor: usize, condition: Condition, began: bool) -> bool {
         self.0.get(motor).is_some_and(|told| {
             let (begun, ended) = told;

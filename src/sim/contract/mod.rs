@@ -49,7 +49,7 @@ pub trait Subject {
         embedded_can::Frame::new(command.id(), &[0; 8])
     }
 
-    /// Tells whether a command frame asks for nothing: eight zeros, unless said otherwise.
+    /// Returns whether a command frame asks for nothing: eight zeros, unless said otherwise.
     fn is_zero(&self, command: &CanFrame) -> bool {
         *command.bytes() == [0; 8]
     }

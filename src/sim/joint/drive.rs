@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_supply_it_forgets_registers_and_zero() {
+    fn a_joint_without_supply_forgets_registers_and_zero() {
         let mut drive = drive();
         steps(&mut drive, 5_000);
         drive.set_powered(false);

@@ -311,7 +311,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read_again(
+        fn a_written_record_is_read_again(
             micros in prop::option::of(any::<u64>()),
             interface in "[!-'*-~][!-~]{0,14}",
             frame in any_frame(),
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_says_column_and_what_was_expected() {
+    fn an_error_names_the_column_and_the_expectation() {
         let error = Record::parse(b"can0 201#0E1").unwrap_err();
         assert_eq!(std::format!("{error}"), "column 13: expected two hexadecimal digits");
     }

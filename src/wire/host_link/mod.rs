@@ -16,7 +16,7 @@
 //!
 //! | question | the robot's document | its newer firmware | here |
 //! |---|---|---|---|
-//! | header of telemetry | `AA 55` | `BB 66` | both; the firmware's is the default: what runs speaks it, and it cannot be taken for a command ([`TelemetryFormat`]) |
+//! | header of telemetry | `AA 55` | `BB 66` | both; the firmware's is the default: the running firmware sends this header, and it differs from that of a command ([`TelemetryFormat`]) |
 //! | byte order of the floats | not said | little-endian: memory of a Cortex-M | both; little-endian is the default, as the only one seen |
 //! | `4B` in the command | up to the CRC | 75 bytes from the function code, CRC included | the firmware's, the only count that fits |
 //! | the four tags | left out | skipped unread | written as 13 to 16, skipped when read |

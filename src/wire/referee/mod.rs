@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn data_that_no_length_field_can_tell_is_refused() {
+    fn data_too_long_for_the_length_field_is_refused() {
         let data = std::vec![0; 65_536];
         let error = encode(1, 0, &data, &mut []).unwrap_err();
         assert_eq!(error, EncodeError::DataTooLong { given: 65_536, most: 65_535 });

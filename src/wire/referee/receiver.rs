@@ -11,12 +11,12 @@ const HIGHEST_LIMIT_W: u16 = 250;
 
 /// Reads the referee system, and returns the valid power limit and buffer energy.
 ///
-/// | what is heard | power limit | buffer energy |
+/// | received frames | power limit | buffer energy |
 /// |---|---|---|
-/// | nothing yet, or nothing in time | the safe limit, or the last that was heard if that is lower | `None` |
+/// | none yet, or none in time | the safe limit, or the last received limit if lower | `None` |
 /// | a first frame | the same | `None` |
 /// | two frames or more | the lower of the last two | the lower of the last two |
-/// | a value that cannot be | as if the frame had not come | as if the frame had not come |
+/// | an impossible value | as without the frame | as without the frame |
 ///
 /// So a limit falls with the first frame of a lower value and rises with the second frame of a higher value, and neither silence
 /// nor a single frame raises it. Both are only numbers: no message arms a motor, moves a motor, or stops a motor.
