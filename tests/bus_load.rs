@@ -5,7 +5,7 @@
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{BusLoad, Devices};
-use drivetrain::runner::{MeasuredLoad, Nb, Runner};
+use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Line, MotorConfig, Sender, Simulation, frame_bits, nominal_bits, worst_case_bits,
 };
@@ -91,7 +91,7 @@ fn frames_of_every_kind_are_counted_by_their_length() {
 }
 
 /// The runner's load beside what the simulated bus carried, from 2 s to 5 s; and the frames a second.
-fn runner_and_truth(world: &Simulation, motors: u8) -> (MeasuredLoad, f32, f32) {
+fn runner_and_truth(world: &Simulation, motors: u8) -> (BusLoad, f32, f32) {
     use embedded_can::{ExtendedId, Frame};
     let mut bus = Bus::new();
     for id in 1..=motors {

@@ -4,7 +4,7 @@
 #![cfg(feature = "sim")]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Mecanum, MecanumWheels, Mode, ModeConfig, Modes,
+    Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -111,7 +111,7 @@ fn the_chassis_follows_its_gimbal() {
     let mut robot = Robot::new(&world, false);
     let config = ModeConfig::new(PidConfig::new(4.0, 0.0, 0.0).with_output_limit(4.0));
     let mut modes = Modes::new(config).unwrap();
-    modes.set_mode(Mode::FollowGimbal);
+    modes.set_mode(ChassisMode::FollowGimbal);
     robot.run(4.0, |robot, tick| {
         // The gimbal holds 60 degrees to the left in the world.
         let yaw = Angle::from_degrees(60.0) - robot.heading();

@@ -26,7 +26,7 @@ mod modes;
 #[path = "../examples/chassis/verdict.rs"]
 mod verdict;
 
-use drivetrain::chassis::Mode;
+use drivetrain::chassis::ChassisMode;
 
 use drivetrain::wire::Deframer;
 use drivetrain::wire::vofa::JustFloat;
@@ -36,7 +36,8 @@ use scenario::{Run, Sample, Scenario, Trouble};
 use serial::Script;
 use verdict::Verdict;
 
-const MODES: [Mode; 4] = [Mode::FollowGimbal, Mode::Rotor, Mode::Independent, Mode::Relax];
+const MODES: [ChassisMode; 4] =
+    [ChassisMode::FollowGimbal, ChassisMode::Rotor, ChassisMode::Independent, ChassisMode::Relax];
 
 fn run(seed: u64, fault: Option<Trouble>) -> Run {
     Scenario { seconds: 10.0, seed, fault, serial: None }.run(|_| {}, |_| {}).unwrap()
@@ -248,7 +249,8 @@ fn every_mode_does_what_it_is_for_with_and_without_a_power_limit() {
 
 #[test]
 fn the_power_limit_binds_and_the_buffer_stays_above_its_reserve() {
-    let drive = Drive { mode: Mode::Rotor, power_limit_w: Some(30.0), seconds: 10.0, seed: 1 };
+    let drive =
+        Drive { mode: ChassisMode::Rotor, power_limit_w: Some(30.0), seconds: 10.0, seed: 1 };
     let outcome = drive.run(|_| {}, |_| {}).unwrap();
     let cut = outcome.samples.iter().filter(|sample| sample.scale < 0.9).count();
     assert!(cut > 500, "cut for {cut} ms");
@@ -276,7 +278,7 @@ fn a_drive_that_fails_its_mode_is_told_so() {
 
 #[test]
 fn the_rotor_goes_where_the_gimbal_looks_and_no_wheel_is_too_fast() {
-    let drive = Drive { mode: Mode::Rotor, power_limit_w: None, seconds: 10.0, seed: 1 };
+    let drive = Drive { mode: ChassisMode::Rotor, power_limit_w: None, seconds: 10.0, seed: 1 };
     let samples = drive.run(|_| {}, |_| {}).unwrap().samples;
     let forward = samples.iter().find(|sample| sample.time_s >= 1.5).unwrap();
     let (x, y) = forward.position_m;

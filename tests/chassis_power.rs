@@ -97,13 +97,13 @@ proptest! {
             speed_rad_s: bus.state(motor).unwrap().velocity.as_rad_per_s(),
         });
         let before = loads(&bus);
-        let cut = model.cut(before, limit_w);
-        bus.scale_outputs(motors, cut.scale);
+        let (scale, power_w) = model.cut(before, limit_w);
+        bus.scale_outputs(motors, scale);
         let after = loads(&bus);
         let total: f32 = after.into_iter().map(|load| model.power_w(load)).sum();
         // A count of current is 1.2 mA: at most 0.03 W on a wheel that brakes at full speed.
-        let bound = if cut.within { limit_w.max(0.0) } else { cut.power_w };
-        prop_assert!(total <= bound + 0.15, "{total} W, {cut:?}");
+        let bound = power_w.max(limit_w.max(0.0));
+        prop_assert!(total <= bound + 0.15, "{total} W, {scale} {power_w}");
     }
 }
 

@@ -5,7 +5,8 @@
 
 use core::fmt::Debug;
 use drivetrain::chassis::{
-    ChassisLimits, MecanumWheels, Mode, ModeConfig, Modes, ModuleState, PowerModel, WheelLoad,
+    ChassisLimits, ChassisMode, MecanumWheels, ModeConfig, Modes, ModuleState, PowerModel,
+    WheelLoad,
 };
 use drivetrain::control::PidConfig;
 use drivetrain::geometry::{
@@ -82,7 +83,12 @@ fn values_of_the_chassis_survive_a_file() {
     let modes = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0));
     round(modes.with_rotor(6.0, 2.0, 3.0).with_alternating_rotor());
     round(modes.with_gimbal_timeout(0.05).with_relax_without_gimbal().with_transition(0.1));
-    for mode in [Mode::Relax, Mode::FollowGimbal, Mode::Rotor, Mode::Independent] {
+    for mode in [
+        ChassisMode::Relax,
+        ChassisMode::FollowGimbal,
+        ChassisMode::Rotor,
+        ChassisMode::Independent,
+    ] {
         round(mode);
     }
 }

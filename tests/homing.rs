@@ -5,9 +5,7 @@
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006};
 use drivetrain::encoder::Position;
-use drivetrain::motor::{
-    Devices, HomingError, HomingStep, Link, ShaftState, StopHoming, StopHomingConfig,
-};
+use drivetrain::motor::{Devices, HomingStep, Link, ShaftState, StopHoming};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
@@ -23,8 +21,9 @@ fn degrees(degrees: f32) -> Angle {
     Angle::from_degrees(degrees)
 }
 
-fn config(rpm: f32) -> StopHomingConfig {
-    StopHomingConfig::new(AngularVelocity::from_rpm(rpm), EFFORT_A).with_travel(degrees(200.0))
+fn config(rpm: f32) -> StopHoming {
+    let homing = StopHoming::new(AngularVelocity::from_rpm(rpm), EFFORT_A);
+    homing.and_then(|homing| homing.with_travel(degrees(200.0))).unwrap()
 }
 
 fn shaft(bus: &Bus, motor: Handle<M2006>) -> Option<ShaftState> {
@@ -38,7 +37,7 @@ fn shaft(bus: &Bus, motor: Handle<M2006>) -> Option<ShaftState> {
 
 #[derive(Debug)]
 struct Outcome {
-    result: Result<(), HomingError>,
+    result: HomingStep,
     took_ms: u64,
     /// What the library says, and how far the shaft really turned since the start.
     position: Position,
@@ -48,14 +47,13 @@ struct Outcome {
 }
 
 /// Homes a motor in a world, from rest; relaxed after a failure.
-fn home(world: &Simulation, key: MotorKey, reversed: bool, config: StopHomingConfig) -> Outcome {
+fn home(world: &Simulation, key: MotorKey, reversed: bool, mut homing: StopHoming) -> Outcome {
     let start = world.motor(key).unwrap().encoder_counts;
     let mut bus = Bus::new();
     let limit = Current::from_amperes(LIMIT_A);
     let arm = Config::<M2006>::new(1).speed_loop(SPEED).with_current_limit(limit);
     let arm = bus.attach(if reversed { arm.reversed() } else { arm }).unwrap();
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    let mut homing = StopHoming::new(config).unwrap();
     let (mut result, mut strongest_a) = (None, 0.0_f32);
     while result.is_none() {
         world.advance(Duration::from_millis(1));
@@ -74,8 +72,7 @@ fn home(world: &Simulation, key: MotorKey, reversed: bool, config: StopHomingCon
                 HomingStep::SetPresentPosition(position) => {
                     bus.set_present_position(arm, position).unwrap();
                 }
-                HomingStep::Done => result = Some(Ok(())),
-                HomingStep::Failed(why) => result = Some(Err(why)),
+                last => result = Some(last),
             }
         }
         if result.is_some() {
@@ -109,8 +106,8 @@ fn the_stop_is_found_from_both_sides_and_whichever_way_the_motor_is_mounted() {
         let world = Simulation::new(3);
         let key = world.attach(motor(-120.0, 60.0)).unwrap();
         let stop_at = Position::new(2, degrees(40.0));
-        let outcome = home(&world, key, reversed, config(rpm).with_stop_at(stop_at));
-        assert_eq!(outcome.result, Ok(()), "{rpm} rpm: {outcome:?}");
+        let outcome = home(&world, key, reversed, config(rpm).with_stop_at(stop_at).unwrap());
+        assert_eq!(outcome.result, HomingStep::Done, "{rpm} rpm: {outcome:?}");
         assert!((outcome.turned.as_degrees() - stop).abs() < 0.1, "{outcome:?}");
         assert!((outcome.position - stop_at).as_degrees().abs() < 0.1, "{outcome:?}");
         assert!(outcome.strongest_a < 1.01 * LIMIT_A && outcome.relaxed, "{outcome:?}");
@@ -123,7 +120,7 @@ fn a_stop_that_is_touched_already_is_home() {
         let world = Simulation::new(4);
         let key = world.attach(motor(lower, upper)).unwrap();
         let outcome = home(&world, key, false, config(rpm));
-        assert_eq!(outcome.result, Ok(()));
+        assert_eq!(outcome.result, HomingStep::Done);
         assert!(outcome.turned.as_degrees().abs() < 0.1 && outcome.took_ms < 1_500, "{outcome:?}");
         assert!((outcome.position - Position::ZERO).as_degrees().abs() < 0.1, "{outcome:?}");
     }
@@ -134,8 +131,8 @@ fn it_backs_off_by_as_much_as_is_asked_for_and_keeps_the_stop_where_it_is() {
     for (rpm, rest) in [(-30.0, 12.0), (30.0, -12.0)] {
         let world = Simulation::new(5);
         let key = world.attach(motor(-70.0, 70.0)).unwrap();
-        let outcome = home(&world, key, false, config(rpm).with_back_off(degrees(12.0)));
-        assert_eq!(outcome.result, Ok(()));
+        let outcome = home(&world, key, false, config(rpm).with_back_off(degrees(12.0)).unwrap());
+        assert_eq!(outcome.result, HomingStep::Done);
         let found = (outcome.position - Position::ZERO).as_degrees();
         assert!((found - rest).abs() < 2.0, "{found} of {rest}");
         // Zero is at the stop, wherever the shaft is now.
@@ -151,7 +148,7 @@ fn friction_is_not_taken_for_the_stop() {
         let world = Simulation::new(6);
         let key = world.attach(motor(-100.0, 100.0).with_load_friction_nm(friction_nm)).unwrap();
         let outcome = home(&world, key, false, config(-30.0));
-        assert_eq!(outcome.result, Ok(()), "{outcome:?}");
+        assert_eq!(outcome.result, HomingStep::Done, "{outcome:?}");
         assert!((outcome.turned.as_degrees() + 100.0).abs() < 0.1, "{friction_nm} Nm: {outcome:?}");
     }
     // To break loose takes 2.7 A, more than at the stop; but not for the whole window.
@@ -159,9 +156,9 @@ fn friction_is_not_taken_for_the_stop() {
         let world = Simulation::new(6);
         let key = world.attach(motor(-100.0, 100.0).with_load_friction_nm(0.44)).unwrap();
         let window = Duration::from_millis(window_ms);
-        let outcome = home(&world, key, false, config(-30.0).with_window(window));
+        let outcome = home(&world, key, false, config(-30.0).with_window(window).unwrap());
         let wrong = (outcome.turned.as_degrees() - turned).abs();
-        assert!(outcome.result.is_ok() && wrong < 0.2, "{window_ms} ms: {outcome:?}");
+        assert!(outcome.result == HomingStep::Done && wrong < 0.2, "{window_ms} ms: {outcome:?}");
     }
 }
 
@@ -169,17 +166,17 @@ fn friction_is_not_taken_for_the_stop() {
 fn each_failure_is_told_and_the_motor_relaxed() {
     let free = MotorConfig::m2006(1);
     let stuck = free.with_load_friction_nm(0.6); // 3.6 A: more than it may
-    let weak = StopHomingConfig::new(AngularVelocity::from_rpm(-30.0), 3.5);
-    let weak = weak.with_timeout(Duration::from_secs(2));
+    let weak = StopHoming::new(AngularVelocity::from_rpm(-30.0), 3.5).unwrap();
+    let weak = weak.with_timeout(Duration::from_secs(2)).unwrap();
     for (motor, config, error, turned) in [
-        (free, config(-30.0), HomingError::NoStop, -200.0),
-        (free, config(30.0), HomingError::NoStop, 200.0),
-        (stuck, weak, HomingError::TimedOut, 0.0),
+        (free, config(-30.0), HomingStep::NoStop, -200.0),
+        (free, config(30.0), HomingStep::NoStop, 200.0),
+        (stuck, weak, HomingStep::TimedOut, 0.0),
     ] {
         let world = Simulation::new(7);
         let key = world.attach(motor).unwrap();
         let outcome = home(&world, key, false, config);
-        assert_eq!(outcome.result, Err(error));
+        assert_eq!(outcome.result, error);
         assert!((outcome.turned.as_degrees() - turned).abs() < 2.0, "{outcome:?}");
         assert!(outcome.strongest_a < 1.01 * LIMIT_A && outcome.relaxed, "{outcome:?}");
     }
@@ -187,6 +184,6 @@ fn each_failure_is_told_and_the_motor_relaxed() {
     let key = world.attach(free).unwrap();
     world.fault(Fault::Silent(key), Instant::from_micros(500_000)..).unwrap();
     let outcome = home(&world, key, false, config(-30.0));
-    assert_eq!(outcome.result, Err(HomingError::LostFeedback));
+    assert_eq!(outcome.result, HomingStep::LostFeedback);
     assert!((510..=512).contains(&outcome.took_ms) && outcome.relaxed, "{outcome:?}");
 }

@@ -205,7 +205,7 @@ impl<'a> Car<'a> {
                 torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
                 speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
             });
-            bus.scale_outputs(wheels, model.cut(loads, allowed_w).scale);
+            bus.scale_outputs(wheels, model.cut(loads, allowed_w).0);
         });
     }
 }

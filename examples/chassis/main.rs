@@ -25,7 +25,7 @@ mod serial;
 mod silence;
 mod verdict;
 
-use drivetrain::chassis::Mode;
+use drivetrain::chassis::ChassisMode;
 use log::Log;
 use modes::Drive;
 use options::{Options, Request};
@@ -102,7 +102,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn run_mode(options: &Options, mode: Mode) -> Result<(), Box<dyn Error>> {
+fn run_mode(options: &Options, mode: ChassisMode) -> Result<(), Box<dyn Error>> {
     let show_progress = std::io::stderr().is_terminal();
     let drive = Drive {
         mode,

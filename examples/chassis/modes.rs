@@ -4,7 +4,7 @@ use super::scenario::{
     FRONT_LEFT_M, Robot, WHEEL_RADIUS_M, Wheels, at, attach_motors, narrow, robot, seconds_of,
 };
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Mecanum, MecanumWheels, Mode, ModeConfig, Modes, PowerBuffer, PowerCut,
+    Chassis, ChassisLimits, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes, PowerBuffer,
     PowerFit, PowerModel, WheelLoad,
 };
 use drivetrain::control::PidConfig;
@@ -25,7 +25,7 @@ const RESERVE_J: f32 = 20.0;
 const START: [f32; 4] = [0.0, 0.475, 0.1, 0.0];
 
 pub(crate) struct Drive {
-    pub(crate) mode: Mode,
+    pub(crate) mode: ChassisMode,
     pub(crate) power_limit_w: Option<f32>,
     pub(crate) seconds: f32,
     pub(crate) seed: u64,
@@ -34,7 +34,7 @@ pub(crate) struct Drive {
 /// One millisecond.
 pub(crate) struct Sample {
     pub(crate) time_s: f32,
-    pub(crate) acting: Mode,
+    pub(crate) acting: ChassisMode,
     pub(crate) position_m: (f32, f32),
     /// Of the chassis and of the gimbal in the world, in degrees.
     pub(crate) heading_deg: f32,
@@ -115,7 +115,7 @@ impl Drive {
                 wheel_rpm: wheels.map(rpm),
                 power_w,
                 buffer_j: limiter.as_ref().map_or(BUFFER_J, |limiter| limiter.energy_j),
-                scale: limiter.as_ref().map_or(1.0, |limiter| limiter.cut.scale),
+                scale: limiter.as_ref().map_or(1.0, |limiter| limiter.scale),
                 is_quiet: commands.into_iter().flatten().all(|current| current.as_amperes() == 0.0),
             });
             if outcome.samples.len().is_multiple_of(250) {
@@ -130,9 +130,9 @@ impl Drive {
     }
 
     /// To relax means something only after having driven.
-    fn mode_at(&self, time_s: f32) -> Mode {
+    fn mode_at(&self, time_s: f32) -> ChassisMode {
         match self.mode {
-            Mode::Relax if time_s < 0.5 * self.seconds => Mode::Independent,
+            ChassisMode::Relax if time_s < 0.5 * self.seconds => ChassisMode::Independent,
             mode => mode,
         }
     }
@@ -185,7 +185,7 @@ struct Limiter {
     buffer: PowerBuffer,
     fit: PowerFit,
     energy_j: f32,
-    cut: PowerCut,
+    scale: f32,
 }
 
 impl Limiter {
@@ -196,7 +196,7 @@ impl Limiter {
             buffer: PowerBuffer::new(RESERVE_J, spend)?,
             fit: PowerFit::new(start()?, 0.999),
             energy_j: BUFFER_J,
-            cut: PowerCut { scale: 1.0, power_w: 0.0, within: true },
+            scale: 1.0,
         })
     }
 
@@ -216,7 +216,7 @@ impl Limiter {
             self.fit.learn(present, measured_w);
         }
         let allowed_w = self.buffer.allowance_w(self.limit_w, Some(self.energy_j), dt_s);
-        self.cut = self.fit.model().cut(loads, allowed_w);
-        bus.scale_outputs(wheels, self.cut.scale);
+        (self.scale, _) = self.fit.model().cut(loads, allowed_w);
+        bus.scale_outputs(wheels, self.scale);
     }
 }

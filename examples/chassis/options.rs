@@ -1,7 +1,7 @@
 //! The command line.
 
 use super::scenario::Trouble;
-use drivetrain::chassis::Mode;
+use drivetrain::chassis::ChassisMode;
 use std::path::PathBuf;
 
 pub(crate) const USAGE: &str = "usage: chassis [options]
@@ -27,15 +27,15 @@ pub(crate) struct Options {
     pub(crate) candump: Option<PathBuf>,
     pub(crate) seed: u64,
     pub(crate) fault: Option<Trouble>,
-    pub(crate) mode: Option<Mode>,
+    pub(crate) mode: Option<ChassisMode>,
     pub(crate) power_limit_w: Option<f32>,
 }
 
-const MODES: [(&str, Mode); 4] = [
-    ("follow", Mode::FollowGimbal),
-    ("rotor", Mode::Rotor),
-    ("independent", Mode::Independent),
-    ("relax", Mode::Relax),
+const MODES: [(&str, ChassisMode); 4] = [
+    ("follow", ChassisMode::FollowGimbal),
+    ("rotor", ChassisMode::Rotor),
+    ("independent", ChassisMode::Independent),
+    ("relax", ChassisMode::Relax),
 ];
 
 #[derive(Debug)]
@@ -97,7 +97,7 @@ impl Options {
                     options.power_limit_w = Some(watts.ok_or_else(|| {
                         format!("--power-limit {text}: not a number from 10 to 500")
                     })?);
-                    options.mode = options.mode.or(Some(Mode::Independent));
+                    options.mode = options.mode.or(Some(ChassisMode::Independent));
                 }
                 other => return Err(format!("unknown option {other}")),
             }

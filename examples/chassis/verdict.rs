@@ -1,7 +1,7 @@
 //! What a drive in a mode came to, in figures, and whether that is what the mode is for.
 
 use super::modes::{BUFFER_J, Drive, Outcome, ROTOR_RAD_S, Sample};
-use drivetrain::chassis::Mode;
+use drivetrain::chassis::ChassisMode;
 use std::fmt::Write as _;
 
 /// The figures, and what is wrong with them.
@@ -15,10 +15,10 @@ impl Verdict {
         let mut verdict = Self { text: String::new(), faults: Vec::new() };
         let samples = &outcome.samples;
         match drive.mode {
-            Mode::FollowGimbal => verdict.follow(drive, samples),
-            Mode::Rotor => verdict.rotor(drive, samples),
-            Mode::Independent => verdict.independent(samples),
-            Mode::Relax => verdict.relax(samples),
+            ChassisMode::FollowGimbal => verdict.follow(drive, samples),
+            ChassisMode::Rotor => verdict.rotor(drive, samples),
+            ChassisMode::Independent => verdict.independent(samples),
+            ChassisMode::Relax => verdict.relax(samples),
         }
         verdict.motion(samples);
         verdict.power(drive, outcome);
@@ -61,7 +61,7 @@ impl Verdict {
 
     /// From half-time on no motor is told anything.
     fn relax(&mut self, samples: &[Sample]) {
-        let relaxed = || samples.iter().filter(|s| s.acting == Mode::Relax);
+        let relaxed = || samples.iter().filter(|s| s.acting == ChassisMode::Relax);
         let loud = relaxed().filter(|s| !s.is_quiet).count();
         let since = relaxed().next().map_or(0.0, |s| s.time_s);
         _ = writeln!(

@@ -3,7 +3,7 @@
 #![no_main]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Differential, Kinematics, Mecanum, Mode, ModeConfig, Modes,
+    Chassis, ChassisLimits, Differential, Kinematics, Mecanum, ChassisMode, ModeConfig, Modes,
     ModuleState, Omni, Swerve, SwerveSteering, WheelSpeed,
 };
 use drivetrain::control::PidConfig;
@@ -178,9 +178,9 @@ fn modes(mut input: Input) {
         config = config.with_transition(input.positive());
     }
     let timeout_s = input.positive();
-    let instead = if input.coin() { Mode::Relax } else { Mode::Independent };
+    let instead = if input.coin() { ChassisMode::Relax } else { ChassisMode::Independent };
     config = config.with_alternating_rotor().with_gimbal_timeout(timeout_s);
-    if instead == Mode::Relax {
+    if instead == ChassisMode::Relax {
         config = config.with_relax_without_gimbal();
     }
     let Ok(mut modes) = Modes::new(config) else { return };
@@ -189,10 +189,10 @@ fn modes(mut input: Input) {
     while !input.is_empty() {
         let kind = input.byte();
         let mode = match kind % 4 {
-            0 => Mode::Relax,
-            1 => Mode::FollowGimbal,
-            2 => Mode::Rotor,
-            _ => Mode::Independent,
+            0 => ChassisMode::Relax,
+            1 => ChassisMode::FollowGimbal,
+            2 => ChassisMode::Rotor,
+            _ => ChassisMode::Independent,
         };
         modes.set_mode(mode);
         let command = Twist::new(input.float(), input.float(), input.float());
@@ -213,10 +213,10 @@ fn modes(mut input: Input) {
         if let Some(twist) = twist {
             assert!(twist.is_finite(), "{twist:?} of {command:?}");
         }
-        assert_eq!(twist.is_none(), modes.acting() == Mode::Relax);
+        assert_eq!(twist.is_none(), modes.acting() == ChassisMode::Relax);
         // Sums of f32 and of f64 may differ by a step or so.
         let lost = age_s > f64::from(timeout_s) * 1.01 + 0.001;
-        if lost && matches!(mode, Mode::FollowGimbal | Mode::Rotor) {
+        if lost && matches!(mode, ChassisMode::FollowGimbal | ChassisMode::Rotor) {
             assert_eq!(modes.acting(), instead, "I4: no yaw for {age_s} s");
         }
         for edges in 0.. {

@@ -17,11 +17,10 @@ use crate::units::Angle;
 /// 4. the modules of a [`Swerve`](super::Swerve) take the shorter way, and at rest keep their angles:
 ///    see [`Swerve::steer`](super::Swerve::steer).
 ///
-/// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command that is not
-/// renewed for 0.1 s counts as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; one
-/// over 0.1 s counts as 0.1 s for the acceleration, and one over 1 s moves no pose. In the 100th tick in a row without
-/// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels are told to
-/// stand at once.
+/// A command that is NaN or infinite, or faster than 1e19 m/s, stops the chassis and is counted. A command not renewed
+/// for 0.1 s counts as zero. A `dt` that is zero, negative, NaN or infinite moves neither pose nor command; a `dt` over
+/// 0.1 s counts as 0.1 s for the acceleration, and a `dt` over 1 s moves no pose. In the 100th tick in a row without
+/// usable time the clock is dead: the command counts as stale, and since no ramp can be timed, the wheels stop at once.
 ///
 /// # Examples
 /// ```
@@ -52,7 +51,7 @@ pub struct Chassis<K: Kinematics> {
     status: ChassisStatus,
 }
 
-/// What the driver wants, in the frame it was said in.
+/// The commanded motion, in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Command {
     Body(Twist<Body>),
@@ -61,7 +60,7 @@ enum Command {
 }
 
 impl<K: Kinematics> Chassis<K> {
-    /// The longest step in seconds that the acceleration limit believes.
+    /// The longest step in seconds that counts in full for the acceleration limit.
     pub const MAX_STEP_S: f32 = 0.1;
 
     /// Takes the layout. Nothing is limited; commands must be renewed every 0.1 s.
@@ -93,10 +92,10 @@ impl<K: Kinematics> Chassis<K> {
         }
     }
 
-    /// Sets the limits; they hold from the next tick on.
+    /// Sets the limits, valid from the next tick on.
     ///
     /// # Errors
-    /// Names the value that is not above zero, or too long. The limits then stay as they were.
+    /// Names the value that is not above zero, or too long. The limits then stay unchanged.
     pub fn set_limits(&mut self, limits: ChassisLimits) -> Result<(), ConfigError> {
         limits.validate()?;
         self.limits = limits;
@@ -110,15 +109,15 @@ impl<K: Kinematics> Chassis<K> {
 
     /// Commands a motion in the frame of the world, and gives the gyroscope's heading for this tick.
     ///
-    /// With a heading that is NaN or infinite the command is as bad as a NaN itself: it stops the chassis.
+    /// If the heading is NaN or infinite, the command counts as NaN: the chassis stops.
     pub fn set_world(&mut self, twist: Twist<World>, heading: Heading) {
         self.set_command(Command::World(twist), can_be_meant(twist) && heading.is_finite());
         self.gyro = Some(heading).filter(|heading| heading.is_finite());
     }
 
-    /// Gives the gyroscope's heading for the next tick. In ticks without one, the wheels keep the heading.
+    /// Sets the gyroscope's heading for the next tick. In ticks without a heading, the wheels continue the heading.
     ///
-    /// A heading that is NaN or infinite is none, and is counted in [`ChassisStatus::rejected`].
+    /// A heading that is NaN or infinite is ignored, and counted in [`ChassisStatus::rejected`].
     pub const fn set_heading(&mut self, heading: Heading) {
         if heading.is_finite() {
             self.gyro = Some(heading);
@@ -133,16 +132,16 @@ impl<K: Kinematics> Chassis<K> {
         self.set_body(Twist::ZERO);
     }
 
-    /// Commands standing still so that the chassis resists being pushed.
+    /// Commands a stop in which the chassis resists being pushed.
     ///
-    /// It comes to a stop within its limits; then the modules of a [`Swerve`](super::Swerve) turn to an X. Other layouts
-    /// stand as after [`stop`](Self::stop): their wheels hold as well as their speed loops do. Renewed like any command;
-    /// when it is not, the modules stay as they are.
+    /// The chassis stops within its limits; then the modules of a [`Swerve`](super::Swerve) turn to an X. Other layouts
+    /// stand as after [`stop`](Self::stop): the speed loops alone hold the wheels. Renew the command like any other;
+    /// otherwise, the modules stay at their angles.
     pub fn lock(&mut self) {
         self.set_command(Command::Lock, true);
     }
 
-    /// Starts over from the measured motion and angles: call it when the motors were relaxed, so that they take over
+    /// Starts over from the measured motion and angles: call this when the motors were relaxed, so that they take over
     /// without a jump.
     pub fn restart(&mut self) {
         self.command = Command::Body(Twist::ZERO);
@@ -164,9 +163,9 @@ impl<K: Kinematics> Chassis<K> {
         self.is_renewed = true;
     }
 
-    /// Takes the measured speed of each wheel, `None` where there is no fresh feedback, and returns the speed it shall have.
+    /// Takes the measured speed of each wheel, `None` without fresh feedback, and returns the target speed of each wheel.
     ///
-    /// Of a module whose speed alone is not known give a speed of NaN: its angle still counts for the steering.
+    /// For a module whose speed is unknown, pass NaN as its speed; its angle is still used for steering.
     pub fn update(
         &mut self,
         measured: K::Wheels<Option<K::Speed>>,
@@ -187,7 +186,8 @@ impl<K: Kinematics> Chassis<K> {
         let mut fastest = Fastest::default();
         let _: K::Wheels<()> = K::map(wheels, |wheel| fastest.see(wheel.velocity()));
         let scale = fastest.scale(self.limits.wheel_speed());
-        // What the wheels cannot do must not wind up: the next step starts from what they do.
+        // A motion beyond the wheels must not wind up: the next step starts from the motion of the
+        // wheels.
         self.reference = if scale > 0.0 { self.reference * scale } else { Twist::ZERO };
         self.status.saturated = scale < 1.0;
         let wheels = K::map(wheels, |wheel| slowed(wheel, scale));
@@ -237,7 +237,7 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     fn target(&mut self, dt_s: f32) -> Twist<Body> {
-        // The step came before a new command, and after an old one.
+        // The step came before a new command, and after an old command.
         self.command_age_s = if self.is_renewed { 0.0 } else { self.command_age_s + dt_s };
         self.is_renewed = false;
         self.status.command_stale =
@@ -250,25 +250,25 @@ impl<K: Kinematics> Chassis<K> {
         }
     }
 
-    /// Returns the measured motion of the last tick; zero while it is unknown.
+    /// Returns the measured motion of the last tick; zero if unknown.
     #[must_use]
     pub const fn measured(&self) -> Twist<Body> {
         self.measured
     }
 
-    /// Returns the motion that the wheels are told to make: the command within the limits.
+    /// Returns the motion commanded to the wheels: the command within the limits.
     #[must_use]
     pub const fn reference(&self) -> Twist<Body> {
         self.reference.to_body(self.odometry.heading())
     }
 
-    /// Returns where the chassis is, from its start or from where it was put.
+    /// Returns the pose of the chassis, relative to its start or to the last pose set.
     #[must_use]
     pub const fn pose(&self) -> Pose2<World> {
         self.odometry.pose()
     }
 
-    /// Puts the chassis at a pose; the motion goes on. The next heading of a gyroscope takes the place of the pose's angle.
+    /// Puts the chassis at a pose; the motion continues. The next heading of a gyroscope takes the place of the pose's angle.
     ///
     /// A pose that is NaN or infinite changes nothing, and is counted in [`ChassisStatus::rejected`].
     pub fn set_pose(&mut self, pose: Pose2<World>) {
@@ -283,7 +283,7 @@ impl<K: Kinematics> Chassis<K> {
         self.reference = body.to_world(self.odometry.heading());
     }
 
-    /// Returns what went on in the last tick.
+    /// Returns the status of the last tick.
     #[must_use]
     pub const fn status(&self) -> &ChassisStatus {
         &self.status
@@ -295,7 +295,7 @@ impl<K: Kinematics> Chassis<K> {
         &self.kinematics
     }
 
-    /// Sets the angle that is added to each heading of the gyroscope: see [`Odometry::set_gyro_offset`]. It outlasts
+    /// Sets the angle added to each heading of the gyroscope: see [`Odometry::set_gyro_offset`]. The offset outlasts
     /// [`set_pose`](Self::set_pose). An angle that is NaN or infinite changes nothing, and is counted in
     /// [`ChassisStatus::rejected`].
     pub const fn set_gyro_offset(&mut self, offset: Angle) {
@@ -308,13 +308,13 @@ impl<K: Kinematics> Chassis<K> {
 
     /// Reads the motors of all wheels, sets their targets, and returns the targets.
     ///
-    /// `owner` is a [`VelocityDrive`](crate::motor::VelocityDrive): a bus, a motor of your own, or a tuple or array of these.
-    /// The handle of a wheel is that of its motor, the handle of a swerve module is [`ModuleMotors`](super::ModuleMotors).
-    /// For motors on two buses, with a runner each, `owner` is the tuple of both buses and a handle tells its bus
-    /// ([`OneOf`](crate::motor::OneOf)); each runner goes on with its own `due` and `tick`.
+    /// `owner` is a [`VelocityDrive`](crate::motor::VelocityDrive): a bus, a motor of the application, or a tuple or array of
+    /// these. The handle of a wheel is that of its motor, the handle of a swerve module is
+    /// [`ModuleMotors`](super::ModuleMotors). For motors on two buses, with a runner each, `owner` is the tuple of both buses
+    /// and a handle names its bus ([`OneOf`](crate::motor::OneOf)); each runner keeps its own `due` and `tick`.
     ///
-    /// If a motor refuses its target, [`status`](Self::status) counts it and keeps the first error; all other wheels are
-    /// driven, those of the same device and those of other devices. If all wheels of all devices refuse, the chassis starts
+    /// If a motor refuses its target, [`status`](Self::status) counts the refusal and keeps the first error; all other
+    /// wheels are driven, on the same device and on other devices. If all wheels of all devices refuse, the chassis starts
     /// over: it discards the angles to hold, and when a motor takes its target again, the command is approached from the
     /// measured motion. An application that stops a chassis with a lost wheel disarms its devices.
     ///
@@ -370,7 +370,7 @@ impl<K: Kinematics> Chassis<K> {
     }
 }
 
-/// The change from one motion to another is measured by its length, whose square must not overflow.
+/// The length of a change between two motions is limited, so its square must not overflow.
 fn can_be_meant<F>(twist: Twist<F>) -> bool {
     twist.linear().dot(twist.linear()).is_finite() && twist.wz_rad_s.is_finite()
 }
@@ -505,7 +505,7 @@ mod tests {
         assert_eq!(chassis.reference(), Twist::ZERO);
     }
 
-    // The step that finds the command old used to count from the next tick on.
+    // The step in which the command expires used to count from the next tick on.
     #[test]
     fn the_first_tick_after_a_long_stall_finds_the_command_old() {
         let mut chassis = Chassis::new(mecanum());
@@ -520,7 +520,7 @@ mod tests {
         assert!(!renewed.status().command_stale && renewed.reference().vx_m_s > 0.9);
     }
 
-    // The length of the change overflowed: the chassis went on as before, whatever it was told.
+    // The length of the change overflowed: the chassis kept its motion, for every command.
     #[test]
     fn a_command_whose_square_overflows_stops_and_is_counted() {
         for speed in [-2e19, 1e25, f32::MAX] {
@@ -588,7 +588,7 @@ mod tests {
     }
 
     #[test]
-    fn one_lost_wheel_is_flagged_and_the_pose_goes_on_two_hold_it() {
+    fn a_lost_wheel_is_flagged_and_the_pose_continues_two_lost_wheels_hold_the_pose() {
         let mut chassis = Chassis::new(mecanum());
         let rolling = mecanum().inverse(Twist::new(1.0, 0.0, 0.0)).map(Some);
         chassis.update(MecanumWheels { rear_left: None, ..rolling }, TICK);
@@ -679,7 +679,7 @@ mod tests {
     }
 
     #[test]
-    fn wheels_beyond_all_numbers_leave_no_slip_that_is_none() {
+    fn wheels_beyond_all_numbers_leave_a_finite_slip() {
         for speed in [1e38, f32::MAX] {
             let mut chassis = Chassis::new(mecanum());
             let mut wheels = MecanumWheels::splat(Some(AngularVelocity::from_rad_per_s(speed)));
@@ -721,7 +721,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_of_nan_is_counted_and_the_chassis_stays_where_it_is() {
+    fn a_pose_of_nan_is_counted_and_changes_nothing() {
         let mut chassis = Chassis::new(mecanum());
         let pose = Pose2::new(1.0, 2.0, Angle::from_degrees(30.0));
         chassis.set_pose(pose);
@@ -798,14 +798,14 @@ mod tests {
 
     const CORNERS: [Vec2; 4] =
         [Vec2::new(0.3, 0.3), Vec2::new(0.3, -0.3), Vec2::new(-0.3, 0.3), Vec2::new(-0.3, -0.3)];
-    /// What the encoders of the modules show when they point forward.
+    /// The encoders of the modules at the forward direction.
     const ZERO: Angle = Angle::from_degrees(200.0);
 
     fn swerve() -> Swerve<4> {
         Swerve::new(0.05, CORNERS).unwrap()
     }
 
-    /// Steering motors that are where they were told to be, with one that may be broken.
+    /// Steering motors at their commanded angles, with one that may be broken.
     struct Turned {
         angles: [Angle; 4],
         broken: usize,
@@ -946,7 +946,7 @@ mod tests {
     }
 
     #[test]
-    fn a_module_that_does_not_steer_does_not_drive_and_the_others_do() {
+    fn a_module_off_its_angle_does_not_drive_and_the_others_do() {
         let mut modules = Modules::new();
         modules.motors.steerings.broken = 2;
         modules.go(1.0, 0.0);
@@ -972,7 +972,7 @@ mod tests {
     }
 
     #[test]
-    fn modules_that_were_turned_by_hand_while_relaxed_stay_where_they_are() {
+    fn modules_turned_by_hand_while_relaxed_keep_their_angles() {
         let by_hand = [20.0, 30.0, 40.0, 50.0];
         let turned = by_hand.map(|degrees| Angle::from_degrees(degrees) + ZERO);
         let mut modules = Modules::new();
@@ -994,7 +994,8 @@ mod tests {
         modules.assert_degrees(by_hand);
     }
 
-    // The stick is held forward while nothing is armed: the chassis used to leap at full speed when it armed.
+    // The stick is held forward while nothing is armed: the chassis used to leap at full speed
+    // after arming.
     #[test]
     fn a_chassis_that_was_refused_starts_from_the_measured_motion() {
         let mut chassis = limited(ChassisLimits::new().with_acceleration(1.0, 1.0));
@@ -1009,7 +1010,7 @@ mod tests {
         assert!((chassis.reference().vx_m_s - 0.001).abs() < 1e-6, "{:?}", chassis.reference());
     }
 
-    /// Motors that are heard and not armed.
+    /// Motors with feedback and not armed.
     struct Refusing;
 
     impl VelocityDrive<usize> for Refusing {

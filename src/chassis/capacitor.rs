@@ -4,19 +4,19 @@ use crate::error::ConfigError;
 /// The charge nears the reserve with a time constant of 1 / this, in 1/s.
 const RATE_PER_S: f32 = 2.0;
 
-/// The share of the supply's power that at most is left for charging below the reserve.
+/// The largest share of the supply's power left for charging below the reserve.
 const CHARGING_SHARE: f32 = 0.1;
 
-/// Plans a burst from a super-capacitor: the power that the chassis may take beside what the controller takes from the supply.
+/// Plans a burst from a super-capacitor: the power for the chassis beside the power that the controller takes from the supply.
 ///
 /// A burst adds `2/s (energy - reserve)`, at most the power that the controller can give. So the charge nears the reserve with a
 /// time constant of 0.5 s. Below the reserve the same rule takes power away, at most a tenth, with or without a burst: an empty
-/// capacitor charges, and an error of the power model is charged back. Without a burst nothing is added, and without a reading nothing
-/// is added or taken away.
+/// capacitor charges, and an error of the power model is charged back. Without a burst nothing is added, and without a reading
+/// nothing is added or taken away.
 ///
-/// The power of the supply has to be the one that the controller was told. With a controller, that is the limit of the referee, or
-/// [`PowerBuffer`](super::PowerBuffer)'s allowance where it is lower: then a burst takes all of it from the capacitor, and the buffer is
-/// left for what the controller does not regulate exactly.
+/// The power of the supply has to be the power commanded to the controller: the limit of the referee, or the allowance of
+/// [`PowerBuffer`](super::PowerBuffer) if lower. A burst then takes all of its power from the capacitor, and the buffer is left
+/// for the error of the controller.
 ///
 /// # Examples
 /// ```
@@ -39,7 +39,7 @@ pub struct CapacitorPlan {
 }
 
 impl CapacitorPlan {
-    /// Takes the energy of a full capacitor and the energy to keep, in J, both from the charge that the controller calls zero.
+    /// Takes the energy of a full capacitor and the reserve, in J, both from the charge at which the controller reports zero.
     ///
     /// # Errors
     /// Names the value that is negative or not finite.
@@ -51,19 +51,19 @@ impl CapacitorPlan {
         })
     }
 
-    /// Sets the most power in W that the capacitor is asked for.
+    /// Sets the largest power in W taken from the capacitor.
     ///
     /// # Errors
-    /// [`ConfigError::Negative`] when it is negative or not finite.
+    /// [`ConfigError::Negative`] when the power is negative or not finite.
     pub fn with_most_w(self, most_w: f32) -> Result<Self, ConfigError> {
         Ok(Self { most_w: not_negative(most_w, "most_w")?, ..self })
     }
 
-    /// Returns the power in W that the chassis may take, from the power in W that the controller takes from the supply, and the share of
-    /// the capacitor's energy that is left.
+    /// Returns the power in W for the chassis, from the power in W that the controller takes from the supply, and the remaining
+    /// share of the capacitor's energy.
     ///
-    /// A share that is NaN counts as no reading, one outside of 0 to 1 as the nearest of them. A power that is negative, NaN or infinite
-    /// counts as zero.
+    /// A share of NaN counts as no reading, a share outside of 0 to 1 as the nearest end. A power that is negative, NaN or
+    /// infinite counts as zero.
     #[must_use]
     pub fn allowance_w(&self, supply_w: f32, share: Option<f32>, burst: bool) -> f32 {
         let supply_w = not_negative(supply_w, "supply_w").unwrap_or(0.0);

@@ -1,4 +1,4 @@
-/// Counts the ticks that bring no usable time: ages in seconds stand still in them.
+/// Counts the ticks without usable time: ages in seconds stand still in them.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DeadClock(u8);
 
@@ -10,7 +10,7 @@ impl DeadClock {
         Self(0)
     }
 
-    /// Takes the step of a tick, and returns it if it is usable: above zero and finite. Otherwise zero.
+    /// Takes the step of a tick, and returns a usable step, above zero and finite, unchanged; otherwise zero.
     pub(super) const fn see(&mut self, dt_s: f32) -> f32 {
         if dt_s > 0.0 && dt_s.is_finite() {
             self.0 = 0;

@@ -4,7 +4,7 @@ use crate::error::ConfigError;
 use crate::geometry::{Body, Twist};
 use crate::units::AngularVelocity;
 
-/// The kinematics of two driven sides that cannot move sideways.
+/// The kinematics of two driven sides without sideways motion.
 ///
 /// ```text
 /// r * left = vx - half track * wz        r * right = vx + half track * wz        vy = 0
@@ -33,9 +33,9 @@ pub struct Differential {
 }
 
 impl Differential {
-    /// Takes the radius of the wheels, and half the distance from the left side to the right one, both in m.
+    /// Takes the radius of the wheels, and half the distance between the left side and the right side, both in m.
     ///
-    /// Tracks and skid steering act like sides that are further apart: measure it by turning in place.
+    /// Tracks and skid steering act like sides further apart: measure the distance by turning in place.
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.

@@ -4,8 +4,8 @@ use crate::units::{Angle, AngularVelocity};
 
 /// An owner of the motors of wheels, for [`Chassis::drive`](super::Chassis::drive).
 ///
-/// `H` is the handle of a wheel, `S` its speed. A [`VelocityDrive`] drives plain wheels. An owner that is an [`AngleDrive`] too
-/// drives the modules of a [`Swerve`](super::Swerve).
+/// `H` is the handle of a wheel, `S` its speed. A [`VelocityDrive`] drives plain wheels. An owner that is also an
+/// [`AngleDrive`] drives the modules of a [`Swerve`](super::Swerve).
 ///
 /// # Examples
 /// ```
@@ -100,9 +100,9 @@ impl<H: Copy, D: VelocityDrive<H> + ?Sized> WheelDrive<H, AngularVelocity> for D
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ModuleMotors<D, S = D> {
-    /// Handle of the drive motor, which rolls the wheel.
+    /// Handle of the drive motor of the wheel.
     pub drive: D,
-    /// Handle of the steering motor, which turns the module; seen from above, counter-clockwise positive.
+    /// Handle of the steering motor of the module; seen from above, counter-clockwise positive.
     pub steering: S,
     /// Angle of the steering motor at which the module points forward.
     pub zero: Angle,

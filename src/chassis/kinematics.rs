@@ -4,8 +4,8 @@ use core::fmt::Debug;
 
 /// A layout of wheels: converts a motion of the body to wheel speeds, and wheel speeds to a motion.
 ///
-/// Every layout has `inverse` and `forward` as its own functions; the trait is what
-/// [`Chassis`](super::Chassis) needs to work with all of them.
+/// Every layout has `inverse` and `forward` as its own functions; [`Chassis`](super::Chassis) works with all layouts
+/// through this trait.
 ///
 /// # Examples
 /// ```
@@ -24,23 +24,23 @@ use core::fmt::Debug;
 /// # Ok::<(), ConfigError>(())
 /// ```
 pub trait Kinematics {
-    /// One `T` for each wheel, under the wheel's name.
+    /// One `T` for each wheel, under the name of the wheel.
     type Wheels<T: Copy>: Copy;
-    /// What a wheel does: its velocity, and for a steered one its angle too.
+    /// Motion of a wheel: its velocity, and for a steered wheel its angle too.
     type Speed: WheelSpeed;
-    /// What is remembered of the wheels from one tick to the next: `()`, or where steered ones point.
+    /// Memory of the wheels from tick to tick: `()`, or the commanded angles of steered wheels.
     type Steering: Copy + Debug + PartialEq;
 
     /// Nothing remembered: before the first tick, and after the motors were relaxed.
     const UNSTEERED: Self::Steering;
 
-    /// Returns what each wheel must do for the motion `twist` of the body.
+    /// Returns the motion of each wheel for the motion `twist` of the body.
     fn inverse(&self, twist: Twist<Body>) -> Self::Wheels<Self::Speed>;
 
-    /// Returns the motion of the body that fits best to what the wheels do.
+    /// Returns the motion of the body that best fits the motion of the wheels.
     fn forward(&self, wheels: Self::Wheels<Self::Speed>) -> Twist<Body>;
 
-    /// Returns the motion of the body from the wheels that are known; `None` when they do not determine it.
+    /// Returns the motion of the body from the known wheels; `None` when these do not determine the motion.
     fn forward_partial(&self, wheels: Self::Wheels<Option<Self::Speed>>) -> Option<Twist<Body>>;
 
     /// Returns the radius of the wheels in m.
@@ -52,9 +52,10 @@ pub trait Kinematics {
     /// Pairs the values of every wheel.
     fn zip<T: Copy, U: Copy>(a: Self::Wheels<T>, b: Self::Wheels<U>) -> Self::Wheels<(T, U)>;
 
-    /// Returns what the motors are told, from what is wanted and what the wheels do: the same, unless they are steered.
+    /// Returns the commands for the motors, from the wanted and the measured motion of the wheels: the wanted motion,
+    /// unless the wheels are steered.
     ///
-    /// `None` stands for a wheel that is not heard; of a steered one that is finite in its angle alone, the angle counts.
+    /// `None` stands for a wheel without feedback; of a steered wheel with a finite angle only, the angle counts.
     #[must_use]
     fn steer(
         &self,
@@ -66,7 +67,7 @@ pub trait Kinematics {
         wanted
     }
 
-    /// Returns what the motors are told so that the chassis resists being pushed: to stand, unless they are steered.
+    /// Returns the commands for a chassis that resists being pushed: zero velocities, unless the wheels are steered.
     #[must_use]
     fn lock(
         &self,
@@ -77,10 +78,10 @@ pub trait Kinematics {
         Self::map(self.inverse(Twist::ZERO), WheelSpeed::stopped)
     }
 
-    /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
+    /// Slows all wheels by one common factor until none is faster than `limit`: the direction of travel stays.
     ///
-    /// Returns the wheels and the factor, 0 to 1: a planner or a loop around the chassis multiplies its motion by it, so that it does not
-    /// wind up. A limit below zero or NaN counts as zero; if any wheel is NaN or infinite, all stop and the factor is 0.
+    /// Returns the wheels and the factor, 0 to 1: a planner or a loop around the chassis multiplies its motion by the factor, and
+    /// does not wind up. A limit below zero or NaN counts as zero; if any wheel is NaN or infinite, all stop and the factor is 0.
     #[must_use]
     fn desaturate(
         &self,
@@ -93,10 +94,10 @@ pub trait Kinematics {
         (Self::map(wheels, |wheel| slowed(wheel, scale)), scale)
     }
 
-    /// Returns the largest difference in m/s between a wheel and the rigid motion that fits best.
+    /// Returns the largest difference in m/s between a wheel and the rigid motion of best fit.
     ///
-    /// Zero when all wheels roll. A lifted, slipping or blocked wheel of an over-determined layout shows here
-    /// with a part of its error (a quarter with four wheels); with as few wheels as unknowns it is always zero.
+    /// Zero when all wheels roll. For a lifted, slipping or blocked wheel of an over-determined layout, the result is a
+    /// part of its error (a quarter with four wheels); with as few wheels as unknowns the result is always zero.
     fn slip_m_s(&self, wheels: Self::Wheels<Self::Speed>) -> f32 {
         let rolling = self.inverse(self.forward(wheels));
         let mut largest = 0.0_f32;
@@ -110,7 +111,7 @@ pub trait Kinematics {
     }
 }
 
-/// What a wheel does, as far as limiting and comparing needs to know it.
+/// The motion of a wheel, as needed for limiting and comparing.
 ///
 /// # Examples
 /// ```
@@ -126,14 +127,14 @@ pub trait WheelSpeed: Copy {
     /// Returns the rolling velocity of the wheel, positive forward.
     fn velocity(self) -> AngularVelocity;
 
-    /// Returns whether all of it is a number: the velocity, and of a steered wheel the angle.
+    /// Returns whether all values are finite: the velocity, and of a steered wheel the angle.
     fn is_finite(self) -> bool;
 
     /// Returns the same motion, faster by `factor`.
     #[must_use]
     fn scaled(self, factor: f32) -> Self;
 
-    /// Returns the same wheel standing still, a steered one at its angle.
+    /// Returns the same wheel at rest, a steered wheel at its angle.
     #[must_use]
     fn stopped(self) -> Self;
 
@@ -192,7 +193,7 @@ impl Fastest {
     }
 }
 
-/// Zero stops a wheel even if it is NaN.
+/// A scale of zero stops a wheel even at NaN.
 pub(super) fn slowed<S: WheelSpeed>(wheel: S, scale: f32) -> S {
     if scale > 0.0 { wheel.scaled(scale) } else { wheel.stopped() }
 }

@@ -1,21 +1,21 @@
-//! The motion that fits best to what is measured along some directions.
+//! Least-squares fit of a motion to measurements along given directions.
 
 use crate::geometry::{Body, Twist, Vec2};
 use crate::math::sqrt;
 
 /// Where the wheels' equations begin to be undetermined: the largest condition number of the normal equations.
 ///
-/// Their matrix is made free of units first: a turn is measured in m at the mean distance (root of the mean square) of
-/// the wheels from the origin. Norms are Frobenius'. At the limit the wheels show the weakest motion with about 3 % of the
-/// strongest, the square root of 1/1000, and rounding of `f32` is some 1e-4 of the motion that is read back.
+/// The matrix is made free of units first: a turn is measured in m at the mean distance (root of the mean square) of the
+/// wheels from the origin. Norms are Frobenius'. At the limit the wheels show the weakest motion with about 3 % of the
+/// strongest, the square root of 1/1000, and rounding of `f32` is some 1e-4 of the motion read back.
 pub(super) const MAX_CONDITION: f32 = 1000.0;
 
-/// What one measurement sees of a motion: `direction . (velocity of the body's origin) + yaw_m * wz`, in m/s.
+/// The part of a motion in one measurement: `direction . (velocity of the body's origin) + yaw_m * wz`, in m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     pub(super) direction: Vec2,
     pub(super) yaw_m: f32,
-    /// The squared distance of the point: what `yaw_m` squared could be at most.
+    /// The squared distance of the point: the upper bound of `yaw_m` squared.
     reach_m2: f32,
 }
 
@@ -131,7 +131,7 @@ impl Inverse {
     }
 }
 
-/// Fits the motion to the measurements in m/s; `None` when they leave some of it undetermined.
+/// Fits the motion to the measurements in m/s; `None` when these leave a part of the motion undetermined.
 pub(super) fn fit(measured: impl Iterator<Item = (Row, f32)> + Clone) -> Option<Twist<Body>> {
     let inverse = Normal::of(measured.clone().map(|(row, _)| row)).inverse()?;
     Some(measured.fold(Twist::ZERO, |sum, (row, speed)| sum + inverse.share(row) * speed))
@@ -145,7 +145,7 @@ mod tests {
     use crate::geometry::Pose2;
     use crate::units::Angle;
 
-    /// Three wheels at 0.2 m from a centre that lies `ahead_m` before the origin of the body.
+    /// Three wheels at 0.2 m from a centre `ahead_m` before the origin of the body.
     fn three(ahead_m: f32) -> Result<Omni<3>, ConfigError> {
         let wheel = |degrees| {
             let wheel = Pose2::<Body>::tangential(Angle::from_degrees(degrees), 0.2);
@@ -154,7 +154,7 @@ mod tests {
         Omni::new(0.05, [60.0, -60.0, 180.0].map(wheel))
     }
 
-    // They were taken: the determinant alone does not see it.
+    // These were accepted: the determinant alone does not see the weak motion.
     #[test]
     fn wheels_whose_centre_is_ten_metres_off_are_refused() {
         assert!(three(0.0).is_ok() && three(0.5).is_ok() && three(3.0).is_ok());
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_just_taken_is_still_read_back() {
+    fn the_worst_accepted_geometry_is_read_back() {
         let omni = [4.5, 4.0, 3.5, 3.0].map(three).into_iter().find_map(Result::ok);
         let omni = omni.unwrap();
         let motion = Twist::new(0.5, -0.25, 1.0);

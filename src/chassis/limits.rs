@@ -2,7 +2,7 @@ use crate::error::ConfigError;
 use crate::geometry::{Twist, World};
 use crate::units::AngularVelocity;
 
-/// The longest time for which a command may drive. It is that of a target of a motor, which the chassis renews in each tick.
+/// The longest time for which a command may drive: the deadline of a motor's target, which the chassis renews in each tick.
 const MAX_COMMAND_TIMEOUT_S: f32 = 1.0;
 
 /// How fast a chassis may go and change. Everything is off by default but the deadline for commands: 0.1 s.
@@ -40,7 +40,7 @@ impl ChassisLimits {
 
     /// Sets the largest acceleration in m/s² in any direction, and in rad/s². Both above zero.
     ///
-    /// The change of the whole motion is shortened by one factor, so that it keeps its direction, the turn included.
+    /// One factor shortens the change of the whole motion, turn included, so the change keeps its direction.
     #[must_use]
     pub const fn with_acceleration(self, linear_m_s2: f32, angular_rad_s2: f32) -> Self {
         Self { linear_m_s2, angular_rad_s2, ..self }
@@ -61,8 +61,8 @@ impl ChassisLimits {
     /// Checks all values.
     ///
     /// # Errors
-    /// Names the first value that is not above zero, or a command timeout above 1 s: with an infinite one, a chassis whose
-    /// program is dead drives on for ever.
+    /// Names the first value that is not above zero, or a command timeout above 1 s: with an infinite time-out, a chassis
+    /// whose program is dead would drive for ever.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let named = [
             (self.linear_m_s2, "linear_m_s2"),

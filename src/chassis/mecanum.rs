@@ -17,7 +17,7 @@ use core::f32::consts::SQRT_2;
 ///
 /// A positive wheel velocity rolls forward on every wheel; how its motor is mounted is the motor's business.
 ///
-/// `FLOOR` is the letter that the rollers form which touch the floor. `'O'` is the usual mounting; from above, the visible
+/// `FLOOR` is the letter formed by the rollers that touch the floor. `'O'` is the usual mounting; from above, the visible
 /// rollers then form an X. With `'X'` the sign of vy changes, and `L` is half track - half wheelbase, so a square chassis
 /// cannot turn. Another letter does not compile:
 ///
@@ -52,11 +52,11 @@ pub struct Mecanum<const FLOOR: char = 'O'> {
 }
 
 impl Mecanum {
-    /// Takes the radius of the wheels over the rollers, and the place of the front left one from the centre, in m, with the
-    /// rollers in the usual mounting.
+    /// Takes the radius of the wheels over the rollers, and the place of the front left wheel from the centre, in m, with
+    /// the rollers in the usual mounting.
     ///
     /// `front_left_m.x` is half the distance of the axles, `front_left_m.y` half the distance from the left wheels to the
-    /// right ones, centre to centre. The other three wheels mirror it.
+    /// right wheels, centre to centre. The other three wheels mirror it.
     ///
     /// # Errors
     /// Names the length that is not above zero and finite.
@@ -75,8 +75,8 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     /// Takes the dimensions as [`new`](Mecanum::new) does, with the rollers in the mounting named by the type.
     ///
     /// # Errors
-    /// Names the length that is not above zero and finite. [`ConfigError::Singular`] for `'X'` when half track and
-    /// half wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
+    /// Names the length that is not above zero and finite. [`ConfigError::Singular`] for `'X'` when half track and half
+    /// wheelbase are nearly the same: when they differ by less than 4 % of the distance of the wheels.
     ///
     /// # Examples
     /// ```
@@ -102,7 +102,7 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
             return Err(error);
         }
         let arm_m = half_track_m + Self::SIDE * half_wheelbase_m;
-        // The condition number of its normal equations, of which translation has two parts.
+        // The condition number of its normal equations, with two parts for translation.
         let reach_m2 = half_track_m * half_track_m + half_wheelbase_m * half_wheelbase_m;
         if arm_m * arm_m * MAX_CONDITION < SQRT_2 * reach_m2 {
             return Err(ConfigError::Singular("rotation: the chassis is square"));
@@ -132,7 +132,7 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
         }
     }
 
-    /// Returns the motion of the body that fits the wheel velocities best (least squares).
+    /// Returns the motion of the body of best fit to the wheel velocities (least squares).
     #[must_use]
     #[inline]
     pub const fn forward(&self, wheels: MecanumWheels<AngularVelocity>) -> Twist<Body> {
@@ -218,7 +218,8 @@ mod tests {
         assert_eq!(wheels(&usual(), -1.0, 0.0, 0.0), [-2.0, -2.0, -2.0, -2.0]);
     }
 
-    // The first seed registers FR, FL, RL, RR on rows in the order FL, FR, RL, RR: its robot turned when it should strafe.
+    // The first seed registers FR, FL, RL, RR on rows in the order FL, FR, RL, RR: its robot turned
+    // instead of strafing.
     #[test]
     fn strafe_left_turns_front_left_backward() {
         assert_eq!(wheels(&usual(), 0.0, 1.0, 0.0), [-2.0, 2.0, 2.0, -2.0]);
@@ -277,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lifted_wheel_shows_as_slip_and_rolling_shows_none() {
+    fn a_lifted_wheel_shows_as_slip_and_rolling_wheels_do_not() {
         let mecanum = usual();
         let rolling = mecanum.inverse(Twist::new(0.5, -0.25, 1.0));
         assert!(mecanum.slip_m_s(rolling) < 1e-6);

@@ -1,7 +1,7 @@
 //! From a motion of the body to wheel speeds and back, for every wheel layout.
 //!
-//! Axes, signs and units are those drawn in [`geometry`](crate::geometry): x forward, y left, counter-clockwise
-//! positive. A positive wheel velocity rolls forward; on an omni wheel, along the direction it was given.
+//! Axes, signs and units are drawn in [`geometry`](crate::geometry): x forward, y left, counter-clockwise positive. A
+//! positive wheel velocity rolls forward; on an omni wheel, along its given direction.
 //!
 //! | layout | wheels | remarks |
 //! |---|---|---|
@@ -11,16 +11,16 @@
 //! | [`Differential`] | an array: left, right | cannot move sideways |
 //! | [`Swerve`] | an array, as given | steered by the shorter way, at rest the angles are held; X-lock |
 //!
-//! A layout is made once from its dimensions; what cannot be driven is refused there with a [`ConfigError`](crate::error::ConfigError).
-//! Where there are more wheels than unknowns, `forward` is the least-squares fit, and
-//! [`slip_m_s`](Kinematics::slip_m_s) tells how far the wheels contradict each other.
+//! A layout is made once from its dimensions; the constructor refuses an impossible layout with a
+//! [`ConfigError`](crate::error::ConfigError). If there are more wheels than unknowns, `forward` is the least-squares fit, and
+//! [`slip_m_s`](Kinematics::slip_m_s) measures the contradiction between the wheels.
 //!
 //! ```text
 //! Modes ──> Chassis: command ──> acceleration limit ──> inverse ──> wheel limit ──> steering ──> wheel targets
 //!                    odometry <── forward <───────────────────────────────────────────────────── wheel speeds
 //! ```
 //!
-//! | on top of a layout | what it does |
+//! | on top of a layout | function |
 //! |---|---|
 //! | [`Chassis`] | commands in body or world frame, [`ChassisLimits`], [`Odometry`], lost wheels, lock |
 //! | [`WheelDrive`] | the motors that it drives, of one device or of several; [`ModuleMotors`] for swerve modules |
@@ -74,10 +74,10 @@ pub use drive::{ModuleMotors, WheelDrive};
 pub use kinematics::{Kinematics, WheelSpeed};
 pub use limits::ChassisLimits;
 pub use mecanum::Mecanum;
-pub use mode::{Mode, ModeConfig, Modes};
+pub use mode::{ChassisMode, ModeConfig, Modes};
 pub use odometry::Odometry;
 pub use omni::Omni;
-pub use power::{PowerCut, PowerModel, WheelLoad};
+pub use power::{PowerModel, WheelLoad};
 pub use power_buffer::PowerBuffer;
 pub use power_fit::PowerFit;
 pub use status::ChassisStatus;

@@ -10,30 +10,30 @@ use core::f32::consts::TAU;
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Mode {
+pub enum ChassisMode {
     /// No motion is wanted: the motors should be relaxed.
     #[default]
     Relax,
-    /// The command is in the frame of the gimbal, and the chassis turns until it faces the same way.
+    /// The command is in the frame of the gimbal, and the chassis turns into the direction of the gimbal.
     FollowGimbal,
-    /// The command is in the frame of the gimbal, and the chassis spins under it.
+    /// The command is in the frame of the gimbal, and the chassis spins under the gimbal.
     Rotor,
     /// The command is in the frame of the chassis, its turn included.
     Independent,
 }
 
-/// What the modes are made from.
+/// Configuration of the modes.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{chassis::{Mode, ModeConfig, Modes}, control::PidConfig, geometry::Twist, units::Angle};
+/// use drivetrain::{chassis::{ChassisMode, ModeConfig, Modes}, control::PidConfig, geometry::Twist, units::Angle};
 ///
 /// let config = ModeConfig::new(PidConfig::new(6.0, 0.0, 0.1).with_output_limit(8.0))
 ///     .with_rotor(6.0, 2.0, 3.0)
 ///     .with_clockwise_rotor()
 ///     .with_transition(0.0);
 /// let mut modes = Modes::new(config)?;
-/// modes.set_mode(Mode::Rotor);
+/// modes.set_mode(ChassisMode::Rotor);
 /// let body = modes.update(Twist::ZERO, Some(Angle::ZERO), 0.001).ok_or("driving")?;
 /// assert_eq!(body.wz_rad_s, -6.0); // the swing begins at its base
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -54,7 +54,7 @@ pub struct ModeConfig {
 }
 
 impl ModeConfig {
-    /// Takes the loop that turns the chassis after the gimbal: from rad to rad/s. It works on the circle by itself.
+    /// Takes the loop that turns the chassis after the gimbal: from rad to rad/s. The period of the circle is set here.
     ///
     /// The rotor spins at 6 rad/s; the gimbal's yaw may be missing for 0.03 s; a change takes 0.2 s.
     #[must_use]
@@ -93,19 +93,19 @@ impl ModeConfig {
     }
 
     /// Sets for how many seconds the last yaw of the gimbal is used, zero or more. Then the chassis drives as in
-    /// [`Mode::Independent`].
+    /// [`ChassisMode::Independent`].
     #[must_use]
     pub const fn with_gimbal_timeout(self, timeout_s: f32) -> Self {
         Self { gimbal_timeout_s: timeout_s, ..self }
     }
 
-    /// Relaxes while a mode lacks the gimbal's yaw, instead of driving as in [`Mode::Independent`].
+    /// Relaxes while a mode lacks the gimbal's yaw, instead of driving as in [`ChassisMode::Independent`].
     #[must_use]
     pub const fn with_relax_without_gimbal(self) -> Self {
         Self { relaxes_without_gimbal: true, ..self }
     }
 
-    /// Sets over how many seconds the motion goes over from one mode to the next, zero or more.
+    /// Sets the time in seconds of the transition from one mode to the next, zero or more.
     #[must_use]
     pub const fn with_transition(self, transition_s: f32) -> Self {
         Self { transition_s, ..self }
@@ -114,17 +114,17 @@ impl ModeConfig {
 
 /// Turns the driver's command into a motion of the body, by mode.
 ///
-/// The yaw is the turn of the gimbal against the chassis, counter-clockwise positive, any number of turns.
-/// A change of mode resets the loop and goes over to the new motion evenly in 0.2 s, so that nothing jumps.
-/// Without the yaw for longer than the timeout, and from the start when there never was one, the modes that need it are
-/// replaced as configured; [`take_edge`](Self::take_edge) tells.
+/// The yaw is the angle of the gimbal relative to the chassis, counter-clockwise positive, any number of turns. A
+/// change of mode resets the loop and moves evenly to the new motion in 0.2 s, without a jump. If the yaw is missing
+/// for longer than the timeout, or from the start, modes that need the yaw are replaced as configured;
+/// [`take_edge`](Self::take_edge) reports the replacement.
 ///
 /// # Examples
 /// ```
-/// use drivetrain::{chassis::{Mode, ModeConfig, Modes}, control::PidConfig, geometry::Twist, units::Angle};
+/// use drivetrain::{chassis::{ChassisMode, ModeConfig, Modes}, control::PidConfig, geometry::Twist, units::Angle};
 ///
 /// let mut modes = Modes::new(ModeConfig::new(PidConfig::new(5.0, 0.0, 0.0)).with_transition(0.0))?;
-/// modes.set_mode(Mode::FollowGimbal);
+/// modes.set_mode(ChassisMode::FollowGimbal);
 /// let yaw = Some(Angle::from_radians(0.2)); // the gimbal looks to the left
 /// let body = modes.update(Twist::new(1.0, 0.0, 0.0), yaw, 0.001).ok_or("driving")?;
 /// assert!((body.wz_rad_s - 1.0).abs() < 1e-5); // so the chassis turns left
@@ -135,13 +135,13 @@ impl ModeConfig {
 pub struct Modes {
     config: ModeConfig,
     follow: Pid,
-    mode: Mode,
-    acting: Mode,
+    mode: ChassisMode,
+    acting: ChassisMode,
     yaw: Option<Heading>,
     yaw_age_s: f32,
     clock: DeadClock,
     gimbal_lost: bool,
-    edges: [Option<Mode>; 2],
+    edges: [Option<ChassisMode>; 2],
     clockwise: bool,
     entered_rotor: bool,
     swing_rad: f32,
@@ -151,10 +151,10 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// Takes the configuration; the mode is [`Mode::Relax`].
+    /// Takes the configuration; the mode is [`ChassisMode::Relax`].
     ///
     /// # Errors
-    /// Names the value that cannot be used.
+    /// Names the invalid value.
     pub fn new(config: ModeConfig) -> Result<Self, ConfigError> {
         let named = [
             (config.rotor_rad_s, "the rotor's base"),
@@ -174,8 +174,8 @@ impl Modes {
             config,
             follow: Pid::new(config.follow.with_period(TAU))
                 .map_err(|error| ConfigError::Loop("the follow loop", error.parameter()))?,
-            mode: Mode::Relax,
-            acting: Mode::Relax,
+            mode: ChassisMode::Relax,
+            acting: ChassisMode::Relax,
             yaw: None,
             yaw_age_s: f32::MAX,
             clock: DeadClock::new(),
@@ -190,13 +190,13 @@ impl Modes {
         })
     }
 
-    /// Chooses the mode. The same one again changes nothing.
-    pub fn set_mode(&mut self, mode: Mode) {
+    /// Sets the mode. The present mode again changes nothing.
+    pub fn set_mode(&mut self, mode: ChassisMode) {
         if mode == self.mode {
             return;
         }
         self.mode = mode;
-        if mode == Mode::Rotor {
+        if mode == ChassisMode::Rotor {
             self.clockwise = if self.config.alternating && self.entered_rotor {
                 !self.clockwise
             } else {
@@ -207,34 +207,34 @@ impl Modes {
         }
     }
 
-    /// Returns the mode that was chosen.
+    /// Returns the chosen mode.
     #[must_use]
-    pub const fn mode(&self) -> Mode {
+    pub const fn mode(&self) -> ChassisMode {
         self.mode
     }
 
-    /// Returns the mode that acts: another one while the gimbal's yaw is missing.
+    /// Returns the acting mode: the replacement while the gimbal's yaw is missing.
     #[must_use]
-    pub const fn acting(&self) -> Mode {
+    pub const fn acting(&self) -> ChassisMode {
         self.acting
     }
 
-    /// Returns the mode that took over because the gimbal's yaw was lost, or because it is back; the oldest change first.
+    /// Returns the mode that took over because the gimbal's yaw was lost or is back; the oldest change first.
     ///
-    /// A lost yaw gives the replacement, [`Mode::Independent`] or [`Mode::Relax`]; a yaw that is back gives the chosen mode.
-    /// Each change is returned once. Call it until it returns `None`.
-    pub const fn take_edge(&mut self) -> Option<Mode> {
+    /// A lost yaw gives the replacement, [`ChassisMode::Independent`] or [`ChassisMode::Relax`]; a yaw that is back gives the chosen mode.
+    /// Each change is returned once. Call this until `None`.
+    pub const fn take_edge(&mut self) -> Option<ChassisMode> {
         let [first, second] = self.edges;
         self.edges = [second, None];
         first
     }
 
-    /// Returns the motion that the command means in this mode; `None` when the motors should be relaxed.
+    /// Returns the motion of the command in this mode; `None` when the motors should be relaxed.
     ///
-    /// A `gimbal_yaw` that is not finite counts as none. A command that is NaN or infinite, or so large that its motion
-    /// overflows, counts as standing still.
-    /// A `dt_s` that is zero, negative, NaN or infinite counts as zero. From the 100th such call in a row on the clock is
-    /// dead: the motion is zero, and a yaw that is missing counts as lost. When time is back the motion starts from rest.
+    /// A `gimbal_yaw` that is not finite counts as missing. A command that is NaN or infinite, or so large that its
+    /// motion overflows, counts as standing still. A `dt_s` that is zero, negative, NaN or infinite counts as zero. From
+    /// the 100th such call in a row on the clock is dead: the motion is zero, and a missing yaw counts as lost. When time
+    /// is back the motion starts from rest.
     pub fn update(
         &mut self,
         command: Twist<Gimbal>,
@@ -247,18 +247,18 @@ impl Modes {
         let allowed = self.allowed();
         self.act(allowed);
         let wanted = match (self.acting, self.yaw) {
-            (Mode::Relax, _) => {
+            (ChassisMode::Relax, _) => {
                 self.output = Twist::ZERO;
                 self.progress = 1.0;
                 return None;
             }
-            (Mode::FollowGimbal, Some(yaw)) => {
+            (ChassisMode::FollowGimbal, Some(yaw)) => {
                 // The chassis stands at minus the yaw on the gimbal's circle, and shall stand at zero.
                 let step = TimeStep::of(dt_s);
                 let wz_rad_s = self.follow.step(0.0, -yaw.angle().as_radians(), &step);
                 command.to_body_by_yaw(yaw).with_wz(wz_rad_s)
             }
-            (Mode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),
+            (ChassisMode::Rotor, Some(yaw)) => command.to_body_by_yaw(yaw).with_wz(self.spin(dt_s)),
             _ => Twist::new(command.vx_m_s, command.vy_m_s, command.wz_rad_s),
         };
         if self.clock.is_dead() {
@@ -281,17 +281,17 @@ impl Modes {
         }
     }
 
-    /// The chosen mode, or what replaces it.
-    fn allowed(&mut self) -> Mode {
-        if !matches!(self.mode, Mode::FollowGimbal | Mode::Rotor) {
+    /// The chosen mode, or its replacement.
+    fn allowed(&mut self) -> ChassisMode {
+        if !matches!(self.mode, ChassisMode::FollowGimbal | ChassisMode::Rotor) {
             self.gimbal_lost = false;
             return self.mode;
         }
         let lost = self.yaw.is_none() || self.yaw_age_s > self.config.gimbal_timeout_s;
         let allowed = match (lost, self.config.relaxes_without_gimbal) {
             (false, _) => self.mode,
-            (true, false) => Mode::Independent,
-            (true, true) => Mode::Relax,
+            (true, false) => ChassisMode::Independent,
+            (true, true) => ChassisMode::Relax,
         };
         if lost != self.gimbal_lost {
             self.gimbal_lost = lost;
@@ -306,7 +306,7 @@ impl Modes {
         allowed
     }
 
-    fn act(&mut self, mode: Mode) {
+    fn act(&mut self, mode: ChassisMode) {
         if mode != self.acting {
             self.acting = mode;
             self.follow.reset();
@@ -319,7 +319,7 @@ impl Modes {
         let config = &self.config;
         let speed = config.rotor_rad_s + config.swing_rad_s * sin_cos(self.swing_rad).0;
         let phase = wrap_tau(self.swing_rad + config.swing_frequency_rad_s * dt_s);
-        // After a step that overflows the swing begins again: NaN would stay.
+        // After an overflowing step the swing begins again: NaN would stay.
         self.swing_rad = if phase.is_finite() { phase } else { 0.0 };
         if self.clockwise { -speed } else { speed }
     }
@@ -350,7 +350,7 @@ mod tests {
         ModeConfig::new(PidConfig::new(5.0, 0.0, 0.0)).with_rotor(6.0, 2.0, 3.0)
     }
 
-    fn modes(config: ModeConfig, mode: Mode) -> Modes {
+    fn modes(config: ModeConfig, mode: ChassisMode) -> Modes {
         let mut modes = Modes::new(config).unwrap();
         modes.set_mode(mode);
         modes
@@ -369,14 +369,14 @@ mod tests {
 
     #[test]
     fn gimbal_to_the_left_turns_the_chassis_left_and_right_right() {
-        let mut follow = modes(config(), Mode::FollowGimbal);
+        let mut follow = modes(config(), ChassisMode::FollowGimbal);
         assert!((settled(&mut follow, 90.0).wz_rad_s - 5.0 * FRAC_PI_2).abs() < 1e-4);
         assert!((settled(&mut follow, -90.0).wz_rad_s + 5.0 * FRAC_PI_2).abs() < 1e-4);
     }
 
     #[test]
     fn follow_takes_the_shorter_way_over_the_seam_for_any_number_of_turns() {
-        let mut follow = modes(config(), Mode::FollowGimbal);
+        let mut follow = modes(config(), ChassisMode::FollowGimbal);
         assert!(settled(&mut follow, 350.0).wz_rad_s < 0.0); // 10 degrees to the right
         assert!(settled(&mut follow, 190.0).wz_rad_s < 0.0);
         assert!(settled(&mut follow, -350.0).wz_rad_s > 0.0);
@@ -386,7 +386,7 @@ mod tests {
     #[test]
     fn follow_closes_the_loop_from_any_side() {
         for start in [170.0_f32, -170.0, 90.0, 10.0, 1000.0] {
-            let mut follow = modes(config(), Mode::FollowGimbal);
+            let mut follow = modes(config(), ChassisMode::FollowGimbal);
             let mut chassis_rad = -start.to_radians(); // the gimbal stands at zero
             for _ in 0..3000 {
                 let twist = follow.update(Twist::ZERO, Some(Angle::from_radians(-chassis_rad)), DT);
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn the_rotor_swings_about_its_base_and_goes_where_the_gimbal_looks() {
-        let mut rotor = modes(config().with_transition(0.0), Mode::Rotor);
+        let mut rotor = modes(config().with_transition(0.0), ChassisMode::Rotor);
         let speeds: Vec<f32> =
             (0..2100).map(|_| rotor.update(AHEAD, yaw(90.0), DT).unwrap().wz_rad_s).collect();
         let highest = speeds.iter().copied().fold(0.0, f32::max);
@@ -410,25 +410,30 @@ mod tests {
     // The fifth seed draws a random direction and never uses it.
     #[test]
     fn the_rotors_direction_is_kept_and_alternates_with_each_entry() {
-        let mut rotor = modes(config().with_alternating_rotor(), Mode::Rotor);
+        let mut rotor = modes(config().with_alternating_rotor(), ChassisMode::Rotor);
         for side in [1.0, -1.0, 1.0] {
             for _ in 0..5 {
-                rotor.set_mode(Mode::Rotor);
+                rotor.set_mode(ChassisMode::Rotor);
                 assert!(settled(&mut rotor, 0.0).wz_rad_s * side > 3.0);
             }
-            rotor.set_mode(Mode::Independent);
+            rotor.set_mode(ChassisMode::Independent);
             settled(&mut rotor, 0.0);
-            rotor.set_mode(Mode::Rotor);
+            rotor.set_mode(ChassisMode::Rotor);
         }
-        let mut clockwise = modes(config().with_clockwise_rotor(), Mode::Rotor);
+        let mut clockwise = modes(config().with_clockwise_rotor(), ChassisMode::Rotor);
         assert!(settled(&mut clockwise, 0.0).wz_rad_s < -3.0);
     }
 
     #[test]
     fn a_change_of_mode_makes_no_jump() {
-        let mut modes = modes(config(), Mode::FollowGimbal);
+        let mut modes = modes(config(), ChassisMode::FollowGimbal);
         let mut last = settled(&mut modes, 60.0);
-        for mode in [Mode::Rotor, Mode::Independent, Mode::FollowGimbal, Mode::Rotor] {
+        for mode in [
+            ChassisMode::Rotor,
+            ChassisMode::Independent,
+            ChassisMode::FollowGimbal,
+            ChassisMode::Rotor,
+        ] {
             modes.set_mode(mode);
             for _ in 0..300 {
                 let now = modes.update(AHEAD, yaw(60.0), DT).unwrap();
@@ -442,27 +447,28 @@ mod tests {
     #[test]
     fn the_follow_loop_begins_anew_when_its_mode_is_entered_again() {
         let follow = PidConfig::new(5.0, 10.0, 0.0).with_output_limit(50.0);
-        let mut modes = modes(ModeConfig::new(follow).with_transition(0.0), Mode::FollowGimbal);
+        let mut modes =
+            modes(ModeConfig::new(follow).with_transition(0.0), ChassisMode::FollowGimbal);
         let mut step = |mode, degrees: f32| {
             modes.set_mode(mode);
             modes.update(Twist::ZERO, yaw(degrees), DT).unwrap().wz_rad_s
         };
-        let first = step(Mode::FollowGimbal, 10.0);
+        let first = step(ChassisMode::FollowGimbal, 10.0);
         for _ in 0..1000 {
-            step(Mode::FollowGimbal, 10.0);
+            step(ChassisMode::FollowGimbal, 10.0);
         }
-        assert!(step(Mode::FollowGimbal, 10.0) > 2.0 * first);
-        assert!(step(Mode::Independent, 10.0).abs() < 1e-6);
-        assert!((step(Mode::FollowGimbal, 10.0) - first).abs() < 1e-6);
+        assert!(step(ChassisMode::FollowGimbal, 10.0) > 2.0 * first);
+        assert!(step(ChassisMode::Independent, 10.0).abs() < 1e-6);
+        assert!((step(ChassisMode::FollowGimbal, 10.0) - first).abs() < 1e-6);
     }
 
     #[test]
     fn relax_gives_nothing_and_leaving_it_starts_from_rest() {
-        let mut modes = modes(config(), Mode::Rotor);
+        let mut modes = modes(config(), ChassisMode::Rotor);
         settled(&mut modes, 0.0);
-        modes.set_mode(Mode::Relax);
+        modes.set_mode(ChassisMode::Relax);
         assert_eq!(modes.update(AHEAD, yaw(0.0), DT), None);
-        modes.set_mode(Mode::Independent);
+        modes.set_mode(ChassisMode::Independent);
         let first = modes.update(AHEAD, yaw(0.0), DT).unwrap();
         assert!(first.linear().norm() < 0.01, "{first:?}");
     }
@@ -470,29 +476,29 @@ mod tests {
     // F64.
     #[test]
     fn a_stale_yaw_is_replaced_by_independent_after_the_timeout_and_told_once() {
-        let mut modes = modes(config(), Mode::FollowGimbal);
+        let mut modes = modes(config(), ChassisMode::FollowGimbal);
         settled(&mut modes, 90.0);
         for _ in 0..29 {
             let _ = modes.update(AHEAD, None, DT);
         }
-        assert_eq!((modes.acting(), modes.take_edge()), (Mode::FollowGimbal, None));
+        assert_eq!((modes.acting(), modes.take_edge()), (ChassisMode::FollowGimbal, None));
         for _ in 0..500 {
             let _ = modes.update(AHEAD, Some(Angle::from_radians(f32::NAN)), DT);
         }
-        assert_eq!(modes.acting(), Mode::Independent);
+        assert_eq!(modes.acting(), ChassisMode::Independent);
         assert_eq!(modes.output, Twist::new(1.0, 0.0, 0.5));
-        assert_eq!((modes.take_edge(), modes.take_edge()), (Some(Mode::Independent), None));
+        assert_eq!((modes.take_edge(), modes.take_edge()), (Some(ChassisMode::Independent), None));
         settled(&mut modes, 90.0);
         assert_eq!(
             (modes.acting(), modes.take_edge()),
-            (Mode::FollowGimbal, Some(Mode::FollowGimbal))
+            (ChassisMode::FollowGimbal, Some(ChassisMode::FollowGimbal))
         );
     }
 
     #[test]
     fn a_clock_that_died_stops_the_motion_and_loses_the_gimbal() {
         for dt in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
-            for mode in [Mode::FollowGimbal, Mode::Rotor, Mode::Independent] {
+            for mode in [ChassisMode::FollowGimbal, ChassisMode::Rotor, ChassisMode::Independent] {
                 let mut modes = modes(config(), mode);
                 let before = settled(&mut modes, 20.0);
                 for calls in 1..=200 {
@@ -502,7 +508,7 @@ mod tests {
                     assert!(change.linear().norm() < 1e-6, "{dt} {calls}: {twist:?}");
                     assert!(change.wz_rad_s.abs() < 0.01, "{dt} {calls}: {twist:?}"); // the swing's last step
                 }
-                assert_eq!(modes.acting(), Mode::Independent);
+                assert_eq!(modes.acting(), ChassisMode::Independent);
                 let again = modes.update(AHEAD, yaw(20.0), DT).unwrap();
                 assert_eq!(modes.acting(), mode);
                 assert!(again.linear().norm() < 0.01, "{again:?}"); // from rest, evenly
@@ -512,18 +518,18 @@ mod tests {
 
     #[test]
     fn without_any_yaw_the_mode_is_replaced_at_once_or_relaxed_as_configured() {
-        let mut independent = modes(config(), Mode::FollowGimbal);
+        let mut independent = modes(config(), ChassisMode::FollowGimbal);
         assert!(independent.update(AHEAD, None, DT).is_some());
-        assert_eq!(independent.acting(), Mode::Independent);
+        assert_eq!(independent.acting(), ChassisMode::Independent);
         let relaxing = config().with_gimbal_timeout(0.05).with_relax_without_gimbal();
-        let mut relaxed = modes(relaxing, Mode::Rotor);
+        let mut relaxed = modes(relaxing, ChassisMode::Rotor);
         assert_eq!(relaxed.update(AHEAD, None, DT), None);
-        assert_eq!(relaxed.take_edge(), Some(Mode::Relax));
+        assert_eq!(relaxed.take_edge(), Some(ChassisMode::Relax));
     }
 
     #[test]
-    fn what_is_not_finite_never_comes_out() {
-        let mut modes = modes(config(), Mode::Rotor);
+    fn modes_never_return_a_value_that_is_not_finite() {
+        let mut modes = modes(config(), ChassisMode::Rotor);
         for dt in [f32::NAN, f32::INFINITY, -1.0, 0.0, DT] {
             let twist = modes.update(Twist::new(f32::NAN, 0.0, 0.0), yaw(10.0), dt);
             assert!(twist.is_some_and(Twist::is_finite));
@@ -535,7 +541,7 @@ mod tests {
     // Its phase was NaN from then on, and the chassis stood still until the mode was left.
     #[test]
     fn a_step_beyond_all_numbers_does_not_end_the_rotor() {
-        let mut rotor = modes(config(), Mode::Rotor);
+        let mut rotor = modes(config(), ChassisMode::Rotor);
         settled(&mut rotor, 20.0);
         let _ = rotor.update(AHEAD, yaw(20.0), f32::MAX);
         assert!(settled(&mut rotor, 20.0).wz_rad_s >= 4.0, "{:?}", rotor.output);

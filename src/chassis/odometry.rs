@@ -5,11 +5,11 @@ use crate::units::Angle;
 /// Adds measured motion up to a pose.
 ///
 /// Each step is an exact arc: the twist is taken as constant over the step. The turn of the step comes from the
-/// gyroscope's heading when there is one, otherwise from the wheels. Rounding is carried along (Kahan), so that
-/// 10^6 steps of a millimetre lose nothing.
+/// gyroscope's heading if given, otherwise from the wheels. Rounding is carried along (Kahan), so 10^6 steps of a
+/// millimetre lose nothing.
 ///
-/// Where the gyroscope returns after a gap, its heading is taken as it is. The first one sets the heading. A gyroscope whose zero
-/// is not that of the world has an [offset](Self::set_gyro_offset).
+/// When the gyroscope returns after a gap, its heading is taken as given. The first heading sets the heading of the pose. A
+/// gyroscope with another zero than the world has an [offset](Self::set_gyro_offset).
 ///
 /// # Examples
 /// ```
@@ -29,9 +29,9 @@ pub struct Odometry {
     y_m: Sum,
     angle_rad: Sum,
     heading: Heading,
-    /// The gyroscope's heading of the step before, if it had one.
+    /// The gyroscope's heading of the step before, if given.
     gyro: Option<Angle>,
-    /// From the gyroscope's heading to that of the world.
+    /// From the gyroscope's heading to the heading in the world.
     gyro_offset: Angle,
 }
 
@@ -39,7 +39,7 @@ impl Odometry {
     /// The longest step in seconds that is integrated.
     pub const MAX_STEP_S: f32 = 1.0;
 
-    /// Takes the pose to start from. What of it is NaN or infinite counts as zero.
+    /// Takes the start pose. Each value of NaN or infinity counts as zero.
     #[must_use]
     pub const fn new(pose: Pose2<World>) -> Self {
         let angle = Angle::from_radians(or_zero(pose.angle.as_radians()));
@@ -53,10 +53,11 @@ impl Odometry {
         }
     }
 
-    /// Sets the angle that is added to each heading of the gyroscope: the heading in the world less that of the gyroscope, when
+    /// Sets the angle added to each heading of the gyroscope: the heading in the world less the heading of the gyroscope, when
     /// both are known.
     ///
-    /// The pose changes with the next heading, which bends no arc, as after a gap. An angle that is NaN or infinite changes nothing.
+    /// The pose changes with the next heading, which bends no arc, as after a gap. An angle that is NaN or infinite changes
+    /// nothing.
     ///
     /// # Examples
     /// ```
@@ -80,11 +81,11 @@ impl Odometry {
 
     /// Adds a step of `dt_s` seconds at the measured `twist`, with the gyroscope's heading at its end.
     ///
-    /// A heading that is not finite counts as none. A twist that is not finite adds no way and no turn; neither does a
+    /// A heading that is not finite counts as missing. A twist that is not finite adds no way and no turn, nor does a
     /// step that is not above zero, NaN, or longer than [`MAX_STEP_S`](Self::MAX_STEP_S): the result is then `false`.
     pub fn advance(&mut self, twist: Twist<Body>, gyro: Option<Heading>, dt_s: f32) -> bool {
         let gyro = gyro.filter(|heading| heading.is_finite()).map(|heading| {
-            // Most have none, and a heading has its sine and cosine already.
+            // Most steps have none, and a heading has its sine and cosine already.
             let has_offset = self.gyro_offset != Angle::ZERO;
             if has_offset { Heading::new(heading.angle() + self.gyro_offset) } else { heading }
         });
@@ -95,7 +96,8 @@ impl Odometry {
             arc.theta_rad = wrap_pi(now.angle().as_radians() - before.as_radians());
         }
         if counts {
-            // The heading at the start is the one the sum has: the gyroscope's of the step before.
+            // The heading at the start is the heading of the sum: the gyroscope's of the step
+            // before.
             let way = self.heading.rotation().apply(arc.chord().0);
             self.x_m.add(way.x);
             self.y_m.add(way.y);
@@ -156,7 +158,7 @@ const fn or_zero(value: f32) -> f32 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// A sum that keeps what rounding would lose for the next addition.
+/// A sum that keeps the rounding error of each addition for the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Sum {
@@ -169,7 +171,7 @@ impl Sum {
         Self { value, rest: 0.0 }
     }
 
-    /// Adds a term; one with which the sum would overflow is left out.
+    /// Adds a term; leaves out a term with which the sum would overflow.
     const fn add(&mut self, term: f32) {
         let term = term + self.rest;
         let sum = self.value + term;
@@ -228,7 +230,7 @@ mod tests {
     fn the_way_of_a_step_bends_by_the_whole_turn_of_the_gyroscope() {
         for from in [0.0_f32, 30.0, 170.0, -100.0] {
             for turn in [-120.0_f32, -90.0, -10.0, -0.5, 0.0, 0.5, 10.0, 90.0, 120.0] {
-                // What the wheels say of the turn does not count.
+                // The turn from the wheels does not count.
                 for wheels in [-2.0, 0.0, 2.0] {
                     let mut odometry = Odometry::default();
                     odometry.advance(Twist::ZERO, degrees(from), 0.001);
@@ -317,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_in_a_million_steps_ends_where_it_began() {
+    fn a_circle_in_a_million_steps_ends_at_its_start() {
         let mut odometry = Odometry::default();
         for _ in 0..1_000_000 {
             odometry.advance(Twist::new(TAU, 0.0, TAU), None, 1e-6);
@@ -327,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kilometre_in_millimetres_loses_none() {
+    fn a_kilometre_in_millimetres_loses_no_millimetre() {
         let mut odometry = Odometry::default();
         for _ in 0..1_000_000 {
             odometry.advance(Twist::new(1.0, 0.0, 0.0), None, 0.001);

@@ -8,13 +8,13 @@ use crate::units::{Angle, AngularVelocity};
 /// The kinematics of `N` omni wheels of one radius, at any places and in any directions.
 ///
 /// A wheel at `p` that rolls along the unit vector `d` has the surface speed `d . v + (p x d) wz`. The motion is the
-/// least-squares fit to all wheels. The values of the wheels come in the order in which the wheels were given;
+/// least-squares fit to all wheels. The values of the wheels come in the order of the constructor;
 /// [`three`](Self::three) and [`four`](Self::four) are the usual layouts.
 ///
 /// # The number of wheels at run time
-/// `N` is part of the type: a chassis has exactly the memory, the motors and the count of lost wheels that its wheels need. Places
-/// and directions are values. A program that learns the number from a file has a branch for each number, and one function for
-/// all of them:
+/// `N` is part of the type: a chassis has exactly the memory, the motors and the count of lost wheels for its wheels. Places and
+/// directions are values. A program that reads the number from a file has a branch for each number, and one function for all of
+/// them:
 /// ```
 /// use drivetrain::chassis::{Chassis, Omni};
 /// use drivetrain::geometry::{Body, Pose2, Twist};
@@ -62,8 +62,8 @@ pub struct Omni<const N: usize> {
 }
 
 impl<const N: usize> Omni<N> {
-    /// Takes the radius of the wheels in m, and for each wheel its point of contact in m and the direction in which it rolls
-    /// for a positive velocity, counter-clockwise from forward.
+    /// Takes the radius of the wheels in m, and for each wheel its point of contact in m and its rolling direction for a
+    /// positive velocity, counter-clockwise from forward.
     ///
     /// # Errors
     /// Names the value that is not finite or not above zero. [`ConfigError::Singular`] when the wheels leave some
@@ -99,7 +99,7 @@ impl<const N: usize> Omni<N> {
         self.rows.map(|row| AngularVelocity::from_rad_per_s(row.of(twist) * self.per_radius))
     }
 
-    /// Returns the motion of the body that fits the wheel velocities best (least squares).
+    /// Returns the motion of the body of best fit to the wheel velocities (least squares).
     #[must_use]
     pub fn forward(&self, wheels: [AngularVelocity; N]) -> Twist<Body> {
         self.shares
@@ -232,8 +232,9 @@ mod tests {
         assert_eq!(signs(0.0, 0.0, -1.0), [-1.0; 4]);
     }
 
-    // The third seed (x right, y forward, wheels clockwise from front right) leaves the factor 1/sqrt(2) out,
-    // and with a heading it does not put its rotated v_y into the rows and loses the signs of rows 3 and 4.
+    // The third seed (x right, y forward, wheels clockwise from front right) leaves the factor
+    // 1/sqrt(2) out; with a heading, the rows lack its rotated v_y, and rows 3 and 4 lose their
+    // signs.
     #[test]
     fn the_third_seeds_rows_hold_once_the_root_of_one_half_is_back() {
         let (x, y, w) = (0.3_f32, 0.8, 1.5); // its axes: x right, y forward
@@ -278,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lifted_wheel_shows_as_slip_and_rolling_shows_none() {
+    fn a_lifted_wheel_shows_as_slip_and_rolling_wheels_do_not() {
         let rolling = four().inverse(Twist::new(0.5, -0.25, 1.0));
         assert!(four().slip_m_s(rolling) < 1e-5);
         let mut lifted = rolling;

@@ -2,7 +2,7 @@ use super::error::not_negative;
 use crate::error::ConfigError;
 use crate::math::sqrt;
 
-/// What one wheel is asked for: torque at its shaft, and the speed it turns at.
+/// Load of one wheel: torque at its shaft, and its speed.
 ///
 /// # Examples
 /// ```
@@ -17,7 +17,7 @@ use crate::math::sqrt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelLoad {
-    /// Torque in N m, or any measure in proportion to it that the model was fitted with, such as a current in A.
+    /// Torque in N m, or the measure in proportion to it to which the model was fitted, such as a current in A.
     pub torque: f32,
     /// Speed in rad/s. Of the same sign as the torque when driving, of the other when braking.
     pub speed_rad_s: f32,
@@ -26,8 +26,8 @@ pub struct WheelLoad {
 /// The electric power of a motor: `P = k0 + k1 torque speed + k2 torque^2 + k3 speed^2`, in W.
 ///
 /// With the torque in N m at the same shaft as the speed, `k1` is 1: the mechanical power. `k2` is the heat in the
-/// winding, `k3` the friction and iron loss, `k0` what the electronics take. Fit them for your motors, by
-/// [`PowerFit`](super::PowerFit) if you like.
+/// winding, `k3` the friction and iron loss, `k0` the power of the electronics. Fit the coefficients to the motors in
+/// use, for example by [`PowerFit`](super::PowerFit).
 ///
 /// # Examples
 /// ```
@@ -49,7 +49,7 @@ pub struct PowerModel {
     pub(super) k3: f32,
 }
 
-/// The coefficients as they stand in a file, where anybody may have changed them.
+/// The coefficients as stored in a file, where they may have been changed.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 #[serde(rename = "PowerModel")]
@@ -69,29 +69,6 @@ impl TryFrom<Stored> for PowerModel {
     }
 }
 
-/// How the torques are to be cut.
-///
-/// # Examples
-/// ```
-/// use drivetrain::chassis::{PowerModel, WheelLoad};
-///
-/// let model = PowerModel::new(5.0, 1.0, 2.0, 0.0)?;
-/// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
-/// let cut = model.cut([stalled; 4], 10.0); // the electronics alone take 20 W
-/// assert_eq!((cut.scale, cut.power_w, cut.within), (0.0, 20.0, false));
-/// # Ok::<(), drivetrain::error::ConfigError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PowerCut {
-    /// The factor for the torque of every wheel, 0..=1.
-    pub scale: f32,
-    /// What the model expects all wheels to take then, in W.
-    pub power_w: f32,
-    /// Whether that is within the limit. It is not when the losses alone are above it; the power is then the least possible.
-    pub within: bool,
-}
-
 impl PowerModel {
     /// Takes the four coefficients, in W, W per torque and rad/s, W per torque squared, W per (rad/s)².
     ///
@@ -106,7 +83,7 @@ impl PowerModel {
         })
     }
 
-    /// Returns the power of one wheel in W; negative when it feeds back more than it loses.
+    /// Returns the power of one wheel in W; negative when the wheel feeds back more than its losses.
     #[must_use]
     pub const fn power_w(&self, load: WheelLoad) -> f32 {
         let WheelLoad { torque, speed_rad_s } = load;
@@ -116,11 +93,12 @@ impl PowerModel {
             + self.k3 * speed_rad_s * speed_rad_s
     }
 
-    /// Returns the largest common factor of all torques, at most 1, with which the total stays within `limit_w`.
+    /// Returns the largest common factor of all torques, 0 to 1, with the total power within `limit_w`, and the expected
+    /// total power at this factor in W.
     ///
-    /// The total is a parabola in the factor, and this is its exact root. Equal wheels stay equal, and a braking
-    /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and one of infinity cuts nothing. If a
-    /// load is NaN or infinite, the factor is zero.
+    /// If the losses alone are above the limit, the returned power is above the limit, and the least possible. The total is a parabola in the factor, and the factor is its exact root. Equal wheels stay equal, and a braking
+    /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and an infinite limit cuts nothing. If
+    /// a load is NaN or infinite, the factor is zero.
     ///
     /// # Examples
     /// ```
@@ -128,12 +106,16 @@ impl PowerModel {
     ///
     /// let model = PowerModel::new(0.0, 1.0, 2.0, 0.0)?;
     /// let wheel = WheelLoad { torque: 2.0, speed_rad_s: 6.0 }; // 12 W and 8 W of heat
-    /// let cut = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
-    /// assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within);
+    /// let (scale, power_w) = model.cut([wheel; 4], 32.0); // 48 s + 32 s^2 = 32
+    /// assert!((scale - 0.5).abs() < 1e-6 && power_w <= 32.0);
+    ///
+    /// let model = PowerModel::new(5.0, 1.0, 2.0, 0.0)?;
+    /// let stalled = WheelLoad { torque: 3.0, speed_rad_s: 0.0 };
+    /// assert_eq!(model.cut([stalled; 4], 10.0), (0.0, 20.0)); // the electronics alone take 20 W
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[must_use]
-    pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> PowerCut {
+    pub fn cut(&self, wheels: impl IntoIterator<Item = WheelLoad>, limit_w: f32) -> (f32, f32) {
         let limit_w = if limit_w > 0.0 { limit_w } else { 0.0 };
         let (mut square, mut linear, mut fixed) = (0.0_f32, 0.0_f32, 0.0_f32);
         for WheelLoad { torque, speed_rad_s } in wheels {
@@ -143,18 +125,18 @@ impl PowerModel {
         }
         let total = |scale: f32| fixed + scale * (linear + scale * square);
         if !total(1.0).is_finite() {
-            return PowerCut { scale: 0.0, power_w: fixed, within: fixed <= limit_w };
+            return (0.0, fixed);
         }
         let scale =
             if total(1.0) <= limit_w { 1.0 } else { largest_root(square, linear, fixed - limit_w) };
         let power_w = total(scale);
-        // The root is exact to rounding of what is added up there.
+        // The root is exact to the rounding of the sums there.
         let rounding = 1e-5 * (fixed + scale * (linear.abs() + scale * square));
-        PowerCut { scale, power_w, within: power_w <= limit_w + rounding }
+        (scale, if power_w <= limit_w + rounding { power_w.min(limit_w) } else { power_w })
     }
 }
 
-/// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given that it is above zero at 1; without any, the
+/// The largest `s` in 0..=1 with `square s^2 + linear s + rest <= 0`, given a value above zero at 1; without any, the
 /// `s` of the least value. `square` is zero or more.
 fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     // The squares of large loads overflow; above zero at 1, one of the three is not zero.
@@ -162,7 +144,7 @@ fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     let (square, linear, rest) = (square / most, linear / most, rest / most);
     let discriminant = linear * linear - 4.0 * square * rest;
     let scale = if rest > 0.0 && (linear >= 0.0 || discriminant < 0.0) {
-        // Never low enough: the bottom of the parabola, which lies at or below zero when nothing is fed back.
+        // Never low enough: the bottom of the parabola, at or below zero when nothing is fed back.
         if linear < 0.0 && square > 0.0 { -0.5 * linear / square } else { 0.0 }
     } else if linear > 0.0 {
         // The usual formula would cancel.
@@ -172,7 +154,7 @@ fn largest_root(square: f32, linear: f32, rest: f32) -> f32 {
     } else {
         1.0
     };
-    // Written so that NaN becomes zero.
+    // In this form NaN becomes zero.
     if scale >= 1.0 {
         1.0
     } else if scale > 0.0 {
@@ -198,16 +180,16 @@ mod tests {
 
     #[test]
     fn enough_power_cuts_nothing() {
-        let cut = model().cut([load(1.0, 10.0); 4], 100.0);
-        assert_eq!(cut.scale, 1.0);
-        assert!(cut.within && (cut.power_w - 4.0 * 13.1).abs() < 1e-3);
+        let (scale, power_w) = model().cut([load(1.0, 10.0); 4], 100.0);
+        assert_eq!(scale, 1.0);
+        assert!((power_w - 4.0 * 13.1).abs() < 1e-3);
     }
 
     #[test]
     fn too_little_power_is_used_to_the_limit() {
-        let cut =
+        let (_, power_w) =
             model().cut([load(3.0, 40.0), load(2.5, 41.0), load(3.0, 39.0), load(2.0, 44.0)], 80.0);
-        assert!(cut.within && (cut.power_w - 80.0).abs() < 1e-3, "{cut:?}");
+        assert!(power_w <= 80.0 && power_w > 79.999, "{power_w}");
     }
 
     // XRobot scales each wheel by its own root: equal wheels come out unequal. One factor cannot.
@@ -217,53 +199,55 @@ mod tests {
             [[load(3.0, 0.0); 4], [load(0.0, 0.0); 4], [load(-3.0, 50.0); 4], [load(3.0, 50.0); 4]]
         {
             for limit in [0.0, -5.0, f32::NAN] {
-                let cut = model().cut(wheels, limit);
-                assert!((0.0..=1.0).contains(&cut.scale) && cut.power_w.is_finite(), "{cut:?}");
+                let (scale, power_w) = model().cut(wheels, limit);
+                assert!((0.0..=1.0).contains(&scale) && power_w.is_finite(), "{scale} {power_w}");
             }
         }
-        assert_eq!(model().cut([load(3.0, 0.0); 4], 0.0).scale, 0.0);
-        assert_eq!(model().cut([load(3.0, 0.0); 4], 4.0).scale, 0.0); // the electronics take it all
+        assert_eq!(model().cut([load(3.0, 0.0); 4], 0.0).0, 0.0);
+        assert_eq!(model().cut([load(3.0, 0.0); 4], 4.0).0, 0.0); // the electronics take it all
     }
 
     #[test]
     fn a_negative_discriminant_gives_the_least_power() {
         // 4 W electronics, braking by 2 W, 8 W heat: 4 - 2 s + 8 s^2 is never 0; the bottom lies at 1/8.
         let model = PowerModel::new(4.0, 1.0, 8.0, 0.0).unwrap();
-        let cut = model.cut([load(1.0, -2.0)], 0.0);
-        assert!((cut.scale - 0.125).abs() < 1e-6 && !cut.within, "{cut:?}");
+        let (scale, power_w) = model.cut([load(1.0, -2.0)], 0.0);
+        assert!((scale - 0.125).abs() < 1e-6 && power_w > 0.0, "{scale} {power_w}");
     }
 
     #[test]
     fn braking_pays_for_losses_that_are_above_the_limit() {
         // 10 W electronics, limit 8 W, braking by 6 W, 1 W heat: 10 - 6 s + s^2 <= 8 from 0.354 on.
         let model = PowerModel::new(10.0, 1.0, 1.0, 0.0).unwrap();
-        assert_eq!(model.cut([load(1.0, -6.0)], 8.0).scale, 1.0);
-        // With 16 W of heat too much of it is as bad as too little: 10 - 12 s + 16 s^2 <= 8 up to 0.5.
+        assert_eq!(model.cut([load(1.0, -6.0)], 8.0).0, 1.0);
+        // With 16 W of heat too much torque is as bad as too little: 10 - 12 s + 16 s^2 <= 8 up to
+        // 0.5.
         let model = PowerModel::new(10.0, 1.0, 16.0, 0.0).unwrap();
-        let cut = model.cut([load(1.0, -12.0)], 8.0);
-        assert!((cut.scale - 0.5).abs() < 1e-6 && cut.within, "{cut:?}");
+        let (scale, power_w) = model.cut([load(1.0, -12.0)], 8.0);
+        assert!((scale - 0.5).abs() < 1e-6 && power_w <= 8.0, "{scale} {power_w}");
     }
 
-    // They were let through whole: the discriminant overflowed.
+    // The loads passed whole: the discriminant overflowed.
     #[test]
     fn loads_whose_squares_overflow_are_cut_to_the_root_all_the_same() {
         let model = PowerModel::new(1000.0, 1.0, 1.0, 0.0).unwrap();
-        let cut = model.cut([load(1e10, -3e9)], 80.0); // 1000 - 3e19 s + 1e20 s^2
-        assert!((cut.scale - 0.3).abs() < 1e-6, "{cut:?}");
+        let (scale, _) = model.cut([load(1e10, -3e9)], 80.0); // 1000 - 3e19 s + 1e20 s^2
+        assert!((scale - 0.3).abs() < 1e-6, "{scale}");
     }
 
-    // It was called within: the slack for rounding was that of the loads before the cut.
+    // The power counted as within: the slack for rounding was calculated from the loads before the
+    // cut.
     #[test]
     fn losses_above_the_limit_are_not_called_within_because_the_loads_are_large() {
-        let cut = model().cut([load(1e6, 1e3)], 80.0);
-        assert!(cut.scale == 0.0 && cut.power_w > 1000.0 && !cut.within, "{cut:?}");
+        let (scale, power_w) = model().cut([load(1e6, 1e3)], 80.0);
+        assert!(scale == 0.0 && power_w > 1000.0, "{scale} {power_w}");
     }
 
     #[test]
     fn a_load_of_nan_cuts_everything() {
-        assert_eq!(model().cut([load(f32::NAN, 1.0), load(1.0, 1.0)], 50.0).scale, 0.0);
-        assert_eq!(model().cut([load(1.0, f32::INFINITY)], 50.0).scale, 0.0);
-        assert_eq!(model().cut([load(1e30, 1.0)], 50.0).scale, 0.0);
+        assert_eq!(model().cut([load(f32::NAN, 1.0), load(1.0, 1.0)], 50.0).0, 0.0);
+        assert_eq!(model().cut([load(1.0, f32::INFINITY)], 50.0).0, 0.0);
+        assert_eq!(model().cut([load(1e30, 1.0)], 50.0).0, 0.0);
     }
 
     #[test]
@@ -280,8 +264,9 @@ mod tests {
         ) {
             // Half of the wheels brake; a limit below zero counts as zero.
             let loads = loads.into_iter().map(|(torque, speed)| load(torque, speed));
-            let cut = PowerModel::new(k0, k1, k2, k3).unwrap().cut(loads.clone(), limit);
-            prop_assert!((0.0..=1.0).contains(&cut.scale) && cut.power_w.is_finite(), "{cut:?}");
+            let (factor, power_w) = PowerModel::new(k0, k1, k2, k3).unwrap().cut(loads.clone(), limit);
+            prop_assert!((0.0..=1.0).contains(&factor) && power_w.is_finite(), "{factor} {power_w}");
+            let is_within = power_w <= limit.max(0.0);
             let [k0, k1, k2, k3] = [k0, k1, k2, k3].map(f64::from);
             let total = |scale: f32| -> f64 {
                 loads.clone().map(|wheel| {
@@ -290,14 +275,14 @@ mod tests {
                 }).sum()
             };
             let limit = f64::from(limit.max(0.0));
-            if cut.within {
-                prop_assert!(total(cut.scale) <= limit + 1e-3, "{cut:?} {}", total(cut.scale));
-                if cut.scale < 0.999 {
-                    prop_assert!(total(cut.scale + 1e-3) > limit - 1e-3);
+            if is_within {
+                prop_assert!(total(factor) <= limit + 1e-3, "{factor} {}", total(factor));
+                if factor < 0.999 {
+                    prop_assert!(total(factor + 1e-3) > limit - 1e-3);
                 }
             } else {
                 for step in 0..=100_u8 {
-                    prop_assert!(total(f32::from(step) * 0.01) >= total(cut.scale) - 1e-3);
+                    prop_assert!(total(f32::from(step) * 0.01) >= total(factor) - 1e-3);
                 }
             }
         }

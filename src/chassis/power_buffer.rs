@@ -3,13 +3,13 @@ use super::error::not_negative;
 use crate::control::{Pid, PidConfig, TimeStep};
 use crate::error::ConfigError;
 
-/// Spends an energy buffer down to a reserve, and lets it fill up again: the power to allow from its charge.
+/// Spends an energy buffer down to a reserve and refills it: the allowed power from the charge.
 ///
-/// The referee's buffer (60 J) drains by what the chassis takes above its limit, and fills by what it leaves. The
+/// The referee's buffer (60 J) drains by the power of the chassis above its limit, and fills by the power below. The
 /// allowance is `limit + pid(energy - reserve)`: with a proportional gain `kp` in W/J the charge nears the reserve with the
-/// time constant `1/kp` and never falls below it, as far as the power model is right. An integral gain takes care of
-/// what it has wrong: the integral only ever takes power away, up to the whole limit, and so a full buffer winds nothing
-/// up that would empty it later. Without a reading only `blind_share` of the limit is allowed.
+/// time constant `1/kp` and never falls below it, as far as the power model is right. An integral gain corrects errors of
+/// the model: the integral only ever takes power away, up to the whole limit, and so a full buffer winds nothing up to
+/// empty it later. Without a reading only `blind_share` of the limit is allowed.
 ///
 /// # Examples
 /// ```
@@ -34,7 +34,7 @@ impl PowerBuffer {
     /// Takes the charge to keep in J, and the loop from J to W.
     ///
     /// # Errors
-    /// Names the value that cannot be used.
+    /// Names the invalid value.
     pub fn new(reserve_j: f32, pid: PidConfig) -> Result<Self, ConfigError> {
         Ok(Self {
             pid: Pid::new(pid)
@@ -48,7 +48,7 @@ impl PowerBuffer {
     /// Sets the share of the limit that is allowed without a reading: zero or more.
     ///
     /// # Errors
-    /// [`ConfigError::Negative`] when it is negative or not finite.
+    /// [`ConfigError::Negative`] when the share is negative or not finite.
     pub fn with_blind_share(self, share: f32) -> Result<Self, ConfigError> {
         let blind_share = not_negative(share, "blind_share")?;
         Ok(Self { blind_share, ..self })
@@ -56,9 +56,9 @@ impl PowerBuffer {
 
     /// Returns the power in W to allow now, zero or more, from the limit in W and the charge in J.
     ///
-    /// A charge that is NaN or infinite counts as none; the loop then starts anew. A limit that is negative, NaN
-    /// or infinite counts as zero. A `dt_s` that is zero, negative, NaN or infinite leaves what is allowed above the limit as it
-    /// was; from the 100th such call in a row on the clock is dead, and a charge counts as none.
+    /// A charge that is NaN or infinite counts as missing; the loop then starts anew. A limit that is negative, NaN or infinite
+    /// counts as zero. A `dt_s` that is zero, negative, NaN or infinite leaves the allowance above the limit unchanged; from the
+    /// 100th such call in a row on the clock is dead, and a charge counts as missing.
     pub fn allowance_w(&mut self, limit_w: f32, energy_j: Option<f32>, dt_s: f32) -> f32 {
         let limit_w = not_negative(limit_w, "limit_w").unwrap_or(0.0);
         let dt_s = self.clock.see(dt_s);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn idling_with_a_full_buffer_winds_nothing_up_that_would_empty_it() {
+    fn idling_with_a_full_buffer_winds_nothing_up() {
         for (kp, ki) in [(2.0, 0.5), (2.0, 10.0), (0.5, 5.0), (20.0, 1.0), (3.0, 0.0)] {
             for gains in
                 [PidConfig::new(kp, ki, 0.0), PidConfig::new(kp, ki, 0.0).with_output_limit(120.0)]
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_integral_gain_brings_the_charge_back_to_the_reserve_with_a_model_that_is_wrong() {
+    fn an_integral_gain_restores_the_reserve_despite_a_wrong_model() {
         for (kp, ki) in [(2.0, 0.5), (2.0, 2.0), (3.0, 1.0)] {
             let (lowest, last) = idle_then_throttle(PidConfig::new(kp, ki, 0.0), 1.1);
             assert!(lowest > 15.0 && (last - 20.0).abs() < 0.1, "{kp} {ki}: {lowest} {last}");
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_buffer_that_was_empty_for_a_minute_is_spent_again_when_it_is_full() {
+    fn a_buffer_empty_for_a_minute_is_spent_again_when_full() {
         let mut buffer = PowerBuffer::new(20.0, PidConfig::new(2.0, 0.5, 0.0)).unwrap();
         for _ in 0..60_000 {
             assert!(buffer.allowance_w(80.0, Some(0.0), 0.001) >= 0.0);
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(buffer().allowance_w(10.0, Some(0.0), 0.001), 0.0);
     }
 
-    // The loop holds its output without time: an empty buffer was allowed what a full one had been.
+    // Without time the loop holds its output: an empty buffer kept the allowance of a full buffer.
     #[test]
     fn a_clock_that_died_allows_no_more_than_without_a_reading() {
         for dt_s in [0.0, -1.0, f32::NAN, f32::INFINITY] {

@@ -52,8 +52,8 @@ impl PowerFit {
         }
     }
 
-    /// Learns from the loads of all wheels and the power in W measured with them; what is not finite, or makes the fit so,
-    /// is counted and left out.
+    /// Learns from the loads of all wheels and the power in W measured with them; leaves out and counts values that are
+    /// not finite, or make the fit so.
     pub fn learn(&mut self, wheels: impl IntoIterator<Item = WheelLoad>, measured_w: f32) {
         let (mut features, mut rest_w) = ([0.0_f32; 3], measured_w);
         for WheelLoad { torque, speed_rad_s } in wheels {
@@ -82,8 +82,8 @@ impl PowerFit {
         }
     }
 
-    /// Takes what was learned off the uncertainty, and forgets in the direction of what was learned only (Kulhavy 1987):
-    /// what is not excited keeps its certainty for ever.
+    /// Subtracts the learned part from the uncertainty, and forgets in the learned direction only (Kulhavy 1987): a
+    /// direction without excitation keeps its certainty for ever.
     fn shrink(&mut self, gain: [f32; 3], spread: f32) {
         let new = self.forgetting - (1.0 - self.forgetting) / spread;
         let factor = new / (1.0 + new * spread);
@@ -108,7 +108,7 @@ impl PowerFit {
         PowerModel { k0: k0 * s0, k1: self.k1, k2: k2 * s2, k3: k3 * s3 }
     }
 
-    /// Returns the number of measurements that were left out.
+    /// Returns the number of measurements left out.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_counted_and_left_out() {
+    fn measurements_that_are_not_finite_are_counted_and_left_out() {
         let mut fit = start();
         let before = fit.model();
         fit.learn([WheelLoad { torque: f32::NAN, speed_rad_s: 0.0 }], 1.0);
@@ -184,9 +184,10 @@ mod tests {
         fit.learn([WheelLoad { torque: 1e30, speed_rad_s: 0.0 }], 1.0);
         assert_eq!((fit.model(), fit.rejected()), (before, 3));
     }
-    // One such reading made a model of NaN, which reads as no losses: the power limit let everything through for ever.
+    // One such reading made a model of NaN, read as no losses: the power limit passed everything
+    // for ever.
     #[test]
-    fn readings_beyond_all_numbers_leave_no_model_that_is_none() {
+    fn readings_beyond_all_numbers_leave_a_finite_model() {
         let mut fit = start();
         for (torque, speed_rad_s, measured_w) in
             [(1.0, 1.0, 3e38), (1.0, 2.0, -3e38), (2.0, 1.0, -3e38), (1e8, 1.0, 3e38)]

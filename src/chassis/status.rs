@@ -1,6 +1,6 @@
 use crate::motor::TargetError;
 
-/// What went on in a chassis, besides the motion.
+/// Status of a chassis, besides its motion.
 ///
 /// # Examples
 /// ```
@@ -18,14 +18,14 @@ use crate::motor::TargetError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChassisStatus {
     /// The motion of the last tick was measured: by all wheels, or by the others while [`lost_wheels`](Self::lost_wheels) is
-    /// above zero. With too few wheels it is unknown: the position stands still; a gyroscope's heading goes on.
+    /// above zero. With too few wheels the motion is unknown: the position stands still; a gyroscope's heading continues.
     pub motion_known: bool,
-    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is none.
+    /// Wheels without feedback in the last tick; a velocity or an angle that is NaN or infinite is no feedback.
     pub lost_wheels: u8,
-    /// Seconds for which the position could not be followed, in all.
+    /// Seconds without a known motion, in all.
     pub blind_s: f32,
-    /// Largest contradiction between the wheels of the last tick in m/s; `None` while one of them is lost, because the
-    /// others then say too little about each other. Never NaN: `f32::MAX` where it overflows.
+    /// Largest contradiction between the wheels of the last tick in m/s; `None` while a wheel is lost, because the
+    /// others then determine too little. Never NaN: `f32::MAX` on overflow.
     pub slip_m_s: Option<f32>,
     /// The last tick ran without a fresh command, or the clock is dead.
     pub command_stale: bool,
@@ -33,7 +33,7 @@ pub struct ChassisStatus {
     pub saturated: bool,
     /// Commands, headings and poses that were NaN or infinite, in all; a command and its heading count once.
     pub rejected: u16,
-    /// Wheels of which a motor refused its target in the last [`drive`](super::Chassis::drive).
+    /// Wheels with a motor that refused its target in the last [`drive`](super::Chassis::drive).
     pub refused: u8,
     /// Why the first of them did.
     pub refusal: Option<TargetError>,

@@ -50,7 +50,7 @@ impl<const N: usize> Swerve<N> {
         self
     }
 
-    /// Lets a module drive at full speed while it still points elsewhere.
+    /// Lets a module drive at full speed before it reaches its angle.
     #[must_use]
     pub const fn without_cosine_compensation(mut self) -> Self {
         self.steering.cosine_compensation = false;
@@ -63,10 +63,10 @@ const fn size(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.abs() }
 }
 
-/// What is remembered of the modules of a [`Swerve`] from one tick to the next: where each was told to point.
+/// Memory of the modules of a [`Swerve`] from tick to tick: the commanded angle of each.
 ///
-/// [`Chassis`](super::Chassis) keeps it. Without one, keep it beside the layout for [`Swerve::steer`] and
-/// [`Swerve::lock`], and take a new one when the motors were relaxed.
+/// [`Chassis`](super::Chassis) keeps this memory. Without a chassis, keep it beside the layout for [`Swerve::steer`]
+/// and [`Swerve::lock`], and take a new memory when the motors were relaxed.
 ///
 /// # Examples
 /// ```
@@ -83,17 +83,17 @@ const fn size(value: f32) -> f32 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwerveSteering<const N: usize>([Module; N]);
 
-/// What is remembered of one module.
+/// Memory of one module.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Module {
     target_rad: f32,
-    /// Not before the module is measured: a target from nowhere would turn it when it arms.
+    /// Not before the module is measured: a target from nowhere would turn the module when it arms.
     has_target: bool,
     reversed: bool,
 }
 
 impl<const N: usize> SwerveSteering<N> {
-    /// Remembers nothing: a module that is not told to move holds the angle at which it is first measured.
+    /// Makes an empty memory: a module without a command holds its first measured angle.
     #[must_use]
     pub const fn new() -> Self {
         Self([Module { target_rad: 0.0, has_target: false, reversed: false }; N])
@@ -106,17 +106,17 @@ impl<const N: usize> Default for SwerveSteering<N> {
     }
 }
 
-/// How wanted states become states that the motors of the modules can follow.
+/// Turns wanted states into states that the motors of the modules can follow.
 impl<const N: usize> Swerve<N> {
-    /// Returns what each module shall do, from what is wanted and the angles measured.
+    /// Returns the target of each module, from the wanted states and the measured angles.
     ///
-    /// * A module turns by at most 90 degrees and the hysteresis; where the other direction is nearer, its drive reverses.
-    ///   The hysteresis keeps a command at 90 degrees from flipping it to and fro.
-    /// * A module that does not point where it should drives with the cosine of its error, so it does not push sideways.
-    /// * At zero command it stands still and keeps its angle; so it does for a wanted state that is NaN or infinite.
-    /// * The angles that come out are near the measured ones, whatever their number of turns: no unwinding.
-    /// * A module whose angle is not measured stands still, because nobody knows where it would push. It keeps its angle;
-    ///   one that was never measured has none to keep, and is given the wanted one, which its motor refuses.
+    /// * A module turns by at most 90 degrees and the hysteresis; if the opposite direction is nearer, its drive reverses.
+    ///   The hysteresis keeps a command at 90 degrees from flipping the module to and fro.
+    /// * A module away from its target angle drives with the cosine of its error, so it does not push sideways.
+    /// * At zero command a module stands still and keeps its angle, also for a wanted state that is NaN or infinite.
+    /// * The returned angles are near the measured angles, for any number of turns: no unwinding.
+    /// * A module without a measured angle stands still, because its direction of push is unknown. The module keeps its
+    ///   angle; a module never measured has no angle to keep, and gets the wanted angle, which its motor refuses.
     ///
     /// # Examples
     /// ```
@@ -144,8 +144,8 @@ impl<const N: usize> Swerve<N> {
         })
     }
 
-    /// Returns the states that lock the chassis in an X: all at rest, each module pointing at the origin of the body, or away
-    /// from it, whichever is nearer. The hysteresis keeps a module that lies across from being turned to and fro.
+    /// Returns the states of a chassis locked in an X: all at rest, each module pointing at the origin of the body, or away
+    /// from it, whichever is nearer. The hysteresis keeps a module that lies across from turning to and fro.
     ///
     /// A module at the origin has no such direction, and holds its angle.
     pub fn lock(
@@ -185,7 +185,7 @@ impl Module {
         ModuleState::new(turned.velocity, target)
     }
 
-    /// The turn from `here` to a direction or against it, whichever is nearer; in the hysteresis, the one taken last.
+    /// The turn from `here` to a direction or against it, whichever is nearer; in the hysteresis, the last choice.
     fn shorter(&mut self, config: Steering, here: f32, direction: Angle) -> f32 {
         let ahead = wrap_pi(direction.as_radians() - here);
         let behind = wrap_pi(ahead + PI);
@@ -201,7 +201,7 @@ impl Module {
     fn hold(&mut self, here: f32) -> ModuleState {
         let kept = if self.has_target { self.target_rad } else { here };
         let way = kept - here;
-        // An encoder that starts over has lost its turns; they are not made up for.
+        // An encoder that starts over has lost its turns; the module does not make up for them.
         let target = if way.abs() > PI { here + wrap_pi(way) } else { kept };
         standing(self.keep(target))
     }
@@ -250,7 +250,7 @@ mod tests {
         ModuleState::new(velocity, Angle::from_degrees(degrees))
     }
 
-    /// One module and what is remembered of it.
+    /// One module and its memory.
     struct One {
         swerve: Swerve<2>,
         steering: SwerveSteering<2>,

@@ -8,7 +8,7 @@ use crate::geometry::{Body, Rotation2, Twist, Vec2};
 use crate::math::atan2;
 use crate::units::{Angle, AngularVelocity};
 
-/// What a steered wheel does: how fast it rolls, and where it points.
+/// Motion of a steered wheel: its rolling speed, and its direction.
 ///
 /// # Examples
 /// ```
@@ -66,9 +66,9 @@ impl WheelSpeed for ModuleState {
 
 /// The kinematics of `N` steered and driven wheels.
 ///
-/// The module at `p` moves with `(vx - wz p.y, vy + wz p.x)`; its angle is the direction of that, its speed the length.
-/// The motion is the least-squares fit to all modules. What comes out of [`inverse`](Self::inverse) goes through
-/// [`steer`](Self::steer), which finds the shorter way and keeps the angles at rest; [`Chassis`](super::Chassis) does that.
+/// The module at `p` moves with `(vx - wz p.y, vy + wz p.x)`; its angle is the direction of this velocity, its speed the
+/// length. The motion is the least-squares fit to all modules. The result of [`inverse`](Self::inverse) goes through
+/// [`steer`](Self::steer), which finds the shorter way and keeps the angles at rest, as [`Chassis`](super::Chassis) does.
 ///
 /// # Examples
 /// ```
@@ -93,7 +93,7 @@ pub struct Swerve<const N: usize> {
     pub(super) steering: Steering,
 }
 
-/// What a module sees of a motion: the velocity of its place forward, and to the left.
+/// The part of a motion seen by a module: the velocity of its place forward, and to the left.
 const fn rows(position_m: Vec2) -> [Row; 2] {
     [Row::new(Vec2::new(1.0, 0.0), position_m), Row::new(Vec2::new(0.0, 1.0), position_m)]
 }
@@ -103,8 +103,8 @@ impl<const N: usize> Swerve<N> {
     ///
     /// # Errors
     /// Names the value that is not finite or not above zero. [`ConfigError::Singular`] when there are fewer than two
-    /// modules, or all stand in one place, or nearly, as seen from the origin (two modules: when it is 8 times as far
-    /// off as they are from each other).
+    /// modules, or all stand in one place, or nearly, as seen from the origin (two modules: at 8 times their distance
+    /// from each other).
     pub fn new(wheel_radius_m: f32, positions_m: [Vec2; N]) -> Result<Self, ConfigError> {
         positive(wheel_radius_m, "wheel_radius_m")?;
         if !positions_m.iter().all(|position| position.is_finite()) {
@@ -125,8 +125,8 @@ impl<const N: usize> Swerve<N> {
         &self.positions_m
     }
 
-    /// Returns what each module must do for the motion `twist` of the body: velocities of zero or more, angles in
-    /// -180..=180 degrees. A module that does not move has the angle 0.
+    /// Returns the state of each module for the motion `twist` of the body: velocities of zero or more, angles in
+    /// -180..=180 degrees. A module at rest has the angle 0.
     #[must_use]
     pub fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.positions_m.map(|position| {
@@ -138,7 +138,7 @@ impl<const N: usize> Swerve<N> {
         })
     }
 
-    /// Returns the motion of the body that fits best to what the modules do (least squares).
+    /// Returns the motion of the body of best fit to the states of the modules (least squares).
     #[must_use]
     pub fn forward(&self, modules: [ModuleState; N]) -> Twist<Body> {
         self.shares.iter().zip(modules).fold(Twist::ZERO, |sum, (&[forward, left], module)| {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn two_modules_are_enough_and_one_is_not() {
+    fn two_modules_are_enough_and_a_single_module_is_refused() {
         let swerve = Swerve::new(0.05, CORNERS).unwrap();
         let motion = Twist::new(0.5, -0.25, 1.0);
         let mut partial = swerve.inverse(motion).map(Some);

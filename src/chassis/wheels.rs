@@ -1,7 +1,7 @@
 use super::kinematics::{Fastest, slowed};
 use crate::units::AngularVelocity;
 
-/// Makes a struct with one value for each named wheel, and what can be done with all of them at once.
+/// Makes a struct with one value for each named wheel, and the functions on all of them at once.
 macro_rules! named_wheels {
     ($(#[$doc:meta])* $name:ident, $count:literal { $($(#[$wheel_doc:meta])* $wheel:ident),+ }) => {
         $(#[$doc])*
@@ -19,7 +19,7 @@ macro_rules! named_wheels {
                 $name { $($wheel: f(self.$wheel),)+ }
             }
 
-            /// Does the same with a function that can fail.
+            /// Maps every value with a function that can fail.
             ///
             /// # Errors
             /// Passes on the first error; the wheels after it are left out.
@@ -71,7 +71,7 @@ macro_rules! named_wheels {
         }
 
         impl<T> $name<Option<T>> {
-            /// Returns all values if no wheel lacks one.
+            /// Returns all values if every wheel has a value.
             #[must_use]
             pub fn all(self) -> Option<$name<T>> {
                 Some($name { $($wheel: self.$wheel?,)+ })
@@ -87,7 +87,7 @@ macro_rules! named_wheels {
         }
 
         impl $name<AngularVelocity> {
-            /// Slows all wheels by one common factor so that none is faster than `limit`: the direction of travel stays.
+            /// Slows all wheels by one common factor until none is faster than `limit`: the direction of travel stays.
             ///
             /// Returns the wheels and the factor, 0 to 1. A limit that is negative or NaN counts as zero; if any wheel is NaN or
             /// infinite, all stop and the factor is 0.

@@ -13,18 +13,18 @@ use crate::math;
 /// [`linear`](Self::linear) follows as a critically damped system would. A step of the input is followed to 4 % after `5 / r`
 /// seconds, and without overshoot as long as `r dt <= 1`.
 ///
-/// [`optimal`](Self::optimal) is Han's: it follows with a bounded acceleration `r`, in the shortest time. `h0`, at least 1.25 time
-/// steps, is the width over which the switching is smoothed: larger filters more noise. From rest, it comes to rest at a constant
-/// input without overshoot. Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions on Industrial
-/// Electronics 56 (2009), section IV.A.
+/// [`optimal`](Self::optimal) is Han's: it follows with a bounded acceleration `r`, in the shortest time. `h0`, at least 1.25
+/// time steps, is the width over which the switching is smoothed: a larger `h0` filters more noise. From rest, the value comes to
+/// rest at a constant input without overshoot. Source: Han, "From PID to Active Disturbance Rejection Control", IEEE Transactions
+/// on Industrial Electronics 56 (2009), section IV.A.
 ///
-/// Both are stepped by Euler's rule. `OPTIMAL` is the law; it follows from the constructor.
+/// Both are stepped by Euler's rule. `OPTIMAL` is the law, chosen by the constructor.
 ///
 /// # Edge behaviour
-/// `dt_s` zero, negative, NaN or infinite, and an input that is NaN or infinite: nothing changes and
+/// If `dt_s` is zero, negative, NaN or infinite, or the input is NaN or infinite, nothing changes and
 /// [`rejected`](Self::rejected) grows. `dt_s` above the maximum, on the first call too: counts as the maximum. Starts from zero
-/// at rest; see [`reset_to`](Self::reset_to). Steps smaller than the spacing of `f32` at the value add up: it arrives, however far
-/// from zero. What overflows `f32` stays at its largest number.
+/// at rest; see [`reset_to`](Self::reset_to). Steps smaller than the spacing of `f32` at the value add up: the value arrives, at
+/// any distance from zero. A value beyond `f32` stays at its largest number.
 ///
 /// # Examples
 /// ```
@@ -57,8 +57,8 @@ impl Differentiator {
     /// Takes `r`, the speed of following in 1/s, and the longest step in seconds, of the linear law.
     ///
     /// # Errors
-    /// Names `r` or `max_step` when NaN, infinite, zero or negative; `r` when `r * max_step_s` is above 1: beyond, it would
-    /// oscillate.
+    /// Names `r` or `max_step` when NaN, infinite, zero or negative; `r` when `r * max_step_s` is above 1, where the value
+    /// would oscillate.
     pub const fn linear(r: f32, max_step_s: f32) -> Result<Self, ConfigError> {
         check!(positive("r", r));
         check!(positive("max_step", max_step_s));
@@ -77,8 +77,8 @@ impl Differentiator<true> {
     /// of the time-optimal law.
     ///
     /// # Errors
-    /// Names the parameter that is NaN, infinite, zero or negative; `h0` when it is below 1.25 `max_step_s`. Han's text allows an
-    /// `h0` of one step, but with it a step of the input of `3 r h0²` overshoots by 4 %; from 1.15 on none does.
+    /// Names a parameter that is NaN, infinite, zero or negative; `h0` when below 1.25 `max_step_s`. Han's text allows an `h0` of
+    /// one step, but then a step of the input of `3 r h0²` overshoots by 4 %; from 1.15 on no step overshoots.
     pub const fn optimal(r: f32, h0_s: f32, max_step_s: f32) -> Result<Self, ConfigError> {
         check!(positive("r", r));
         check!(positive("h0", h0_s));
@@ -107,7 +107,7 @@ impl<const OPTIMAL: bool> Differentiator<OPTIMAL> {
         self.follower.reset_to(value);
     }
 
-    /// Returns the value that follows the input.
+    /// Returns the value, which follows the input.
     #[must_use]
     pub const fn value(&self) -> f32 {
         self.follower.value.value()
@@ -119,14 +119,14 @@ impl<const OPTIMAL: bool> Differentiator<OPTIMAL> {
         self.follower.rate.value()
     }
 
-    /// Returns the number of steps that were refused; stays at 65535.
+    /// Returns the number of refused steps; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.follower.rejected
     }
 }
 
-/// A value and its rate that follow an input, stepped by Euler's rule.
+/// A value and its rate, stepped by Euler's rule to follow an input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Follower {
@@ -141,7 +141,8 @@ impl Follower {
         Self { max_step_s, value: Sum::ZERO, rate: Sum::ZERO, rejected: 0 }
     }
 
-    /// Steps by the acceleration that `pull` makes of the error and the rate; the step is no longer than the longest one.
+    /// Steps by the acceleration that `pull` calculates from the error and the rate; the step is no longer than the
+    /// longest step.
     #[inline]
     fn step(&mut self, input: f32, step: &TimeStep, pull: impl FnOnce(f32, f32) -> f32) -> f32 {
         if step.admits(input.is_finite(), &mut self.rejected) {
@@ -159,10 +160,10 @@ impl Follower {
     }
 }
 
-/// Returns Han's time-optimal acceleration, in ±`r`, that brings the discrete double integrator (`x1`, `x2`) to rest at zero.
+/// Returns Han's time-optimal acceleration, in ±`r`, to bring the discrete double integrator (`x1`, `x2`) to rest at zero.
 ///
-/// `r` is the largest acceleration and `h` the step in seconds, both more than zero. Where an argument is NaN, or the result
-/// would be, it is 0.
+/// `r` is the largest acceleration and `h` the step in seconds, both more than zero. If an argument is NaN, or the result
+/// would be, the result is 0.
 ///
 /// # Examples
 /// ```
@@ -286,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_pause_counts_as_the_longest_step_for_the_optimal_one_too() {
+    fn a_long_pause_counts_as_the_longest_step_for_the_optimal_law_too() {
         let new = || Differentiator::optimal(10.0, WIDTH_S, DT_S).unwrap();
         let (mut paused, mut steady) = (new(), new());
         for _ in 0..20 {
@@ -325,7 +326,7 @@ mod tests {
         assert_eq!((optimal.value(), optimal.rate()), (0.0, 0.0));
     }
 
-    /// Follows a step of the input from rest at `start`; says what is wrong on the way to the end or at it.
+    /// Follows a step of the input from rest at `start`; reports a violation on the way or at the end.
     fn arrives(
         (r, h0_s): (f32, f32),
         start: f32,
@@ -356,8 +357,8 @@ mod tests {
         f32::from_bits(value.abs().to_bits() + 1) - value.abs()
     }
 
-    /// Each of these once went too far: the first when a width of one step was let through, by the law; the others by
-    /// the rounding of a rate of many thousand times what it changes in a step.
+    /// Each of these once went too far: the first when the law admitted a width of one step; the others by the rounding
+    /// of a rate many thousand times its change in a step.
     #[test]
     fn a_far_target_is_reached_without_overshoot_and_one_step_of_width_is_refused() {
         for (r, target, widths, steps) in [
@@ -376,7 +377,8 @@ mod tests {
 
     #[test]
     fn far_from_zero_where_a_step_is_less_than_the_spacing_of_f32_both_arrive() {
-        // At a million, the spacing is 0.06; in the last 36 units, a step of 1 ms is less than half of it.
+        // At a million, the spacing is 0.06; in the last 36 units, a step of 1 ms is less than half
+        // of the spacing.
         for (start, way) in [(1e6, 90.0), (-1e6, 90.0), (1e5, -1.0)] {
             let times = core::iter::repeat_n(DT_S, 20_000);
             assert_eq!(arrives((10.0, WIDTH_S), start, start + way, times), Ok(()), "{start}");
@@ -407,7 +409,7 @@ mod tests {
             start in prop_oneof![Just(0.0_f32), -1e6_f32..1e6], parts in prop::collection::vec(1e-3_f32..=1.0, 1..8),
         ) {
             let width_s = width * DT_S;
-            // From a thousandth to ten thousand times what one width of time reaches.
+            // From a thousandth to ten thousand times the distance covered in one width of time.
             let way = r * width_s * width_s * 10.0_f32.powf(widths);
             let target = start + if direction { way } else { -way };
             let times = parts.iter().chain(&[1.0, 1.0]).cycle().take(8000);

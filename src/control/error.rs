@@ -1,19 +1,19 @@
-//! Checks of parameters that controllers, filters and tuners have in common.
+//! Parameter checks shared by controllers, filters and tuners.
 
 use crate::error::ConfigError;
 pub(crate) use crate::error::check;
 
-/// Refuses what is negative, NaN or infinite.
+/// Refuses a negative, NaN or infinite value.
 pub(crate) const fn not_negative(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
     if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(ConfigError::Negative(parameter)) }
 }
 
-/// Refuses what is zero, negative, NaN or infinite.
+/// Refuses a zero, negative, NaN or infinite value.
 pub(crate) const fn positive(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(ConfigError::NotPositive(parameter)) }
 }
 
-/// As [`positive`], for an option that is off when zero.
+/// As [`positive`], for an option that zero turns off.
 pub(crate) const fn off_or_positive(
     parameter: &'static str,
     value: f32,
@@ -21,12 +21,12 @@ pub(crate) const fn off_or_positive(
     if value == 0.0 { Ok(()) } else { positive(parameter, value) }
 }
 
-/// Refuses what is NaN or infinite.
+/// Refuses a NaN or infinite value.
 pub(crate) const fn finite(parameter: &'static str, value: f32) -> Result<(), ConfigError> {
     if value.is_finite() { Ok(()) } else { Err(ConfigError::NotFinite(parameter)) }
 }
 
-/// Refuses the gains of a controller when one is negative, NaN or infinite.
+/// Refuses the gains of a controller when a gain is negative, NaN or infinite.
 pub(crate) const fn gains(kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
     check!(not_negative("kp", kp));
     check!(not_negative("ki", ki));
@@ -46,7 +46,7 @@ pub(crate) const fn ordered(
     }
 }
 
-/// Refuses the ends of an output, and calls them what they were called: one limit, or a range.
+/// Refuses invalid ends of an output, and names them as they were given: one limit, or a range.
 pub(crate) const fn output_ends(lower: f32, upper: f32) -> Result<(), ConfigError> {
     if (-lower).to_bits() == upper.to_bits() {
         positive("output_limit", upper)

@@ -18,16 +18,17 @@
 //! | the rate of a noisy signal | [`Differentiator`] | |
 //! | what pushes, brakes or blocks a shaft; a speed with less noise and no lag | [`LoadObserver`] | a bandwidth of 200 rad/s |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
-//! | gains for a plant nobody knows | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
+//! | gains for an unknown plant | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
-//! # What they all do
-//! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. What a
-//!   very long one does is said at each type; for the controllers see [`TimeStep`].
-//! * A setpoint or measurement that is NaN or infinite: the last output is returned and the sample is counted. The next good one
-//!   works as if the bad one had not been, but that the D of a controller rests in it, since the time between is not one step.
-//! * Limits, gains and frequencies are checked once, when it is made; a [`ConfigError`](crate::error::ConfigError) names the one that
-//!   cannot work. What needs arithmetic only is `const`, so that a bad constant does not compile.
-//! * Nothing panics, and what is stored is finite.
+//! # Common behaviour
+//! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. Each
+//!   type states the effect of a very long `dt_s`; for the controllers see [`TimeStep`].
+//! * If a setpoint or measurement is NaN or infinite, the last output is returned and the sample is counted. The next good
+//!   sample works as if the bad sample had not come, except that the D of a controller rests in it, since the time between is
+//!   longer than one step.
+//! * Limits, gains and frequencies are checked once, by the constructor; a [`ConfigError`](crate::error::ConfigError) names the
+//!   invalid parameter. A check by arithmetic alone is `const`, so a bad constant does not compile.
+//! * Nothing panics, and every stored value is finite.
 //!
 //! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.
 //!
@@ -42,7 +43,7 @@
 
 mod actuator;
 mod differentiator;
-mod error;
+pub(crate) mod error;
 mod filter;
 mod number;
 mod observer;

@@ -1,6 +1,6 @@
-//! Arithmetic that stays finite.
+//! Arithmetic with finite results.
 
-/// Returns `value` within `lower..=upper`, which the caller knows to be in order.
+/// Returns `value` within `lower..=upper`; the caller guarantees their order.
 #[inline]
 pub(crate) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
     if value > upper {
@@ -12,7 +12,7 @@ pub(crate) const fn limited(value: f32, lower: f32, upper: f32) -> f32 {
     }
 }
 
-/// Returns `value`, or the largest number of its sign when it is infinite, or zero when it is NaN.
+/// Returns `value`; if infinite, the largest number of its sign; if NaN, zero.
 #[inline]
 pub(super) const fn finite(value: f32) -> f32 {
     if value.abs() <= f32::MAX {
@@ -24,13 +24,13 @@ pub(super) const fn finite(value: f32) -> f32 {
     }
 }
 
-/// A sum without loss, whatever its size: a plain one in `f32` of steps of 0.5 ms stands still at 16384 s. What is beyond `f32`
-/// is cut off, and gone.
+/// A sum without loss, of any size: a plain sum in `f32` of steps of 0.5 ms stands still at 16384 s. A part beyond `f32` is cut
+/// off and lost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Sum {
     value: f32,
-    /// What the value could not take yet.
+    /// The part not yet contained in the value.
     rest: f32,
 }
 
@@ -54,7 +54,7 @@ impl Sum {
         self.value
     }
 
-    /// Returns how far it is above `other`, exactly when it is near; it may overflow.
+    /// Returns the difference to `other`, exact when the two are near; may overflow.
     #[inline]
     pub(super) const fn above(self, other: f32) -> f32 {
         self.value - other + self.rest
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_f32_it_stays_at_the_largest_number_and_comes_back_at_once() {
+    fn a_differentiator_beyond_f32_stays_at_the_largest_number_and_returns_at_once() {
         for way in [1.0_f32, -1.0] {
             let mut sum = Sum::from(f32::MAX.copysign(way));
             for change in [f32::MAX, f32::INFINITY, 1e32] {
@@ -98,7 +98,7 @@ mod tests {
             for change in changes {
                 sum.add(change);
                 exact += f64::from(change);
-                // Half a spacing of the value, and what the rests round.
+                // Half a spacing of the value, and a number that the rests round.
                 prop_assert!((f64::from(sum.value()) - exact).abs() <= 6.1e-8 * exact.abs() + 1e-6);
                 let above = f64::from(sum.above(sum.value())) + f64::from(sum.value());
                 prop_assert!((above - exact).abs() <= 2e-6);

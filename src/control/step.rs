@@ -1,6 +1,6 @@
 /// The time since the step before, validated once for all loops of a tick.
 ///
-/// | `dt_s` | kind | what a controller does with it |
+/// | `dt_s` | kind | reaction of a controller |
 /// |---|---|---|
 /// | above 0, up to `dt_max_s` | normal | its work |
 /// | above `dt_max_s` | [frozen](Self::is_frozen) | integral and derivative stay for this step, the rest follows, the step is counted |
@@ -18,17 +18,17 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStep {
     pub(super) dt_s: f32,
-    /// Infinite unless the step is normal, so that no plain arithmetic can take it for one.
+    /// Infinite unless the step is normal, so no plain arithmetic mistakes it for a number.
     pub(super) half_dt_s: f32,
     pub(super) per_dt: f32,
 }
 
 impl TimeStep {
-    /// The longest step in seconds that is believed, unless [`new`](Self::new) says otherwise.
+    /// The longest step in seconds that counts in full, unless [`new`](Self::new) sets another.
     pub const MAX_S: f32 = 0.1;
 
-    /// Takes the seconds since the step before, of which up to [`MAX_S`](Self::MAX_S) are believed: for loops of more than 10 Hz.
-    /// A slower one sets its longest step with [`new`](Self::new).
+    /// Takes the seconds since the step before; up to [`MAX_S`](Self::MAX_S) counts in full: for loops of more than 10 Hz. A
+    /// slower loop sets its longest step with [`new`](Self::new).
     ///
     /// # Examples
     /// ```
@@ -42,14 +42,14 @@ impl TimeStep {
         Self::new(dt_s, Self::MAX_S)
     }
 
-    /// Takes the seconds since the step before and the longest step that is still believed.
+    /// Takes the seconds since the step before and the longest step that counts in full.
     ///
-    /// A `dt_max_s` that is NaN counts as infinite; with one of zero or less every step holds.
+    /// A `dt_max_s` of NaN counts as infinite; with a `dt_max_s` of zero or less every step holds.
     #[must_use]
     #[inline]
     pub const fn new(dt_s: f32, dt_max_s: f32) -> Self {
         let per_dt = 1.0 / dt_s;
-        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity are none of it.
+        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity fail it.
         if per_dt.to_bits().wrapping_sub(1) < f32::MAX.to_bits() {
             if dt_s > dt_max_s {
                 return Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
@@ -65,13 +65,13 @@ impl TimeStep {
         self.dt_s
     }
 
-    /// Tells whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
+    /// Returns whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
     #[must_use]
     pub const fn is_hold(&self) -> bool {
         self.dt_s <= 0.0
     }
 
-    /// Tells whether there is time and the inputs are finite; what is refused is counted, up to 65535.
+    /// Returns whether time has passed and the inputs are finite; refusals are counted, up to 65535.
     pub(super) const fn admits(&self, finite: bool, rejected: &mut u16) -> bool {
         let admitted = finite && !self.is_hold();
         if !admitted {
@@ -80,7 +80,7 @@ impl TimeStep {
         admitted
     }
 
-    /// Tells whether integral and derivative stay for this step: `dt_s` was above the maximum.
+    /// Returns whether integral and derivative stay for this step: `dt_s` was above the maximum.
     #[must_use]
     pub const fn is_frozen(&self) -> bool {
         self.dt_s > 0.0 && self.per_dt > f32::MAX
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_longest_step_that_is_none_holds_all_and_one_that_is_nan_freezes_none() {
+    fn a_longest_step_of_zero_holds_all_steps_and_a_longest_step_of_nan_freezes_no_step() {
         for dt_max_s in [0.0, -0.1, f32::NEG_INFINITY] {
             let step = TimeStep::new(0.001, dt_max_s);
             assert!(step.is_hold() && !step.is_frozen(), "{dt_max_s}");

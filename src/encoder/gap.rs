@@ -6,8 +6,8 @@ use super::{COUNTS_PER_TURN, shortest};
 /// Takes angle (counts) and speed (rpm) of the rotor before and after, the time between in µs, and the no-load speed of the
 /// motor (rotor rpm).
 ///
-/// Between two frames that are `T` apart the rotor moved about the mean of both reported speeds times `T`.
-/// The angle fixes the rest, as long as the estimate is off by less than half a rotor turn. Its error is at most
+/// Between two frames `T` apart, the rotor moved about the mean of both reported speeds times `T`. The angle fixes the
+/// rest, as long as the error of the estimate is less than half a rotor turn. This error is at most
 ///
 /// ```text
 /// |v1 - v0| / 2 * T    the speed may have changed early or late
@@ -15,9 +15,9 @@ use super::{COUNTS_PER_TURN, shortest};
 /// v * 1 ms             the ESC took its samples up to a period before they arrived
 /// ```
 ///
-/// The frame may also have waited, in a queue or in a driver that was polled late, and stand for a moment soon after
-/// the one before. So a way with a turn less in the same direction must not fit either: at speed `v` a gap of up to
-/// about one rotor turn is sure, a longer one is not.
+/// The frame may also have waited, in a queue or in a driver polled late, and describe a moment soon after the frame
+/// before. So a way with a turn less in the same direction must not fit either: at speed `v` a gap of up to about one
+/// rotor turn is sure, a longer gap is not.
 ///
 /// # Errors
 /// The nearest way, when the number of turns is in doubt.
@@ -66,7 +66,7 @@ pub fn resolve_gap(
     }
 }
 
-/// Tells whether one turn less, in the direction of the way, is a way that a frame from earlier could have seen.
+/// Returns whether one turn less, in the direction of the way, is possible for a frame from an earlier moment.
 fn fits_an_earlier_frame(counts: i32, slack: f32) -> bool {
     counts.unsigned_abs() as f32 + slack >= f32::from(COUNTS_PER_TURN)
 }
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_speed_may_have_done_in_between_is_allowed_for_and_no_more() {
+    fn a_possible_change_of_speed_in_between_is_accepted_and_no_more() {
         // From 0 to 3000 rpm in 4 ms, or back: 819.2 counts on the mean, and as many for an early or a late change;
         // 101.1 for a rise and fall in between; 409.6 for 1 ms at the faster speed: 1329.9.
         for (before, after) in [(0, 3000), (3000, 0)] {
@@ -130,7 +130,7 @@ mod tests {
         }
     }
     proptest! {
-        /// Law: a frame that waited is resolved exactly or flagged, however long it waited.
+        /// Law: a frame that waited is resolved exactly or flagged, for any time of waiting.
         #[test]
         fn a_frame_that_waited_is_never_silently_wrong(
             start in 0_u16..8192, rpm in -9256_i16..=9256, moved_us in 0_u32..30_000, waited_us in 0_u32..30_000,

@@ -25,17 +25,17 @@ impl GearRatio {
     /// The output shaft is the rotor.
     pub const DIRECT: Self = Self { rotor: 1, output: 1 };
 
-    /// Takes the turns of the rotor in the time that the output shaft makes `output` turns.
+    /// Takes the turns of the rotor during `output` turns of the output shaft.
     ///
     /// # Errors
-    /// When one of them is zero, when the output would turn more than twice as fast as the rotor, or when the
-    /// reduced fraction has more than 4096 rotor turns.
+    /// When a number is zero, when the output would turn more than twice as fast as the rotor, or when the reduced
+    /// fraction has more than 4096 rotor turns.
     pub const fn new(rotor: u16, output: u16) -> Result<Self, ConfigError> {
         let (mut divisor, mut rest) = (rotor, output);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
         }
-        // Both zero: NaN, which no range has.
+        // Both zero: NaN, outside of every range.
         let ratio = rotor as f32 / output as f32;
         check!(ConfigError::check_range("gear ratio", ratio, 0.5, 4_096.0));
         let Some(divisor) = NonZeroU16::new(divisor) else {

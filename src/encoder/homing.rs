@@ -1,4 +1,4 @@
-/// What is known of the absolute angle of an output shaft.
+/// Knowledge of the absolute angle of an output shaft.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -8,14 +8,14 @@ pub enum Homing {
     /// Geared, not zeroed yet: the position is relative to where the motor was at power-on.
     #[default]
     Relative,
-    /// Geared and zeroed: the position is relative to the zero that was set.
+    /// Geared and zeroed: the position is relative to the zero set.
     Homed,
     /// Was known, until a gap in the feedback left the number of turns in doubt.
     Uncertain,
 }
 
 impl Homing {
-    /// Tells whether an absolute angle may be commanded.
+    /// Returns whether an absolute angle may be commanded.
     #[must_use]
     pub const fn is_known(self) -> bool {
         matches!(self, Self::Absolute | Self::Homed)

@@ -4,14 +4,14 @@
 //! 13-bit angle ──shortest / resolve──> rotor counts moved ──Shaft──> turns: i64 + phase of the output shaft
 //! ```
 //!
-//! | item | what it does |
+//! | item | function |
 //! |---|---|
 //! | [`shortest`] | the way from one angle to the next, when less than half a rotor turn passed |
 //! | [`resolve_gap`] | the same across lost frames, with the reported speeds; says when it cannot know |
 //! | [`GearRatio`] | an exact fraction, 3591:187 say |
 //! | [`Shaft`] | turns and phase of the output shaft, in integers, for any number of turns |
 //! | [`Position`] | a multi-turn position as users write it |
-//! | [`Homing`] | what is known of the output shaft's absolute angle |
+//! | [`Homing`] | knowledge of the output shaft's absolute angle |
 //!
 //! All positions are exact: the phase of the output shaft is counted in rotor counts divided by the gear's
 //! denominator, so neither a float nor a 64-bit division takes part, and an `f32` is made only of the

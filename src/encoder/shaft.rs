@@ -1,4 +1,4 @@
-//! Turns and phase of an output shaft, and the positions that users write.
+//! Turns and phase of an output shaft, and the positions written by users.
 
 use super::{COUNTS_PER_TURN, GearRatio};
 use crate::units::Angle;
@@ -54,7 +54,7 @@ pub struct Shaft {
     fine_per_count: NonZeroI16,
 }
 
-/// Whole turns in 64 bits, in two halves: a struct that holds it needs no alignment to 8 bytes.
+/// Whole turns in 64 bits, in two halves: a struct with them needs no alignment to 8 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Turns {
     high: i32,
@@ -67,7 +67,7 @@ impl Turns {
         Self { high: (turns >> 32) as i32, low: turns.cast_unsigned() as u32 }
     }
 
-    /// Returns the lower half, for what is kept in the place of turns.
+    /// Returns the lower half, for values stored in the place of turns.
     pub(crate) const fn low(self) -> u32 {
         self.low
     }
@@ -83,7 +83,7 @@ impl Turns {
 }
 
 impl Shaft {
-    /// Takes the gear, and whether the rotor's positive direction is the shaft's negative one.
+    /// Takes the gear, and whether the rotor's positive direction is the shaft's negative direction.
     #[must_use]
     pub const fn new(gear: GearRatio, reversed: bool) -> Self {
         #[expect(clippy::cast_possible_wrap, reason = "a gear ratio has at most 8192 output turns")]
@@ -105,7 +105,7 @@ impl Shaft {
         self.rotor as i32 * COUNTS_PER_TURN as i32
     }
 
-    /// Tells whether the encoder sits on the output shaft: then its angle is known whatever was missed.
+    /// Returns whether the encoder sits on the output shaft: then its angle is known after any gap.
     #[must_use]
     pub const fn is_direct(&self) -> bool {
         self.rotor == 1 && self.fine_per_count.unsigned_abs().get() == 1
@@ -183,8 +183,8 @@ impl Shaft {
         Angle::from_radians(if radians < TAU { radians } else { BELOW_ONE_TURN })
     }
 
-    /// Returns the rotor's counts in the direction of the shaft, since the seed (which counts its angle) or
-    /// since zero was set; exact. After a position other than zero was set, rounded to whole counts.
+    /// Returns the rotor's counts in the direction of the shaft, since the seed (which counts its angle) or since zero
+    /// was set; exact. After a position other than zero was set, rounded to whole counts.
     #[must_use]
     #[inline]
     pub const fn rotor_counts(&self) -> i64 {
@@ -210,8 +210,8 @@ impl Shaft {
         }
     }
 
-    /// Returns the lower half of the turns of a located position; for one that is further away than 2^30 turns, of one
-    /// that is 2^30 turns away in that direction.
+    /// Returns the lower half of the turns of a located position; beyond a distance of 2^30 turns, the turns at 2^30
+    /// turns in that direction.
     #[must_use]
     pub(crate) const fn near(&self, turns: Turns) -> u32 {
         const FAR: i64 = 1 << 30;
@@ -226,8 +226,7 @@ impl Shaft {
         }
     }
 
-    /// Returns the way to a located position that was [near](Self::near), in radians: exact near zero, saturated at 63
-    /// turns.
+    /// Returns the way to a [near](Self::near) located position, in radians: exact near zero, saturated at 63 turns.
     #[must_use]
     #[inline]
     pub(crate) const fn way_to(&self, turns: u32, phase: i32) -> f32 {
@@ -258,7 +257,7 @@ impl Shaft {
     }
 }
 
-/// Says that a way is seldom taken: its code stands behind that of the other.
+/// Marks a way as seldom: its code stands behind the other way.
 #[cold]
 #[inline]
 const fn seldom() {}
@@ -321,7 +320,7 @@ impl Position {
         Self { turns, angle: Angle::ZERO }
     }
 
-    /// Takes any angle, which may be more than one turn; beyond 2^31 turns it saturates.
+    /// Takes any angle, also of more than one turn; saturates beyond 2^31 turns.
     #[must_use]
     pub const fn from_angle(angle: Angle) -> Self {
         let turns = angle.as_turns();
@@ -354,19 +353,19 @@ impl Position {
         self.angle
     }
 
-    /// Returns all of it in turns, rounded to `f32`: single rotor counts are lost after some hundred turns.
+    /// Returns the position in turns, rounded to `f32`: single rotor counts are lost after some hundred turns.
     #[must_use]
     pub const fn as_turns(self) -> f32 {
         self.turns as f32 + self.angle.as_turns()
     }
 
-    /// Returns all of it as one angle, rounded to `f32`.
+    /// Returns the position as one angle, rounded to `f32`.
     #[must_use]
     pub const fn as_angle(self) -> Angle {
         Angle::from_turns(self.as_turns())
     }
 
-    /// Tells whether the angle is neither NaN nor infinite.
+    /// Returns whether the angle is neither NaN nor infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.angle.is_finite()
@@ -441,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_way_is_at_most_half_a_turn_and_there_it_is_down() {
+    fn the_shortest_way_is_at_most_half_a_turn_and_half_a_turn_leads_down() {
         for (from, to, way) in [
             (0, 100, 100_i16),
             (0, 8092, -100),
@@ -604,7 +603,7 @@ mod position_tests {
     }
 
     #[test]
-    fn beyond_two_to_the_31_turns_it_saturates_on_a_whole_turn() {
+    fn a_position_beyond_two_to_the_31_turns_saturates_on_a_whole_turn() {
         for (degrees, turns) in [(3e12, 1 << 31), (-3e12, -1 << 31), (-f32::MAX, -1 << 31)] {
             let position = Position::from_angle(Angle::from_degrees(degrees));
             assert_eq!(position, Position::from_turns(turns), "{degrees}");

@@ -1,7 +1,7 @@
-//! The error of every configuration: which parameter, which value, which limits.
+//! The error of every configuration: the parameter, its value, its limits.
 //!
-//! A controller, a chassis, a gear, a transform and a motor of any family are all refused with one type, so a program that makes
-//! them needs one error type too:
+//! A controller, a chassis, a gear, a transform and a motor of any family are all refused with one type, so a program needs one
+//! error type too:
 //!
 //! ```
 //! use drivetrain::control::{Pid, PidConfig};
@@ -23,7 +23,7 @@
 
 use core::fmt;
 
-/// A parameter that cannot work, by its name; with the value and its limits where they are numbers.
+/// An invalid parameter, by its name; with the value and its limits if these are numbers.
 ///
 /// # Examples
 /// ```
@@ -40,76 +40,76 @@ use core::fmt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// It is negative, NaN or infinite, and must be zero or more.
+    /// The value is negative, NaN or infinite, and must be zero or more.
     Negative(&'static str),
-    /// It is zero, negative, NaN or infinite, and must be more than zero.
+    /// The value is zero, negative, NaN or infinite, and must be more than zero.
     NotPositive(&'static str),
-    /// It is zero, negative or NaN, and must be more than zero; an infinite limit limits nothing.
+    /// The value is zero, negative or NaN, and must be more than zero; an infinite limit limits nothing.
     NotAboveZero(&'static str),
-    /// Its lower end is not below its upper end, or one of them is NaN or infinite.
+    /// The lower end is not below the upper end, or an end is NaN or infinite.
     Reversed(&'static str),
-    /// It is too fast for the time step: the result would overshoot or grow without bound.
+    /// The value is too fast for the time step: the result would overshoot or grow without bound.
     Unstable(&'static str),
-    /// It is NaN or infinite.
+    /// The value is NaN or infinite.
     NotFinite(&'static str),
-    /// It is outside of the range that its documentation gives.
+    /// The value is outside of the documented range.
     Unusable(&'static str),
-    /// It does not go together with another parameter.
+    /// The parameter excludes another parameter.
     Conflict(&'static str),
-    /// It is where the change starts, so that there is none.
+    /// The value equals the start of the change, so there is no change.
     NoChange(&'static str),
-    /// It is outside of the range that the documentation gives, where `f32` is not exact enough.
+    /// The value is outside of the documented range, where `f32` is not exact enough.
     OutOfRange(&'static str),
-    /// A [`RelayTuner`](crate::control::RelayTuner) saw no steady swing within this time: too small an amplitude, a bias that does
-    /// not hold, or too much hysteresis.
+    /// A [`RelayTuner`](crate::control::RelayTuner) saw no steady swing within this time: too small an amplitude, a bias that
+    /// does not hold, or too much hysteresis.
     OutOfTime(&'static str),
     /// A half-period has fewer than [`RelayTuner::LEAST_SAMPLES`](crate::control::RelayTuner::LEAST_SAMPLES) samples: take more of
     /// this, less amplitude or a faster loop.
     TooFewSamples(&'static str),
-    /// The swing is no larger than this, or beyond `f32`, so that no gain follows from it.
+    /// The swing is no larger than this, or beyond `f32`, so it gives no gain.
     NoGain(&'static str),
-    /// The wheels leave a direction of motion undetermined, or nearly: the named one, or several.
+    /// The wheels leave a direction of motion undetermined, or nearly: the named direction, or several.
     ///
-    /// That is when the condition number of their normal equations is above 1000: a motion then shows in the wheels with
-    /// less than about 3 % of the strongest. A turn counts in m, at the mean distance of the wheels from the origin.
+    /// The condition number of their normal equations is then above 1000: a motion shows in the wheels with less than
+    /// about 3 % of the strongest. A turn counts in m, at the mean distance of the wheels from the origin.
     Singular(&'static str),
-    /// A loop, by its name, and its parameter, which cannot work.
+    /// A loop, by its name, and its invalid parameter.
     Loop(&'static str, &'static str),
-    /// The model, or its firmware, does not have it.
+    /// The model, or its firmware, does not have the parameter.
     Unsupported(&'static str),
-    /// A register that cannot be written.
+    /// A register not open for writing.
     ReadOnly(&'static str),
-    /// A register, and the value that it cannot hold.
+    /// A register, and a value outside of its range.
     CannotHold(&'static str, f32),
-    /// A counter whose frequency has no ratio to 1 MHz that fits 32 bits.
+    /// A counter whose frequency has no ratio to 1 MHz within 32 bits.
     Ratio {
-        /// The frequency that was given, in Hz.
+        /// The given frequency, in Hz.
         ticks_per_second: u32,
     },
-    /// A value that is not from `least` to `most`.
+    /// A value outside of `least` to `most`.
     Range {
         /// The name of the parameter, with its unit.
         parameter: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: f32,
-        /// The least that is allowed.
+        /// The least allowed value.
         least: f32,
-        /// The most that is allowed.
+        /// The largest allowed value.
         most: f32,
     },
-    /// A limit that is not above 0 and at most `most`.
+    /// A limit outside of the range above 0 and up to `most`.
     Limit {
         /// The name of the parameter, with its unit.
         parameter: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: f32,
-        /// The most that is allowed.
+        /// The largest allowed value.
         most: f32,
     },
 }
 
 impl ConfigError {
-    /// Returns the name of the parameter, as it stands in the `with_*` method or the constructor.
+    /// Returns the name of the parameter, as in the `with_*` method or the constructor.
     #[must_use]
     pub const fn parameter(&self) -> &'static str {
         match *self {
@@ -137,7 +137,7 @@ impl ConfigError {
         }
     }
 
-    /// Lets a limit pass that is above 0 and at most `most`.
+    /// Accepts a limit above 0 and at most `most`.
     pub(crate) const fn check_limit(
         parameter: &'static str,
         value: f32,
@@ -147,7 +147,7 @@ impl ConfigError {
         if is_valid { Ok(()) } else { Err(Self::Limit { parameter, value, most }) }
     }
 
-    /// Lets a value pass that is from `least` to `most`.
+    /// Accepts a value from `least` to `most`.
     pub(crate) const fn check_range(
         parameter: &'static str,
         value: f32,

@@ -1,7 +1,7 @@
-//! The plain CAN frame that the core works on.
+//! The plain CAN frame of the core.
 //!
-//! A driver's own frame type is copied into a [`CanFrame`] at the door ([`CanFrame::copy_of`]) and built
-//! from one on the way out ([`CanFrame::convert`]); in between, the crate knows no driver.
+//! A driver's own frame type is copied into a [`CanFrame`] on the way in ([`CanFrame::copy_of`]) and built from it on
+//! the way out ([`CanFrame::convert`]); in between, the crate knows no driver.
 //!
 //! ```text
 //! CanFrame = header (29-bit id, extended flag, remote flag) + length 0..=8 + data, zero beyond the length
@@ -23,11 +23,11 @@ use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
 const EXTENDED: u32 = 1 << 29;
 const REMOTE: u32 = 1 << 30;
-/// Bytes are missing: one comparison tells a whole standard data frame from all others.
+/// Bytes are missing: one comparison distinguishes a whole standard data frame from all others.
 const SHORT: u32 = 1 << 31;
 pub(crate) const ID_MASK: u32 = 0x1FFF_FFFF;
 
-/// 0 to 8. The compiler knows that there is no other, so that no frame and a frame take the same room.
+/// 0 to 8. With this bound known to the compiler, an optional frame takes the room of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 enum Length {
@@ -106,7 +106,7 @@ impl CanFrame {
         frame
     }
 
-    /// Copies a frame of any driver; `None` when it carries more than 8 bytes.
+    /// Copies a frame of any driver; `None` for a frame of more than 8 bytes.
     #[must_use]
     pub fn copy_of(frame: &impl Frame) -> Option<Self> {
         if frame.is_remote_frame() {
@@ -119,8 +119,8 @@ impl CanFrame {
     /// An empty frame, to be written over.
     pub(crate) const EMPTY: Self = Self { key: SHORT, data: [0; 8], length: Length::L0 };
 
-    /// [`copy_of`](Self::copy_of) in the place of this frame, which stays when there is none; tells whether there is one.
-    // In place: a frame that is returned is moved three times on its way.
+    /// [`copy_of`](Self::copy_of) in the place of this frame; returns whether there is a copy, and otherwise leaves this
+    /// frame unchanged. In place: a returned frame is moved three times on its way.
     #[inline(always)]
     pub(crate) fn copy_from(&mut self, frame: &impl Frame) -> bool {
         if !frame.is_remote_frame() {
@@ -140,7 +140,7 @@ impl CanFrame {
         copy.is_some()
     }
 
-    /// Builds a driver's frame with the same content; `None` when the driver's type cannot hold it.
+    /// Builds a driver's frame with the same content; `None` when the driver's type cannot hold the content.
     #[must_use]
     pub fn convert<F: Frame>(&self) -> Option<F> {
         if self.is_remote_frame() {
@@ -152,31 +152,31 @@ impl CanFrame {
 
     /// Returns the id, extended flag and remote flag as one word.
     ///
-    /// For a standard data frame, and only for that, it is at most `0x7FF`: one comparison tells all three.
+    /// At most `0x7FF` for a standard data frame, and only then: one comparison checks all three.
     #[must_use]
     pub const fn header(&self) -> u32 {
         self.key & !SHORT
     }
 
-    /// Returns all 8 data bytes; those beyond the length are zero.
+    /// Returns all 8 data bytes; the bytes beyond the length are zero.
     #[must_use]
     pub const fn bytes(&self) -> &[u8; 8] {
         &self.data
     }
 
-    /// Returns the number of data bytes, or the length that a remote frame asks for: 0 to 8.
+    /// Returns the number of data bytes, or the requested length of a remote frame: 0 to 8.
     #[must_use]
     pub const fn length(&self) -> u8 {
         self.length as u8
     }
 
-    /// Returns the [header](Self::header) of a frame of 8 bytes. It is another one for frames with fewer, and above `0x7FF`.
+    /// Returns the [header](Self::header) of a frame of 8 bytes. Frames with fewer bytes have another key, above `0x7FF`.
     #[inline]
     pub(crate) const fn key(&self) -> u32 {
         self.key
     }
 
-    /// Tells whether this is a standard data frame of 8 bytes.
+    /// Returns whether this is a standard data frame of 8 bytes.
     #[inline]
     pub(crate) const fn is_whole(&self) -> bool {
         self.key <= 0x7FF

@@ -47,16 +47,17 @@ impl Arc {
 }
 
 impl Twist<Body> {
-    /// Returns the stretch that this twist makes in `dt_s` seconds.
+    /// Returns the stretch of this twist in `dt_s` seconds.
     pub(crate) const fn over(self, dt_s: f32) -> Arc {
         Arc::new(self.vx_m_s * dt_s, self.vy_m_s * dt_s, self.wz_rad_s * dt_s)
     }
 
-    /// Returns the twist that, held for `dt_s`, ends where `self` would with its direction fixed in space.
+    /// Returns the twist that, held for `dt_s`, ends at the pose of `self` with its direction fixed in space.
     ///
-    /// A command to go forward and turn means: straight ahead as the body stands now. Held for a period, it bends
-    /// into an arc, and the robot skews off by half the turn of a period. This takes the bend off.
-    /// Turns of more than half a revolution in a period, and a `dt_s` that is not finite, leave the twist as it is.
+    /// A command to go forward and turn means: straight ahead in the present direction of the body. Held for a period,
+    /// the command bends into an arc, and the robot skews off by half the turn of a period. This function removes the
+    /// bend. Turns of more than half a revolution in a period, and a `dt_s` that is not finite, leave the twist
+    /// unchanged.
     ///
     /// # Examples
     /// ```

@@ -1,4 +1,4 @@
-/// The frame of the chassis: x forward, y left, origin where the kinematics put it (the centre of the wheels).
+/// The frame of the chassis: x forward, y left, origin at the origin of the kinematics (the centre of the wheels).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Body {}
@@ -8,7 +8,7 @@ pub enum Body {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum World {}
 
-/// The frame of what the driver looks through: x where the gimbal points, turned against the chassis by its yaw.
+/// The frame of the driver's view: x in the direction of the gimbal, turned against the chassis by its yaw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Gimbal {}

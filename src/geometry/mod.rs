@@ -1,4 +1,4 @@
-//! Vectors, rotations, transforms and twists that cannot be mixed up: the frame is part of the type.
+//! Vectors, rotations, transforms and twists with their frame in the type, so frames cannot be mixed up.
 //!
 //! ```text
 //!                x  forward
@@ -14,7 +14,7 @@
 //!
 //! These axes hold for the whole crate: the body frame of a chassis, and any other frame that carries a name.
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Vec2`], [`Vec3`] | plain numbers along the axes, without a frame |
 //! | [`Point2`], [`Point3`] | a place in a frame |
@@ -26,7 +26,7 @@
 //! | [`Body`], [`World`], [`Gimbal`] | names of frames |
 //!
 //! A frame of your own is any type: `#[derive(Debug, PartialEq)] enum Camera {}`. The names cost nothing at run time.
-//! What they cannot see: two robots whose frames have the same name, and numbers of the wrong unit.
+//! The types do not distinguish two robots whose frames have the same name, nor numbers of the wrong unit.
 //!
 //! The types catch a twist of the wrong frame:
 //!

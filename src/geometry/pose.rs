@@ -4,7 +4,7 @@ use crate::math::wrap_pi;
 use crate::units::Angle;
 use core::marker::PhantomData;
 
-/// A position and a direction in the plane, in the frame `F`: what an odometry reports and a person reads.
+/// A position and a direction in the plane, in the frame `F`: as reported by an odometry and read by a person.
 ///
 /// # Examples
 /// ```
@@ -69,7 +69,7 @@ impl<F> Pose2<F> {
         Heading::new(self.angle)
     }
 
-    /// Returns the transform from the frame that stands at this pose.
+    /// Returns the transform from the frame at this pose.
     #[must_use]
     pub const fn to_transform<Own>(self) -> Transform2<Own, F> {
         Transform2::new(Rotation2::new(self.angle), Vec2::new(self.x_m, self.y_m))

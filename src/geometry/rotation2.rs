@@ -2,11 +2,11 @@ use super::Vec2;
 use crate::math::{atan2, sin_cos};
 use crate::units::Angle;
 
-/// A turn in the plane, kept as a unit vector (cosine, sine): no trigonometry when it is applied.
+/// A turn in the plane, kept as a unit vector (cosine, sine): applying it needs no trigonometry.
 ///
 /// Counter-clockwise is positive. Every composition rounds: after 10^6 of them the vector's length is up to 10 % off and
-/// its angle up to 1e-3 rad. [`normalized`](Self::normalized), once in a thousand, keeps the length to 2e-7. What is read
-/// with `serde` is brought back to length 1; without a length it is refused.
+/// its angle up to 1e-3 rad. [`normalized`](Self::normalized), once in a thousand, keeps the length to 2e-7. A value read
+/// with `serde` is brought back to length 1; a value without a length is refused.
 ///
 /// # Examples
 /// ```
@@ -83,7 +83,7 @@ impl Rotation2 {
         Self { cos: self.cos, sin: -self.sin }
     }
 
-    /// Returns the same turn with its vector brought back to length 1, for lengths within 10 % of it.
+    /// Returns the same turn with its vector brought back to length 1, for lengths within 10 % of 1.
     #[must_use]
     pub const fn normalized(self) -> Self {
         // One Newton step of 1/sqrt at 1: an error e of the length becomes 1.5 e^2.
@@ -91,9 +91,9 @@ impl Rotation2 {
         Self { cos: self.cos * scale, sin: self.sin * scale }
     }
 
-    /// Returns the turn that lies the fraction `t` of the shorter way from `self` to `other`.
+    /// Returns the turn at the fraction `t` of the shorter way from `self` to `other`.
     ///
-    /// `t` = 0 gives `self`, 1 gives `other`; values outside go on in the same direction.
+    /// `t` = 0 gives `self`, 1 gives `other`; values outside continue in the same direction.
     #[must_use]
     pub fn interpolate(self, other: Self, t: f32) -> Self {
         let step = self.inverse().compose(other).angle() * t;
@@ -114,10 +114,10 @@ pub(super) fn angle_of(sin: f32, cos: f32) -> f32 {
     angle
 }
 
-/// The direction that the chassis faces in the world, with its sine and cosine at hand.
+/// The direction of the chassis in the world, with its sine and cosine at hand.
 ///
-/// Make it once a tick from the gyroscope's yaw: every conversion of that tick then costs four products.
-/// The angle may have any number of turns. With `serde` it is the angle alone.
+/// Make it once a tick from the gyroscope's yaw: every conversion of that tick then costs four products. The angle may
+/// have any number of turns. With `serde`, only the angle is stored.
 ///
 /// # Examples
 /// ```
@@ -146,7 +146,7 @@ impl Heading {
         Self { angle, rotation: Rotation2::new(angle) }
     }
 
-    /// Returns the angle as it was given.
+    /// Returns the angle as given.
     #[must_use]
     pub const fn angle(self) -> Angle {
         self.angle
@@ -158,7 +158,7 @@ impl Heading {
         self.rotation
     }
 
-    /// Tells whether the angle is neither NaN nor infinite.
+    /// Returns whether the angle is neither NaN nor infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.angle.is_finite()

@@ -5,8 +5,9 @@ use crate::error::ConfigError;
 use crate::math::{sin_cos, sqrt};
 use crate::units::Angle;
 
-/// A turn in space, kept as a unit quaternion; every composition brings its length back to 1, and so does reading it with
-/// `serde`, which refuses one without a length. After 10^6 compositions the length is right to 2e-7, the angle to 3e-3 rad.
+/// A turn in space, kept as a unit quaternion; every composition brings its length back to 1, and so does reading with
+/// `serde`, which refuses a quaternion without a length. After 10^6 compositions the length is right to 2e-7, the angle to
+/// 3e-3 rad.
 ///
 /// # Examples
 /// ```
@@ -26,7 +27,7 @@ pub struct Rotation3 {
     vector: Vec3,
 }
 
-/// The cosine of pitch below which it counts as 90 degrees: what rounding leaves there is up to 5e-7.
+/// The cosine of pitch below which the pitch counts as 90 degrees: rounding leaves up to 5e-7 there.
 const LOCKED: f32 = 2e-6;
 
 impl Rotation3 {
@@ -112,7 +113,7 @@ impl Rotation3 {
         Angle::from_radians(2.0 * angle_of(self.vector.norm(), self.w.abs()))
     }
 
-    /// Returns the turn that lies the fraction `t` of the shorter way from `self` to `other`, at constant speed.
+    /// Returns the turn at the fraction `t` of the shorter way from `self` to `other`, at constant speed.
     ///
     /// `t` = 0 gives `self`, 1 gives `other`. For half turns either way is the shorter one.
     #[must_use]
@@ -122,7 +123,7 @@ impl Rotation3 {
         let length = way.vector.norm();
         let half = angle_of(length, way.w * side);
         let (sin, cos) = sin_cos(half * t);
-        // sin(half t) / sin(half), which is t where both vanish.
+        // sin(half t) / sin(half), equal to t where both vanish.
         let share = if length < 1e-4 { t } else { sin / length };
         self.compose(Self { w: cos, vector: way.vector * (side * share) })
     }
@@ -130,10 +131,10 @@ impl Rotation3 {
     /// Returns the three angles: pitch in -90..=90 degrees, the others in -180..=180.
     ///
     /// At a pitch of ±90 degrees (to 2e-6 rad) roll and yaw turn about the same axis: the gimbal is locked. Roll is then 0
-    /// and yaw takes all: yaw - roll when the nose points down (+90), yaw + roll when it points up.
+    /// and yaw takes all: yaw - roll when the nose points down (+90), yaw + roll when the nose points up.
     ///
     /// The three angles make the same turn again to 1e-6 rad, at the lock to 5e-6. Roll and yaw each are less exact near
-    /// the lock, their errors cancel: with `d` rad left to it, each is right to some 1e-6/`d` rad.
+    /// the lock, their errors cancel: at a distance of `d` rad, each is right to some 1e-6/`d` rad.
     ///
     /// # Examples
     /// ```
@@ -155,7 +156,7 @@ impl Rotation3 {
         } else {
             let yaw = angle_of(r10, r00);
             let (sin, cos) = (r10 / level, r00 / level);
-            // Roll is what is left after yaw, so that errors of yaw near the lock cancel in the whole.
+            // Roll is the rest after yaw, so errors of yaw near the lock cancel in the whole.
             (angle_of(sin * r02 - cos * r12, cos * r11 - sin * r01), yaw)
         };
         [roll, pitch, yaw].map(Angle::from_radians)
@@ -186,7 +187,7 @@ impl Rotation3 {
         Ok(Self::from_rows(matrix))
     }
 
-    /// Lets rows pass that are those of a rotation, to 1e-3.
+    /// Accepts the rows of a rotation, to 1e-3.
     pub(super) fn check_rows([x, y, z]: [Vec3; 3]) -> Result<(), ConfigError> {
         if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(ConfigError::NotFinite("matrix"));
@@ -205,7 +206,7 @@ impl Rotation3 {
         Self { w, vector }
     }
 
-    /// Divides by the largest of w, x, y, z (Shepperd), so that nothing cancels. The rows are trusted.
+    /// Divides by the largest of w, x, y, z (Shepperd), so nothing cancels. The rows are trusted.
     pub(super) fn from_rows(matrix: [[f32; 3]; 3]) -> Self {
         let [[r00, r01, r02], [r10, r11, r12], [r20, r21, r22]] = matrix;
         let (w, x, y, z) = if r00 + r11 + r22 > 0.0 {
@@ -271,7 +272,7 @@ mod tests {
 
     type Quaternion = [f64; 4];
 
-    /// The quaternion of three angles as they are in `f32`, without rounding.
+    /// The quaternion of three angles as given in `f32`, without rounding.
     fn exact(angles: [Angle; 3]) -> Quaternion {
         let half = |angle: Angle| (0.5 * f64::from(angle.as_radians())).sin_cos();
         let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(half);
@@ -305,7 +306,7 @@ mod tests {
     const ROUNDING: f64 = 1e-6;
 
     #[test]
-    fn at_gimbal_lock_roll_is_zero_yaw_takes_all_and_near_it_the_turn_is_the_same() {
+    fn at_gimbal_lock_roll_is_zero_and_yaw_takes_all_and_nearby_the_turn_is_the_same() {
         for away in [0.0, 1e-7, 1e-6, 2e-6, 3e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
             for (side, roll, yaw) in grid() {
                 let (roll, yaw) = (0.2617 * roll, 0.2619 * yaw);
@@ -316,7 +317,7 @@ mod tests {
                 assert!(between(exact(wanted), in_f64(made)) < ROUNDING, "{wanted:?}");
                 let read = made.roll_pitch_yaw();
                 let [read_roll, read_pitch, read_yaw] = read;
-                // What is left of roll at the lock is taken for none: twice the 2e-6 rad that count as lock.
+                // A rest of roll at the lock counts as none: twice the 2e-6 rad that count as lock.
                 let bound = if read_roll == Angle::ZERO { 4e-6 } else { 0.0 } + ROUNDING;
                 assert!(between(exact(read), in_f64(made)) < bound, "{wanted:?} {read:?}");
                 assert!((read_pitch.as_radians() - pitch).abs() < 1e-6, "{wanted:?} {read:?}");
@@ -377,7 +378,8 @@ mod tests {
         }
         let length = sqrt(whole.w * whole.w + whole.vector.dot(whole.vector));
         assert!((length - 1.0).abs() < 2e-7, "{length}");
-        // What the step really turns, in f64: its rounding would otherwise be counted a million times.
+        // The real turn of the step, in f64: its rounding would otherwise be counted a million
+        // times.
         let each = 2.0 * f64::from(step.vector.z).atan2(f64::from(step.w));
         let expected = (each * 1e6).rem_euclid(core::f64::consts::TAU);
         let is = f64::from(whole.roll_pitch_yaw()[2].as_radians());
@@ -429,7 +431,7 @@ mod tests {
             let half = a.interpolate(b, 0.5);
             let there = a.inverse().compose(half).angle().as_radians();
             let rest = half.inverse().compose(b).angle().as_radians();
-            // A few roundings of an angle of up to half of pi, also where the arc tangent is the coarse one.
+            // A few roundings of an angle of up to half of pi, also with the coarse arc tangent.
             prop_assert!((there - rest).abs() < 2e-6, "{there} {rest}");
             prop_assert!(there < core::f32::consts::FRAC_PI_2 + 1e-6);
             prop_assert!((2.0 * there - a.inverse().compose(b).angle().as_radians()).abs() < 2e-6);

@@ -1,4 +1,4 @@
-//! What values with an invariant look like in a file, and how they are taken back: checked, or brought into form.
+//! The form of values with an invariant in a file, and their reading: checked, or brought into form.
 
 use super::{Rotation2, Rotation3, Transform3, Vec2, Vec3};
 use crate::error::ConfigError;

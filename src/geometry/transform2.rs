@@ -5,7 +5,7 @@ use super::{Body, Point2, Pose2, Rotation2, Twist, Vec2};
 use crate::error::ConfigError;
 use core::marker::PhantomData;
 
-/// Where the frame `From` stands in the frame `To`; applied to a point in `From` it gives the point in `To`.
+/// Place of the frame `From` in the frame `To`; applied to a point in `From`, gives the point in `To`.
 ///
 /// # Examples
 /// ```
@@ -124,7 +124,7 @@ impl<From, To> Transform2<From, To> {
         Self::new(self.rotation.interpolate(other.rotation, t), self.translation_m + way * t)
     }
 
-    /// Returns where a body stands after `dt_s` seconds at the constant `twist`, seen from where it started: the exponential.
+    /// Returns the pose of a body after `dt_s` seconds at the constant `twist`, seen from its start: the exponential.
     ///
     /// # Examples
     /// ```
@@ -251,8 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_a_million_composed_steps_ends_where_it_began() {
-        // 1 m radius; of each step what f32 makes of it, a million times: the last place of the turn counts.
+    fn a_circle_of_a_million_composed_steps_ends_at_its_start() {
+        // 1 m radius; each step as rounded to f32, a million times: the last place of the turn
+        // counts.
         let step = Transform2::<Body, Body>::exp(Twist::new(TAU * 1e-6, 0.0, TAU * 1e-6), 1.0);
         let mut end = BodyToWorld::IDENTITY;
         for count in 1..=1_000_000 {
@@ -292,7 +293,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_transform_after_its_inverse_and_before_it_changes_nothing(t in transforms()) {
+        fn a_transform_composed_with_its_inverse_in_either_order_changes_nothing(t in transforms()) {
             let nothing = t.inverse().compose(t);
             prop_assert!(nothing.translation_m().norm() < 1e-5);
             prop_assert!(nothing.rotation().angle().as_radians().abs() < 1e-6);
@@ -302,7 +303,7 @@ mod tests {
         }
 
         #[test]
-        fn a_chain_takes_a_point_where_its_links_take_it_in_turn(
+        fn a_chain_moves_a_point_as_its_links_in_turn(
             a in transforms(), b in loops(), x in -10.0_f32..10.0, y in -10.0_f32..10.0
         ) {
             let point = Point2::<Body>::new(x, y);

@@ -4,15 +4,15 @@ use super::{Point3, Rotation3, Vec3};
 use crate::error::ConfigError;
 use core::marker::PhantomData;
 
-/// Where the frame `From` stands in the frame `To`, in space; applied to a point in `From` it gives the point in `To`.
+/// Place of the frame `From` in the frame `To`, in space; applied to a point in `From`, gives the point in `To`.
 ///
-/// It is also the pose of a thing in space: [`rotation`](Self::rotation) is its orientation, [`translation_m`](Self::translation_m)
-/// its position, [`relative_to`](Self::relative_to) the same as seen from another pose.
+/// A transform is also the pose of a thing in space: [`rotation`](Self::rotation) is its orientation,
+/// [`translation_m`](Self::translation_m) its position, [`relative_to`](Self::relative_to) the same as seen from another pose.
 ///
 /// The turn is kept as a matrix, which is cheaper to apply than a quaternion. After 10^6 compositions its rows are some per
 /// cent off. With [`normalized`](Self::normalized) once in a thousand they stay right, and 10^6 composed steps add up to
-/// less than 0.04 rad and 5e-3 of the largest distance on the way; a [`Rotation3`] is ten times as exact.
-/// Read with `serde`, rows that are off by more than 1e-3 are refused.
+/// less than 0.04 rad and 5e-3 of the largest distance on the way; a [`Rotation3`] is ten times as exact. In reading with
+/// `serde`, rows with an error above 1e-3 are refused.
 ///
 /// # Examples
 /// ```
@@ -240,7 +240,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_transform_after_its_inverse_and_before_it_changes_nothing(t in transforms()) {
+        fn a_transform_composed_with_its_inverse_in_either_order_changes_nothing(t in transforms()) {
             let nothing = t.inverse().compose(t);
             prop_assert!(nothing.translation_m().norm() < 2e-5);
             prop_assert!(nothing.rotation().angle().as_radians() < 5e-6);
@@ -258,7 +258,7 @@ mod tests {
         }
 
         #[test]
-        fn a_chain_takes_a_point_where_its_links_take_it_in_turn(
+        fn a_chain_moves_a_point_as_its_links_in_turn(
             a in transforms(), b in loops(), x in -10.0_f32..10.0, y in -10.0_f32..10.0, z in -10.0_f32..10.0
         ) {
             let point = Point3::<Body>::new(x, y, z);

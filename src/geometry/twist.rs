@@ -53,7 +53,7 @@ impl<F> Twist<F> {
         Self::new(self.vx_m_s, self.vy_m_s, wz_rad_s)
     }
 
-    /// Tells whether no part is NaN or infinite.
+    /// Returns whether no part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.vx_m_s.is_finite() && self.vy_m_s.is_finite() && self.wz_rad_s.is_finite()
@@ -72,7 +72,7 @@ impl<F> Default for Twist<F> {
 }
 
 impl Twist<World> {
-    /// Returns the same motion as the chassis sees it: turned by minus the heading.
+    /// Returns the same motion as seen by the chassis: turned by minus the heading.
     #[must_use]
     pub const fn to_body(self, heading: Heading) -> Twist<Body> {
         self.turned(heading.rotation().inverse())
@@ -80,7 +80,7 @@ impl Twist<World> {
 }
 
 impl Twist<Gimbal> {
-    /// Returns the same motion as the chassis sees it; `yaw` is the gimbal's turn against the chassis.
+    /// Returns the same motion as seen by the chassis; `yaw` is the gimbal's turn against the chassis.
     #[must_use]
     pub const fn to_body_by_yaw(self, yaw: Heading) -> Twist<Body> {
         self.turned(yaw.rotation())
@@ -88,7 +88,7 @@ impl Twist<Gimbal> {
 }
 
 impl Twist<Body> {
-    /// Returns the same motion as the world sees it: turned by the heading.
+    /// Returns the same motion as seen in the world: turned by the heading.
     #[must_use]
     pub const fn to_world(self, heading: Heading) -> Twist<World> {
         self.turned(heading.rotation())
@@ -110,9 +110,9 @@ impl Twist<Body> {
         Vec2::new(self.vx_m_s - self.wz_rad_s * point_m.y, self.vy_m_s + self.wz_rad_s * point_m.x)
     }
 
-    /// Returns the motion of the origin that gives the point at `center_m` the velocity of `self`.
+    /// Returns the motion of the origin at which the point `center_m` has the velocity of `self`.
     ///
-    /// With a pure rotation the chassis then turns about that point.
+    /// With a pure rotation the chassis then turns about this point.
     ///
     /// # Examples
     /// ```

@@ -71,7 +71,7 @@ impl Vec2 {
         sqrt(self.dot(self))
     }
 
-    /// Tells whether neither part is NaN or infinite.
+    /// Returns whether neither part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite()
@@ -110,7 +110,7 @@ impl Vec3 {
         sqrt(self.dot(self))
     }
 
-    /// Tells whether no part is NaN or infinite.
+    /// Returns whether no part is NaN or infinite.
     #[must_use]
     pub const fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
@@ -151,7 +151,7 @@ macro_rules! linear {
 }
 pub(super) use linear;
 
-/// Makes a value copyable whatever its frames are: they are names only.
+/// Makes a value copyable for all frames: these are names only.
 macro_rules! copy {
     ($name:ident <$($frame:ident),+>) => {
         impl<$($frame),+> Clone for $name<$($frame),+> {

@@ -1,4 +1,4 @@
-//! The few elementary functions that motor control needs, in `f32`, small and fast on a Cortex-M4F.
+//! The few elementary functions of motor control, in `f32`, small and fast on a Cortex-M4F.
 //!
 //! | function | result | largest error, measured |
 //! |---|---|---|

@@ -1,7 +1,7 @@
 /// Returns the square root of `x`; NaN for a negative `x`.
 ///
-/// Rounded correctly with the feature `libm`; within one unit in the last place without it. `micromath` is
-/// never used here: its square root is up to 6 % off.
+/// Rounded correctly with the feature `libm`; within one unit in the last place otherwise. `micromath` is never used
+/// here: its square root is up to 6 % off.
 ///
 /// # Examples
 /// ```
@@ -20,9 +20,9 @@ pub fn sqrt(x: f32) -> f32 {
     }
 }
 
-/// Returns the cube root of a positive `x`, to two units in the last place, and 0 for everything else that is not above 1e-37.
+/// Returns the cube root of a positive `x`, to two units in the last place, and 0 for every `x` that is not above 1e-37.
 ///
-/// A third of the exponent for a start that is 5 % off at most, then three steps of Newton's rule.
+/// A third of the exponent for a start with an error of 5 % at most, then three steps of Newton's rule.
 pub(crate) const fn cube_root(x: f32) -> f32 {
     if x.is_nan() || x <= 1e-37 {
         return 0.0;
@@ -33,7 +33,7 @@ pub(crate) const fn cube_root(x: f32) -> f32 {
     (2.0 * root + x / (root * root)) * (1.0 / 3.0)
 }
 
-/// Halves the exponent for a start that is 4 % off at most, then squares that error three times.
+/// Halves the exponent for a start with an error of 4 % at most, then squares the error three times.
 #[cfg(any(test, not(feature = "libm")))]
 const fn newton(x: f32) -> f32 {
     const SUBNORMAL_SCALE: f32 = 16_777_216.0; // 4096 squared
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_root_is_nan_and_the_ends_stay() {
+    fn a_negative_square_root_is_nan_and_the_ends_stay() {
         for root in [sqrt, newton] {
             assert!(
                 root(-1e-30).is_nan()

@@ -5,9 +5,9 @@ use core::f32::consts::FRAC_PI_2;
 
 /// Returns the sine and the cosine of `x` radians.
 ///
-/// The largest error is 1.6e-7 in ±π and 1.8e-7 up to ±1000; beyond, it grows with the spacing of `f32` at `x`
-/// (half of it, 0.03 at a million). Past 6.5 million radians, where neighbouring values lie half a radian apart,
-/// the angle counts as 0. NaN and infinity give NaN. Takes the same number of instructions for every argument.
+/// The largest error is 1.6e-7 in ±π and 1.8e-7 up to ±1000; beyond, the error grows with the spacing of `f32` at `x`
+/// (half of it, 0.03 at a million). Past 6.5 million radians, where neighbouring values lie half a radian apart, the
+/// angle counts as 0. NaN and infinity give NaN. Takes the same number of instructions for every argument.
 ///
 /// A quarter turn is taken off in two parts (Cody and Waite), the rest goes through minimax polynomials.
 ///
@@ -23,7 +23,7 @@ use core::f32::consts::FRAC_PI_2;
 #[inline]
 pub const fn sin_cos(x: f32) -> (f32, f32) {
     const LARGEST: f32 = 6.5e6;
-    // The upper part has 12 bits, so up to 4096 quarter turns times it is exact.
+    // The upper part has 12 bits, so its product with up to 4096 quarter turns is exact.
     const UPPER: f32 = 1.570_800_8;
     const LOWER: f32 = -4.454_455e-6;
     let x = if x.abs() > LARGEST { x * 0.0 } else { x };
@@ -44,9 +44,9 @@ pub const fn sin_cos(x: f32) -> (f32, f32) {
 
 /// Returns the angle of the vector (`x`, `y`) in radians, -π..=π, counter-clockwise from the x axis.
 ///
-/// The largest error is 3.2e-7; with the feature `micromath` it is 0.005, at fewer instructions, for
-/// vectors of a length from 1e-15 to 1e15, and on the negative x axis either of ±π. The zero vector has the angle 0.
-/// NaN in either argument gives NaN; so may an infinite one.
+/// The largest error is 3.2e-7; with the feature `micromath`, 0.005, at fewer instructions, for vectors of a length
+/// from 1e-15 to 1e15, and on the negative x axis either of ±π. The zero vector has the angle 0. NaN in either argument
+/// gives NaN; infinity may give NaN.
 ///
 /// # Examples
 /// ```
@@ -72,7 +72,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     }
 }
 
-/// Arc tangent of the flatter side over the steeper one by a minimax polynomial, then unfolded to the full turn.
+/// Arc tangent of the flatter side over the steeper side by a minimax polynomial, then unfolded to the full turn.
 #[cfg(any(test, not(any(feature = "libm", feature = "micromath"))))]
 const fn octant_atan2(y: f32, x: f32) -> f32 {
     let steep = y.abs() > x.abs();

@@ -1,11 +1,11 @@
 use super::ROUND;
 use core::f32::consts::{PI, TAU};
 
-/// Returns the angle in [-π, π) that points the same way as `x`, both in radians.
+/// Returns the angle in [-π, π) of the same direction as `x`, both in radians.
 ///
-/// The error is at most 4e-7 up to ±10 000 rad; beyond, it is at most the spacing of `f32` at `x`. Past four million
-/// turns, where that spacing is a third of a turn, the result is some angle in the range.
-/// The ends are the `f32` nearest to ±π. NaN and infinity give NaN.
+/// The error is at most 4e-7 up to ±10 000 rad; beyond, the error is at most the spacing of `f32` at `x`. Past four
+/// million turns, where the spacing is a third of a turn, the result is some angle in the range. The ends are the `f32`
+/// nearest to ±π. NaN and infinity give NaN.
 ///
 /// # Examples
 /// ```
@@ -18,7 +18,7 @@ use core::f32::consts::{PI, TAU};
 #[must_use]
 #[inline]
 pub const fn wrap_pi(x: f32) -> f32 {
-    // The upper part has 12 bits, so up to 4096 turns times it is exact.
+    // The upper part has 12 bits, so its product with up to 4096 turns is exact.
     const UPPER: f32 = 6.283_203;
     const LOWER: f32 = -1.781_782e-5;
     let turns = (x * (1.0 / TAU) + ROUND) - ROUND;
@@ -26,9 +26,10 @@ pub const fn wrap_pi(x: f32) -> f32 {
     if rest.abs() < PI { rest } else { at_the_edge(rest, x) }
 }
 
-/// Returns the angle in [0, 2π) that points the same way as `x`, both in radians.
+/// Returns the angle in [0, 2π) of the same direction as `x`, both in radians.
 ///
-/// Errors, NaN and infinity as in [`wrap_pi`]. What rounding would put on 2π, such as a tiny negative angle, is 0.
+/// Errors, NaN and infinity as in [`wrap_pi`]. A result that rounding would put on 2π, such as a tiny negative angle,
+/// is 0.
 ///
 /// # Examples
 /// ```
@@ -46,8 +47,8 @@ pub const fn wrap_tau(x: f32) -> f32 {
 /// Returns the value in [-`period`/2, `period`/2) that differs from `x` by whole periods.
 ///
 /// Exact for every finite `x` and every normal `period`. Within one period, and within 4096 periods of at most 12 significant
-/// bits (360.0, 8192.0), it takes one division; beyond, a division of integers for every 8 bits of the quotient, 36 at most. NaN and infinity give
-/// NaN, and so does a period that is zero, negative or not finite.
+/// bits (360.0, 8192.0), wrapping takes one division; beyond, a division of integers for every 8 bits of the quotient, 36 at
+/// most. NaN and infinity give NaN, and so does a period of zero, a negative or an infinite period.
 ///
 /// # Examples
 /// ```
@@ -70,8 +71,8 @@ pub const fn wrap(x: f32, period: f32) -> f32 {
     if turns.abs() <= exact_turns && rest.abs() < 0.5 * period { rest } else { far(x, period) }
 }
 
-/// Returns the value of [`wrap`], to within the spacing of `f32` at `x`, where that is within half a period, the ends not
-/// included; otherwise a value that is not. Fewer instructions than [`wrap`], for ways of a few periods.
+/// Returns the value of [`wrap`], to within the spacing of `f32` at `x`, if the value is within half a period, the ends
+/// not included; otherwise a value beyond. Fewer instructions than [`wrap`], for ways of a few periods.
 #[inline]
 pub(crate) const fn rest(x: f32, period: f32) -> f32 {
     let turns = (x / period + ROUND) - ROUND;
@@ -80,8 +81,8 @@ pub(crate) const fn rest(x: f32, period: f32) -> f32 {
 
 /// Returns the value in [0, `period`) that differs from `x` by whole periods.
 ///
-/// NaN, infinity and bad periods as in [`wrap`]. The result is the `f32` nearest to the exact value; where that is `period` itself,
-/// as for a tiny negative value, it is 0.
+/// NaN, infinity and bad periods as in [`wrap`]. The result is the `f32` nearest to the exact value; if the nearest is `period`
+/// itself, as for a tiny negative value, the result is 0.
 ///
 /// # Examples
 /// ```
@@ -101,7 +102,7 @@ const fn positive(wrapped: f32, period: f32) -> f32 {
     if shifted >= period { 0.0 } else { shifted }
 }
 
-/// The half turn itself, what rounding left on the wrong side of it, and arguments too large to hold a remainder.
+/// The half turn itself, a value rounded to the wrong side of it, and arguments too large to hold a remainder.
 #[cold]
 #[inline(never)]
 const fn at_the_edge(rest: f32, x: f32) -> f32 {
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_an_angle_is_nan() {
+    fn the_wrap_of_nan_and_infinity_is_nan() {
         for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             assert!(wrap_pi(x).is_nan() && wrap_tau(x).is_nan());
             assert!(wrap(x, 360.0).is_nan() && wrap_positive(x, 360.0).is_nan());
@@ -236,7 +237,7 @@ mod tests {
         }
     }
 
-    /// At 1e10 the result was 0, and past 46 000 turns it was off by up to the spacing of `f32`.
+    /// At 1e10 the result was 0, and past 46 000 turns the error was up to the spacing of `f32`.
     #[test]
     fn huge_arguments_are_wrapped_exactly() {
         assert_eq!((wrap(1e10, 360.0), wrap(-1e10, 360.0)), (-80.0, 80.0));
@@ -290,7 +291,7 @@ mod tests {
             prop_assert!((-PI..PI).contains(&wrap_pi(x)) && (0.0..TAU).contains(&wrap_tau(x)));
         }
 
-        /// Law: the result is the exact remainder, whatever the number of periods.
+        /// Law: the result is the exact remainder, for any number of periods.
         #[test]
         fn every_finite_argument_is_wrapped_exactly(
             x in any_x(),

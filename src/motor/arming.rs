@@ -1,6 +1,6 @@
 use super::{Claim, MotorName, WrongSetting};
 
-/// The motors that stand in the way of arming, by name.
+/// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Missing {
@@ -12,7 +12,7 @@ impl Missing {
     /// How many names are kept; the others are only counted.
     pub const CAPACITY: usize = 12;
 
-    /// Collects names; `None` when there are none.
+    /// Collects names; `None` without any.
     pub fn collect(names: impl Iterator<Item = MotorName>) -> Option<Self> {
         let mut missing = Self::NONE;
         names.for_each(|name| missing.add(name));
@@ -28,7 +28,7 @@ impl Missing {
         self.total = self.total.saturating_add(1);
     }
 
-    /// Iterates over the names that were kept.
+    /// Iterates over the kept names.
     pub fn names(&self) -> impl Iterator<Item = MotorName> + '_ {
         self.names.iter().flatten().copied()
     }
@@ -73,8 +73,8 @@ pub enum ArmError {
     NoMotors,
     /// The driver takes no frames.
     BusDown,
-    /// A motor was relaxed since it was armed, and the last request to arm, or that moment, lies less than 100 ms back. A
-    /// request that is repeated in each tick is one request, and is not granted. Only updates whose time moves on count.
+    /// A motor was relaxed since it was armed, and the last request to arm, or the relaxing, lies less than 100 ms back.
+    /// A request repeated in each tick is one request, and is not granted. Only updates with advancing time count.
     NotReleased,
 }
 

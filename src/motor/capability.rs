@@ -1,32 +1,33 @@
-/// Something that a motor can be asked for, or reports.
+/// A kind of target that a motor takes, or a quantity that it reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Capability {
-    /// It takes a direct command on its own scale: the word on the wire, a duty, a throttle.
+    /// The motor takes a direct command on its own scale: the word on the wire, a duty, a throttle.
     Raw,
-    /// It takes a torque current.
+    /// The motor takes a torque current.
     Current,
-    /// It takes a voltage.
+    /// The motor takes a voltage.
     Voltage,
-    /// It takes a torque of the output shaft.
+    /// The motor takes a torque of the output shaft.
     Torque,
-    /// It takes a velocity of the output shaft.
+    /// The motor takes a velocity of the output shaft.
     Velocity,
-    /// It takes an angle within a turn, and goes there by the shortest way.
+    /// The motor takes an angle within a turn, and moves there by the shortest way.
     Angle,
-    /// It takes a position over many turns.
+    /// The motor takes a position over many turns.
     Position,
-    /// It takes a position, a velocity and a torque with a stiffness and a damping: [`Impedance`](super::Impedance).
+    /// The motor takes a position, a velocity and a torque with a stiffness and a damping:
+    /// [`Impedance`](super::Impedance).
     Impedance,
-    /// It reports what its shaft does, and so can be missing.
+    /// The motor reports the state of its shaft, and so can be missing.
     Feedback,
-    /// It reports its temperature.
+    /// The motor reports its temperature.
     Temperature,
-    /// It reports what is wrong with it.
+    /// The motor reports its errors.
     ErrorCodes,
-    /// It knows the angle of its output shaft at power-on, without being homed.
+    /// The motor knows the angle of its output shaft at power-on, without being homed.
     AbsoluteAngle,
 }
 
@@ -47,7 +48,7 @@ impl Capability {
         Self::AbsoluteAngle,
     ];
 
-    /// Tells whether it is a kind of target; otherwise it is something that the motor reports.
+    /// Returns whether this is a kind of target; otherwise, a quantity reported by the motor.
     #[must_use]
     pub const fn is_target(self) -> bool {
         (self as u16) < Self::Feedback as u16
@@ -73,10 +74,10 @@ impl core::fmt::Display for Capability {
     }
 }
 
-/// What a motor offers, as it is configured: a set of [`Capability`].
+/// The capabilities of a motor in its configuration: a set of [`Capability`].
 ///
-/// A target that is not in the set is refused with an error when it is set: `Unsupported` where the motor has no such
-/// thing, `NoLoop` where it was attached without the loop.
+/// A target outside of the set is refused with an error when set: `Unsupported` if the motor has no such target,
+/// `NoLoop` if the motor was attached without the loop.
 ///
 /// # Examples
 /// ```
@@ -93,7 +94,7 @@ impl core::fmt::Display for Capability {
 pub struct Capabilities(u16);
 
 impl Capabilities {
-    /// Offers nothing: a motor that was detached.
+    /// No capability: a detached motor.
     pub const NONE: Self = Self(0);
 
     /// Collects a list.
@@ -107,13 +108,13 @@ impl Capabilities {
         set
     }
 
-    /// Adds one.
+    /// Adds a capability.
     #[must_use]
     pub const fn with(self, capability: Capability) -> Self {
         Self(self.0 | 1 << capability as u16)
     }
 
-    /// Tells whether one is among them.
+    /// Returns whether a capability is in the set.
     #[must_use]
     pub const fn has(self, capability: Capability) -> bool {
         self.0 & 1 << capability as u16 != 0

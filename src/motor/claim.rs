@@ -1,17 +1,17 @@
 use super::MotorName;
 use embedded_can::Id;
 
-/// Who sends the frames of a claimed id.
+/// Sender of the frames of a claimed id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Role {
-    /// The controller sends it.
+    /// The controller.
     Command,
-    /// The motor sends it.
+    /// The motor.
     Feedback,
 }
 
-/// A CAN id, or a block of ids under a mask, that belongs to one motor.
+/// A CAN id, or a block of ids under a mask, of one motor.
 ///
 /// # Examples
 /// ```
@@ -41,7 +41,7 @@ impl Claim {
         Self { id: id.into(), mask: u32::MAX, role, is_shared: false, motor }
     }
 
-    /// Claims every id that is equal under `mask`.
+    /// Claims every id with an equal value under `mask`.
     #[must_use]
     pub const fn with_mask(self, mask: u32) -> Self {
         Self { mask, ..self }
@@ -49,7 +49,7 @@ impl Claim {
 
     /// Allows other motors to claim the same id in the same direction: their frames differ in their data.
     ///
-    /// Two claims share an id only if both of them allow it.
+    /// Two claims share an id only if both of them allow sharing.
     ///
     /// # Examples
     /// ```
@@ -88,8 +88,8 @@ impl Claim {
         extended == other_extended && (own ^ other) & self.mask == 0
     }
 
-    /// Tells whether some id belongs to both claims, unless both [share](Self::shared) it in one direction, or they are the two
-    /// directions of one motor: some protocols send command and feedback with one id, which is then not shared.
+    /// Returns whether some id belongs to both claims, unless both [share](Self::shared) the id in one direction, or the claims
+    /// are the two directions of one motor: some protocols send command and feedback with one id, which is then not shared.
     #[must_use]
     pub fn clashes_with(&self, other: &Self) -> bool {
         let is_shared = self.is_shared || other.is_shared;
@@ -104,7 +104,7 @@ impl Claim {
         extended == other_extended && (raw ^ other_raw) & self.mask & other.mask == 0
     }
 
-    /// Returns the header that frames with the id have, and the bits of it that count.
+    /// Returns the header of frames with the id, and the significant bits of the header.
     pub(super) fn pattern(&self) -> (u32, u32) {
         (crate::frame::header_of(self.id), self.mask | !crate::frame::ID_MASK)
     }
@@ -115,7 +115,7 @@ impl Claim {
         self.id
     }
 
-    /// Returns who sends it.
+    /// Returns the sender of the frames.
     #[must_use]
     pub const fn role(&self) -> Role {
         self.role
@@ -125,7 +125,7 @@ impl Claim {
         self.is_shared
     }
 
-    /// Returns the motor that it belongs to.
+    /// Returns the motor of the claim.
     #[must_use]
     pub const fn motor(&self) -> MotorName {
         self.motor

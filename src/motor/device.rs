@@ -2,12 +2,12 @@ use super::{Claim, Edge, MotorName, WrongSetting};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
-/// A device family on a CAN bus: the seam between its motors and whatever moves their frames.
+/// A device family on a CAN bus: the interface between its motors and the transport of their frames.
 ///
-/// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type that implements this trait
-/// implements that one by a line, `visitor.visit(self)`.
+/// [`Devices`](super::Devices) is the side of the caller: a runner, an async task, a test. A type with this trait implements
+/// `Devices` by a line, `visitor.visit(self)`.
 ///
-/// No method has a body here. A device that forgets one does not compile:
+/// No method has a body here. A device with a missing method does not compile:
 /// ```compile_fail,E0046
 /// use drivetrain::{frame::CanFrame, motor::*, time::*};
 ///
@@ -35,53 +35,52 @@ use crate::time::{Instant, Tick};
 /// }
 /// ```
 pub trait CanDevice {
-    /// Takes a received frame that arrived at `now`. Constant time, no I/O, no control.
+    /// Takes a frame received at `now`. Constant time, no I/O, no control.
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest;
 
     /// Runs every control loop once and encodes the commands.
     ///
-    /// An update that does not lie after the one before sends zeros in that cycle, and relaxes every motor until it is armed
-    /// again.
+    /// An update that does not lie after the last sends zeros in that cycle, and relaxes every motor until armed again.
     fn update(&mut self, tick: Tick);
 
-    /// Returns a frame that waits to be sent, and takes it off the list.
+    /// Returns a pending frame, and removes it from the list.
     fn next_frame(&mut self) -> Option<CanFrame>;
 
-    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this device's.
+    /// Takes back a frame that was not sent, or was evicted; `false` for a frame of another device.
     ///
     /// The frame is not offered again before the next update, and then with the newest values.
     fn requeue(&mut self, frame: &CanFrame) -> bool;
 
-    /// Returns how many frames were replaced by newer ones before they were taken, wrapping.
+    /// Returns the number of frames replaced by newer frames before sending, wrapping.
     fn superseded(&self) -> u32;
 
-    /// Lists the CAN ids that this device sends and expects.
+    /// Lists the CAN ids sent and expected by this device.
     fn claims(&self) -> impl Iterator<Item = Claim>;
 
     /// Lists the motors without fresh feedback at `now`.
     fn missing(&self, now: Instant) -> impl Iterator<Item = MotorName>;
 
-    /// Lists the motors that must not be driven although they are heard: a fault of the ESC, say.
+    /// Lists the motors that must not be driven despite their feedback, for example after a fault of the ESC.
     fn faulty(&self) -> impl Iterator<Item = MotorName>;
 
-    /// Returns a setting of a drive that differs from what the device expects, or is not known yet.
+    /// Returns a setting of a drive that differs from the expected value, or is not known yet.
     fn wrong_setting(&self) -> Option<WrongSetting>;
 
-    /// Returns a command of this device that another node has sent within the last second.
+    /// Returns a command of this device sent by another node within the last second.
     fn second_master(&self) -> Option<Claim>;
 
-    /// Returns the oldest change of a motor's condition that was not read yet.
+    /// Returns the oldest unread edge of a motor.
     ///
-    /// Changes wait until they are read, so it can be called as often or as seldom as is convenient.
+    /// Edges wait until read, so the interval between calls is free.
     fn next_edge(&mut self) -> Option<Edge>;
 
-    /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
-    /// 100 ms of updates back.
+    /// Takes a request to arm; `false` if the request does not count: after a trip, when another request or the trip lies
+    /// less than 100 ms of updates back.
     fn ask(&mut self) -> bool;
 
-    /// Lets targets through from now on, for the motors that are heard; a motor that takes them already goes on
-    /// undisturbed. Called by [`arm`](super::Devices::arm) when all of its conditions hold; without effect while the emergency
-    /// stop is set, and, after a trip, unless the last request [counted](Self::ask).
+    /// Allows targets from now on, for the motors with feedback; an armed motor continues undisturbed. Called by
+    /// [`arm`](super::Devices::arm) when all of its conditions hold; without effect while the emergency stop is set, and,
+    /// after a trip, unless the last request [counted](Self::ask).
     fn engage(&mut self, now: Instant);
 
     /// Relaxes every motor and refuses targets until armed again.
@@ -90,8 +89,8 @@ pub trait CanDevice {
     /// Disarms because of a fault around the motors, such as a bus that is down: arming again needs a new request.
     fn trip(&mut self);
 
-    /// Tells whether every motor takes targets: false as long as one of them waits to be armed, at the start and after
-    /// a fault that relaxed it.
+    /// Returns whether every motor takes targets: false as long as a motor waits to be armed, at the start and after a
+    /// fault that relaxed it.
     fn is_armed(&self) -> bool;
 
     /// Trips every motor at once. From the next frame on, all commands are zero until the stop is cleared and the device armed.
@@ -104,16 +103,16 @@ pub trait CanDevice {
     fn is_stopped(&self) -> bool;
 }
 
-/// What a device did with a received frame.
+/// Result of offering a received frame to a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum Ingest {
-    /// It was feedback and was taken.
+    /// The frame was feedback and was taken.
     Taken,
-    /// It belongs to somebody else; nothing changed.
+    /// The frame belongs to another device; nothing changed.
     Unrelated,
-    /// It has the id of one of this device's motors, but not the form of its feedback; nothing changed.
+    /// The frame has the id of one of this device's motors, but not the form of its feedback; nothing changed.
     Malformed(Malformed),
 }
 
@@ -124,6 +123,6 @@ pub enum Ingest {
 pub enum Malformed {
     /// Too few or too many bytes.
     Length(u8),
-    /// A field has a value that it cannot have.
+    /// A field has an impossible value.
     Field,
 }

@@ -1,4 +1,4 @@
-//! One device or several, as their caller sees them.
+//! One device or several, as seen by their caller.
 
 use super::visitor::{
     Ask, Back, ClearStop, Disarm, Engage, Nth, Obstacles, Offer, Parts, Read, Rival, Search,
@@ -8,14 +8,14 @@ use super::{ArmError, Claim, Edge, Ingest, Missing};
 use crate::frame::CanFrame;
 use crate::time::{Instant, Tick};
 
-/// One [`CanDevice`](super::CanDevice) or several: what a runner, an async task or a test drives.
+/// One [`CanDevice`](super::CanDevice) or several: the unit driven by a runner, an async task or a test.
 ///
 /// The caller pushes received frames in and *pulls* frames to send out; a device never does I/O. In each cycle:
 ///
 /// 1. `ingest` every received frame, with the time of its arrival;
 /// 2. `update` once: all loops run, all commands are encoded;
-/// 3. `next_frame` until it returns `None`, sending each; give a frame that was not sent, or was sent and
-///    evicted again, back to `requeue`. It is offered again after the next update, with the newest values.
+/// 3. `next_frame` until `None`, sending each; give a frame that was not sent, or was sent and evicted again, back to
+///    `requeue`. The frame is offered again after the next update, with the newest values.
 ///
 /// A tuple or array of devices and `&mut D` are devices. A struct of devices names its parts in one method; everything else,
 /// from routing to arming, follows from it.
@@ -42,10 +42,10 @@ use crate::time::{Instant, Tick};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Devices {
-    /// Has the visitor visit every device, in an order that stays the same.
+    /// Lets the visitor visit every device, always in the same order.
     fn visit(&mut self, visitor: &mut impl Visitor);
 
-    /// Takes a received frame that arrived at `now`. Constant time, no I/O, no control.
+    /// Takes a frame received at `now`. Constant time, no I/O, no control.
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let mut offer = Offer { frame, now, outcome: Ingest::Unrelated };
@@ -64,9 +64,9 @@ pub trait Devices {
         self.visit(&mut Update(tick));
     }
 
-    /// Returns a frame that waits to be sent, and takes it off the list.
+    /// Returns a pending frame, and removes it from the list.
     ///
-    /// `turn` is any number that grows by one a cycle: the search starts with another device each time, so that none starves
+    /// `turn` is any number that grows by one a cycle: the search starts with another device each time, so no device starves
     /// on a full bus.
     #[inline]
     fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
@@ -82,26 +82,26 @@ pub trait Devices {
         search.frame
     }
 
-    /// Takes back a frame that was not sent, or was evicted; `false` when no device owns it.
+    /// Takes back a frame that was not sent, or was evicted; `false` for a frame of no device.
     ///
     /// The frame is not offered again before the next update, and then with the newest values.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         let mut back = Back { frame, to_owner: true, taken: false };
         self.visit(&mut back);
-        // The last frame of a motor that was detached is claimed by nobody.
+        // No device claims the last frame of a detached motor.
         back.to_owner = false;
         self.visit(&mut back);
         back.taken
     }
 
-    /// Returns how many frames were replaced by newer ones before they were taken, wrapping.
+    /// Returns the number of frames replaced by newer frames before sending, wrapping.
     fn superseded(&mut self) -> u32 {
         let mut superseded = Superseded(0);
         self.visit(&mut superseded);
         superseded.0
     }
 
-    /// Lists the CAN ids that the devices send and expect.
+    /// Lists the CAN ids sent and expected by the devices.
     fn claims(&mut self) -> impl Iterator<Item = Claim> {
         (0..).map_while(move |index| {
             let mut nth = Nth { left: index, claim: None };
@@ -110,7 +110,7 @@ pub trait Devices {
         })
     }
 
-    /// Returns two motors that use one CAN id, if any: on a bus with several families, say.
+    /// Returns two motors with one CAN id, if any, for example on a bus with several families.
     fn clash(&mut self) -> Option<(Claim, Claim)> {
         for index in 0.. {
             let mut rival = Rival { left: index, claim: None, other: None };
@@ -123,8 +123,7 @@ pub trait Devices {
         None
     }
 
-    /// Returns the oldest change of a motor's condition that was not read yet; of several devices, that of the first one with
-    /// a change.
+    /// Returns the oldest unread edge of a motor; of several devices, from the first device with an edge.
     fn next_edge(&mut self) -> Option<Edge> {
         let mut read = Read(None);
         self.visit(&mut read);
@@ -133,15 +132,15 @@ pub trait Devices {
 
     /// Arms every device: nothing moves before.
     ///
-    /// Arming is a gesture. After a trip it is granted only when nobody asked for 100 ms of updates, so a program that calls this in each
-    /// tick never re-arms. A refused call counts as asking.
+    /// Arming is a gesture. After a trip, arming is granted only after 100 ms of updates without a request, so a program that
+    /// calls this in each tick never re-arms. A refused call counts as a request.
     ///
-    /// At power-on, or after a reset, there is no trip to remember. Call this when a switch *turns* on, and take it as on before the
-    /// first reading: one that is left on then arms nothing.
+    /// After power-on or a reset, no trip is remembered. Call this when a switch *turns* on, and take the switch as on before the
+    /// first reading: a switch left on then arms nothing.
     ///
     /// # Errors
-    /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a drive with other settings, a set emergency
-    /// stop, a request that was not released since a trip.
+    /// Names the reason: motors without feedback, a CAN id with two owners or two senders, a fault, a drive with other settings,
+    /// a set emergency stop, a request not released since a trip.
     fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
         let granted = Ask::of(self);
         if self.is_stopped() {
@@ -157,7 +156,7 @@ pub trait Devices {
         let mut obstacles =
             Obstacles { now, missing, second_master: None, faulty, wrong_setting: None };
         self.visit(&mut obstacles);
-        // A drive that is set up for other commands may answer none of ours.
+        // A drive set up for other commands may answer none of ours.
         if let Some(wrong) = obstacles.wrong_setting.filter(|wrong| wrong.found.is_some()) {
             return Err(ArmError::Setting(wrong));
         }
@@ -197,7 +196,7 @@ pub trait Devices {
         standing.any && standing.all_armed
     }
 
-    /// Trips every motor at once; the runner repeats it in each tick while the stop is set. From the next frame on, all
+    /// Trips every motor at once; the runner repeats the stop in each tick while it is set. From the next frame on, all
     /// commands are zero until the stop is cleared and the devices armed.
     fn emergency_stop(&mut self) {
         self.visit(&mut Stop);
@@ -320,7 +319,7 @@ mod tests {
         }
     }
 
-    /// Each visit lists all ids. With one for each pair of them, arming took longer than a watchdog waits.
+    /// Each visit lists all ids. With a visit for each pair of devices, arming took longer than a watchdog waits.
     #[test]
     fn clashes_are_found_in_one_visit_for_each_id() {
         let mut parts = [Bus::new(), Bus::new()];

@@ -27,13 +27,13 @@ pub trait VelocityDrive<H: Copy> {
     /// Returns the measured velocity of the output shaft; `None` when there is no fresh feedback.
     fn velocity(&self, motor: H) -> Option<AngularVelocity>;
 
-    /// Returns what a motor offers as it is configured; at least velocities, unless said otherwise.
+    /// Returns the capabilities of a motor in its configuration; by default velocities.
     fn capabilities(&self, motor: H) -> Capabilities {
         let _ = motor;
         Capabilities::of(&[Capability::Velocity])
     }
 
-    /// Sets the velocity that the output shaft is to follow.
+    /// Sets the target velocity of the output shaft.
     ///
     /// # Errors
     /// Says why the motor cannot take the target now. The value is then not kept for later.
@@ -42,7 +42,7 @@ pub trait VelocityDrive<H: Copy> {
     /// Sets the velocities of several motors: of all wheels of a chassis, say.
     ///
     /// # Errors
-    /// The first error. The motors after it are set all the same.
+    /// The first error. The targets of the following motors are set all the same.
     fn drive(
         &mut self,
         targets: impl IntoIterator<Item = (H, AngularVelocity)>,
@@ -70,15 +70,16 @@ impl<H: Copy, D: VelocityDrive<H>> VelocityDrive<H> for &mut D {
     }
 }
 
-/// An owner of motors whose output shafts go to an angle, by the shortest way: those that steer a wheel, say.
+/// An owner of motors whose output shafts move to an angle, by the shortest way, for example the steering motors of
+/// wheels.
 ///
-/// `H` is the owner's handle type. The motors have [`Capability::Angle`]. A tuple or array is an owner if each of its owners is
-/// one, with the handles of [`VelocityDrive`]; so is `&mut D`.
+/// `H` is the owner's handle type. The motors have [`Capability::Angle`]. A tuple or array of such owners is an owner, with the
+/// handles of [`VelocityDrive`]; so is `&mut D`.
 pub trait AngleDrive<H: Copy> {
-    /// Returns the measured angle of the output shaft; `None` when there is no fresh feedback, or it is not homed.
+    /// Returns the measured angle of the output shaft; `None` without fresh feedback, or before homing.
     fn angle(&self, motor: H) -> Option<Angle>;
 
-    /// Sets the angle that the output shaft is to go to; how many turns it has does not matter.
+    /// Sets the target angle of the output shaft; its number of turns does not matter.
     ///
     /// # Errors
     /// Says why the motor cannot take the target now. The value is then not kept for later.
@@ -95,7 +96,7 @@ impl<H: Copy, D: AngleDrive<H>> AngleDrive<H> for &mut D {
     }
 }
 
-/// The handle of a motor in a tuple of two to four owners: which owner, and the handle there.
+/// The handle of a motor in a tuple of two to four owners: the owner, and the handle there.
 ///
 /// Tuples and arrays nest, so an owner in the tuple may be a tuple or an array itself.
 ///
@@ -219,7 +220,7 @@ impl<H: Copy, D: AngleDrive<H>, const N: usize> AngleDrive<(usize, H)> for [D; N
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum TargetError {
-    /// The owner has no motor with this handle; it was detached, say.
+    /// The owner has no motor with this handle, for example after a detach.
     Detached,
     /// The target is NaN or infinite. The motor goes to its safe output at once.
     NotFinite,
@@ -229,13 +230,13 @@ pub enum TargetError {
     NoFeedback,
     /// The motor was relaxed by a fault and waits to be armed again.
     Relaxed,
-    /// The motor was attached without the control loop that this kind of target needs.
+    /// The motor was attached without the control loop for this kind of target.
     NoLoop,
-    /// The position of a geared output shaft is relative to power-on until it is zeroed.
+    /// The position of a geared output shaft is relative to power-on until zeroed.
     NotHomed,
     /// This motor does not offer this kind of target.
     Unsupported,
-    /// The measurement that the target goes with is too old, or lies ahead. The motor goes to its safe output at once.
+    /// The measurement of the target is too old, or lies ahead. The motor moves to its safe output at once.
     StaleMeasurement,
 }
 

@@ -1,133 +1,18 @@
+use crate::control::error::{not_negative, positive};
 use crate::encoder::Position;
+use crate::error::{ConfigError, check};
 use crate::time::{Duration, Instant, Tick};
 use crate::units::{Angle, AngularVelocity};
 
-/// How a shaft is homed against a mechanical stop.
-///
-/// # Examples
-/// ```
-/// use drivetrain::encoder::Position;
-/// use drivetrain::motor::StopHomingConfig;
-/// use drivetrain::time::Duration;
-/// use drivetrain::units::{Angle, AngularVelocity};
-///
-/// // Down at 20 rpm until 3 A meet a shaft that stands: that is zero, and 5° free of it is the place to rest.
-/// const ARM: StopHomingConfig = StopHomingConfig::new(AngularVelocity::from_rpm(-20.0), 3.0)
-///     .with_travel(Angle::from_degrees(200.0))
-///     .with_back_off(Angle::from_degrees(5.0))
-///     .with_stop_at(Position::ZERO);
-/// assert_eq!(ARM.validate(), Ok(()));
-/// assert_eq!(ARM.with_window(Duration::ZERO).validate(), Err("window"));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct StopHomingConfig {
-    velocity: AngularVelocity,
-    effort: f32,
-    speed: f32,
-    window: Duration,
-    timeout: Duration,
-    travel: Angle,
-    stop_at: Position,
-    back_off: Angle,
-}
-
-impl StopHomingConfig {
-    /// Takes the velocity of the approach, whose sign is the way to the stop, and the effort that the shaft meets there,
-    /// in the unit in which it is measured: amperes or newton metres, above what friction and load ask for on the way.
-    ///
-    /// A shaft below a tenth of the velocity stands; the window is 100 ms, the time-out 10 s, the travel a turn, the stop
-    /// at zero, and there is no back-off.
-    #[must_use]
-    pub const fn new(velocity: AngularVelocity, effort: f32) -> Self {
-        let speed = velocity.as_rad_per_s() / 10.0;
-        Self {
-            velocity,
-            effort,
-            speed: if speed < 0.0 { -speed } else { speed },
-            window: Duration::from_millis(100),
-            timeout: Duration::from_secs(10),
-            travel: Angle::from_turns(1.0),
-            stop_at: Position::ZERO,
-            back_off: Angle::ZERO,
-        }
-    }
-
-    /// Sets the speed below which the shaft stands, in either direction.
-    #[must_use]
-    pub const fn with_standing_below(self, speed: AngularVelocity) -> Self {
-        Self { speed: speed.as_rad_per_s(), ..self }
-    }
-
-    /// Sets for how long the shaft has to stand against the effort: longer than it takes to break loose from friction.
-    #[must_use]
-    pub const fn with_window(self, window: Duration) -> Self {
-        Self { window, ..self }
-    }
-
-    /// Sets after how long the procedure gives up, the back-off included.
-    #[must_use]
-    pub const fn with_timeout(self, timeout: Duration) -> Self {
-        Self { timeout, ..self }
-    }
-
-    /// Sets how far the shaft may turn until the stop is there, in either direction.
-    #[must_use]
-    pub const fn with_travel(self, travel: Angle) -> Self {
-        Self { travel, ..self }
-    }
-
-    /// Sets the position that the stop has.
-    #[must_use]
-    pub const fn with_stop_at(self, position: Position) -> Self {
-        Self { stop_at: position, ..self }
-    }
-
-    /// Sets how far the shaft turns back from the stop in the end.
-    #[must_use]
-    pub const fn with_back_off(self, back_off: Angle) -> Self {
-        Self { back_off, ..self }
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    /// Names the first that is not usable.
-    pub const fn validate(&self) -> Result<(), &'static str> {
-        let velocity = self.velocity.as_rad_per_s();
-        let fastest = if velocity < 0.0 { -velocity } else { velocity };
-        let (travel, back_off) = (self.travel.as_radians(), self.back_off.as_radians());
-        Err(if !(fastest > 0.0 && fastest.is_finite()) {
-            "approach velocity"
-        } else if !(self.effort > 0.0 && self.effort.is_finite()) {
-            "effort"
-        } else if !(self.speed > 0.0 && self.speed < fastest) {
-            "standing speed"
-        } else if self.window.as_micros() == 0 {
-            "window"
-        } else if self.timeout.as_micros() <= self.window.as_micros() {
-            "time-out"
-        } else if !(travel > 0.0 && travel.is_finite()) {
-            "travel"
-        } else if !self.stop_at.is_finite() {
-            "position of the stop"
-        } else if !(back_off >= 0.0 && back_off.is_finite()) {
-            "back-off"
-        } else {
-            return Ok(());
-        })
-    }
-}
-
-/// What a homing procedure has to know of its motor in each tick, all in the direction of the output shaft.
+/// State of a shaft for [`StopHoming`], in the direction of the output shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ShaftState {
-    /// Where it is, over many turns.
+    /// Position, over many turns.
     pub position: Position,
-    /// How fast it turns.
+    /// Velocity.
     pub velocity: AngularVelocity,
-    /// What the motor does: its measured current in amperes, or its torque in newton metres.
+    /// Measured current of the motor in amperes, or its torque in newton metres.
     pub effort: f32,
 }
 
@@ -137,38 +22,40 @@ impl ShaftState {
     }
 }
 
-/// What to do in this tick.
+/// Next action of a homing procedure.
+///
+/// A failure is final: relax the motor; later steps return the same.
+///
+/// # Examples
+/// ```
+/// use drivetrain::motor::HomingStep;
+///
+/// assert_eq!(HomingStep::NoStop.to_string(), "no stop within the travel");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum HomingStep {
     /// Set this velocity.
     Drive(AngularVelocity),
-    /// The stop is there: call the present position this, once, and set no target.
+    /// The shaft is at the stop: call `set_present_position` with this position, once, and set no target.
     SetPresentPosition(Position),
-    /// It is homed: relax the motor, or give it its first target.
+    /// The shaft is homed: relax the motor, or give it its first target.
     Done,
-    /// It is not: relax the motor. Later steps say the same.
-    Failed(HomingError),
-}
-
-/// Why a shaft was not homed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum HomingError {
-    /// It took too long: the motor does not move, and does not press against anything either.
+    /// Failed: the time-out expired. The motor does not move, and does not press against a stop either.
     TimedOut,
-    /// The shaft turned as far as it may, and there was no stop.
+    /// Failed: the shaft turned by its whole travel without a stop.
     NoStop,
-    /// There was no fresh feedback, or it was not finite.
+    /// Failed: there was no fresh feedback, or feedback that is not finite.
     LostFeedback,
 }
 
-impl core::fmt::Display for HomingError {
+impl core::fmt::Display for HomingStep {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
+            Self::Drive(_) => "homing in progress",
+            Self::SetPresentPosition(_) => "at the stop",
+            Self::Done => "homed",
             Self::TimedOut => "homing took too long",
             Self::NoStop => "no stop within the travel",
             Self::LostFeedback => "no fresh feedback while homing",
@@ -176,28 +63,40 @@ impl core::fmt::Display for HomingError {
     }
 }
 
-impl core::error::Error for HomingError {}
-
-/// Homes a shaft against a mechanical stop: goes there slowly until the motor presses and the shaft stands.
+/// Homes a shaft against a mechanical stop: approaches slowly until the motor presses and the shaft stands.
 ///
 /// ```text
 /// approach ──> effort >= threshold and speed < threshold, for the window ──> set the position ──> back off ──> done
 ///    └── travel, time-out, feedback ──> failed
 /// ```
 ///
-/// Does no I/O and sets nothing itself: it is fed with the state of the shaft in each tick and answers with what to set. A
-/// shaft that already touches the stop is homed where it is.
+/// Does no I/O and sets no target: each step takes the state of the shaft and returns the next action. A shaft that already
+/// touches the stop is homed in place.
 ///
-/// What bounds the torque is the motor: give it a current limit, or its speed loop an output limit, that the mechanics
-/// bear and that is above the effort of the stop; and a speed loop with an integral, that presses until it gets there.
+/// The motor limits the torque: give it a current limit, or its speed loop an output limit, within the strength of the
+/// mechanics and above the effort of the stop; and a speed loop with an integral, which presses up to this effort.
 ///
 /// # Examples
-/// The whole procedure with a DJI motor is a loop of a few lines, and with a motor of your own it is the same.
+/// Down at 20 rpm until 3 A meet a standing shaft; this position is zero, and the shaft rests 5° away from it:
+/// ```
+/// use drivetrain::error::ConfigError;
+/// use drivetrain::motor::StopHoming;
+/// use drivetrain::time::Duration;
+/// use drivetrain::units::{Angle, AngularVelocity};
+///
+/// let arm = StopHoming::new(AngularVelocity::from_rpm(-20.0), 3.0)?
+///     .with_travel(Angle::from_degrees(200.0))?
+///     .with_back_off(Angle::from_degrees(5.0))?;
+/// assert_eq!(arm.with_window(Duration::ZERO).err(), Some(ConfigError::Unusable("window")));
+/// # Ok::<(), ConfigError>(())
+/// ```
+///
+/// The whole procedure with a DJI motor is a loop of a few lines, the same for a motor of the application:
 /// ```
 /// use drivetrain::control::PidConfig;
 /// use drivetrain::dji::{Bus, Config, M2006};
 /// use drivetrain::encoder::Position;
-/// use drivetrain::motor::{HomingStep, Link, ShaftState, StopHoming, StopHomingConfig};
+/// use drivetrain::motor::{HomingStep, Link, ShaftState, StopHoming};
 /// use drivetrain::runner::{Nb, Runner};
 /// use drivetrain::sim::{MotorConfig, Simulation};
 /// use drivetrain::time::Duration;
@@ -212,8 +111,7 @@ impl core::error::Error for HomingError {}
 /// let arm = bus.attach(Config::<M2006>::new(1).speed_loop(speed).with_current_limit(limit))?;
 /// let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
 ///
-/// let config = StopHomingConfig::new(AngularVelocity::from_rpm(-30.0), 2.0);
-/// let mut homing = StopHoming::new(config)?;
+/// let mut homing = StopHoming::new(AngularVelocity::from_rpm(-30.0), 2.0)?;
 /// let mut homed = false;
 /// while !homed {
 ///     world.advance(Duration::from_millis(1));
@@ -233,7 +131,7 @@ impl core::error::Error for HomingError {}
 ///             HomingStep::Drive(velocity) => bus.set_velocity(arm, velocity)?,
 ///             HomingStep::SetPresentPosition(position) => bus.set_present_position(arm, position)?,
 ///             HomingStep::Done => homed = true,
-///             HomingStep::Failed(why) => return Err(why.into()),
+///             failed => return Err(failed.to_string().into()),
 ///         }
 ///     }
 ///     runner.tick(tick);
@@ -242,14 +140,23 @@ impl core::error::Error for HomingError {}
 /// assert!((state.position - Position::ZERO).as_degrees().abs() < 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StopHoming {
-    config: StopHomingConfig,
+    velocity: AngularVelocity,
+    effort: f32,
+    speed: f32,
+    window: Duration,
+    timeout: Duration,
+    travel: Angle,
+    stop_at: Position,
+    back_off: Angle,
     phase: Phase,
     started: Option<Instant>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Phase {
     Start,
     /// From this position; pressing since then.
@@ -258,45 +165,124 @@ enum Phase {
     Set,
     /// From this position.
     BackOff(Position),
-    Done,
-    Failed(HomingError),
+    /// Done or failed: the last step, forever.
+    Over(HomingStep),
 }
 
 impl StopHoming {
-    /// Takes the configuration: begins with the first step.
+    /// Takes the velocity of the approach, whose sign is the way to the stop, and the effort of the shaft at the stop, in
+    /// its measured unit: amperes or newton metres, above friction and load on the way.
+    ///
+    /// At first, a shaft below a tenth of the velocity stands; the window is 100 ms, the time-out 10 s, the travel a turn,
+    /// the stop at zero, and there is no back-off.
     ///
     /// # Errors
-    /// Names the parameter that is not usable.
-    pub const fn new(config: StopHomingConfig) -> Result<Self, &'static str> {
-        match config.validate() {
-            Ok(()) => Ok(Self { config, phase: Phase::Start, started: None }),
-            Err(parameter) => Err(parameter),
+    /// Names `velocity` when zero or not finite, `effort` when not above zero and finite.
+    pub const fn new(velocity: AngularVelocity, effort: f32) -> Result<Self, ConfigError> {
+        check!(positive("velocity", magnitude(velocity)));
+        check!(positive("effort", effort));
+        Ok(Self {
+            velocity,
+            effort,
+            speed: magnitude(velocity) / 10.0,
+            window: Duration::from_millis(100),
+            timeout: Duration::from_secs(10),
+            travel: Angle::from_turns(1.0),
+            stop_at: Position::ZERO,
+            back_off: Angle::ZERO,
+            phase: Phase::Start,
+            started: None,
+        })
+    }
+
+    /// Sets the speed below which the shaft stands, in either direction.
+    ///
+    /// # Errors
+    /// Names `speed` when not above zero and below the velocity of the approach.
+    pub const fn with_standing_below(self, speed: AngularVelocity) -> Result<Self, ConfigError> {
+        let speed = speed.as_rad_per_s();
+        if speed > 0.0 && speed < magnitude(self.velocity) {
+            Ok(Self { speed, ..self })
+        } else {
+            Err(ConfigError::Unusable("speed"))
         }
     }
 
-    /// Takes the state of the shaft, `None` without fresh feedback, and returns what to do in this tick.
+    /// Sets the time for which the shaft has to stand against the effort: longer than the time to break loose from friction.
     ///
-    /// Call it in each tick from the first to the last. Time that goes back counts as none that passed.
+    /// # Errors
+    /// Names `window` when zero, or not below the time-out: set a longer time-out first.
+    pub const fn with_window(self, window: Duration) -> Result<Self, ConfigError> {
+        if window.as_micros() > 0 && window.as_micros() < self.timeout.as_micros() {
+            Ok(Self { window, ..self })
+        } else {
+            Err(ConfigError::Unusable("window"))
+        }
+    }
+
+    /// Sets the time limit of the procedure, the back-off included.
+    ///
+    /// # Errors
+    /// Names `timeout` when not above the window.
+    pub const fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
+        if timeout.as_micros() > self.window.as_micros() {
+            Ok(Self { timeout, ..self })
+        } else {
+            Err(ConfigError::Unusable("timeout"))
+        }
+    }
+
+    /// Sets the largest turn of the shaft before the stop, in either direction.
+    ///
+    /// # Errors
+    /// Names `travel` when not above zero and finite.
+    pub const fn with_travel(self, travel: Angle) -> Result<Self, ConfigError> {
+        check!(positive("travel", travel.as_radians()));
+        Ok(Self { travel, ..self })
+    }
+
+    /// Sets the position of the stop.
+    ///
+    /// # Errors
+    /// Names `position` when not finite.
+    pub const fn with_stop_at(self, position: Position) -> Result<Self, ConfigError> {
+        if position.is_finite() {
+            Ok(Self { stop_at: position, ..self })
+        } else {
+            Err(ConfigError::NotFinite("position"))
+        }
+    }
+
+    /// Sets the turn of the shaft back from the stop at the end.
+    ///
+    /// # Errors
+    /// Names `back_off` when negative or not finite.
+    pub const fn with_back_off(self, back_off: Angle) -> Result<Self, ConfigError> {
+        check!(not_negative("back_off", back_off.as_radians()));
+        Ok(Self { back_off, ..self })
+    }
+
+    /// Takes the state of the shaft, `None` without fresh feedback, and returns the action of this tick.
+    ///
+    /// Call this in each tick from the first to the last. Time that goes back counts as standing.
     pub fn step(&mut self, shaft: Option<ShaftState>, tick: Tick) -> HomingStep {
         let now = tick.now();
         let started = *self.started.get_or_insert(now);
-        match self.phase {
-            Phase::Done => return HomingStep::Done,
-            Phase::Failed(error) => return HomingStep::Failed(error),
-            _ => {}
+        if let Phase::Over(last) = self.phase {
+            return last;
         }
         let Some(shaft) = shaft.filter(ShaftState::is_finite) else {
-            return self.fail(HomingError::LostFeedback);
+            return self.end(HomingStep::LostFeedback);
         };
-        if now.since(started) >= self.config.timeout {
-            return self.fail(HomingError::TimedOut);
+        if now.since(started) >= self.timeout {
+            return self.end(HomingStep::TimedOut);
         }
         match self.phase {
             Phase::Start => self.approach(shaft, shaft.position, None, now),
             Phase::Approach(from, pressing) => self.approach(shaft, from, pressing, now),
             Phase::Set => self.back_off(shaft, shaft.position),
             Phase::BackOff(from) => self.back_off(shaft, from),
-            Phase::Done | Phase::Failed(_) => HomingStep::Done,
+            Phase::Over(last) => last,
         }
     }
 
@@ -307,56 +293,64 @@ impl StopHoming {
         pressing: Option<Instant>,
         now: Instant,
     ) -> HomingStep {
-        let config = &self.config;
-        let downwards = config.velocity.as_rad_per_s() < 0.0;
+        let downwards = self.velocity.as_rad_per_s() < 0.0;
         let effort = if downwards { -shaft.effort } else { shaft.effort };
         // Braked by a load that drives it, a shaft is at no stop.
-        let presses = effort >= config.effort && shaft.velocity.as_rad_per_s().abs() < config.speed;
+        let presses = effort >= self.effort && shaft.velocity.as_rad_per_s().abs() < self.speed;
         let since = presses.then(|| pressing.unwrap_or(now));
-        if since.is_some_and(|since| now.since(since) >= config.window) {
+        if since.is_some_and(|since| now.since(since) >= self.window) {
             self.phase = Phase::Set;
-            return HomingStep::SetPresentPosition(config.stop_at);
+            return HomingStep::SetPresentPosition(self.stop_at);
         }
-        if (shaft.position - from).as_radians().abs() > config.travel.as_radians() {
-            return self.fail(HomingError::NoStop);
+        if (shaft.position - from).as_radians().abs() > self.travel.as_radians() {
+            return self.end(HomingStep::NoStop);
         }
         self.phase = Phase::Approach(from, since);
-        HomingStep::Drive(config.velocity)
+        HomingStep::Drive(self.velocity)
     }
 
     fn back_off(&mut self, shaft: ShaftState, from: Position) -> HomingStep {
         let moved = (shaft.position - from).as_radians();
         // A stop that yields is no way back.
-        let away = if self.config.velocity.as_rad_per_s() < 0.0 { moved } else { -moved };
-        if away >= self.config.back_off.as_radians() {
-            self.phase = Phase::Done;
-            return HomingStep::Done;
+        let away = if self.velocity.as_rad_per_s() < 0.0 { moved } else { -moved };
+        if away >= self.back_off.as_radians() {
+            return self.end(HomingStep::Done);
         }
         self.phase = Phase::BackOff(from);
-        HomingStep::Drive(-self.config.velocity)
+        HomingStep::Drive(-self.velocity)
     }
 
-    const fn fail(&mut self, error: HomingError) -> HomingStep {
-        self.phase = Phase::Failed(error);
-        HomingStep::Failed(error)
+    const fn end(&mut self, last: HomingStep) -> HomingStep {
+        self.phase = Phase::Over(last);
+        last
     }
 
-    /// Tells whether the shaft is homed.
+    /// Returns whether the shaft is homed.
     #[must_use]
     pub const fn is_done(&self) -> bool {
-        matches!(self.phase, Phase::Done)
+        matches!(self.phase, Phase::Over(HomingStep::Done))
     }
+}
+
+const fn magnitude(velocity: AngularVelocity) -> f32 {
+    let value = velocity.as_rad_per_s();
+    if value < 0.0 { -value } else { value }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const DOWN: StopHomingConfig =
-        StopHomingConfig::new(AngularVelocity::from_rad_per_s(-2.0), 3.0)
-            .with_travel(Angle::from_radians(1.5))
-            .with_back_off(Angle::from_radians(0.1))
-            .with_stop_at(Position::from_turns(4));
+    fn homing(rad_per_s: f32) -> Result<StopHoming, ConfigError> {
+        StopHoming::new(AngularVelocity::from_rad_per_s(rad_per_s), 3.0)?
+            .with_travel(Angle::from_radians(1.5))?
+            .with_back_off(Angle::from_radians(0.1))?
+            .with_stop_at(Position::from_turns(4))
+    }
+
+    fn down() -> StopHoming {
+        homing(-2.0).unwrap()
+    }
 
     fn at(radians: f32, rad_per_s: f32, effort: f32) -> Option<ShaftState> {
         Some(ShaftState {
@@ -375,7 +369,7 @@ mod tests {
 
     #[test]
     fn it_takes_effort_and_standstill_for_the_whole_window() {
-        let mut homing = StopHoming::new(DOWN).unwrap();
+        let mut homing = down();
         for ms in 0..60 {
             assert_eq!(homing.step(at(0.0, -0.1, -3.5), tick(ms)), DRIVE); // presses
         }
@@ -407,9 +401,7 @@ mod tests {
 
     #[test]
     fn a_stop_that_yields_is_no_way_back_in_either_direction() {
-        let up = StopHomingConfig { velocity: AngularVelocity::from_rad_per_s(2.0), ..DOWN };
-        for (config, direction) in [(DOWN, -1.0), (up, 1.0)] {
-            let mut homing = StopHoming::new(config).unwrap();
+        for (mut homing, direction) in [(down(), -1.0), (homing(2.0).unwrap(), 1.0)] {
             let mut step = |radians: f32, ms| {
                 homing.step(at(radians * direction, 0.0, 9.0 * direction), tick(ms))
             };
@@ -427,16 +419,16 @@ mod tests {
         let nan = at(0.0, f32::NAN, 0.0);
         let long = tick(10_000);
         for (shaft, when, error) in [
-            (None, tick(1), HomingError::LostFeedback),
-            (nan, tick(1), HomingError::LostFeedback),
-            (at(0.0, 0.0, 0.0), long, HomingError::TimedOut),
-            (at(-1.6, -2.0, -1.0), tick(800), HomingError::NoStop),
-            (at(1.6, 2.0, -1.0), tick(800), HomingError::NoStop), // wired the wrong way round
+            (None, tick(1), HomingStep::LostFeedback),
+            (nan, tick(1), HomingStep::LostFeedback),
+            (at(0.0, 0.0, 0.0), long, HomingStep::TimedOut),
+            (at(-1.6, -2.0, -1.0), tick(800), HomingStep::NoStop),
+            (at(1.6, 2.0, -1.0), tick(800), HomingStep::NoStop), // wired the wrong way round
         ] {
-            let mut homing = StopHoming::new(DOWN).unwrap();
+            let mut homing = down();
             assert_eq!(homing.step(at(0.0, 0.0, 0.0), tick(0)), DRIVE);
-            assert_eq!(homing.step(shaft, when), HomingStep::Failed(error));
-            assert_eq!(homing.step(at(0.0, 0.0, -9.0), tick(20_000)), HomingStep::Failed(error));
+            assert_eq!(homing.step(shaft, when), error);
+            assert_eq!(homing.step(at(0.0, 0.0, -9.0), tick(20_000)), error);
         }
     }
 
@@ -444,19 +436,23 @@ mod tests {
     fn parameters_that_make_no_sense_are_named() {
         let velocity = AngularVelocity::from_rad_per_s;
         let angle = Angle::from_radians;
-        for (config, name) in [
-            (StopHomingConfig::new(velocity(0.0), 1.0), "approach velocity"),
-            (StopHomingConfig::new(velocity(f32::NAN), 1.0), "approach velocity"),
-            (StopHomingConfig::new(velocity(1.0), -1.0), "effort"),
-            (DOWN.with_standing_below(velocity(2.0)), "standing speed"),
-            (DOWN.with_standing_below(velocity(f32::NAN)), "standing speed"),
-            (DOWN.with_window(Duration::ZERO), "window"),
-            (DOWN.with_timeout(Duration::from_millis(100)), "time-out"),
-            (DOWN.with_travel(angle(0.0)), "travel"),
-            (DOWN.with_stop_at(Position::from_angle(angle(f32::NAN))), "position of the stop"),
-            (DOWN.with_back_off(angle(-0.1)), "back-off"),
+        for (refused, error) in [
+            (StopHoming::new(velocity(0.0), 1.0), ConfigError::NotPositive("velocity")),
+            (StopHoming::new(velocity(f32::NAN), 1.0), ConfigError::NotPositive("velocity")),
+            (StopHoming::new(velocity(1.0), -1.0), ConfigError::NotPositive("effort")),
+            (down().with_standing_below(velocity(2.0)), ConfigError::Unusable("speed")),
+            (down().with_standing_below(velocity(f32::NAN)), ConfigError::Unusable("speed")),
+            (down().with_window(Duration::ZERO), ConfigError::Unusable("window")),
+            (down().with_window(Duration::from_secs(10)), ConfigError::Unusable("window")),
+            (down().with_timeout(Duration::from_millis(100)), ConfigError::Unusable("timeout")),
+            (down().with_travel(angle(0.0)), ConfigError::NotPositive("travel")),
+            (
+                down().with_stop_at(Position::from_angle(angle(f32::NAN))),
+                ConfigError::NotFinite("position"),
+            ),
+            (down().with_back_off(angle(-0.1)), ConfigError::Negative("back_off")),
         ] {
-            assert_eq!(StopHoming::new(config).map(|_| ()), Err(name));
+            assert_eq!(refused, Err(error));
         }
     }
 }

@@ -62,7 +62,7 @@ impl Timeouts {
     /// Sets the ages from which feedback is late and a motor offline: `late` at most 1 s, `offline` from `late` to 10 s.
     ///
     /// # Errors
-    /// Names the age that is out of its range, which is longer than a robot may be driven blindly.
+    /// Names the age outside of its range: longer than a robot may be driven blindly.
     ///
     /// # Examples
     /// ```
@@ -95,8 +95,8 @@ impl Timeouts {
         }
     }
 
-    /// Sets the age from which a target no longer counts: at most 1 s, and longer than the period of the updates,
-    /// because a target has the time of the update before it.
+    /// Sets the age at which a target expires: at most 1 s, and longer than the period of the updates, because a target
+    /// has the time of the last update.
     ///
     /// # Errors
     /// The age is zero or longer than 1 s.
@@ -107,11 +107,11 @@ impl Timeouts {
         }
     }
 
-    /// Sets the age from which a [measurement of another sensor](super::Measured) is too old to be followed: 1 ms to 1 s, in
-    /// whole milliseconds. It never counts for longer than the command deadline.
+    /// Sets the age at which a [measurement of another sensor](super::Measured) expires: 1 ms to 1 s, in whole milliseconds.
+    /// A measurement never counts for longer than the command deadline.
     ///
     /// # Errors
-    /// The age is out of that range.
+    /// The age is out of this range.
     pub const fn with_measured(self, measured: Duration) -> Result<Self, ConfigError> {
         match ConfigError::check_micros("measurement in us", measured.micros_u32(), 1_000, BLIND_US)
         {
@@ -139,13 +139,13 @@ impl Timeouts {
         Duration::from_micros(self.offline_us as u64)
     }
 
-    /// Returns the age from which a target no longer counts.
+    /// Returns the age at which a target expires.
     #[must_use]
     pub const fn command(&self) -> Duration {
         Duration::from_micros(self.command_us as u64)
     }
 
-    /// Returns the age from which a measurement of another sensor is too old.
+    /// Returns the age at which a measurement of another sensor expires.
     #[must_use]
     pub const fn measured(&self) -> Duration {
         Duration::from_millis(self.measured_ms as u64)
@@ -180,7 +180,7 @@ impl Default for Timeouts {
     }
 }
 
-/// The longest time that a motor may be driven without news of it, or without a new target.
+/// The longest time for which a motor may be driven without feedback, or without a new target.
 const BLIND_US: u32 = 1_000_000;
 
 /// Far below the 71 minutes after which a 32-bit stamp repeats.

@@ -1,7 +1,8 @@
 use crate::frame::CanFrame;
 use core::num::NonZeroU32;
 
-/// How full a bus is: what its frames take of its bit rate, without stuff bits and with as many as can be.
+/// Load of a bus: the share of its bit rate taken by its frames, without stuff bits and with the most possible. Calculated here,
+/// or [measured](crate::runner::Runner::measured_load) by a runner.
 ///
 /// Counts standard data frames, each with the pause of three bits after it; for the 8 bytes that DJI motors use:
 ///
@@ -10,8 +11,8 @@ use core::num::NonZeroU32;
 /// | nominal | 111 | 34 stuffable bits around 64 of data, 13 that are never stuffed: `47 + 8 * 8` |
 /// | worst case | 135 | and a stuff bit after the first five, then after every fourth: `(34 + 64 - 1) / 4` = 24 |
 ///
-/// The load is `bits * frames a second / bit rate`. What a bus carries lies between the two, and depends on the
-/// content. Above 1 the frames of lowest priority, those with the highest ids, do not get through.
+/// The load is `bits * frames a second / bit rate`. The real load lies between the two, and depends on the content.
+/// Above 1, the frames of lowest priority (highest ids) do not get through.
 ///
 /// Feedback of DJI motors at 1 kHz, and a command frame for every four of them at the same rate, at 1 Mbit/s:
 ///
@@ -58,15 +59,16 @@ impl BusLoad {
     /// Bits of a standard data frame of 8 bytes without stuff bits, with the pause after it.
     pub const NOMINAL_BITS: u32 = Self::nominal_bits(8);
 
-    /// Bits of a standard data frame of 8 bytes with as many stuff bits as can be, with the pause after it.
+    /// Bits of a standard data frame of 8 bytes with the most stuff bits possible, with the pause after it.
     pub const WORST_CASE_BITS: u32 = Self::worst_bits(8);
 
     /// CRC delimiter, acknowledge slot and delimiter, end of frame, and the pause of three bits.
     const UNSTUFFED_BITS: u32 = 13;
 
-    /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with as many as can be.
+    /// Returns the bits of one frame of any kind, with the pause after it: without stuff bits, and with the most stuff
+    /// bits possible.
     ///
-    /// What is really sent lies between the two. A remote frame carries no data, whatever length it asks for.
+    /// The sent bits lie between the two. A remote frame carries no data, for any requested length.
     ///
     /// # Examples
     /// ```
@@ -97,6 +99,17 @@ impl BusLoad {
             bit_rate: if bit_rate == 0 { 1 } else { bit_rate },
             nominal_bits_per_s: 0,
             worst_bits_per_s: 0,
+        }
+    }
+
+    /// Takes the bit rate and the counts of one second: frames, bits without stuff bits, bits with the most stuff bits
+    /// possible.
+    pub(crate) const fn measured(bit_rate: u32, frames: u32, nominal: u32, worst: u32) -> Self {
+        Self {
+            frames_per_s: frames,
+            nominal_bits_per_s: nominal as u64,
+            worst_bits_per_s: worst as u64,
+            ..Self::new(bit_rate)
         }
     }
 
@@ -131,7 +144,7 @@ impl BusLoad {
         }
     }
 
-    /// Adds what others send on the same bus: another device family, say. The bit rate stays.
+    /// Adds the frames of others on the same bus, for example of another device family. The bit rate stays.
     ///
     /// # Examples
     /// ```
@@ -183,8 +196,8 @@ impl BusLoad {
         self.worst_bits_per_s as f32 / self.bit_rate as f32
     }
 
-    /// Returns how many frames of 8 bytes a second fit below a ceiling of the worst case, rounded down. A ceiling that is NaN or
-    /// negative counts as 0.
+    /// Returns the number of frames of 8 bytes a second below a ceiling of the worst case, rounded down. A ceiling that is NaN
+    /// or negative counts as 0.
     ///
     /// # Examples
     /// ```
@@ -208,7 +221,7 @@ impl BusLoad {
         self.percent(self.worst_bits_per_s)
     }
 
-    /// Returns a load in percent, rounded up; saturates. With 32-bit divisions only, which small cores have.
+    /// Returns a load in percent, rounded up; saturates. With 32-bit divisions only, for small cores.
     const fn percent(&self, bits_per_s: u64) -> u32 {
         let Some(rate) = NonZeroU32::new(self.bit_rate) else { return u32::MAX };
         #[expect(clippy::cast_possible_truncation, reason = "limited right here")]

@@ -2,11 +2,11 @@ use crate::encoder::Position;
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};
 
-/// Where a shaft is and how fast it turns, by another sensor than the motor's own: a gimbal's yaw by an IMU.
+/// Angle and velocity of a shaft by another sensor than the motor's own, for example a gimbal's yaw by an IMU.
 ///
-/// `A` is [`Angle`] where the sensor tells an angle within a turn, and [`Position`] where it counts turns. Angle and
-/// velocity are those of one axis, in the motor's positive direction: when the motor turns it that way and its
-/// base stands, both grow.
+/// `A` is [`Angle`] for a sensor with an angle within a turn, and [`Position`] for a sensor that counts turns. Angle
+/// and velocity are those of one axis, in the motor's positive direction: when the motor turns in this direction and
+/// its base stands, both grow.
 ///
 /// # Examples
 /// ```
@@ -25,11 +25,11 @@ use crate::units::{Angle, AngularVelocity};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Measured<A = Angle> {
-    /// Where it is.
+    /// The angle or position.
     pub angle: A,
-    /// How fast it turns.
+    /// The velocity.
     pub velocity: AngularVelocity,
-    /// When it was measured; or when it arrived, if its way was short.
+    /// Time of the measurement; or of its arrival, after a short way.
     pub at: Instant,
 }
 

@@ -1,4 +1,4 @@
-//! What every motor has in common, whatever its family.
+//! Common parts of all motors, of any family.
 //!
 //! The bus owns the motors and the application holds small `Copy` handles, so the traits here are
 //! implemented by the *owner* of the motors and take the handle as an argument: nothing borrows a motor.
@@ -25,9 +25,9 @@
 //! | [`HealthConfig`] | what is looked for, and what follows |
 //! | [`BusLoad`] | how full the bus is |
 //!
-//! A motor of your own joins by implementing [`OwnMotor`]: its ids, frames and loop, and of safety only what rest is. A
-//! motor that does not fit implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays of devices are
-//! [`Devices`]; a struct of devices names its parts in one method.
+//! A motor of the application joins by implementing [`OwnMotor`]: its ids, frames and loop, and of safety only the frame of
+//! rest. A motor outside of this scheme implements [`CanDevice`] itself, with a [`Guard`] for each motor. Tuples and arrays
+//! of devices are [`Devices`]; a struct of devices names its parts in one method.
 
 mod arming;
 mod capability;
@@ -56,7 +56,7 @@ pub use devices::Devices;
 pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
 pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
-pub use homing::{HomingError, HomingStep, ShaftState, StopHoming, StopHomingConfig};
+pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
 pub use measured::Measured;

@@ -15,7 +15,7 @@ pub struct MotorName {
 }
 
 impl MotorName {
-    /// Takes the model and the id that is set on the motor.
+    /// Takes the model and the id set on the motor.
     #[must_use]
     pub const fn new(model: &'static str, id: u8) -> Self {
         Self { model, id }
@@ -27,7 +27,7 @@ impl MotorName {
         self.model
     }
 
-    /// Returns the id that is set on the motor.
+    /// Returns the id set on the motor.
     #[must_use]
     pub const fn id(self) -> u8 {
         self.id

@@ -1,6 +1,6 @@
 use super::MotorName;
 
-/// A setting of a drive that keeps its motor from being armed: it differs from what the program was written for, or is not known.
+/// A setting of a drive that prevents arming: the setting differs from the expected value, or is not known.
 ///
 /// # Examples
 /// ```
@@ -21,7 +21,7 @@ pub struct WrongSetting {
     pub motor: MotorName,
     /// The name of the setting in the manual of the drive.
     pub setting: &'static str,
-    /// The value that the configuration of the motor has, in the unit of the manual.
+    /// The value in the configuration of the motor, in the unit of the manual.
     pub expected: f32,
     /// The value in the drive; `None` if the drive has not answered yet.
     pub found: Option<f32>,

@@ -1,4 +1,4 @@
-//! What is done with every device of several: one visitor for each.
+//! Actions on every device of several: one visitor for each action.
 
 use super::{CanDevice, Claim, Devices, Edge, Ingest, Missing, Role, WrongSetting};
 use crate::frame::CanFrame;
@@ -6,7 +6,7 @@ use crate::time::{Instant, Tick};
 use core::ops::Range;
 use embedded_can::Frame;
 
-/// What visits every device of [`Devices`].
+/// An action on every device of [`Devices`].
 pub trait Visitor {
     /// Visits one device.
     fn visit(&mut self, device: &mut impl CanDevice);
@@ -69,7 +69,7 @@ impl Visitor for Search {
     }
 }
 
-/// Gives a frame back: first to the device that claims its id as a command, then to one that sent it once.
+/// Gives a frame back: first to the device that claims its id as a command, then to a former sender.
 pub(super) struct Back<'a> {
     pub(super) frame: &'a CanFrame,
     pub(super) to_owner: bool,
@@ -111,7 +111,7 @@ impl Visitor for Nth {
     }
 }
 
-/// Looks for a claim that clashes with the one that has so many before it.
+/// Searches for a claim that clashes with the claim at this index.
 pub(super) struct Rival {
     pub(super) left: usize,
     pub(super) claim: Option<Claim>,
@@ -158,7 +158,8 @@ pub(crate) struct Ask {
 }
 
 impl Ask {
-    /// Returns whether the request counts for all of them. A caller that refuses on its own hands it on too.
+    /// Returns whether the request counts for all of them. A caller with a refusal of its own passes the request on
+    /// too.
     pub(crate) fn of(devices: &mut (impl Devices + ?Sized)) -> bool {
         let mut ask = Self { granted: true };
         devices.visit(&mut ask);

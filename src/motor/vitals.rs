@@ -1,18 +1,18 @@
-/// How bad it is what an ESC reports.
+/// Severity of an error reported by an ESC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Severity {
-    /// It goes on, and says so.
+    /// The ESC continues, with a warning.
     Warning,
-    /// It must not be driven.
+    /// The motor must not be driven.
     Fault,
 }
 
-/// What a motor of your own knows of itself beside its velocity: whatever is known is watched.
+/// Quantities known to an own motor beside its velocity: every known quantity is monitored.
 ///
-/// Shares are of what the motor can do: 0.5 of the largest command, current or speed without load; negative the other way
-/// round.
+/// Shares are relative to the largest command, current or speed without load: 0.5 is half; negative in the other
+/// direction.
 ///
 /// # Examples
 /// ```
@@ -26,15 +26,15 @@ pub enum Severity {
 pub struct Vitals {
     /// Its temperature in °C. Watched when its [`HealthConfig`](super::HealthConfig) has temperatures.
     pub temperature_c: Option<i16>,
-    /// What its ESC reports.
+    /// Severity of the error reported by the ESC.
     pub error: Option<Severity>,
-    /// The code behind that, for the log.
+    /// The error code, for the log.
     pub error_code: u8,
-    /// The command of the last [`control`](super::OwnMotor::control), as a share; 0 when it is not known, and then neither
-    /// stall nor runaway is looked for.
+    /// The command of the last [`control`](super::OwnMotor::control), as a share; 0 if not known, and then neither stall
+    /// nor runaway is detected.
     pub effort: f32,
-    /// The speed as a share of that without load.
+    /// The speed as a share of the speed without load.
     pub speed: f32,
-    /// The current as a share; 0 when it is not known.
+    /// The current as a share; 0 if not known.
     pub current: f32,
 }

@@ -22,7 +22,7 @@ enum Target {
     Velocity(f32),
 }
 
-/// Which way the pins tell the bridge to drive.
+/// Direction in which the pins drive the bridge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Way {
     Coast,
@@ -30,7 +30,7 @@ enum Way {
     Backward,
 }
 
-/// A pin that failed.
+/// A failed pin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BrushedError<P, D> {
@@ -90,7 +90,7 @@ pub struct Brushed<P, D> {
     target: Target,
     way: Way,
     output: f32,
-    /// The last update set a duty of its own; the loop goes on from there.
+    /// The last update set a duty of its own; the loop continues from there.
     was_direct: bool,
     /// An update without a step may set the output once more.
     may_hold: bool,
@@ -104,7 +104,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Takes the pins: disarmed. Nothing is sent before the first [`update`](Self::update).
     ///
     /// # Errors
-    /// Names the parameter that is not usable.
+    /// Names the invalid parameter.
     pub fn new(channel: P, direction: D, config: BrushedConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let speed = config.make_loop()?;
@@ -129,7 +129,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         })
     }
 
-    /// Takes a reading of the encoder's counter; it may wrap. Read it at least once in half a wrap.
+    /// Takes a reading of the encoder's counter, which may wrap. Read the counter at least once in half a wrap.
     pub fn ingest_counts(&mut self, counter: u32, now: Instant) {
         let Some(counts_per_turn) = self.config.counts_per_turn else { return };
         let (before, then) = self.counted.replace((counter, now)).unwrap_or((counter, now));
@@ -181,7 +181,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         self.rest();
     }
 
-    /// Disarms, and stays so until it is cleared and armed.
+    /// Disarms; the motor stays disarmed until the stop is cleared and the motor armed.
     pub fn emergency_stop(&mut self) {
         self.guard.emergency_stop();
         self.rest();
@@ -192,7 +192,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         self.guard.clear_emergency_stop();
     }
 
-    /// Tells whether targets are taken.
+    /// Returns whether targets are taken.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
         self.guard.is_armed()
@@ -201,17 +201,17 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// Sets the duty directly: -1 to 1, saturating at the limit.
     ///
     /// # Errors
-    /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
+    /// Names the reason of the refusal. A value that is NaN or infinite also removes the present target.
     pub fn set_duty(&mut self, share: f32) -> Result<(), TargetError> {
         self.admit(share.is_finite())?;
         self.target = Target::Duty(share);
         Ok(())
     }
 
-    /// Runs the loop and sets the pins. Call it in every tick.
+    /// Runs the loop and sets the pins. Call this in every tick.
     ///
     /// # Errors
-    /// That of a pin; the next call tries again.
+    /// The error of a pin; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
         let healthy = self.look(tick.now());
         let asked = self.command(tick);
@@ -234,7 +234,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         if way != self.way {
             // Never a pulse in the wrong direction while the pins change.
             self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm)?;
-            // A pin that fails may have changed or not: the next call sets both again.
+            // A failed pin may have changed or not: the next call sets both again.
             self.way = Way::Coast;
             let set = match way {
                 Way::Coast => self.direction.coast(),
@@ -249,7 +249,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             .map_err(BrushedError::Pwm)
     }
 
-    /// Stops by both ways that there are, whether one of them fails or not.
+    /// Stops by both means, even if one of them fails.
     fn coast(&mut self) -> Result<(), BrushedError<P::Error, D::Error>> {
         let off = self.channel.set_duty_cycle_fully_off().map_err(BrushedError::Pwm);
         let set = self.direction.coast().map_err(BrushedError::Direction);
@@ -259,7 +259,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     fn command(&mut self, tick: Tick) -> f32 {
         if !self.guard.drives(tick.now()) {
-            // Late counts leave the integral as it is; without a target it starts afresh.
+            // Late counts leave the integral unchanged; without a target it starts afresh.
             if !self.guard.has_target() {
                 self.rest();
             }
@@ -275,7 +275,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         match (self.target, &mut self.speed) {
             (Target::Duty(share), speed) => {
                 if !was_direct {
-                    // The loop has no part in it.
+                    // The loop has no part in this output.
                     speed.iter_mut().for_each(Pid::reset);
                 }
                 share
@@ -292,7 +292,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
 
     fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         if !self.guard.has_target() {
-            // What was asked for before, and its output, are over.
+            // The target before and its output are discarded.
             (self.target, self.may_hold, self.was_direct) = (Target::Rest, false, false);
         }
         self.guard.admit(is_finite)
@@ -327,7 +327,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
         &self.direction
     }
 
-    /// Returns what decides whether it may be driven.
+    /// Returns the guard, which decides whether the motor may be driven.
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard

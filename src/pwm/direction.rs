@@ -1,8 +1,9 @@
 use embedded_hal::digital::{ErrorType, OutputPin};
 
-/// The pins that tell a bridge which way to drive: an array of one pin, or a tuple of two.
+/// The direction pins of a bridge: an array of one pin, or a tuple of two.
 ///
-/// One pin, `[pin]`, is low for forward and high for backward; coasting leaves it as it is. A tuple is IN1 and IN2 of a bridge like the L298N or TB6612FNG: at most one pin is high, and both low let the motor coast.
+/// One pin, `[pin]`, is low for forward and high for backward; coasting leaves the pin unchanged. A tuple is IN1 and IN2 of a
+/// bridge like the L298N or TB6612FNG: at most one pin is high, and both low let the motor coast.
 ///
 /// # Examples
 /// ```
@@ -26,29 +27,29 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 /// # Ok::<(), core::convert::Infallible>(())
 /// ```
 pub trait Direction {
-    /// What can go wrong with a pin.
+    /// Error of a pin.
     type Error: core::fmt::Debug;
 
-    /// Lets the motor coast, where the bridge can do that.
+    /// Lets the motor coast, if the bridge can.
     ///
     /// # Errors
-    /// That of the pin.
+    /// The error of the pin.
     fn coast(&mut self) -> Result<(), Self::Error>;
 
     /// Drives in the positive direction.
     ///
     /// # Errors
-    /// That of the pin.
+    /// The error of the pin.
     fn forward(&mut self) -> Result<(), Self::Error>;
 
     /// Drives in the negative direction.
     ///
     /// # Errors
-    /// That of the pin.
+    /// The error of the pin.
     fn backward(&mut self) -> Result<(), Self::Error>;
 }
 
-/// Low is forward, high is backward; coasting leaves the pin as it is.
+/// Low is forward, high is backward; coasting leaves the pin unchanged.
 impl<P: OutputPin> Direction for [P; 1] {
     type Error = P::Error;
 
@@ -67,7 +68,7 @@ impl<P: OutputPin> Direction for [P; 1] {
     }
 }
 
-/// Lowers a pin before it raises the other one: both are never high.
+/// Lowers a pin before it raises the other pin: both are never high.
 impl<A: OutputPin, B: OutputPin + ErrorType<Error = A::Error>> Direction for (A, B) {
     type Error = A::Error;
 

@@ -59,25 +59,25 @@ impl RcConfig {
         }
     }
 
-    /// Sets the number by which it is called in edges; 1 at first.
+    /// Sets the number of the motor in edges; 1 at first.
     #[must_use]
     pub const fn with_id(self, id: u8) -> Self {
         Self { name: MotorName::new("RC PWM", id), ..self }
     }
 
-    /// Sets the pulses for throttle -1, 0 and 1, in µs. One that turns one way only has `low` as its neutral.
+    /// Sets the pulses for throttle -1, 0 and 1, in µs. For an ESC with one direction only, `low` is the neutral pulse.
     #[must_use]
     pub const fn with_pulses_us(self, low: u16, neutral: u16, high: u16) -> Self {
         Self { low_us: low, neutral_us: neutral, high_us: high, ..self }
     }
 
-    /// Sets the period to which the timer is set: 20 ms at first.
+    /// Sets the period of the timer: 20 ms at first.
     #[must_use]
     pub const fn with_period(self, period: Duration) -> Self {
         Self { period_us: period.as_micros(), ..self }
     }
 
-    /// Sends no pulse, instead of the neutral one, when it is not to move: a servo goes limp.
+    /// Sends no pulse, instead of the neutral pulse, for a motor at rest: a servo goes limp.
     ///
     /// Not for an ESC: most disarm then, and would have to see neutral again. With the neutral pulse an ESC stops and stays
     /// armed, and a servo goes to its centre.
@@ -86,14 +86,14 @@ impl RcConfig {
         Self { off_at_rest: true, ..self }
     }
 
-    /// Sets how long the neutral pulse is sent before targets are taken: what the ESC waits for. 2 s at first, counted
-    /// from the first one that the channel took.
+    /// Sets how long the neutral pulse is sent before targets are taken, as required by the ESC. 2 s at first, counted
+    /// from the first pulse taken by the channel.
     #[must_use]
     pub const fn with_arming_time(self, time: Duration) -> Self {
         Self { arming: time, ..self }
     }
 
-    /// Sets the velocity that full throttle stands for, so that it takes velocities. Nothing measures it.
+    /// Sets the velocity at full throttle, so that velocities are valid targets. The velocity is not measured.
     #[must_use]
     pub const fn with_full_speed(self, velocity: AngularVelocity) -> Self {
         Self { full_speed: Some(velocity), ..self }
@@ -114,7 +114,7 @@ impl RcConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the first that is not usable.
+    /// Names the first invalid parameter.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let speed = self.full_speed.map(AngularVelocity::as_rad_per_s);
         Err(ConfigError::Unusable(if self.low_us == 0 || self.low_us >= self.high_us {
@@ -139,7 +139,7 @@ impl Default for RcConfig {
 
 /// An RC ESC or servo on a PWM channel whose timer runs at the period of the configuration.
 ///
-/// It reports nothing, so it cannot be missing; what it does with its pulses is its own affair.
+/// The motor sends no feedback, so feedback cannot be missing; the motion is up to the ESC.
 ///
 /// # Examples
 /// ```
@@ -192,7 +192,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// Takes a channel: disarmed. Nothing is sent before the first [`update`](Self::update).
     ///
     /// # Errors
-    /// Names the parameter that is not usable.
+    /// Names the invalid parameter.
     pub fn new(channel: P, config: RcConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let guard =
@@ -228,18 +228,18 @@ impl<P: SetDutyCycle> RcPwm<P> {
         self.arming = Arming::Idle;
     }
 
-    /// Disarms, and stays so until it is cleared and armed.
+    /// Disarms; the motor stays disarmed until the stop is cleared and the motor armed.
     pub const fn emergency_stop(&mut self) {
         self.guard.emergency_stop();
         self.arming = Arming::Idle;
     }
 
-    /// Takes the emergency stop back; it stays disarmed.
+    /// Clears the emergency stop; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
         self.guard.clear_emergency_stop();
     }
 
-    /// Tells whether targets are taken.
+    /// Returns whether targets are taken.
     #[must_use]
     pub const fn is_armed(&self) -> bool {
         self.guard.is_armed()
@@ -248,17 +248,17 @@ impl<P: SetDutyCycle> RcPwm<P> {
     /// Sets the throttle of an ESC or the place of a servo: -1 to 1, saturating, for low, neutral and high.
     ///
     /// # Errors
-    /// Says why it is not taken. A value that is NaN or infinite takes the present one away.
+    /// Names the reason of the refusal. A value that is NaN or infinite also removes the present target.
     pub fn set_throttle(&mut self, throttle: f32) -> Result<(), TargetError> {
         self.guard.admit(throttle.is_finite())?;
         self.throttle = throttle.clamp(-1.0, 1.0);
         Ok(())
     }
 
-    /// Sends the pulse of this tick. Call it in every one.
+    /// Sends the pulse of this tick. Call this in every tick.
     ///
     /// # Errors
-    /// That of the channel; the next call tries again.
+    /// The error of the channel; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), P::Error> {
         let drives = self.guard.drives(tick.now());
         if self.guard.conditions().contains(Condition::ClockFault) {
@@ -280,7 +280,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         }
     }
 
-    /// Sends neutral. A pulse that the channel did not take does not count.
+    /// Sends neutral. A pulse refused by the channel does not count.
     fn go_on_arming(&mut self, now: Instant) -> Result<(), P::Error> {
         self.send(self.config.neutral_us.into())?;
         let since = match self.arming {
@@ -308,20 +308,20 @@ impl<P: SetDutyCycle> RcPwm<P> {
         self.channel.set_duty_cycle(duty(share, self.channel.max_duty_cycle()))
     }
 
-    /// Returns what is wrong with it: that its targets grew too old, as it reports nothing.
+    /// Returns the present conditions: expired targets only, since the motor sends no feedback.
     #[must_use]
     pub const fn conditions(&self) -> Conditions {
         self.guard.conditions()
     }
 
-    /// Returns how it is.
+    /// Returns the health of the motor.
     #[must_use]
     pub const fn health(&self) -> Health {
         self.guard.health(self.config.name)
     }
 
-    /// Returns the oldest change of a condition that was not read yet. None is lost, however late it is read; while it
-    /// waits, the same change is not noted again.
+    /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
+    /// is not noted again.
     pub fn next_edge(&mut self) -> Option<Edge> {
         self.guard.next_edge(self.config.name)
     }
@@ -332,7 +332,7 @@ impl<P: SetDutyCycle> RcPwm<P> {
         &self.channel
     }
 
-    /// Returns what decides whether it may be driven.
+    /// Returns the guard, which decides whether the motor may be driven.
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard

@@ -1,31 +1,31 @@
-//! A driver that can call back what waits in its controller.
+//! A driver that can abort the frames pending in its controller.
 
 use super::port::{Driver, Received, Sent};
 use super::{Nb, Port};
 use crate::frame::CanFrame;
 
-/// A CAN driver that can call back frames which wait in its controller: bxCAN, FDCAN and MCP2515 can.
+/// A CAN driver that can abort frames pending in its controller, as bxCAN, FDCAN and MCP2515 allow.
 ///
-/// `embedded-can` has no such call. Without it, a plug that was pulled while the motors were driven leaves a frame with the old
-/// currents in each mailbox, and they leave when it is back. Implement it for the newtype around the driver, and give the
-/// runner `NbAbort(Nb(driver))`.
+/// `embedded-can` has no such call. Without it, if the plug is pulled while the motors are driven, a frame with the old
+/// currents stays in each mailbox and leaves when the bus is back. Implement the trait for the newtype around the driver, and
+/// give the runner `NbAbort(Nb(driver))`.
 pub trait AbortPending: embedded_can::nb::Can {
-    /// Asks the controller not to send what waits in it, and hands each such frame to `back`. Does not wait.
+    /// Aborts the transmission of all pending frames, and hands each aborted frame to `back`. Does not wait.
     ///
-    /// A frame that is on the wire at that moment may still arrive; it is handed over too if the controller cannot tell. What
-    /// waits in a queue of the driver counts as well.
+    /// A frame on the wire at that moment may still arrive; if the controller cannot tell, the frame is handed over too.
+    /// Frames in a queue of the driver count as pending as well.
     fn abort_pending(&mut self, back: impl FnMut(Self::Frame));
 }
 
 /// A driver that implements [`AbortPending`]: as [`Nb`], and no command older than one period waits in the controller.
 ///
-/// Before each update, every frame that was not sent since the tick before is called back. Those of the device are offered
-/// again with the values of this update. Frames of others are given up: they go to the closure of
-/// [`Runner::tick_with`](super::Runner::tick_with), as evicted ones do. A bus that sends nothing for 100 ms is down, as it is when the driver
-/// refuses every frame.
+/// Before each update, every frame not sent since the tick before is called back. Frames of the device are offered again with the
+/// values of this update. Frames of others are not offered again: they go to the closure of
+/// [`Runner::tick_with`](super::Runner::tick_with), as evicted frames do. A bus that sends nothing for 100 ms is down, as if the
+/// driver refused every frame.
 ///
 /// # Examples
-/// The plug is out for 5 ms while the current changes: with `Nb`, each mailbox would send an old one afterwards.
+/// The plug is out for 5 ms while the current changes: with `Nb`, each mailbox would send an old frame afterwards.
 /// ```
 /// use drivetrain::dji::{Bus, Config, M3508};
 /// use drivetrain::frame::CanFrame;

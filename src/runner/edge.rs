@@ -1,8 +1,8 @@
-//! What can be wrong with a bus as a whole, and the latch that keeps it until it is read.
+//! Conditions of the bus as a whole, and the latch that keeps each edge until read.
 
 use crate::time::{ConditionEdge, Duration, Instant};
 
-/// Something that is wrong with the bus as a whole, for a moment or for hours.
+/// A fault of the bus as a whole, for a moment or for hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -11,15 +11,15 @@ pub enum BusCondition {
     /// Some command frame was not sent for 100 ms, refused or given back by the driver: everything was disarmed. Ends when all are
     /// sent.
     Down,
-    /// Feedback was heard once, and none from any motor for 100 ms. Ends with the first.
+    /// After the first feedback, no motor sent feedback for 100 ms. Ends with the next feedback.
     Silent,
     /// Received frames were lost because a buffer was full: the driver's, or a queue. Ends after 1 s without.
     ReceiveOverrun,
-    /// A tick came so late that others were left out. Ends after 1 s without.
+    /// A tick came so late that periods were left out. Ends after 1 s without a late tick.
     TickOverrun,
-    /// The clock shows the same time again and again. Ends after 1 s in which it goes on.
+    /// The clock shows the same time again and again. Ends after 1 s in which the clock runs.
     ClockStandstill,
-    /// The clock went back. Ends after 1 s in which it does not.
+    /// The clock went back. Ends after 1 s without going back.
     ClockReversal,
 }
 
@@ -34,7 +34,7 @@ impl BusCondition {
         Self::ClockReversal,
     ];
 
-    /// Tells whether it happens from time to time, and so is over when it did not for a while.
+    /// Returns whether the condition consists of repeated incidents, and so ends after a while without an incident.
     const fn is_repeated(self) -> bool {
         !matches!(self, Self::Down | Self::Silent)
     }
@@ -53,13 +53,13 @@ impl core::fmt::Display for BusCondition {
     }
 }
 
-/// A [`BusCondition`] that began or ended, for [`Runner::next_edge`](super::Runner::next_edge).
+/// Beginning or end of a [`BusCondition`], for [`Runner::next_edge`](super::Runner::next_edge).
 pub(super) type BusEdge = ConditionEdge<BusCondition>;
 
-/// How long a repeated condition must not have come again before it is over.
+/// Time without an incident after which a repeated condition ends.
 const CALM: Duration = Duration::from_secs(1);
 
-/// The conditions and the edges that wait to be read.
+/// The present conditions, and the edges not read yet.
 #[derive(Debug)]
 pub(super) struct Edges {
     latches: [Latch; BusCondition::ALL.len()],
@@ -102,7 +102,7 @@ impl Edges {
         }
     }
 
-    /// Notes that a condition is there; returns whether it was not before.
+    /// Begins a condition; returns whether the condition was absent before.
     pub(super) fn begin(&mut self, condition: BusCondition, at: Instant) -> bool {
         self.is_calm = false;
         self.latches.get_mut(condition as usize).is_some_and(|latch| latch.begin(at))
@@ -114,7 +114,7 @@ impl Edges {
         }
     }
 
-    /// Ends the repeated conditions that did not come again. To be called in each tick, unless all is calm.
+    /// Ends the repeated conditions without a recent incident. Has to be called in each tick, unless all is calm.
     pub(super) fn settle(&mut self, now: Instant) {
         for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.latches) {
             // The clock may have gone back.
@@ -146,7 +146,7 @@ impl Latch {
         }
         self.active = true;
         if self.begin_waits {
-            // It ended and began again, and nobody has read either.
+            // The condition ended and began again, and neither edge was read.
             self.end_waits = false;
         } else {
             self.began = at;
@@ -163,9 +163,9 @@ impl Latch {
         }
     }
 
-    /// Returns the edge that is to be read next.
+    /// Returns the edge to be read next.
     const fn waiting(&self, condition: BusCondition) -> Option<BusEdge> {
-        // An end that waits while the condition is there belongs to the time before.
+        // While the condition is present, a pending end belongs to the time before.
         if self.end_waits && (self.active || !self.begin_waits) {
             Some(ConditionEdge { condition, began: false, at: self.ended })
         } else if self.begin_waits {
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_came_and_went_unread_is_its_first_beginning_and_its_last_end() {
+    fn an_unread_condition_that_came_and_went_keeps_its_first_beginning_and_its_last_end() {
         let mut edges = Edges::new();
         for round in 0..3 {
             edges.begin(DOWN, at_ms(100 * round));
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_condition_is_over_when_it_did_not_come_for_a_second() {
+    fn a_repeated_condition_ends_after_a_second_without_an_incident() {
         let mut edges = Edges::new();
         for ms in (0..5_000).step_by(900) {
             edges.begin(OVERRUN, at_ms(ms));

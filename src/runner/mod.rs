@@ -7,15 +7,15 @@
 //!                                                     requeue <── refused, failed or evicted
 //! ```
 //!
-//! Sending never loses a newest value: what the driver refuses, fails or evicts is offered again after the next
-//! update, first, with the values of that update. What already waits in the controller cannot be called back through
-//! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver that can abort
-//! them implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
+//! Sending never loses a newest value: a frame refused, failed or evicted by the driver is offered again after the next
+//! update, first, with the values of that update. Frames pending in the controller cannot be called back through
+//! `embedded-can`: up to one frame a mailbox with older values may still go out after a stop. A driver able to abort
+//! pending frames implements [`AbortPending`], and [`NbAbort`] then leaves no frame older than one period.
 //!
-//! # What it watches
-//! A bus that is down or silent, overruns and a clock that does not go on are latched as [`ConditionEdge`]s beside those of
-//! the motors; [`Runner::next_edge`] hands them out. [`Runner::heartbeat`] is for the hardware watchdog, which alone
-//! can help when the loop itself stops.
+//! # Supervision
+//! A bus down or silent, overruns and a standing clock are latched as [`ConditionEdge`]s beside those of the motors;
+//! [`Runner::next_edge`] returns these edges. [`Runner::heartbeat`] is for the hardware watchdog, the only remedy when the
+//! loop itself stops.
 //!
 //! Nothing here is needed: a program can call [`Devices`] itself, as the examples `sans_io` and `async_sans_io` do.
 
@@ -35,11 +35,11 @@ pub use edge::BusCondition;
 pub use port::{BlockingTx, Nb, Port};
 #[cfg(feature = "queue")]
 pub use queue::{FrameQueue, FrameReceiver, FrameSender};
-pub use statistics::{ErrorCounts, MeasuredLoad, Statistics};
+pub use statistics::{ErrorCounts, Statistics};
 pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, Ask, Devices};
+use crate::motor::{ArmError, Ask, BusLoad, Devices};
 use crate::time::{Clock, ConditionEdge, Duration, Instant, Tick, Ticker};
 use statistics::{Meter, increment};
 use watch::Watch;
@@ -81,14 +81,14 @@ pub struct Runner<P, K, D> {
     clock: K,
     device: D,
     ticker: Ticker,
-    /// The step that is due and was not run.
+    /// The step due and not run yet.
     waiting: Option<Tick>,
     turn: u32,
     statistics: Statistics,
     stop: Option<&'static EmergencyStop>,
     watch: Watch,
     meter: Meter,
-    /// The frame that goes last in the next tick, because it failed as the first one.
+    /// A frame that failed as the first, and therefore goes last in the next tick.
     yields: Option<u32>,
 }
 
@@ -118,11 +118,11 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self
     }
 
-    /// Sets how many readings in a row without a later time mean that the clock stands, at least 1, instead of the limit that
-    /// [`due`](Self::due) learns.
+    /// Sets the number of readings in a row without a later time after which the clock counts as standing, at least 1,
+    /// instead of the limit learned by [`due`](Self::due).
     ///
-    /// Make it several times what a loop reads while the clock, if it counts in coarse ticks, shows one time: a step that comes by
-    /// mistake relaxes every motor.
+    /// If the clock counts in coarse ticks, choose several times the number of readings within one of them: a step by mistake
+    /// relaxes every motor.
     ///
     /// # Examples
     /// A loop that waits 10 ms in each turn, for a clock in microseconds: zeros go out 0.2 s after the clock stopped.
@@ -171,7 +171,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ///
     /// # Errors
     /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. A refused call
-    /// counts as asking.
+    /// counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
         let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
             ArmError::Stopped
@@ -185,13 +185,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         Err(refusal)
     }
 
-    /// Tells whether every motor takes targets; see [`Devices::is_armed`].
+    /// Returns whether every motor takes targets; see [`Devices::is_armed`].
     #[must_use]
     pub fn is_armed(&mut self) -> bool {
         self.device.is_armed()
     }
 
-    /// Takes an emergency stop back, the watched one and that of the device. The device stays disarmed.
+    /// Clears the watched emergency stop and the stop of the device. The device stays disarmed.
     pub fn clear_emergency_stop(&mut self) {
         if let Some(stop) = self.stop {
             stop.clear();
@@ -199,21 +199,20 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.device.clear_emergency_stop();
     }
 
-    /// Runs one step: update, then send. An evicted frame of others is dropped.
+    /// Runs one step: update, then send. Drops frames of others that the driver evicts.
     pub fn tick(&mut self, tick: Tick) {
         self.tick_with(tick, |_| {});
     }
 
-    /// Runs one step: update, then send. Hands frames of others that the driver evicted to `evicted`, if they
-    /// have at most 8 bytes.
+    /// Runs one step: update, then send. Hands evicted frames of others to `evicted`, if they have at most 8 bytes.
     pub fn tick_with(&mut self, tick: Tick, evicted: impl FnMut(&CanFrame)) {
         self.step(tick, |_| {}, evicted);
     }
 
-    /// Runs one step: update, then `limit`, then send. In between, all that the loops ask for is known and nothing of it
-    /// is on the wire: see [`scale_outputs`](crate::dji::Bus::scale_outputs) of a bus.
+    /// Runs one step: update, then `limit`, then send. In between, all outputs of the loops are known and none is on the
+    /// wire: see [`scale_outputs`](crate::dji::Bus::scale_outputs) of a bus.
     ///
-    /// For a limit over motors on two buses, nest the one call in the other's `limit`.
+    /// For a limit over motors on two buses, nest one call in the `limit` of the other.
     pub fn tick_limited(&mut self, tick: Tick, limit: impl FnOnce(&mut D)) {
         self.step(tick, limit, |_| {});
     }
@@ -235,7 +234,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Calls back what was offered in the tick before and did not leave; hands frames of others to `others`.
+    /// Calls back the frames offered in the tick before that did not leave; hands frames of others to `others`.
     fn call_back(&mut self, now: Instant, others: &mut impl FnMut(&CanFrame)) {
         let Self { port, device, statistics, meter, watch, .. } = self;
         port.call_back(|frame| match frame {
@@ -258,7 +257,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.meter.count(frame);
     }
 
-    /// Returns what was counted.
+    /// Returns the counters.
     #[must_use]
     pub fn statistics(&mut self) -> Statistics {
         Statistics {
@@ -270,22 +269,22 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Tells whether some command frame was not sent for 100 ms, refused or given back by the driver; over when all are sent.
+    /// Returns whether some command frame was not sent for 100 ms, refused or given back by the driver; over when all are sent.
     #[must_use]
     pub const fn is_bus_down(&self) -> bool {
         self.has(BusCondition::Down)
     }
 
-    /// Tells whether something is wrong with the bus now.
+    /// Returns whether something is wrong with the bus now.
     #[must_use]
     pub const fn has(&self, condition: BusCondition) -> bool {
         self.watch.has(condition)
     }
 
-    /// Returns the oldest change of a [`BusCondition`] that was not read yet, and takes it off the list.
+    /// Returns the oldest unread edge of a [`BusCondition`], and removes it from the list.
     ///
-    /// As long as a change waits, the same change is not noted again, so that none floods: [`Statistics`] has the numbers. Two
-    /// beginnings in a row say that the condition ended in between. What concerns one motor only is an edge of that motor.
+    /// While an edge is unread, the same edge is not latched again, so no condition floods: [`Statistics`] has the numbers.
+    /// Two beginnings in a row mean that the condition ended in between. A change of one motor is an edge of that motor.
     ///
     /// # Examples
     /// A second without a tick, and a second in time:
@@ -314,18 +313,18 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.watch.next_edge()
     }
 
-    /// Takes all changes that were not read yet, the oldest first; see [`next_edge`](Self::next_edge).
+    /// Takes all unread edges, the oldest first; see [`next_edge`](Self::next_edge).
     pub fn edges(&mut self) -> impl Iterator<Item = ConditionEdge<BusCondition>> + '_ {
         core::iter::from_fn(|| self.next_edge())
     }
 
-    /// Returns a number that goes on with each tick in which the whole loop ran: received frames were looked for since
-    /// the one before, the time went on, every loop was updated, and everything was offered to the driver. It wraps.
+    /// Returns a counter of the ticks in which the whole loop ran: received frames were polled since the tick before,
+    /// time advanced, every loop was updated, and every frame was offered to the driver. The counter wraps.
     ///
-    /// Feed the hardware watchdog when it has changed, and only then: a loop that hangs, in a driver that waits for ever
-    /// say, lets the watchdog bite, and a program that resets starts disarmed. A dead bus is no reason to reset, so what
-    /// counts is that each part ran, not that it had something to do. [`poll`](Self::poll) and `poll_queue` count
-    /// as looking for frames; a program that hands them to [`ingest`](Self::ingest) calls `poll(0)` beside it.
+    /// Feed the hardware watchdog when the counter has changed, and only then: a hanging loop, for example in a driver
+    /// waiting for ever, lets the watchdog bite, and a reset program starts disarmed. A dead bus is no reason to reset,
+    /// so each part has to run, with or without work to do. [`poll`](Self::poll) and `poll_queue` count as polling; a
+    /// program that hands frames to [`ingest`](Self::ingest) also calls `poll(0)`.
     ///
     /// # Examples
     /// ```
@@ -360,11 +359,44 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.watch.heartbeat
     }
 
-    /// Returns how full the bus was in the last second, by the frames that came and went here; `None` in the first one.
+    /// Returns the load of the bus in the last window of a second or a little more, by the frames sent and received here;
+    /// `None` in the first window.
     ///
-    /// What the hardware filter drops is not seen.
+    /// Frames are counted by their length. Compare the result with [`Bus::load`](crate::dji::Bus::load), calculated from the
+    /// rates of the motors: if the measured load is above, another node sends, or an ESC has another rate.
+    ///
+    /// # Limits
+    /// **Frames dropped by the filter of the controller are not counted**, nor are frames lost in an overrun, error frames
+    /// and repetitions. A sent frame counts when the driver takes it, and no longer when the driver gives it back.
+    ///
+    /// # Examples
+    /// Three M3508 at 1 kHz, whose three feedback frames of 8 bytes are the only traffic:
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::runner::{Nb, Runner};
+    /// use drivetrain::sim::{MotorConfig, Simulation};
+    /// use drivetrain::time::Duration;
+    ///
+    /// let world = Simulation::new(1);
+    /// let mut bus = Bus::new();
+    /// for id in 1..=3 {
+    ///     world.attach(MotorConfig::m3508(id))?;
+    ///     bus.attach(Config::<M3508>::new(id))?;
+    /// }
+    /// let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    /// for _ in 0..2_100 {
+    ///     world.advance(Duration::from_millis(1));
+    ///     runner.poll(16);
+    ///     if let Some(tick) = runner.due() {
+    ///         runner.tick(tick);
+    ///     }
+    /// }
+    /// let load = runner.measured_load().ok_or("two seconds are over")?;
+    /// assert!((load.nominal() - 0.333).abs() < 0.03, "{load}"); // and a zero frame each 10 ms
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
-    pub const fn measured_load(&self) -> Option<MeasuredLoad> {
+    pub const fn measured_load(&self) -> Option<BusLoad> {
         self.meter.last()
     }
 
@@ -380,8 +412,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         &mut self.device
     }
 
-    /// Returns the driver: to send own frames beside those of the device, to recover from bus-off, to abort what
-    /// waits in mailboxes.
+    /// Returns the driver: to send own frames beside those of the device, to recover from bus-off, to abort pending
+    /// frames.
     #[must_use]
     pub const fn port_mut(&mut self) -> &mut P {
         &mut self.port

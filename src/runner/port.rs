@@ -9,34 +9,35 @@ use crate::motor::{Devices, Ingest};
 use crate::time::{Clock, Instant};
 use embedded_can::{Error, ErrorKind};
 
-/// What the runner needs of a CAN driver: implemented by [`Nb`], [`NbAbort`](super::NbAbort) and [`BlockingTx`].
+/// A CAN driver as the runner needs it: implemented by [`Nb`], [`NbAbort`](super::NbAbort) and [`BlockingTx`].
 ///
 /// Several drivers implement both traits of `embedded-can`, whose methods have the same names, so the choice is a
 /// newtype. A driver with neither trait gets `embedded_can::nb::Can` by a newtype of its own.
 pub trait Port: Driver {}
 
-/// How frames go to a driver and come from it. Sealed: a [`Port`] outside of this module is made from the traits of
+/// Transfer of frames to and from a driver. Sealed: outside of this module, a [`Port`] is made from the traits of
 /// `embedded-can`.
 pub trait Driver {
-    /// Offers a frame to the driver; writes one that it evicts over `evicted`.
+    /// Offers a frame to the driver; if the driver evicts a frame, writes it over `evicted`.
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent;
 
-    /// Asks the driver for a received frame, and writes it over `frame`.
+    /// Asks the driver for a received frame, and writes the frame over `frame`.
     fn try_receive(&mut self, frame: &mut CanFrame) -> Received;
 
-    /// Calls back the frames that wait in the controller, if the driver can; `None` for one that is no classic CAN frame.
+    /// Calls back the frames pending in the controller, if the driver can; `None` for a frame other than a classic CAN
+    /// frame.
     fn call_back(&mut self, _back: impl FnMut(Option<CanFrame>)) {}
 }
 
-/// What became of a frame that was offered to the driver.
+/// Result of offering a frame to the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[must_use]
 pub enum Sent {
-    /// It waits in the controller.
+    /// The frame waits in the controller.
     Accepted,
-    /// It waits in the controller, in the place of a frame of lower priority, which stands in the argument.
+    /// The frame waits in the controller, in the place of a frame of lower priority, now in the argument.
     Evicted,
-    /// It waits in the controller, in the place of a frame that is no classic CAN frame of at most 8 bytes.
+    /// The frame waits in the controller, in the place of a frame other than a classic CAN frame of at most 8 bytes.
     EvictedForeign,
     /// There is no place now.
     Full,
@@ -44,13 +45,13 @@ pub enum Sent {
     Failed(ErrorKind),
 }
 
-/// What the driver had received.
+/// Result of asking the driver for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[must_use]
 pub enum Received {
-    /// A frame, which stands in the argument.
+    /// A frame, now in the argument.
     Frame,
-    /// A frame that is no classic CAN frame of at most 8 bytes.
+    /// A frame other than a classic CAN frame of at most 8 bytes.
     Foreign,
     /// Nothing now.
     Empty,
@@ -65,7 +66,7 @@ pub struct Nb<C>(pub C);
 impl<C: embedded_can::nb::Can> Port for Nb<C> {}
 
 impl<C: embedded_can::nb::Can> Driver for Nb<C> {
-    // The length of the frame is known where it comes from: no loop copies its bytes then.
+    // The length of the frame is known at its origin: no loop copies its bytes then.
     #[inline(always)]
     fn try_send(&mut self, frame: &CanFrame, evicted: &mut CanFrame) -> Sent {
         let Some(frame) = frame.convert() else { return Sent::Failed(ErrorKind::Form) };
@@ -92,8 +93,8 @@ impl<C: embedded_can::nb::Can> Driver for Nb<C> {
 /// A driver that implements `embedded_can::blocking::Can`: sends only.
 ///
 /// Sending waits until the driver has a place: on a bus that stands still, for ever. A blocking receive waits for a
-/// frame by contract, so the runner never calls it: feed received frames to
-/// [`Runner::ingest`](super::Runner::ingest), from an interrupt through the queue (feature `queue`) for example.
+/// frame by contract, so the runner never calls it: feed received frames to [`Runner::ingest`](super::Runner::ingest),
+/// from an interrupt through the queue (feature `queue`) for example.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockingTx<C>(pub C);
 
@@ -113,15 +114,15 @@ impl<C: embedded_can::blocking::Can> Driver for BlockingTx<C> {
     }
 }
 
-/// One reading of the clock is for so many frames: those that wait in the driver came before it, and those that come meanwhile
-/// look older by the time that the others take.
+/// Number of frames for one reading of the clock: frames in the driver arrived before the reading, and frames arriving
+/// meanwhile look older by the processing time of the others.
 const FRAMES_A_READING: usize = 16;
 
-/// A bound on the frames of one tick, for devices that would offer frames for ever.
+/// Upper bound on the frames of one tick, for devices with an endless supply of frames.
 const FRAMES_A_TICK: usize = 64;
 
-/// A frame that fails so often in a row takes another turn: not before, because a driver whose errors alternate with
-/// successes would fail it there as well.
+/// Number of failures in a row after which a frame takes another turn. A driver whose errors alternate with successes
+/// would fail an earlier change as well.
 const PATIENCE: u8 = 3;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
@@ -130,16 +131,16 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         self.poll_with(budget, |_| {})
     }
 
-    /// Takes at most `budget` received frames from the driver and hands those of others to `unrelated`. Returns how
-    /// many came.
+    /// Takes at most `budget` received frames from the driver and hands frames of others to `unrelated`. Returns the
+    /// number of frames.
     ///
-    /// Never waits, goes on after errors, and ends: an error counts against the budget as well.
-    /// The clock is read for each 16 frames: the time of a frame is that of the first of them.
+    /// Never waits, continues after errors, and ends: an error counts against the budget as well. The clock is read for
+    /// each 16 frames: a frame has the time of the first of its 16.
     pub fn poll_with(&mut self, budget: usize, mut unrelated: impl FnMut(&CanFrame)) -> usize {
         self.watch.receive_ran();
         let (mut frame, mut now) = (CanFrame::EMPTY, Instant::START);
         let mut tally = Tally::default();
-        // Frames of other kinds are not among those that a reading of the clock is for.
+        // Frames of other kinds do not count towards the frames of a reading.
         let (mut frames, mut foreign) = (0, 0);
         for _ in 0..budget {
             match self.port.try_receive(&mut frame) {
@@ -161,7 +162,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             }
         }
         self.enter(frames, &tally);
-        // Those since the last reading.
+        // Frames since the last reading.
         let waited = frames.checked_sub(1).map_or(0, |before| before % FRAMES_A_READING + 1);
         self.watch.standstill.receive(waited);
         frames + foreign
@@ -177,17 +178,17 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Takes at most `budget` frames from a queue, with the times of their arrival; those of others are dropped. Returns
-    /// how many came.
+    /// Takes at most `budget` frames from a queue, with the times of their arrival; drops frames of others. Returns the
+    /// number of frames.
     #[cfg(feature = "queue")]
     pub fn poll_queue(&mut self, queue: &mut FrameReceiver<'_>, budget: usize) -> usize {
         self.poll_queue_with(queue, budget, |_| {})
     }
 
-    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands those of others to
-    /// `unrelated`. Returns how many came.
+    /// Takes at most `budget` frames from a queue, with the times of their arrival, and hands frames of others to
+    /// `unrelated`. Returns the number of frames.
     ///
-    /// Frames that the queue dropped since the last call are noted as [`lost`](super::Statistics::lost).
+    /// Frames dropped by the queue since the last call are noted as [`lost`](super::Statistics::lost).
     ///
     /// # Examples
     /// ```
@@ -237,7 +238,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         frames
     }
 
-    /// Takes one frame that was received elsewhere, in an interrupt say, with the time of its arrival.
+    /// Takes one frame received elsewhere, for example in an interrupt, with the time of its arrival.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let mut tally = Tally::default();
         let outcome = self.take(frame, now, &mut tally);
@@ -275,7 +276,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Notes received frames that were lost before they came here: what a queue of your own dropped. 0 changes nothing.
+    /// Counts received frames lost before this call, for example in a queue of the application. 0 changes nothing.
     pub fn note_lost(&mut self, frames: u32) {
         if frames > 0 {
             self.statistics.lost = self.statistics.lost.saturating_add(frames);
@@ -286,7 +287,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
 }
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
-    /// Offers the frames of one tick to the driver; hands frames of others that it evicts to `evicted`.
+    /// Offers the frames of one tick to the driver; hands evicted frames of others to `evicted`.
     pub(super) fn send(&mut self, now: Instant, evicted: &mut impl FnMut(&CanFrame)) {
         if self.yields.is_some() {
             return self.send_rest(0, None, now, evicted);
@@ -302,11 +303,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
     }
 
-    /// Offers the frames after one that the driver did not simply take, and those of a tick in which one takes another turn.
+    /// Offers the frames after a frame not simply taken by the driver, and all frames of a tick in which a frame takes
+    /// another turn.
     ///
-    /// A frame for which there is no place goes first in the next tick. One that fails again and again takes another
-    /// turn: the last if it was the first, the first otherwise. So a driver that fails one call in each tick, always the
-    /// first or always the last, keeps no frame from the bus.
+    /// A frame without a place goes first in the next tick. A frame that fails again and again takes another turn: the
+    /// last after the first, otherwise the first. So a driver with one failing call in each tick, always the first or
+    /// always the last, keeps no frame from the bus.
     #[cold]
     #[inline(never)]
     fn send_rest(
@@ -345,7 +347,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
                     if self.device.requeue(&other) {
                         increment(&mut self.statistics.evicted);
                         self.meter.discount(&other);
-                        // Before the frame that took its place: they may be of one id.
+                        // Before the frame that took its place: both may have one id.
                         self.watch.evicted(other.header(), now);
                     } else {
                         increment(&mut self.statistics.evicted_unrelated);
@@ -381,7 +383,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
             }
             is_first = false;
         }
-        // What is given back last goes first.
+        // The frame given back last goes first.
         for frame in [held, goes_first, refused].into_iter().flatten() {
             self.device.requeue(&frame);
         }
@@ -430,7 +432,7 @@ mod tests {
         }
     }
 
-    /// Gives back a frame of another program for each one that it takes.
+    /// Gives back a frame of another program for each frame taken.
     struct Full {
         length: usize,
     }
@@ -448,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn an_evicted_frame_of_others_is_counted_also_where_it_is_too_long_to_be_handed_back() {
+    fn an_evicted_frame_of_others_is_counted_even_if_too_long_to_be_handed_back() {
         for (length, handed_back) in [(8, 1), (12, 0), (64, 0)] {
             let clock = ManualClock::new(Instant::from_micros(1_000));
             let mut bus = Bus::new();
@@ -481,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_another_kind_leaves_the_time_of_the_frames_after_it_as_it_is() {
+    fn a_frame_of_another_kind_does_not_change_the_time_of_the_frames_after() {
         for place in [0, 1, 8, 16] {
             let clock = ManualClock::new(Instant::from_micros(10_000_000));
             let mut bus = Bus::new();

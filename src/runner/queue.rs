@@ -6,8 +6,8 @@ use heapless::spsc;
 
 /// A queue of received frames with the time of their arrival, from a CAN interrupt to the control task.
 ///
-/// It holds `N - 1` frames. A frame that finds it full is dropped and counted: the newest feedback is lost, and
-/// the motor's age does the rest.
+/// The queue holds `N - 1` frames. If the queue is full, a new frame is dropped and counted: the newest feedback is
+/// lost, and the age of the motor's feedback handles the rest.
 ///
 /// # Examples
 /// ```
@@ -41,7 +41,7 @@ pub struct FrameSender<'q> {
 pub struct FrameReceiver<'q> {
     frames: spsc::Consumer<'q, (CanFrame, Instant)>,
     dropped: &'q AtomicU32,
-    /// Of those, how many the runner knows of.
+    /// Number of these that the runner has counted.
     noted: u32,
 }
 
@@ -69,10 +69,11 @@ impl<const N: usize> Default for FrameQueue<N> {
 }
 
 impl FrameSender<'_> {
-    /// Puts a frame that arrived at `now` into the queue; `false` when it was full, or the frame had more than
-    /// 8 bytes, and was dropped.
+    /// Puts a frame with its time of arrival `now` into the queue. Returns `false` if the frame was dropped: the queue
+    /// was full, or the frame had more than 8 bytes.
     pub fn push(&mut self, frame: &impl Frame, now: Instant) -> bool {
-        // Always holds: says that the length of the queue, by which heapless divides, is not zero.
+        // Always true: tells the compiler that the length of the queue, by which heapless divides,
+        // is not zero.
         let divisible = self.frames.capacity() != usize::MAX;
         let kept = divisible
             && CanFrame::copy_of(frame)

@@ -1,11 +1,11 @@
-//! What a runner counts: frames, errors, and how full the bus is.
+//! Counters of a runner: frames, errors, and the load of the bus.
 
 use crate::frame::CanFrame;
 use crate::motor::BusLoad;
 use crate::time::{Duration, Instant};
 use embedded_can::ErrorKind;
 
-/// What a runner has counted since it was made; every counter saturates.
+/// Counters of a runner since its creation; every counter saturates.
 ///
 /// Received frames add up: `received = taken + unrelated + malformed`. Offered frames add up:
 /// `offered = sent + refused + send_errors.total()`.
@@ -13,40 +13,41 @@ use embedded_can::ErrorKind;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Statistics {
-    /// Frames that the driver delivered, or that were given to `ingest`.
+    /// Frames delivered by the driver or given to `ingest`.
     pub received: u32,
-    /// Frames that the device took as feedback.
+    /// Frames taken by the device as feedback.
     pub taken: u32,
     /// Frames of others, handed back.
     pub unrelated: u32,
-    /// Frames with a motor's id in a form that is not its feedback; not used.
+    /// Frames with a motor's id but not in the form of its feedback; not used.
     pub malformed: u32,
     /// Errors of the driver when asked for a frame.
     pub receive_errors: ErrorCounts,
     /// Frames offered to the driver.
     pub offered: u32,
-    /// Frames that the driver took.
+    /// Frames taken by the driver.
     pub sent: u32,
-    /// Frames that the driver had no place for. Kept, and offered again with newer values.
+    /// Frames without a place in the driver. Kept, and offered again with newer values.
     pub refused: u32,
     /// Errors of the driver when offered a frame. The frame is kept as well.
     pub send_errors: ErrorCounts,
-    /// Own frames that the driver gave back, for others of higher priority or because they were called back. Kept as well.
+    /// Own frames given back by the driver, for frames of higher priority or because they were called back. Kept as well.
     pub evicted: u32,
-    /// Frames of others that the driver gave back for ours. Handed back, unless they are no classic CAN frames of at most 8 bytes.
+    /// Frames of others given back by the driver for ours. Handed back, unless they are not classic CAN frames of at most 8
+    /// bytes.
     pub evicted_unrelated: u32,
-    /// Command frames that newer ones replaced before they were sent; wraps. See
+    /// Command frames replaced by newer frames before they were sent; wraps. See
     /// [`Devices::superseded`](crate::motor::Devices::superseded).
     pub superseded: u32,
-    /// Received frames that a queue dropped before they came here.
+    /// Received frames dropped by a queue before the runner saw them.
     pub lost: u32,
-    /// Periods without a tick: that passed before the program asked, or whose step it did not run.
+    /// Periods without a tick: passed before the program asked, or with a step not run by the program.
     pub overruns: u32,
-    /// Times that some command frame could not be sent for 100 ms: everything was disarmed.
+    /// Number of times that some command frame could not be sent for 100 ms: everything was disarmed.
     pub bus_losses: u32,
-    /// Ticks whose time was that of the one before, those included that are due because the clock stands.
+    /// Ticks with the same time as the tick before, including ticks due because the clock stands.
     pub clock_standstills: u32,
-    /// Times that the clock went back.
+    /// Number of times that the clock went back.
     pub clock_reversals: u32,
 }
 
@@ -57,7 +58,7 @@ pub struct Statistics {
 pub struct ErrorCounts {
     /// The receive buffer overflowed.
     pub overrun: u32,
-    /// A bit on the bus was not the one sent.
+    /// A bit on the bus differed from the bit sent.
     pub bit: u32,
     /// The bit stuffing was wrong.
     pub stuff: u32,
@@ -67,7 +68,7 @@ pub struct ErrorCounts {
     pub form: u32,
     /// Nobody acknowledged the frame.
     pub acknowledge: u32,
-    /// Any other error, bus-off included: `embedded-can` has no kind for it.
+    /// Any other error, bus-off included: `embedded-can` has no kind for these.
     pub other: u32,
 }
 
@@ -92,7 +93,7 @@ impl Statistics {
         clock_reversals: 0,
     };
 
-    /// Returns the counters with the sums, which are not counted by themselves.
+    /// Returns the counters, with the sums that have no counter of their own.
     pub(super) const fn with_sums(self) -> Self {
         let received = self.taken.saturating_add(self.unrelated).saturating_add(self.malformed);
         let offered = self.sent.saturating_add(self.refused);
@@ -129,82 +130,12 @@ impl ErrorCounts {
     }
 }
 
-/// The frames of one call that are no feedback in 8 bytes: what else there is follows from their number, and costs no counter.
+/// The frames of one call other than feedback in 8 bytes: their total gives the number of feedback frames, without a counter.
 #[derive(Default)]
 pub(super) struct Tally {
     /// Not of 8 bytes with an 11-bit id.
     pub(super) others: u32,
     pub(super) rejected: u32,
-}
-
-/// How full a bus was in the last window of a second or a little more, by the frames that the runner sent and received.
-///
-/// Frames are counted by their length: without stuff bits, and with as many as can be. What the bus carried lies
-/// between the two. Compare it with what [`BusLoad`] reckons from the motors' rates: a measured load above that
-/// means that somebody else talks, or that an ESC is set to another rate.
-///
-/// # Limits
-/// **Frames that the controller's filter drops are not seen**, and neither are those that were lost in an overrun, nor
-/// error frames and repetitions. A sent frame counts when the driver takes it, and no longer when it is given back.
-///
-/// # Examples
-/// ```
-/// use drivetrain::runner::MeasuredLoad;
-///
-/// // Four motors and one command frame at 1 kHz, as `Runner::measured_load` may return it.
-/// let load = MeasuredLoad::new(1_000_000, 5_000, 555_000, 675_000);
-/// assert_eq!((load.nominal(), load.worst_case()), (0.555, 0.675));
-/// assert_eq!(load.to_string(), "56 % to 68 %");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MeasuredLoad {
-    bit_rate: u32,
-    frames_per_s: u32,
-    nominal_bits_per_s: u32,
-    worst_case_bits_per_s: u32,
-}
-
-impl MeasuredLoad {
-    /// Takes the bit rate in bits a second, of which 0 counts as 1; and what was counted in a second: frames, bits without
-    /// stuff bits, bits with as many as can be.
-    #[must_use]
-    pub const fn new(bit_rate: u32, frames: u32, nominal_bits: u32, worst_case_bits: u32) -> Self {
-        Self {
-            bit_rate: if bit_rate == 0 { 1 } else { bit_rate },
-            frames_per_s: frames,
-            nominal_bits_per_s: nominal_bits,
-            worst_case_bits_per_s: worst_case_bits,
-        }
-    }
-
-    /// Returns the number of frames a second.
-    #[must_use]
-    pub const fn frames_per_s(&self) -> u32 {
-        self.frames_per_s
-    }
-
-    /// Returns the load without stuff bits; 1 is a full bus.
-    #[must_use]
-    pub const fn nominal(&self) -> f32 {
-        self.nominal_bits_per_s as f32 / self.bit_rate as f32
-    }
-
-    /// Returns the load with as many stuff bits as can be; 1 is a full bus.
-    #[must_use]
-    pub const fn worst_case(&self) -> f32 {
-        self.worst_case_bits_per_s as f32 / self.bit_rate as f32
-    }
-}
-
-/// Writes both loads in percent, rounded up.
-impl core::fmt::Display for MeasuredLoad {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let percent = |bits: u32| (u64::from(bits) * 100).div_ceil(u64::from(self.bit_rate));
-        let (low, high) = (self.nominal_bits_per_s, self.worst_case_bits_per_s);
-        write!(f, "{} % to {} %", percent(low), percent(high))
-    }
 }
 
 /// The shortest window.
@@ -215,13 +146,13 @@ const WINDOW: Duration = Duration::from_secs(1);
 pub(super) struct Meter {
     bit_rate: u32,
     since: Option<Instant>,
-    /// Standard data frames of 8 bytes, which nearly all are.
+    /// Standard data frames of 8 bytes: nearly all frames.
     whole: u32,
     /// All others, and their bits.
     others: u32,
     nominal: u32,
     worst_case: u32,
-    last: Option<MeasuredLoad>,
+    last: Option<BusLoad>,
 }
 
 impl Meter {
@@ -265,7 +196,7 @@ impl Meter {
         self.worst_case = self.worst_case.saturating_add(worst_case);
     }
 
-    /// Takes back a frame that was counted and never left.
+    /// Removes a counted frame that never left.
     pub(super) const fn discount(&mut self, frame: &CanFrame) {
         if frame.is_whole() {
             self.whole = self.whole.saturating_sub(1);
@@ -277,7 +208,7 @@ impl Meter {
         self.worst_case = self.worst_case.saturating_sub(worst_case);
     }
 
-    /// Closes the window when it is over.
+    /// Closes the window at its end.
     #[inline]
     pub(super) fn finish(&mut self, now: Instant) {
         match self.since {
@@ -301,7 +232,7 @@ impl Meter {
         let worst_case =
             self.whole.saturating_mul(BusLoad::WORST_CASE_BITS).saturating_add(self.worst_case);
         let [frames, nominal, worst_case] = [frames, nominal, worst_case].map(a_second);
-        self.last = Some(MeasuredLoad::new(self.bit_rate, frames, nominal, worst_case));
+        self.last = Some(BusLoad::measured(self.bit_rate, frames, nominal, worst_case));
         self.restart(now);
     }
 
@@ -311,7 +242,7 @@ impl Meter {
         (self.nominal, self.worst_case) = (0, 0);
     }
 
-    pub(super) const fn last(&self) -> Option<MeasuredLoad> {
+    pub(super) const fn last(&self) -> Option<BusLoad> {
         self.last
     }
 }
@@ -326,7 +257,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn a_window_that_lasts_longer_is_no_fuller_for_it() {
+    fn a_longer_window_gives_the_same_load() {
         let frame = CanFrame::standard(0x200, [0; 8]).unwrap();
         let mut meter = Meter::new();
         meter.set_bit_rate(500_000);
@@ -337,19 +268,19 @@ mod tests {
         assert_eq!(meter.last(), None);
         meter.count(&frame);
         meter.finish(Instant::from_micros(3_000_007));
-        let expected = MeasuredLoad::new(500_000, 1_000, 111_000, 135_000);
+        let expected = BusLoad::measured(500_000, 1_000, 111_000, 135_000);
         assert_eq!(meter.last(), Some(expected));
     }
 
     #[test]
     fn absurd_numbers_saturate() {
-        let load = MeasuredLoad::new(0, u32::MAX, u32::MAX, u32::MAX);
+        let load = BusLoad::measured(0, u32::MAX, u32::MAX, u32::MAX);
         assert!(load.worst_case().is_finite() && load.frames_per_s() == u32::MAX);
-        assert_eq!(load.to_string(), "429496729500 % to 429496729500 %");
+        assert_eq!(load.to_string(), "4294967295 % to 4294967295 %");
         let mut meter = Meter::new();
         meter.finish(Instant::from_micros(5));
         meter.finish(Instant::from_micros(1));
         meter.finish(Instant::from_micros(u64::MAX));
-        assert_eq!(meter.last(), Some(MeasuredLoad::new(1_000_000, 0, 0, 0)));
+        assert_eq!(meter.last(), Some(BusLoad::new(1_000_000)));
     }
 }

@@ -2,7 +2,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 /// An emergency stop that any context can set: put it into a `static` and set it from an interrupt.
 ///
-/// The runner looks at it in each tick; from that tick on every command is zero, until
+/// The runner reads the stop in each tick; from that tick on every command is zero, until
 /// [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop) and arming again.
 ///
 /// # Examples
@@ -17,7 +17,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 pub struct EmergencyStop(AtomicBool);
 
 impl EmergencyStop {
-    /// Makes one that is not set.
+    /// Makes an emergency stop that is not set.
     #[must_use]
     pub const fn new() -> Self {
         Self(AtomicBool::new(false))
@@ -28,12 +28,12 @@ impl EmergencyStop {
         self.0.store(true, Ordering::Release);
     }
 
-    /// Takes the stop back; what it stopped stays stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
+    /// Clears the stop; stopped motors stay stopped until [`Runner::clear_emergency_stop`](super::Runner::clear_emergency_stop).
     pub fn clear(&self) {
         self.0.store(false, Ordering::Release);
     }
 
-    /// Tells whether it is set.
+    /// Returns whether the stop is set.
     #[must_use]
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Acquire)

@@ -11,7 +11,7 @@ use std::vec::Vec;
 
 type Answer = Result<Option<CanFrame>, nb::Error<ErrorKind>>;
 
-/// Answers as scripted, then takes everything; records what was offered.
+/// Answers as scripted, then takes everything; records the offered frames.
 #[derive(Default)]
 struct Scripted {
     transmit: VecDeque<Answer>,
@@ -108,7 +108,7 @@ fn a_refused_frame_goes_first_next_time() {
         clock.advance(Duration::from_millis(1));
         hear(&mut runner, &clock);
         set(&mut runner, wheels, raw % 100 + 1);
-        // One place a tick: with a fixed order the second frame would never get it.
+        // One place a tick: with a fixed order the second frame would never get a place.
         runner.port_mut().0.transmit.extend([Ok(None), Err(nb::Error::WouldBlock)]);
         runner.tick(Tick::new(clock.now(), 0.001));
     }
@@ -208,7 +208,7 @@ fn a_bus_that_takes_nothing_for_100_ms_disarms_and_offers_zeros_afterwards() {
     assert_eq!(runner.arm(Tick::new(clock.now(), 0.001)), Ok(()));
 }
 
-/// 100 ms in which nobody asks for arming.
+/// 100 ms without a request to arm.
 fn pause(runner: &mut TestRunner<'_>, clock: &ManualClock) {
     for _ in 0..100 {
         clock.advance(Duration::from_millis(1));
@@ -245,7 +245,7 @@ fn one_frame_that_never_leaves_is_a_lost_bus_though_its_neighbour_does() {
 }
 
 #[test]
-fn a_frame_that_is_not_offered_any_more_is_not_waited_for() {
+fn a_frame_no_longer_offered_does_not_count_as_unsent() {
     let clock = ManualClock::new(Instant::from_micros(1_000));
     let (mut runner, _) = driving(&clock);
     runner.port_mut().0.stuck = Some(0x1FF);
@@ -343,7 +343,7 @@ fn frames_add_up() {
     assert!(bus.packed >= s.sent && s.bus_losses == 0);
 }
 
-/// A driver that only sends, and counts how often it is asked for a frame, which would be waiting.
+/// A driver that only sends, and counts requests for a frame, which would be blocking.
 #[derive(Default)]
 struct Blocking {
     sent: Vec<CanFrame>,
@@ -426,7 +426,7 @@ impl AbortPending for Mailboxes {
 }
 
 /// Drives with a current that counts up each millisecond; the plug is out from 20 ms on, for a while. Returns the words that left
-/// when it was back, the number of ticks when the bus was down first, and the runner.
+/// when the plug was back, the number of ticks when the bus was down first, and the runner.
 fn pulled<P: Port>(
     port: impl Fn(Mailboxes) -> P,
     mailboxes: impl Fn(&mut P) -> &mut Mailboxes,
@@ -471,14 +471,15 @@ fn without_an_abort_a_pulled_plug_leaves_a_stale_frame_a_mailbox() {
 }
 
 #[test]
-fn with_an_abort_what_leaves_after_a_pulled_plug_is_of_the_last_tick() {
+fn with_an_abort_frames_after_a_pulled_plug_are_of_the_last_tick() {
     let (left, down) = pulled(|can| NbAbort(Nb(can)), |port| &mut port.0.0, 150);
     assert_eq!(left, [0], "zeros, once");
     assert!(
         down.is_some_and(|ms| (100..=102).contains(&ms)),
         "a bus that sends nothing is down: {down:?}"
     );
-    // Shorter than it takes to lose the feedback: the current of the last tick, 2.5 A, of 20 A in 16384.
+    // Shorter than the time until feedback is lost: the current of the last tick, 2.5 A, of 20 A in
+    // 16384.
     assert_eq!(pulled(|can| NbAbort(Nb(can)), |port| &mut port.0.0, 5), (std::vec![2048], None));
 }
 

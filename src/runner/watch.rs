@@ -1,4 +1,4 @@
-//! Whether the loop runs: on time, with a clock that goes on, heard and sent.
+//! Supervision of the loop: on time, with a clock that advances, with frames received and sent.
 
 mod unsent;
 
@@ -14,12 +14,12 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Reads the clock and returns the step that is due, if any.
     ///
     /// If the clock stands or goes back, a step with a `dt_s` of 0 is due: its update sends zeros and relaxes every motor
-    /// until it is armed again.
+    /// until armed again.
     ///
-    /// A clock stands when too many readings in a row show no later time, by this method and by [`poll`](Self::poll). The limit is
-    /// learned from the clock while it goes on: 100 times as many readings as it ever needed to show a later time, and at least
-    /// 2 for each microsecond of its resolution; from 1000 to 200 000, and 200 000 until it has moved on once. 1600 received
-    /// frames are as good as the limit.
+    /// A clock stands when too many readings in a row, by this method and by [`poll`](Self::poll), show no later time. The limit
+    /// is learned from the running clock: 100 times the most readings ever needed to show a later time, and at least 2 for each
+    /// microsecond of its resolution; from 1000 to 200 000, and 200 000 until the clock has advanced once. 1600 received frames
+    /// count as much as the limit.
     ///
     /// | loop | resolution of the clock | the step comes after |
     /// |---|---|--:|
@@ -27,21 +27,22 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// | the same | 1 ms | 0.1 s |
     /// | the same | 10 ms | 0.2 s |
     /// | wakes up each 0.25 ms | 1 µs | 0.25 s |
-    /// | wakes up each ms | 1 µs | 1 s; 2 s if it is never early or late |
+    /// | wakes up each ms | 1 µs | 1 s; 2 s if never early or late |
     /// | the same | 1 ms | 2 s |
     /// | the same | of a clock that has never moved | 200 s |
     /// | wakes up for each frame of 4 motors at 1 kHz | 1 µs | 0.15 s |
     ///
     /// Slower loops set a limit of their own: [`with_standstill_after`](Self::with_standstill_after).
     ///
-    /// A step that was not run stays due: it is returned again, until [`tick`](Self::tick) or its kin ran a step. When the next one
-    /// comes due before, that one takes its place, with a `dt_s` that covers both, and the step that was left out is an overrun;
-    /// one with a `dt_s` of 0 stays. So two runners can wait for each other:
+    /// A step that was not run stays due: further calls return the same step until [`tick`](Self::tick) or a sibling has run a
+    /// step. When the next step comes due before, the next step takes its place, with a `dt_s` that covers both, and the step
+    /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.standstill.take() {
-            // Not after the last step that was run, so that it does not count as time that moved on.
+            // Not after the last step that was run, so that the step does not count as advancing
+            // time.
             let last = self.ticker.last();
             let at = self.watch.ticked().map_or(last, |ticked| ticked.min(last));
             self.waiting = Some(Tick::new(at, 0.0));
@@ -75,7 +76,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 }
 
-/// A step in the place of one that was not run and the next one: no time that passed is lost, nor a clock that stood or went back.
+/// Merges a step that was not run with the next step: no elapsed time is lost, nor a clock that stood or went back.
 fn together(waiting: Tick, next: Tick) -> Tick {
     if next.dt_s() <= 0.0 {
         next
@@ -86,7 +87,7 @@ fn together(waiting: Tick, next: Tick) -> Tick {
     }
 }
 
-/// Without feedback for this long, or with a command frame that waits for this long, something is wrong with the bus.
+/// Time without feedback, or with an unsent command frame, after which the bus counts as faulty.
 const BUS_LOST_AFTER: Duration = Duration::from_millis(100);
 
 #[derive(Debug)]
@@ -123,7 +124,7 @@ impl Watch {
         }
     }
 
-    /// Notes that the program looked for received frames.
+    /// Notes that the program polled for received frames.
     pub(super) const fn receive_ran(&mut self) {
         self.received = true;
     }
@@ -161,7 +162,8 @@ impl Watch {
         self.reading = now;
     }
 
-    /// Notes a frame that the driver took. It counts as sent when it does not come back until the next tick has ended.
+    /// Notes a frame taken by the driver. The frame counts as sent if it does not come back until the end of the next
+    /// tick.
     #[inline]
     pub(super) fn accepted(&mut self, header: u32, now: Instant) {
         if self.has_unsent {
@@ -182,7 +184,7 @@ impl Watch {
         self.ticked = Some(now);
         self.listen(now);
         if self.edges.is_calm {
-            // Neither down nor silent, nor anything that may be over.
+            // Neither down nor silent, and no repeated condition.
             return self.has_unsent && self.watch_sending(now);
         }
         self.edges.settle(now);
@@ -213,23 +215,23 @@ impl Watch {
     }
 }
 
-/// The largest limit; it holds until the clock has moved on once. A fast loop takes 0.1 s to 1 s for so many readings.
+/// The largest limit, valid until the clock has advanced once. A fast loop takes 0.1 s to 1 s for so many readings.
 const MOST_READINGS: u32 = 200_000;
 
-/// The smallest limit that is learned.
+/// The smallest learned limit.
 const LEAST_READINGS: u32 = 1_000;
 
-/// The limit is so many times the readings that the clock ever needed to show a later time.
+/// Ratio of the limit to the most readings that the clock ever needed to show a later time.
 const TIMES_THE_LONGEST: u32 = 100;
 
 /// Readings in a microsecond of the clock's resolution: a fast loop polls 1 000 000 times a second.
 const READINGS_A_MICRO: u32 = 2;
 
-/// So many received frames are as good as the limit, for loops that sleep until a frame comes: a bus of 1 Mbit/s takes 80 ms and
-/// more for them.
+/// Number of received frames equal to the limit, for loops sleeping until a frame arrives: a bus of 1 Mbit/s takes 80 ms
+/// and more for these.
 const FRAMES: u32 = 1_600;
 
-/// Counts readings that show no later time, and learns how many of them are usual.
+/// Counts readings that show no later time, and learns their usual number.
 #[derive(Debug)]
 pub(super) struct Standstill {
     limit: u32,
@@ -305,7 +307,7 @@ impl Standstill {
         (self.readings, self.frames) = (0, 0);
     }
 
-    /// Tells whether the clock stands; once for each time that it takes to be sure.
+    /// Returns whether the clock stands; true once for each full count.
     pub(super) const fn take(&mut self) -> bool {
         let a_frame = if self.limit < FRAMES { 1 } else { self.limit / FRAMES };
         let passed = self.readings.saturating_add(self.frames.saturating_mul(a_frame));
@@ -327,7 +329,7 @@ mod tests {
     use crate::time::ManualClock;
     use embedded_can::ErrorKind;
 
-    /// Takes every frame, and counts those that drive.
+    /// Takes every frame, and counts frames that drive.
     #[derive(Default)]
     struct Sink {
         driving: u32,
@@ -351,7 +353,7 @@ mod tests {
 
     type TestRunner<'c> = Runner<Nb<Sink>, &'c ManualClock, Bus>;
 
-    /// A motor that is driven, just after the step at 10 ms.
+    /// A driven motor, just after the step at 10 ms.
     fn driving(clock: &ManualClock) -> TestRunner<'_> {
         clock.set(at_us(10_000));
         let mut bus = Bus::new();
@@ -367,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_was_not_run_stays_due_and_the_next_one_covers_both() {
+    fn a_step_not_run_stays_due_and_the_next_step_covers_both() {
         let clock = ManualClock::default();
         let mut runner = driving(&clock);
         clock.set(at_us(11_000));
@@ -390,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_by_hand_takes_the_place_of_the_one_that_is_due() {
+    fn a_step_by_hand_replaces_the_due_step() {
         let clock = ManualClock::default();
         let mut runner = driving(&clock);
         clock.set(at_us(11_000));
@@ -399,7 +401,7 @@ mod tests {
         assert_eq!(runner.due(), None);
     }
 
-    /// The zeros of a clock that stands or went back are sent, however many steps the program leaves out.
+    /// The zeros of a standing or reversed clock are sent, regardless of the steps left out by the program.
     #[test]
     fn a_step_without_a_length_stays_due_until_it_is_run() {
         for back in [false, true] {
@@ -423,7 +425,8 @@ mod tests {
         }
     }
 
-    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` with a clock that goes on in between.
+    /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` with a clock that advances in
+    /// between.
     #[test]
     fn two_runners_that_wait_for_each_other_lose_no_step() {
         let clock = ManualClock::new(at_us(0));
@@ -476,7 +479,8 @@ mod standstill_tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Reads a clock of this resolution after each of these gaps in ns, `times` times in a row; returns how often it stood.
+    /// Reads a clock of this resolution after each of these gaps in ns, `times` times in a row; returns how often the clock
+    /// counted as standing.
     fn stood(resolution_us: u64, phases: &[(u64, u32)]) -> usize {
         let (mut standstill, mut ns, mut stood) = (Standstill::new(), 12_345_678, 0);
         let mut heard_ns = ns;
@@ -496,7 +500,8 @@ mod standstill_tests {
         stood
     }
 
-    /// Reads a clock of this resolution each `gap_us` for 2 s, then one that stands; returns after how many µs it is one.
+    /// Reads a clock of this resolution each `gap_us` for 2 s, then a standing clock; returns the time until detection in
+    /// µs.
     fn noticed_us(resolution_us: u64, gap_us: u64) -> u64 {
         let mut standstill = Standstill::new();
         let mut now = Instant::START;
@@ -525,7 +530,7 @@ mod standstill_tests {
         assert!((95..=100).contains(&ms(noticed_us(1_000, 1))));
         assert!((185..=200).contains(&ms(noticed_us(10_000, 1))));
         assert!((490..=500).contains(&ms(noticed_us(1_000, 250))));
-        // It may be read faster at any time.
+        // The clock may be read faster at any time.
         assert!((1_990..=2_000).contains(&ms(noticed_us(1_000, 1_000))));
     }
 
@@ -552,8 +557,8 @@ mod standstill_tests {
     }
 
     proptest! {
-        /// Law: a clock of any resolution that goes on is none that stands, however the pace of the loop changes, up to
-        /// 2 000 000 readings a second.
+        /// Law: a running clock of any resolution never counts as standing, for any change of the loop's pace, up to 2
+        /// 000 000 readings a second.
         #[test]
         fn a_clock_that_goes_on_never_stands(
             resolution_us in prop_oneof![1..100_u64, 100..1_000_u64, Just(1_000), Just(10_000)],

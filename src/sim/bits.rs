@@ -1,7 +1,7 @@
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id};
 
-/// The pause after a frame, in bits: nobody may begin another one in it.
+/// The pause after a frame, in bits: no node may begin another frame in it.
 pub const INTERMISSION_BITS: u32 = 3;
 
 /// CRC delimiter, acknowledge slot and delimiter, end of frame: never stuffed.
@@ -9,10 +9,10 @@ const TAIL_BITS: u32 = 10;
 /// x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1, without its highest term.
 const POLYNOMIAL: u16 = 0x4599;
 
-/// Returns the time that a frame occupies the bus, in bits, with its stuff bits and the pause after it.
+/// Returns the time of a frame on the bus, in bits, with its stuff bits and the pause after it.
 ///
-/// At 1 Mbit/s a bit is a microsecond. The length depends on the content, because after five equal bits the
-/// sender inserts one of the other value, in the checksum too.
+/// At 1 Mbit/s a bit is a microsecond. The length depends on the content: after five equal bits, the checksum included,
+/// the sender inserts a bit of the other value.
 ///
 /// Source: Bosch CAN specification 2.0 (1991), part B, chapters 3.1 and 5.
 ///
@@ -71,10 +71,10 @@ pub const fn nominal_bits(extended: bool, length: u8) -> u32 {
     stuffable_bits(extended, length) + TAIL_BITS + INTERMISSION_BITS
 }
 
-/// Returns the largest length that a data frame can have with stuff bits and the pause after it, in bits.
+/// Returns the largest length of a data frame with stuff bits and the pause after it, in bits.
 ///
-/// One stuff bit after the first five bits and then after every fourth: a quarter of the stuffed part less one.
-/// A length above 8 counts as 8.
+/// One stuff bit after the first five bits and then after every fourth: a quarter of the stuffed part less one. A
+/// length above 8 counts as 8.
 ///
 /// Source: T. Nolte, H. Hansson, C. Norström, "Minimizing CAN response-time jitter by message manipulation"
 /// (2002), equation 1.
@@ -96,7 +96,7 @@ const fn stuffable_bits(extended: bool, length: u8) -> u32 {
     head + 8 * (if length > 8 { 8 } else { length as u32 })
 }
 
-/// Counts bits as they go out, stuff bits included, and keeps the checksum of those before stuffing.
+/// Counts bits as sent, stuff bits included, and keeps the checksum of the bits before stuffing.
 #[derive(Default)]
 struct Stuffed {
     bits: u32,

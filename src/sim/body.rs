@@ -3,15 +3,15 @@ use crate::math::{sin_cos, sqrt};
 
 /// Gravity in m/s².
 const GRAVITY: f32 = 9.81;
-/// How stiffly a wheel holds to the ground, N for each m/s of slip, before [`held`] smooths it.
+/// Stiffness of a wheel on the ground, N for each m/s of slip, before [`held`] smooths it.
 const STIFFNESS: f32 = 40_000.0;
 
-/// A rigid body on wheels: what the ground does to both.
+/// A rigid body on wheels: the action of the ground on both.
 ///
-/// The ground passes under a wheel at `p` with `u = v + wz x p`. It holds the wheel along the direction of its
-/// [`Contact`], a tyre across it too, against the slip, with friction times load at most. The force acts on the body
-/// where the wheel stands, and on the wheel with the same lever by which it slips, so that no energy comes from
-/// nowhere. There is one rule for all layouts, and no matrix of any.
+/// The ground passes under a wheel at `p` with `u = v + wz x p`. The ground holds the wheel along the direction of its
+/// [`Contact`], and a tyre across this direction too, against the slip, with friction times load at most. The force
+/// acts on the body at the place of the wheel, and on the wheel with the lever of its slip, so energy is conserved.
+/// There is one rule for all layouts, and no matrix of any.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Body {
     mass: f32,
@@ -37,11 +37,11 @@ pub(crate) struct Body {
 pub(crate) struct Contact {
     /// From the centre of mass, m.
     pub(crate) position: Vec2,
-    /// Direction in which a turning wheel pulls, of length 1.
+    /// Direction of the pull of a turning wheel, of length 1.
     pub(crate) along: Vec2,
-    /// How fast it passes the ground in that direction at 1 rad/s, m.
+    /// Speed over the ground in this direction at 1 rad/s, m.
     pub(crate) reach: f32,
-    /// Whether the ground holds it across that direction too.
+    /// Whether the ground holds the wheel across this direction too.
     pub(crate) holds_across: bool,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct Rolling {
     pub(crate) velocity: f32,
     /// kg m², at the wheel.
     pub(crate) inertia: f32,
-    /// Nm, by which the ground holds it: the result.
+    /// Nm, by which the ground holds the wheel: the result.
     pub(crate) torque: f32,
 }
 
@@ -100,7 +100,7 @@ impl Body {
         }
     }
 
-    /// Moves the body by one step of `dt_s`, and finds the torques by which the ground holds the wheels.
+    /// Moves the body by one step of `dt_s`, and calculates the torques of the ground on the wheels.
     pub(crate) fn step(&mut self, wheels: &mut [Rolling], dt_s: f32) {
         let (sine, cosine) = sin_cos(self.heading_wrapped());
         let Velocity { vx, vy, wz } = self.velocity_body();
@@ -156,16 +156,16 @@ impl Body {
     }
 }
 
-/// Returns the force for a slip of 1 m/s, over a whole step: the slip dies out within it and never turns around,
-/// however stiff the contact (an implicit step with all wheels at once, bounded from above).
+/// Returns the force for a slip of 1 m/s, over a whole step: the slip dies out within the step and never turns around,
+/// for any stiffness of the contact (an implicit step with all wheels at once, bounded from above).
 fn held(compliance: f32, dt_s: f32) -> f32 {
     STIFFNESS / (1.0 + STIFFNESS * compliance * dt_s)
 }
 
 /// Returns the largest eigenvalue of `J M^-1 J'`, with a row of `J` for each held direction, or a little more.
 ///
-/// It is that of the 3x3 matrix `M^-1/2 J' J M^-1/2`, which no row sum is below. A tyre's two rows add up to the same
-/// wherever it points.
+/// The bound is the row sum of the 3x3 matrix `M^-1/2 J' J M^-1/2`. A tyre's two rows add up to the same in every
+/// direction of the tyre.
 fn compliance(contacts: impl Iterator<Item = Contact>, mass: f32, yaw_inertia: f32) -> f32 {
     let (x_scale, yaw_scale) = (1.0 / sqrt(mass), 1.0 / sqrt(yaw_inertia));
     let mut matrix = [[0.0_f32; 3]; 3];
@@ -290,7 +290,7 @@ mod tests {
             let (sine, cosine) = sin_cos(degrees.to_radians());
             contact(Vec2::new(cosine, sine) * 0.2, degrees + 90.0, 0.05, false)
         };
-        // The rear wheel rolls to the right where it stands.
+        // The rear wheel rolls to the right at its place.
         for (torques, direction) in [
             ([1.0, 1.0, 1.0], [0, 0, 1]),
             ([0.5, 0.5, -1.0], [0, 1, 0]),
@@ -314,7 +314,7 @@ mod tests {
         assert!(cart.body.pose().1.abs() < 0.01, "{:?}", cart.body.pose());
         cart.body.push = [0.0, 200.0, 0.0]; // more than 0.8 of the weight
         cart.run([0.0; 2], 5_000);
-        // What the floor does not hold accelerates the body for half a second.
+        // A force beyond the friction of the floor accelerates the body for half a second.
         let expected = 0.5 * (200.0 - 0.8 * 20.0 * 9.81) / 20.0 * 0.25;
         assert!((cart.body.pose().1 / expected - 1.0).abs() < 0.03, "{:?}", cart.body.pose());
     }
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn no_contact_however_it_lies_adds_energy() {
+    fn no_contact_in_any_direction_adds_energy() {
         // Slip in all directions at once, more than the floor holds and less.
         for speed in [0.1, 30.0] {
             for contacts in [mecanum(), tyres([0.0; 4]), tyres([0.0, 30.0, 60.0, 170.0])] {

@@ -4,11 +4,11 @@ use super::motor::MOTORS;
 use super::{MotorKey, Wheel};
 use crate::geometry::{self, Twist};
 
-/// A chassis to attach to a [`Simulation`](super::Simulation): a rigid body on wheels of any layout, all of which can slip.
+/// A chassis to attach to a [`Simulation`](super::Simulation): a rigid body on wheels of any layout, all with slip.
 ///
-/// The weight rests on all wheels alike. The floor holds each [`Wheel`] as its kind says, with a force of at most
-/// friction times load, in all directions together; below that the slip is some millimetres a second. Castors are no
-/// wheels: they roll freely and carry nothing. Friction of motors and gearboxes is the motors' own.
+/// The weight rests on all wheels alike. The floor holds each [`Wheel`] according to its kind, with a force of at most
+/// friction times load, in all directions together; below this force the slip is some millimetres a second. Castors do
+/// not count as wheels: they roll freely and carry nothing. Friction of motors and gearboxes belongs to the motors.
 ///
 /// # Examples
 /// ```
@@ -50,7 +50,7 @@ pub struct ChassisConfig {
 }
 
 impl ChassisConfig {
-    /// The number of wheels that a chassis can have.
+    /// The largest number of wheels of a chassis.
     pub const MAX_WHEELS: usize = 8;
 
     /// Takes the wheels. The body weighs 20 kg, turns with 0.8 kg m² and grips with 0.8, until told otherwise.
@@ -85,8 +85,9 @@ impl ChassisConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// The name of the first that makes no sense: no wheel or more than eight, a length, mass, inertia or friction that
-    /// is not above zero and at most 1000, a direction that is not finite, a joint as the motor of a wheel, a roller that lies nearly across its wheel.
+    /// The name of the first invalid parameter: no wheel or more than eight, a length, mass, inertia or friction that is not
+    /// above zero and at most 1000, a direction that is not finite, a joint as the motor of a wheel, a roller that lies nearly
+    /// across its wheel.
     pub fn validate(&self) -> Result<(), &'static str> {
         if self.too_many || self.wheels().next().is_none() {
             return Err("number of wheels");
@@ -108,7 +109,7 @@ impl ChassisConfig {
     }
 }
 
-/// Where a simulated chassis truly is, and how it truly moves.
+/// True pose and motion of a simulated chassis.
 ///
 /// The chassis starts at the origin, facing along the world's x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,18 +133,18 @@ pub(crate) struct Chassis {
     wheels: [Option<Mounted>; ChassisConfig::MAX_WHEELS],
 }
 
-/// A wheel with what does not change while it rolls.
+/// A wheel with its constants.
 #[derive(Debug, Clone, Copy)]
 struct Mounted {
     wheel: Wheel,
-    /// As it stands now; turns with the steering motor only.
+    /// The present contact; turns with the steering motor only.
     contact: Contact,
-    /// Its part of its motor's inertia: one, unless the motor drives others too.
+    /// Its share of the inertia of its motor: one, unless the motor drives other wheels too.
     share: f32,
 }
 
 impl Chassis {
-    /// Takes a configuration that makes sense.
+    /// Takes a valid configuration.
     pub(crate) fn new(config: &ChassisConfig) -> Self {
         let contacts = config.wheels().map(|wheel| wheel.contact(None));
         let ChassisConfig { mass_kg, yaw_inertia_kg_m2, friction, .. } = *config;
@@ -161,8 +162,8 @@ impl Chassis {
         }
     }
 
-    /// Moves the chassis on its motors by one step, and returns the torque of the ground on each motor. A wheel
-    /// without one stands still.
+    /// Moves the chassis on its motors by one step, and returns the torque of the ground on each motor. A wheel without
+    /// a motor stands still.
     pub(crate) fn step(&mut self, escs: &Escs, dt_s: f32) -> [f32; MOTORS] {
         let esc = |motor: MotorKey| escs.get(motor.index())?.as_ref();
         let mut rolling = [NONE; ChassisConfig::MAX_WHEELS];
@@ -234,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_that_makes_no_sense_is_named() {
+    fn an_invalid_parameter_is_named() {
         let motor = MotorKey::new(0).unwrap();
         let config = ChassisConfig::new(&four(motor));
         assert_eq!(config.validate(), Ok(()));

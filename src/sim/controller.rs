@@ -2,21 +2,20 @@ use super::mailbox::Offer;
 use super::{Fault, Line, SimError, Simulation};
 use crate::frame::CanFrame;
 
-/// How long a blocking call waits, in simulated time, before it gives up.
+/// Time limit of a blocking call, in simulated time.
 const PATIENCE_NS: u64 = 1_000_000_000;
 /// A blocking call looks again at least this often.
 const NAP_NS: u64 = 100_000;
 
 /// The driver's end of a simulated bus: three transmit mailboxes and a receive queue.
 ///
-/// It implements [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], so it can stand in for any
-/// driver. A frame that is handed over begins at the earliest when time moves: those handed over at one instant
-/// compete by their ids.
+/// The controller implements [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], so it can stand in for any
+/// driver. Transmission begins at the earliest when time moves: frames handed over at one instant compete by their ids.
 ///
-/// * `transmit` with full mailboxes evicts the pending frame of lowest priority for one of strictly higher
-///   priority and returns it; otherwise it would block. A frame in transmission is not evicted, and frames of one
-///   id keep their order.
-/// * `receive` reports an overrun once, then goes on with what was kept; the newest frames are the ones missed.
+/// * If the mailboxes are full, `transmit` evicts and returns the pending frame of lowest priority for a frame of
+///   strictly higher priority; otherwise `transmit` would block. A frame in transmission is not evicted, and frames of
+///   one id keep their order.
+/// * `receive` reports an overrun once, then continues with the kept frames; the newest frames are missing.
 /// * The blocking calls move the time of the world until they are done, for a second at most.
 ///
 /// # Examples
@@ -49,9 +48,9 @@ impl<'a> Controller<'a> {
         Self { world, line }
     }
 
-    /// Takes back what waits in the mailboxes, except for a frame in transmission.
+    /// Aborts the frames in the mailboxes, except a frame in transmission.
     ///
-    /// embedded-can has no such call; drivers have it as `abort`.
+    /// embedded-can has no such call; drivers name it `abort`.
     pub fn abort_pending(&mut self) {
         self.world.with(|engine| engine.wire_mut(self.line).mailboxes.abort());
     }
@@ -155,7 +154,7 @@ impl embedded_can::blocking::Can for Controller<'_> {
             }
             let line = self.line;
             let room = self.world.with(|engine| engine.wire(line).mailboxes.has_room());
-            // Room first: a blocking driver waits, it does not evict.
+            // Room first: a blocking driver waits and does not evict.
             (room && !self.is_blocked()).then(|| {
                 self.offer(frame);
                 Ok(())

@@ -16,7 +16,7 @@ const STEP_S: f32 = 1e-4;
 /// Every so many steps the temperatures move.
 const STEPS_A_WARMING: u64 = 10;
 
-/// What happens next. At equal times the earlier one in this list goes first.
+/// The next event. At equal times, the order of this list decides.
 #[derive(Debug, Clone, Copy)]
 enum Event {
     FrameEnd(Line),
@@ -27,7 +27,7 @@ enum Event {
     Arbitration(Line),
 }
 
-/// Everything in a world: a list of things to come, and the state that they change.
+/// The content of a world: a list of future events, and the state changed by them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Engine {
     pub(crate) seed: u64,
@@ -39,7 +39,7 @@ pub(crate) struct Engine {
     joints: [Option<Drive>; JOINTS],
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
-    /// Frames that passed while a blocking call waited.
+    /// Frames that passed during a blocking call.
     pub(crate) unseen: Ring<Transmission, 64>,
 }
 
@@ -123,7 +123,7 @@ impl Engine {
         (self.now_ns - self.stepped_ns) as f32 * 1e-9
     }
 
-    /// Lets happen what happens until `limit_ns`, up to and including the next frame.
+    /// Runs all events until `limit_ns`, up to and including the next frame.
     pub(crate) fn run_until(&mut self, limit_ns: u64) -> Option<Transmission> {
         loop {
             let (at_ns, event) = self.next_event();
@@ -233,7 +233,7 @@ impl Engine {
         }
     }
 
-    /// Returns the frame of highest priority among all that wait on a bus, and its sender.
+    /// Returns the pending frame of highest priority on a bus, and its sender.
     fn winner(&self, line: Line) -> Option<(CanFrame, Sender)> {
         let wire = self.wire(line);
         let connected = self.faults.is_connected(line, self.now_ns);
@@ -275,7 +275,7 @@ impl Engine {
         self.wire_mut(line).begin(frame, sender, now_ns);
     }
 
-    /// Takes a frame off the wire and gives it to all the others.
+    /// Removes a frame from the wire and delivers it to all other nodes.
     fn end_frame(&mut self, line: Line) -> Option<Transmission> {
         let now_ns = self.now_ns;
         let flight = self.wire(line).flight()?;
@@ -283,7 +283,7 @@ impl Engine {
         let connected = self.faults.is_connected(line, now_ns);
         match sender {
             Sender::Controller if !connected => {
-                // Cut off in the middle: the frame is for nobody, and still waits.
+                // Cut off in the middle: no node receives the frame, which stays pending.
                 let wire = self.wire_mut(line);
                 wire.mailboxes.give_up();
                 return wire.finish(now_ns, false);

@@ -12,23 +12,23 @@ pub enum SimError {
     Id {
         /// The name of the model.
         model: &'static str,
-        /// The id that was asked for.
+        /// The requested id.
         id: u8,
     },
     /// There is no joint with this id, or there are 12 joints already.
     Joint {
-        /// The id that was asked for.
+        /// The requested id.
         id: u8,
     },
     /// A parameter of the chassis, by its name, makes no sense; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
     Chassis(&'static str),
-    /// There are 16 faults already that are not over yet.
+    /// There are already 16 faults that are not over.
     TooManyFaults,
-    /// The fault is one of an ESC, and the motor is a joint: a joint can be silent or without supply.
+    /// The fault belongs to an ESC, and the motor is a joint: a joint can be silent or without supply.
     NoFaultOfJoint,
     /// The controller is bus-off.
     BusOff,
-    /// Frames were missed because the receive queue was full. Reported once; those before them are still there.
+    /// Frames were missed because the receive queue was full. Reported once; the frames before are still there.
     Overrun,
     /// [`Fault::DriverErrors`](super::Fault::DriverErrors) wants the call of the driver to fail.
     Scripted,

@@ -10,7 +10,7 @@ use crate::units::{AngularVelocity, Current};
 /// A seeded clock is at most this far off, in millionths: a common crystal. An estimate.
 const CLOCK_PPM: u32 = 50;
 
-/// What a fault does to the feedback of one ESC.
+/// Effects of faults on the feedback of one ESC.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(crate) struct Tampering {
     pub(crate) silent: bool,
@@ -21,7 +21,7 @@ pub(crate) struct Tampering {
     pub(crate) length: Option<u8>,
 }
 
-/// An ESC with its motor: takes command slots from the wire, and puts feedback on it from a clock of its own.
+/// An ESC with its motor: takes command slots from the wire, and sends feedback by a clock of its own.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Esc {
     pub(crate) config: MotorConfig,
@@ -41,7 +41,7 @@ pub(crate) struct Esc {
     loss: Option<bool>,
     command: i16,
     commanded_ns: u64,
-    /// Counts that are taken off the angle before it is sent.
+    /// Counts subtracted from the angle in its frame.
     zero: i64,
     /// The feedback as last sent.
     sent: [u8; 8],
@@ -85,8 +85,8 @@ impl Esc {
         Some(esc)
     }
 
-    /// Gives the supply (`None`) or takes it away, with or without the zero of the angle. A fresh start forgets
-    /// the command and begins at another phase.
+    /// Gives the supply (`None`) or removes it, with or without the zero of the angle. A fresh start forgets the
+    /// command and begins at another phase.
     pub(crate) fn set_powered(&mut self, loss: Option<bool>, now_ns: u64) {
         match (self.loss, loss) {
             (Some(forgets_angle), None) => {
@@ -142,8 +142,8 @@ impl Esc {
         self.loss.is_none().then_some(self.due_ns)
     }
 
-    /// Builds the feedback frame that is due, `since_step_s` after the last step of the motor. `None` when a
-    /// fault keeps it back.
+    /// Builds the due feedback frame, `since_step_s` after the last step of the motor. `None` when a fault suppresses
+    /// the frame.
     pub(crate) fn feedback(
         &mut self,
         since_step_s: f32,
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn without_commands_the_last_one_holds_unless_told_otherwise() {
+    fn without_commands_the_last_command_holds_unless_configured_otherwise() {
         let timeout = Duration::from_millis(20);
         let config = MotorConfig::new(Model::M3508, 1);
         for (config, later) in [(config, 1000), (config.with_command_timeout(timeout), 0)] {
@@ -392,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn the_free_running_clock_keeps_its_rate_whatever_the_jitter() {
+    fn the_free_running_clock_keeps_its_rate_under_any_jitter() {
         let config = MotorConfig::new(Model::M3508, 1).with_clock_ppm(40);
         let mut esc = Esc::new(config, 9, 3, 0).unwrap();
         let first = esc.due().unwrap();

@@ -7,21 +7,21 @@ use crate::time::{Duration, Instant};
 use core::ops::{Bound, RangeBounds};
 use embedded_can::{Frame, Id};
 
-/// Something that goes wrong in a [`Simulation`](super::Simulation) for a while.
+/// A fault of a [`Simulation`](super::Simulation) for a limited time.
 ///
-/// What needs no fault: a second master ([`Simulation::inject`](super::Simulation::inject) of a command frame), two motors with
-/// one id (attach both), a burst after a stall (advance without receiving), an overrun (the same, with
+/// Some events need no fault: a second master ([`Simulation::inject`](super::Simulation::inject) of a command frame), two
+/// motors with one id (attach both), a burst after a stall (advance without receiving), an overrun (the same, with
 /// [`Simulation::with_receive_depth`](super::Simulation::with_receive_depth)), heat
 /// ([`Simulation::set_temperature_c`](super::Simulation::set_temperature_c)), a push from outside
 /// ([`Simulation::set_load_nm`](super::Simulation::set_load_nm)), a full bus (eight motors).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Frames take their time on the wire and reach nobody.
+    /// Frames take their time on the wire and reach no node.
     LostFrames {
         /// The bus.
         line: Line,
-        /// Which frames; `None` for all.
+        /// Id of the frames; `None` for all.
         id: Option<Id>,
         /// 0 for none, 1 for all.
         probability: f32,
@@ -30,17 +30,17 @@ pub enum Fault {
     DuplicateFrames {
         /// The bus.
         line: Line,
-        /// Which frames; `None` for all.
+        /// Id of the frames; `None` for all.
         id: Option<Id>,
     },
-    /// The controller is bus-off: it neither sends nor hears, and its calls return an error.
+    /// The controller is bus-off: it neither sends nor receives, and its calls return an error.
     ///
-    /// Its mailboxes keep what they hold and send it afterwards, as those of bxCAN do.
+    /// Its mailboxes keep their frames and send them afterwards, as in bxCAN.
     BusOff(Line),
-    /// The cable between controller and motors is out: nothing is acknowledged, so the mailboxes fill up and then
-    /// refuse, and nothing is heard. Afterwards they send what they hold.
+    /// The cable between controller and motors is out: no frame is acknowledged, so the mailboxes fill up and then
+    /// refuse, and nothing is received. Afterwards the mailboxes send their frames.
     Unplugged(Line),
-    /// The driver refuses every frame to transmit with would-block, whatever room it has.
+    /// The driver refuses every frame to transmit with would-block, with or without room.
     WouldBlock(Line),
     /// Calls of the driver return an error.
     DriverErrors {
@@ -53,30 +53,30 @@ pub enum Fault {
     Flood {
         /// The bus.
         line: Line,
-        /// What it sends.
+        /// The frame of the node.
         frame: CanFrame,
-        /// Time between two of them; at least 1 µs. The bus limits the rate that comes out.
+        /// Time between two frames; at least 1 µs. The bus limits the resulting rate.
         period: Duration,
     },
-    /// The ESC sends no feedback, or the joint answers nothing, and goes on otherwise.
+    /// The ESC sends no feedback, or the joint answers nothing; all else works.
     Silent(MotorKey),
     /// There is no supply: no feedback, no current, nothing heard. Afterwards the motor starts afresh, a joint disabled.
     PowerLoss {
         /// The motor.
         motor: MotorKey,
-        /// Whether the angle at which it starts again is its new zero. The zero of a joint always is: it counts from where
-        /// it is.
+        /// Whether the angle at the restart is its new zero. A joint always takes a new zero: it counts from its angle at
+        /// the start.
         forgets_angle: bool,
     },
-    /// Angle and speed in the feedback stay what they were.
+    /// Angle and speed in the feedback stay constant.
     StuckEncoder(MotorKey),
-    /// The ESC sends the same feedback again and again, and goes on otherwise.
+    /// The ESC sends the same feedback again and again; all else works.
     FrozenFeedback(MotorKey),
     /// Nothing turns the shaft.
     BlockedShaft(MotorKey),
-    /// The motor turns against its command, and reports that it does: torque and back-EMF have the wrong sign.
+    /// The motor turns against its command, and reports this motion: torque and back-EMF have the wrong sign.
     ReversedTorque(MotorKey),
-    /// The angle field of the feedback has this value; above 8191 it is not valid.
+    /// The angle field of the feedback has this value; a value above 8191 is invalid.
     WrongAngle {
         /// The motor.
         motor: MotorKey,
@@ -100,7 +100,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Tells whether its motor cannot have it: a joint has no fault of an ESC.
+    /// Returns whether the fault excludes this motor: a joint has no fault of an ESC.
     const fn is_impossible(&self) -> bool {
         match self {
             Self::Silent(_) | Self::PowerLoss { .. } => false,
@@ -111,7 +111,7 @@ impl Fault {
         }
     }
 
-    /// Returns the motor that the fault belongs to.
+    /// Returns the motor of the fault.
     const fn motor(&self) -> Option<MotorKey> {
         match self {
             Self::Silent(motor)
@@ -144,7 +144,7 @@ impl Scheduled {
     }
 }
 
-/// The faults of a world, with the windows of time in which they hold.
+/// The faults of a world, with their windows of time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Faults {
     scheduled: [Option<Scheduled>; 16],
@@ -200,7 +200,7 @@ impl Faults {
             .any(|fault| *fault == Fault::BusOff(line) || *fault == Fault::Unplugged(line))
     }
 
-    /// Returns what faults do to the feedback of a motor.
+    /// Returns the effects of faults on the feedback of a motor.
     pub(crate) fn tampering(&self, motor: MotorKey, now_ns: u64) -> Tampering {
         let mut tampering = Tampering::default();
         for fault in self.active(now_ns).filter(|fault| fault.motor() == Some(motor)) {
@@ -217,7 +217,7 @@ impl Faults {
         tampering
     }
 
-    /// Returns whether a motor is without its supply, and whether it then forgets its angle.
+    /// Returns whether a motor is without its supply, and whether the motor then forgets its angle.
     pub(crate) fn power_loss(&self, motor: MotorKey, now_ns: u64) -> Option<bool> {
         self.active(now_ns).find_map(|fault| match fault {
             Fault::PowerLoss { motor: dead, forgets_angle } if *dead == motor => {
@@ -227,7 +227,7 @@ impl Faults {
         })
     }
 
-    /// Returns what faults do to the mechanics of a motor.
+    /// Returns the effects of faults on the mechanics of a motor.
     pub(crate) fn mechanics(&self, motor: MotorKey, now_ns: u64) -> Mechanics {
         let has = |fault| self.is_active(fault, now_ns);
         Mechanics {
@@ -284,7 +284,7 @@ impl Faults {
         next
     }
 
-    /// Takes one frame of a flood that is due.
+    /// Takes one due frame of a flood.
     pub(crate) fn next_of_flood(&mut self, now_ns: u64) -> Option<(Line, CanFrame)> {
         self.scheduled.iter_mut().flatten().find_map(|slot| match slot.fault {
             Fault::Flood { line, frame, period }

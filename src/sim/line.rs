@@ -18,7 +18,7 @@ pub enum Line {
     Can3,
 }
 
-/// Who sent a frame.
+/// Sender of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sender {
@@ -30,7 +30,7 @@ pub enum Sender {
     Foreign,
 }
 
-/// A frame that was on the wire.
+/// A frame on the wire.
 ///
 /// Its `Display` is a line of candump's log form.
 ///
@@ -57,11 +57,11 @@ pub struct Transmission {
     pub line: Line,
     /// The frame.
     pub frame: CanFrame,
-    /// Who sent it.
+    /// The sender.
     pub sender: Sender,
-    /// The time that it took, with the pause after it, in bits.
+    /// The length of the frame, with the pause after it, in bits.
     pub bits: u32,
-    /// Whether it reached the others; `false` when a fault lost it or cut it off.
+    /// Whether the frame reached the others; `false` when a fault lost it or cut it off.
     pub delivered: bool,
 }
 
@@ -85,7 +85,7 @@ impl core::fmt::Display for Transmission {
     }
 }
 
-/// What went over one bus since the start of the world.
+/// Traffic of one bus since the start of the world.
 ///
 /// # Examples
 /// ```
@@ -106,27 +106,27 @@ impl core::fmt::Display for Transmission {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Traffic {
-    /// Bits that passed.
+    /// Bits of elapsed time.
     pub total_bits: u64,
-    /// Bits that frames took, each with the pause after it.
+    /// Bits of frames, each with the pause after it.
     pub busy_bits: u64,
     /// Frames on the wire.
     pub frames: u32,
-    /// Frames on the wire that a fault lost.
+    /// Frames on the wire lost by a fault.
     pub lost: u32,
-    /// Feedback frames that an ESC threw away because its mailboxes were full.
+    /// Feedback frames discarded by an ESC because its mailboxes were full.
     pub starved: u32,
-    /// Frames of the controller that left it for good.
+    /// Frames that left the controller for good.
     pub sent: u32,
-    /// Frames that the controller heard and its filter let through.
+    /// Frames received by the controller, within its filter.
     pub heard: u32,
-    /// Frames that the controller missed because its receive queue was full.
+    /// Frames missed by the controller because its receive queue was full.
     pub overruns: u32,
-    /// Frames that the controller evicted from its mailboxes.
+    /// Frames evicted by the controller from its mailboxes.
     pub evicted: u32,
-    /// Frames that the controller refused with would-block.
+    /// Frames refused by the controller with would-block.
     pub refused: u32,
-    /// Calls of the controller's driver that returned an error.
+    /// Calls of the controller's driver with an error.
     pub errors: u32,
 }
 
@@ -137,7 +137,7 @@ impl Traffic {
         if self.total_bits == 0 { 0.0 } else { self.busy_bits as f32 / self.total_bits as f32 }
     }
 
-    /// Returns what was added since an earlier reading of the same bus.
+    /// Returns the increase since an earlier reading of the same bus.
     #[must_use]
     pub const fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -176,7 +176,7 @@ pub(crate) struct Wire {
     pub(crate) mailboxes: Mailboxes,
     receive: Ring<CanFrame, RECEIVE_CAPACITY>,
     receive_depth: usize,
-    /// Id and mask of the standard data frames that the controller takes.
+    /// Id and mask of the acceptance filter for standard data frames.
     filter: (u16, u16),
     overrun: bool,
     pub(crate) foreign: Ring<CanFrame, 64>,
@@ -231,7 +231,7 @@ impl Wire {
         self.filter = (id, mask);
     }
 
-    /// Tells whether the acceptance filter lets a frame through.
+    /// Returns whether the acceptance filter lets a frame through.
     fn accepts(&self, frame: &CanFrame) -> bool {
         let (id, mask) = self.filter;
         // The header of anything but a standard data frame is above all ids.
@@ -247,7 +247,7 @@ impl Wire {
         self.flight.map(|flight| flight.end_ns)
     }
 
-    /// Returns when the next frame may begin; `None` during one.
+    /// Returns the start time of the next frame; `None` during a frame.
     pub(crate) fn idle_from(&self) -> Option<u64> {
         self.flight.is_none().then_some(self.idle_ns)
     }
@@ -261,7 +261,7 @@ impl Wire {
         self.flight = Some(Flight { frame, sender, bits, end_ns });
     }
 
-    /// Takes the frame in transmission off the wire, and counts it.
+    /// Removes the frame in transmission from the wire, and counts it.
     pub(crate) fn finish(&mut self, now_ns: u64, delivered: bool) -> Option<Transmission> {
         let Flight { frame, sender, bits, .. } = self.flight.take()?;
         self.traffic.busy_bits += u64::from(bits);
@@ -290,12 +290,12 @@ impl Wire {
         }
     }
 
-    /// Tells once that frames were missed.
+    /// Reports missed frames once.
     pub(crate) const fn take_overrun(&mut self) -> bool {
         core::mem::replace(&mut self.overrun, false)
     }
 
-    /// Takes a frame that the controller heard.
+    /// Takes a frame received by the controller.
     pub(crate) fn take_heard(&mut self) -> Option<CanFrame> {
         self.receive.pop()
     }

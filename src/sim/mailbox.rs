@@ -1,11 +1,11 @@
 use crate::frame::CanFrame;
 use embedded_can::{Frame, Id};
 
-/// What became of a frame that was handed to full or free mailboxes.
+/// Result of handing a frame to full or free mailboxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Offer {
     Taken,
-    /// It took the place of this frame, which was not in transmission.
+    /// The frame took the place of this frame, which was not in transmission.
     Replaced(CanFrame),
     /// Full, and no pending frame has a lower priority.
     Refused,
@@ -25,7 +25,7 @@ pub(crate) struct Mailboxes {
     order: u64,
 }
 
-/// What arbitration compares: the id, then data before remote; at last the order of arrival.
+/// The criteria of arbitration: the id, then data before remote; at last the order of arrival.
 type Rank = (Id, bool, u64);
 
 const fn rank_of(frame: &CanFrame, id: Id, order: u64) -> Rank {
@@ -43,8 +43,8 @@ impl Mailboxes {
         Self { slots: [None; 3], order: 0 }
     }
 
-    /// Takes a frame as `embedded_can::nb::Can::transmit` demands: frames of one id keep their order, and full
-    /// mailboxes give up their lowest priority for a frame of strictly higher priority.
+    /// Takes a frame as `embedded_can::nb::Can::transmit` requires: frames of one id keep their order, and full
+    /// mailboxes evict their lowest priority for a frame of strictly higher priority.
     pub(crate) fn offer(&mut self, frame: CanFrame) -> Offer {
         let pending = Pending { frame, order: self.order, in_transmission: false };
         if let Some(free) = self.slots.iter_mut().find(|slot| slot.is_none()) {
@@ -72,7 +72,7 @@ impl Mailboxes {
         }
     }
 
-    /// Returns the frame that takes part in the next arbitration.
+    /// Returns the frame for the next arbitration.
     pub(crate) fn candidate(&self) -> Option<CanFrame> {
         self.slots.iter().flatten().min_by_key(|slot| slot.rank()).map(|slot| slot.frame)
     }
@@ -97,14 +97,14 @@ impl Mailboxes {
         }
     }
 
-    /// Takes the frame in transmission for one that still waits.
+    /// Treats the frame in transmission as pending.
     pub(crate) fn give_up(&mut self) {
         for slot in self.slots.iter_mut().flatten() {
             slot.in_transmission = false;
         }
     }
 
-    /// Takes out what is not in transmission.
+    /// Removes all frames except a frame in transmission.
     pub(crate) fn abort(&mut self) {
         for slot in &mut self.slots {
             if slot.is_some_and(|pending| !pending.in_transmission) {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_higher_priority_evicts_the_lowest_and_an_equal_or_lower_one_is_refused() {
+    fn a_higher_priority_evicts_the_lowest_and_an_equal_or_lower_priority_is_refused() {
         let mut mailboxes = filled([0x300, 0x100, 0x200]);
         assert_eq!(mailboxes.offer(frame(0x300, 1)), Offer::Refused);
         assert_eq!(mailboxes.offer(frame(0x301, 1)), Offer::Refused);

@@ -1,8 +1,8 @@
-//! A simulated world to test robots in: CAN buses, motors with their ESCs, and what goes wrong with them.
+//! A simulated world to test robots in: CAN buses, motors with their ESCs, and their faults.
 //!
 //! [`Simulation`] stands for everything beyond the CAN driver. The code under test gets the driver's end of a bus,
-//! [`Controller`], which implements both [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], and a
-//! clock, `&Simulation`; the test moves time, and looks at what is true rather than at what was reported.
+//! [`Controller`], which implements both [`embedded_can::nb::Can`] and [`embedded_can::blocking::Can`], and a clock,
+//! `&Simulation`; the test moves time, and reads the true state rather than the reported state.
 //!
 //! ```text
 //!  code under test                        Simulation
@@ -15,7 +15,7 @@
 //!  └──────────────┘   └──────────────────────────────────────────────────┘
 //! ```
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Simulation`] | the three buses, up to 16 motors and 12 joints, and the time |
 //! | [`MotorConfig`], [`JointConfig`] | a motor to attach, or a joint of a snake robot with its drive |
@@ -23,10 +23,10 @@
 //! | [`ChassisConfig`], [`Wheel`], [`ChassisState`] | a body on wheels of any layout, and its true state |
 //! | [`SerialLine`] | a serial line that takes its time, and damages bytes |
 //! | [`Controller`] | the driver's end of a bus |
-//! | [`Fault`] | what goes wrong, and when |
+//! | [`Fault`] | a fault and its window of time |
 //! | [`SimError`] | why something is refused, or a call of the driver failed |
 //! | [`Transmission`], [`Sender`], [`Traffic`] | every frame on a [`Line`] with its time, as a line of candump; bus load and counters |
-//! | [`contract`] | whether a device, yours too, keeps what it promises |
+//! | [`contract`] | check of a device, also of the application, against its promises |
 //! | [`frame_bits`], [`nominal_bits`], [`worst_case_bits`] | how long a frame is on the wire |
 //!
 //! ```
@@ -50,22 +50,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What is exact and what is not
-//! Exact: frame lengths with stuff bits and checksum, arbitration, mailbox rules, slots, scales, rounding, and
-//! that the same seed and the same calls give the same states, bit for bit, on every target. Documented:
-//! torque constants, gears and no-load speeds. **Estimates**: inertia, friction, winding, heat, jitter of the
-//! ESC, and what it does when commands stop ([`MotorConfig::with_command_timeout`]).
+//! # Accuracy
+//! Exact: frame lengths with stuff bits and checksum, arbitration, mailbox rules, slots, scales, rounding; the same
+//! seed and the same calls give the same states, bit for bit, on every target. Documented: torque constants, gears and
+//! no-load speeds. **Estimates**: inertia, friction, winding, heat, jitter of the ESC, and its reaction when commands
+//! stop ([`MotorConfig::with_command_timeout`]).
 //!
-//! A wheel on the ground holds as its friction allows (estimate 0.8, so about 2 Nm a wheel under 20 kg): more
-//! torque than that makes it spin, as on a real floor.
+//! A wheel on the ground holds within its friction (estimate 0.8, so about 2 Nm a wheel under 20 kg): at a larger
+//! torque the wheel spins, as on a real floor.
 //!
-//! Not simulated: error frames and error counters, two senders of one id at the same bit, cogging, the
-//! supply's sag, the weight that moves to other wheels when a chassis accelerates, and what a turning module does to the
-//! floor, to its wheel's drive and to the body. Motors move in steps of 100 µs; in between, the feedback continues their angle in a line.
+//! Not simulated: error frames and error counters, two senders of one id at the same bit, cogging, the supply's sag, the transfer
+//! of weight to other wheels when a chassis accelerates, and the effect of a turning module on the floor, on its wheel's drive
+//! and on the body. Motors move in steps of 100 µs; in between, the feedback continues their angle in a line.
 //!
 //! # A node of your own
-//! Anything that talks on a bus can be played by the test: look at each frame in
-//! [`Simulation::advance_with`] and answer with [`Simulation::inject`].
+//! A test can play any other node of a bus: read each frame in [`Simulation::advance_with`] and answer with
+//! [`Simulation::inject`].
 
 mod bits;
 mod body;

@@ -7,7 +7,7 @@ use crate::units::{Angle, AngularVelocity, Current};
 /// A motor with its ESC to attach to a [`Simulation`](super::Simulation).
 ///
 /// All values at the output shaft, at 24 V. Torque constant, gear and no-load speed are those of the driver's table
-/// ([`facts`](Self::facts)); the M3508's resistance is what its rated point asks for, 469 rpm at 10 A and 3 Nm.
+/// ([`facts`](Self::facts)); the M3508's resistance follows from its rated point, 469 rpm at 10 A and 3 Nm.
 /// **Everything else is an estimate** of the right order, chosen without a source.
 ///
 /// | | M2006 | M3508 | GM6020 |
@@ -24,8 +24,8 @@ use crate::units::{Angle, AngularVelocity, Current};
 /// | final heat, K/A² (estimate) | 4 | 0.6 | 15 |
 /// | time constant of heat, s (estimate) | 200 | 300 | 400 |
 ///
-/// What a real ESC does when commands stop is not documented, so the default is the worst case: it goes on with the last one
-/// for ever ([`with_command_timeout`](Self::with_command_timeout)).
+/// The reaction of a real ESC when commands stop is not documented, so the default is the worst case: the ESC continues with
+/// the last command for ever ([`with_command_timeout`](Self::with_command_timeout)).
 ///
 /// # Examples
 /// ```
@@ -71,7 +71,7 @@ impl MotorConfig {
         Self::new(Model::M3508, id)
     }
 
-    /// Takes the id of a GM6020 as it is delivered, commanded in volts: 1 to 7.
+    /// Takes the id of a GM6020 as delivered, commanded in volts: 1 to 7.
     #[must_use]
     pub const fn gm6020_voltage(id: u8) -> Self {
         Self::new(Model::Gm6020Voltage, id)
@@ -102,7 +102,7 @@ impl MotorConfig {
         }
     }
 
-    /// Returns what the wire and the data sheets say about the motor.
+    /// Returns the facts of the motor from the wire and the data sheets.
     #[must_use]
     pub const fn facts(&self) -> &'static Facts {
         self.model.facts()
@@ -114,35 +114,37 @@ impl MotorConfig {
         Self { line, ..self }
     }
 
-    /// Makes the ESC go to zero so long after the last command; by default it goes on with it for ever.
+    /// Sets the time after the last command at which the ESC goes to zero; by default the ESC continues with the
+    /// command for ever.
     #[must_use]
     pub const fn with_command_timeout(self, timeout: Duration) -> Self {
         Self { command_timeout: Some(timeout), ..self }
     }
 
-    /// Sets the supply in volts, 24 by default; what is not a positive number counts as 24.
+    /// Sets the supply in volts, 24 by default; a value that is not a positive number counts as 24.
     #[must_use]
     pub const fn with_supply_v(self, supply_v: f32) -> Self {
         let supply_v = if supply_v > 0.0 && supply_v < 1e3 { supply_v } else { 24.0 };
         Self { supply_v, ..self }
     }
 
-    /// Fixes an inertia to the output shaft, in kg m²; what is not a positive number counts as none.
+    /// Fixes an inertia to the output shaft, in kg m²; a value that is not a positive number counts as none.
     #[must_use]
     pub const fn with_load_inertia_kg_m2(self, inertia: f32) -> Self {
         let inertia = if inertia > 0.0 && inertia < 1e3 { inertia } else { 0.0 };
         Self { load_inertia_kg_m2: inertia, ..self }
     }
 
-    /// Adds dry friction at the output shaft to the motor's own, in Nm; what is not a positive number counts as none.
+    /// Adds dry friction at the output shaft to the motor's own, in Nm; a value that is not a positive number counts as
+    /// none.
     #[must_use]
     pub const fn with_load_friction_nm(self, friction: f32) -> Self {
         let friction = if friction > 0.0 && friction < 1e3 { friction } else { 0.0 };
         Self { load_friction_nm: friction, ..self }
     }
 
-    /// Puts the output shaft between two hard stops without bounce, as angles from where it starts: at most zero, and at
-    /// least zero. What is NaN counts as zero.
+    /// Puts the output shaft between two hard stops without bounce, as angles from its start: at most zero, and at least
+    /// zero. NaN counts as zero.
     #[must_use]
     pub const fn with_stops(self, lower: Angle, upper: Angle) -> Self {
         let (lower, upper) = (lower.as_radians(), upper.as_radians());
@@ -151,13 +153,13 @@ impl MotorConfig {
         Self { stops: Some((lower, upper)), ..self }
     }
 
-    /// Sets the rotor's angle at the start, in counts of which a turn has 8192; by default the seed chooses.
+    /// Sets the rotor's angle at the start, in counts of 8192 a turn; by default the seed chooses.
     #[must_use]
     pub const fn with_rotor_angle(self, counts: u16) -> Self {
         Self { rotor_angle: Some(counts & 0x1FFF), ..self }
     }
 
-    /// Makes full scale ±30000, as a GM6020 of 2020 and before has it; no other model has such a past.
+    /// Makes full scale ±30000, as in a GM6020 of 2020 and before; other models have no such past.
     #[must_use]
     pub const fn with_legacy_full_scale(self) -> Self {
         Self { legacy_full_scale: matches!(self.model, Model::Gm6020Voltage), ..self }
@@ -196,7 +198,7 @@ impl MotorConfig {
     }
 }
 
-/// A motor of a [`Simulation`](super::Simulation): one with an ESC, or a joint.
+/// A motor of a [`Simulation`](super::Simulation): a motor with an ESC, or a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorKey(u8);
@@ -217,7 +219,7 @@ impl MotorKey {
         u8::try_from(index + MOTORS).ok().filter(|_| index < JOINTS).map(Self)
     }
 
-    /// Returns the place among the motors with ESCs; that of a joint is beyond all of them.
+    /// Returns the place among the motors with ESCs; the place of a joint is beyond all of them.
     pub(crate) const fn index(self) -> usize {
         self.0 as usize
     }
@@ -234,7 +236,7 @@ impl MotorKey {
 
 /// The true state of a simulated motor, before anything is rounded for the wire. Counter-clockwise is positive.
 ///
-/// What a joint is not simulated for (its drive goes where it is told, whatever that takes) is NaN: current, torque, power and
+/// Quantities not simulated for a joint (its drive moves to its target at any load) are NaN: current, torque, power and
 /// temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -248,25 +250,25 @@ pub struct MotorState {
     pub current: Current,
     /// The torque of the motor at the output shaft, friction not taken off, in Nm.
     pub torque_nm: f32,
-    /// The electric power that it takes from the supply, in W: what moves it and the heat in its winding. Below zero while
-    /// it feeds back.
+    /// The electric power taken from the supply, in W: the mechanical power and the heat in its winding. Below zero while
+    /// the motor feeds back.
     pub power_w: f32,
-    /// The temperature that the ESC measures, in °C.
+    /// The temperature measured by the ESC, in °C.
     pub temperature_c: f32,
-    /// The angle as its encoder shows it since the start, whatever its drive forgot: 8192 a turn of an ESC's rotor, whose first
-    /// turn begins at 0; 65536 a turn of a joint.
+    /// The angle of its encoder since the start, regardless of the memory of its drive: 8192 a turn of an ESC's rotor, whose
+    /// first turn begins at 0; 65536 a turn of a joint.
     pub encoder_counts: i64,
-    /// The same as its drive counts it, from the zero that it took at its last start, in 32 bits that wrap. An ESC sends it
+    /// The same as counted by its drive, from the zero of its last start, in 32 bits with wrap. An ESC sends the angle
     /// within a turn.
     pub drive_counts: i32,
-    /// The command that the drive acts on, as on the wire: the word of an ESC, the target of a joint in pulses.
+    /// The acting command of the drive, as on the wire: the word of an ESC, the target of a joint in pulses.
     pub command: i32,
-    /// Whether the drive moves the shaft, or holds it: an ESC does while it has its supply, a joint while it is enabled.
+    /// Whether the drive moves or holds the shaft: an ESC does while it has its supply, a joint while it is enabled.
     pub is_enabled: bool,
-    /// Answers to requests of a joint, feedback frames of an ESC; those too that found no room in its mailboxes.
+    /// Answers to requests of a joint, feedback frames of an ESC; frames without room in its mailboxes included.
     pub replies: u32,
-    /// How often a frame of the controller with its id began in the same bit as its reply: on a real bus both would have
-    /// been destroyed. Here the controller goes first. Only a joint has one id for both.
+    /// Number of frames of the controller with its id that began in the same bit as its reply: on a real bus both would
+    /// have been destroyed. Here the controller goes first. Only a joint has one id for both.
     pub collisions: u32,
 }
 
@@ -281,7 +283,7 @@ pub(crate) enum Model {
 }
 
 impl Model {
-    /// Returns what the wire and the data sheets say about it.
+    /// Returns the facts from the wire and the data sheets.
     pub(crate) const fn facts(self) -> &'static Facts {
         match self {
             Self::M2006 => <dji::M2006 as dji::Model>::FACTS,
@@ -298,7 +300,7 @@ pub(crate) const fn wrapped(counts: i64) -> i32 {
     counts as i32
 }
 
-/// Returns the position that is so many turns.
+/// Returns the position at this number of turns.
 #[expect(clippy::cast_possible_truncation, reason = "an angle within a turn")]
 pub(crate) fn position(turns: f64) -> Position {
     let whole = turns as i64;
@@ -373,7 +375,7 @@ impl Constants {
         }
     }
 
-    /// Returns the back-EMF constant in V s/rad with which the documented no-load speed comes out at 24 V.
+    /// Returns the back-EMF constant in V s/rad for the documented no-load speed at 24 V.
     pub(crate) const fn back_emf(&self, facts: &Facts) -> f32 {
         let no_load = facts.no_load_rpm * (core::f32::consts::TAU / 60.0);
         let friction = self.coulomb + self.viscous * no_load;

@@ -11,7 +11,7 @@ pub(crate) struct Random {
 const MULTIPLIER: u64 = 6_364_136_223_846_793_005;
 
 impl Random {
-    /// Seeds one of 2^63 streams; numbers of different streams have nothing to do with each other.
+    /// Seeds one of 2^63 streams; numbers of different streams are independent.
     pub(crate) const fn new(seed: u64, stream: u64) -> Self {
         let increment = (stream << 1) | 1;
         let first = increment.wrapping_add(seed).wrapping_mul(MULTIPLIER).wrapping_add(increment);

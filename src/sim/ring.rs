@@ -15,7 +15,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.length
     }
 
-    /// Takes a value at the end; gives it back when the queue is full.
+    /// Appends a value; returns it when the queue is full.
     pub(crate) fn push(&mut self, value: T) -> Result<(), T> {
         if self.length >= N {
             return Err(value);
@@ -28,7 +28,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         Ok(())
     }
 
-    /// Returns the first value and leaves it there.
+    /// Returns the first value without removing it.
     pub(crate) fn peek(&self) -> Option<T> {
         self.slots.get(self.first).copied().flatten()
     }

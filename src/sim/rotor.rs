@@ -1,10 +1,10 @@
 use super::motor::{Constants, MotorConfig};
 use core::f32::consts::TAU;
 
-/// One turn of the rotor in the unit in which its angle is kept.
+/// One turn of the rotor in the unit of the stored angle.
 const TURN: f32 = 4_294_967_296.0;
 
-/// What the power stage of the ESC is told.
+/// The command of the ESC's power stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Drive {
     /// The power stage is open: no current.
@@ -13,7 +13,7 @@ pub(crate) enum Drive {
     Volts(f32),
 }
 
-/// What a fault does to the mechanics of one motor.
+/// Effects of faults on the mechanics of one motor.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Mechanics {
     pub(crate) blocked: bool,
@@ -34,7 +34,7 @@ pub(crate) struct Rotor {
     gear: f32,
     /// The rotor's lowest and highest angle.
     stops: Option<(i64, i64)>,
-    /// Rotor turns times 2^32: exact for 2^31 turns, whatever the speed.
+    /// Rotor turns times 2^32: exact for 2^31 turns, at any speed.
     angle: i64,
     /// Output shaft, rad/s.
     velocity: f32,
@@ -91,7 +91,7 @@ impl Rotor {
             }
         };
         let current = self.current + (settled - self.current) * share;
-        // What the supply can drive against the back-EMF; between the two, what the ESC allows.
+        // The range of the supply against the back-EMF; within it, the range of the ESC.
         let generated = self.generated();
         let highest = (self.supply_v - generated) / self.constants.resistance;
         let lowest = (-self.supply_v - generated) / self.constants.resistance;
@@ -139,7 +139,7 @@ impl Rotor {
         }
     }
 
-    /// Returns the angle that the rotor covers in `dt_s`, in turns times 2^32.
+    /// Returns the angle covered by the rotor in `dt_s`, in turns times 2^32.
     const fn travel(&self, dt_s: f32) -> i64 {
         rotor_angle(self.velocity * dt_s, self.gear)
     }
@@ -151,7 +151,7 @@ impl Rotor {
         self.temperature += (settled - self.temperature) * share;
     }
 
-    /// Returns the rotor's angle `dt_s` after the last step, in counts of which a turn has 8192.
+    /// Returns the rotor's angle `dt_s` after the last step, in counts of 8192 a turn.
     pub(crate) fn counts(&self, dt_s: f32) -> i64 {
         self.angle.wrapping_add(self.travel(dt_s)) >> 19
     }
@@ -162,7 +162,7 @@ impl Rotor {
         turns / f64::from(self.gear)
     }
 
-    /// Returns the angle of the output shaft within a turn in rad, from that of the rotor's zero at the start.
+    /// Returns the angle of the output shaft within a turn in rad, from the rotor's zero at the start.
     #[expect(clippy::cast_possible_truncation, reason = "within a turn")]
     pub(crate) fn shaft_rad(&self) -> f32 {
         let turns = self.angle as f64 / f64::from(TURN) / f64::from(self.gear);
@@ -200,7 +200,7 @@ impl Rotor {
     }
 }
 
-/// Returns the angle of the rotor, in turns times 2^32, that is this angle of the output shaft.
+/// Returns the angle of the rotor, in turns times 2^32, at this angle of the output shaft.
 #[expect(clippy::cast_possible_truncation, reason = "saturates; far below 2^63 at any real speed")]
 const fn rotor_angle(output_rad: f32, gear: f32) -> i64 {
     (output_rad * (gear / TAU) * TURN) as i64
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn the_power_of_a_held_shaft_is_heat_and_at_full_speed_it_is_what_friction_takes() {
+    fn the_power_of_a_held_shaft_is_heat_and_at_full_speed_that_of_friction() {
         for model in MODELS {
             let facts = model.facts();
             let mut held = rotor(model);

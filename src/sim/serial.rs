@@ -35,7 +35,7 @@ pub struct SerialLine {
     counts: Counts,
 }
 
-/// What went over a line.
+/// Counts of a line.
 #[derive(Debug, Default, Clone, Copy)]
 struct Counts {
     sent: u32,
@@ -62,22 +62,22 @@ impl SerialLine {
         }
     }
 
-    /// Sets how probable it is that one bit of a byte is wrong, from now on: 0 to 1, by default 0.
+    /// Sets the probability of a wrong bit in a byte, from now on: 0 to 1, by default 0.
     pub const fn set_flipped(&mut self, probability: f32) {
         self.flipped = probability;
     }
 
-    /// Sets how probable it is that a byte is missing, from now on: 0 to 1, by default 0.
+    /// Sets the probability of a missing byte, from now on: 0 to 1, by default 0.
     pub const fn set_dropped(&mut self, probability: f32) {
         self.dropped = probability;
     }
 
-    /// Sets how probable it is that a byte of chance stands before a byte, from now on: 0 to 1, by default 0.
+    /// Sets the probability of a random byte before a byte, from now on: 0 to 1, by default 0.
     pub const fn set_inserted(&mut self, probability: f32) {
         self.inserted = probability;
     }
 
-    /// Cuts the line, or mends it: what is sent while it is cut comes out nowhere.
+    /// Cuts or mends the line: bytes sent while the line is cut are lost.
     pub const fn set_cut(&mut self, is_cut: bool) {
         self.is_cut = is_cut;
     }
@@ -86,7 +86,7 @@ impl SerialLine {
     pub fn send(&mut self, bytes: &[u8], now: Instant) -> usize {
         self.free_ns = self.free_ns.max(now.as_micros().saturating_mul(1_000));
         for (done, byte) in bytes.iter().enumerate() {
-            // Room for it, and for one that noise adds.
+            // Room for the byte, and for a byte of noise.
             if self.queue.len() + 2 > CAPACITY {
                 return done;
             }
@@ -114,7 +114,7 @@ impl SerialLine {
         _ = self.queue.push((self.free_ns, byte ^ wrong));
     }
 
-    /// Takes the bytes that arrived until `now`, as many as fit into `out`; returns them.
+    /// Takes the bytes that arrived until `now`, up to the length of `out`; returns them.
     pub fn receive<'a>(&mut self, now: Instant, out: &'a mut [u8]) -> &'a [u8] {
         let now_ns = now.as_micros().saturating_mul(1_000);
         let mut length = 0;
@@ -155,7 +155,7 @@ impl SerialLine {
         self.counts.lost
     }
 
-    /// Returns how many bytes came out that nobody sent.
+    /// Returns the number of received bytes that were never sent.
     #[must_use]
     pub const fn inserted(&self) -> u32 {
         self.counts.inserted
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_add_up_whatever_the_noise_does() {
+    fn bytes_add_up_under_any_noise() {
         let mut line = SerialLine::new(115_200, 3);
         line.set_flipped(0.1);
         line.set_dropped(0.05);

@@ -12,9 +12,9 @@ use core::ops::RangeBounds;
 
 /// Three CAN buses with motors on them, and the time.
 ///
-/// It is shared by reference, so that the code under test can own the driver's end of a bus while the test goes
-/// on to move time: nothing happens but in [`advance`](Self::advance) and its like, and in calls that block. A
-/// reference to it is a [`Clock`] that shows its time.
+/// The simulation is shared by reference, so the code under test can own the driver's end of a bus while the test moves
+/// time: events happen only in [`advance`](Self::advance) and its siblings, and in blocking calls. A reference is a
+/// [`Clock`] with the simulated time.
 ///
 /// # Examples
 /// ```
@@ -32,9 +32,9 @@ use core::ops::RangeBounds;
 pub struct Simulation(RefCell<Engine>);
 
 impl Simulation {
-    /// The number of motors with ESCs that it holds.
+    /// The largest number of motors with ESCs.
     pub const MAX_MOTORS: usize = MOTORS;
-    /// The number of joints that it holds.
+    /// The largest number of joints.
     pub const MAX_JOINTS: usize = JOINTS;
 
     /// Makes empty buses at 1 Mbit/s. The seed decides phases, clock errors, start angles and every chance.
@@ -50,15 +50,15 @@ impl Simulation {
         self
     }
 
-    /// Sets how many frames the controller of one bus holds until they are taken: 1 to 64, by default 64.
+    /// Sets the number of received frames that the controller of one bus can hold: 1 to 64, by default 64.
     #[must_use]
     pub fn with_receive_depth(self, line: Line, frames: usize) -> Self {
         self.with(|engine| engine.wire_mut(line).set_receive_depth(frames));
         self
     }
 
-    /// Gives the controller of one bus an acceptance filter: a standard data frame passes when `id & mask` is the
-    /// same for both, and nothing else passes. A mask of 0 lets everything through.
+    /// Gives the controller of one bus an acceptance filter: a standard data frame passes when `id & mask` is the same
+    /// for both, and nothing else passes. A mask of 0 passes everything.
     #[must_use]
     pub fn with_filter(self, line: Line, id: u16, mask: u16) -> Self {
         self.with(|engine| engine.wire_mut(line).set_filter(id, mask));
@@ -102,15 +102,15 @@ impl Simulation {
         self.advance_with(duration, |_| {});
     }
 
-    /// Moves time forward to an instant; one that is past changes nothing.
+    /// Moves time forward to an instant; a past instant changes nothing.
     pub fn advance_to(&self, instant: Instant) {
         self.advance(instant.since(self.now()));
     }
 
-    /// Moves time forward, and shows every frame that passes on any bus, in order.
+    /// Moves time forward, and shows every frame on any bus, in order.
     ///
-    /// While a frame is shown, the time is the end of that frame, and all of this world can be used.
-    /// Frames that passed while a blocking call waited are shown first, the first 64 of them.
+    /// While a frame is shown, the time is the end of this frame, and the whole world can be used. Frames that passed
+    /// during a blocking call are shown first, the first 64 of them.
     ///
     /// # Examples
     /// A node that answers every remote request for 0x123 with one byte:
@@ -151,11 +151,11 @@ impl Simulation {
         self.with(|engine| engine.motor(motor))
     }
 
-    /// Puts a chassis on its motors; their shafts then carry it. They may sit on different buses. A second chassis
-    /// replaces the first.
+    /// Puts a chassis on its motors; their shafts then carry it. The motors may sit on different buses. A second
+    /// chassis replaces the first.
     ///
     /// # Errors
-    /// Names the parameter that makes no sense.
+    /// Names the invalid parameter.
     pub fn attach_chassis(&self, config: ChassisConfig) -> Result<(), SimError> {
         config.validate().map_err(SimError::Chassis)?;
         let chassis = Chassis::new(&config);
@@ -163,13 +163,13 @@ impl Simulation {
         Ok(())
     }
 
-    /// Returns where the chassis truly is; `None` without one.
+    /// Returns the true state of the chassis; `None` without a chassis.
     #[must_use]
     pub fn chassis(&self) -> Option<ChassisState> {
         self.with(|engine| engine.chassis.as_ref().map(Chassis::state))
     }
 
-    /// Pushes the chassis from now on: N along the world's x and y axes, and Nm counter-clockwise. What is not
+    /// Pushes the chassis from now on: N along the world's x and y axes, and Nm counter-clockwise. A value that is not
     /// finite counts as zero.
     pub fn push_chassis(&self, x_n: f32, y_n: f32, torque_nm: f32) {
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
@@ -181,8 +181,8 @@ impl Simulation {
         });
     }
 
-    /// Puts a torque on the output shaft of a motor, in Nm; positive turns it counter-clockwise. What is not
-    /// finite counts as zero. A joint does not feel it: its drive is strong enough for everything.
+    /// Puts a torque on the output shaft of a motor, in Nm; positive turns the shaft counter-clockwise. A value that is
+    /// not finite counts as zero. A joint is unaffected: its drive is strong enough for every load.
     pub fn set_load_nm(&self, motor: MotorKey, torque_nm: f32) {
         let torque_nm = if torque_nm.is_finite() { torque_nm } else { 0.0 };
         self.with(|engine| {
@@ -192,7 +192,8 @@ impl Simulation {
         });
     }
 
-    /// Sets the temperature of a motor in °C, from which it goes on. What is not finite changes nothing, and a joint has none.
+    /// Sets the temperature of a motor in °C, as the start of its further course. A value that is not finite changes nothing,
+    /// and a joint has no temperature.
     pub fn set_temperature_c(&self, motor: MotorKey, celsius: f32) {
         self.with(|engine| {
             if let Some(esc) = engine.esc_mut(motor).filter(|_| celsius.is_finite()) {
@@ -201,7 +202,7 @@ impl Simulation {
         });
     }
 
-    /// Sends a frame from a foreign node, after those that it has yet to send.
+    /// Sends a frame from a foreign node, after its pending frames.
     ///
     /// # Errors
     /// Gives the frame back when 64 wait already.
@@ -225,7 +226,7 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// When 16 faults are scheduled that are not over yet, and when a joint cannot have the fault.
+    /// When there are already 16 faults that are not over, and when the fault excludes a joint.
     pub fn fault(&self, fault: Fault, window: impl RangeBounds<Instant>) -> Result<(), SimError> {
         self.with(|engine| {
             let (seed, now_ns) = (engine.seed, engine.now_ns);
@@ -233,13 +234,13 @@ impl Simulation {
         })
     }
 
-    /// Returns what went over a bus so far.
+    /// Returns the traffic of a bus so far.
     #[must_use]
     pub fn traffic(&self, line: Line) -> Traffic {
         self.with(|engine| engine.wire(line).traffic(engine.now_ns))
     }
 
-    /// Works on the state. No caller's code runs in `work`, so it is never borrowed twice.
+    /// Works on the state. No caller's code runs in `work`, so the state is never borrowed twice.
     pub(super) fn with<T>(&self, work: impl FnOnce(&mut Engine) -> T) -> T {
         work(&mut self.0.borrow_mut())
     }
@@ -279,7 +280,7 @@ mod tests {
         CanFrame::standard(0x200, [high, low, high, low, high, low, high, low]).unwrap()
     }
 
-    /// Four motors and a controller that changes its mind, with `micros` between two looks at the time.
+    /// Four motors and a controller that changes its mind, with `micros` between two readings of the time.
     fn story(seed: u64, micros: u64) -> String {
         let world = Simulation::new(seed);
         let keys = [1, 2, 3, 4].map(|id| world.attach(m3508(id)).unwrap());
@@ -304,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn one_seed_is_one_story_however_time_is_cut_and_another_seed_is_another() {
+    fn one_seed_is_one_history_for_any_split_of_time_and_another_seed_is_another() {
         let story_of_7 = story(7, 100);
         assert!(story_of_7.lines().count() > 200 && story_of_7.contains("lost"));
         assert_eq!(story_of_7, story(7, 100));
@@ -315,7 +316,7 @@ mod tests {
 
     #[test]
     fn the_states_are_the_same_on_every_target() {
-        // FNV-1a of the story as it came out on x86-64. It changes with the physics, on purpose only.
+        // FNV-1a of the history on x86-64. The value changes with the physics, on purpose only.
         let fold = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
         let hash = story(7, 100).bytes().fold(0xCBF2_9CE4_8422_2325, fold);
         assert_eq!(hash, STORY_OF_7, "{hash:#018x}");
@@ -386,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_forgot_its_angle_counts_from_there() {
+    fn a_drive_that_lost_its_angle_counts_from_the_present_angle() {
         let world = Simulation::new(1);
         let wheel = world.attach(m3508(1).with_rotor_angle(1_000)).unwrap();
         let loss = Fault::PowerLoss { motor: wheel, forgets_angle: true };
@@ -429,7 +430,7 @@ mod tests {
         assert_eq!(empty.motor(key), None);
     }
 
-    /// The feedback of one motor in the 100 ms around a fault that holds from 20 to 50 ms.
+    /// The feedback of one motor in the 100 ms around a fault from 20 to 50 ms.
     fn feedback_around(fault: impl Fn(MotorKey) -> Fault) -> Vec<(u64, CanFrame)> {
         let world = Simulation::new(5);
         let key = world.attach(m3508(1)).unwrap();
@@ -461,7 +462,8 @@ mod tests {
             assert_eq!(within(heard), []);
             assert!((69..=71).contains(&heard.len()), "{}", heard.len());
         }
-        // A silent motor goes on pulling; one without a supply coasts and waits for a new command.
+        // A silent motor continues to pull; a motor without supply coasts and waits for a new
+        // command.
         let current = |heard: &[(u64, CanFrame)]| heard.last().unwrap().1.bytes()[4..6].to_vec();
         assert_eq!(
             (current(&silent), current(&dead)),
@@ -519,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_takes_what_the_ids_leave_it() {
+    fn a_flood_takes_the_time_left_by_higher_priorities() {
         let world = Simulation::new(2);
         world.attach(m3508(1)).unwrap();
         let frame = CanFrame::standard(0x7FF, [0x55; 8]).unwrap();

@@ -3,7 +3,8 @@ use super::body::Contact;
 use crate::geometry::{Rotation2, Vec2};
 use crate::units::Angle;
 
-/// A wheel under a simulated chassis: what turns it, where it touches the floor, and how it holds there.
+/// A wheel under a simulated chassis: its motor, its contact with the floor, and the directions in which the floor
+/// holds it.
 ///
 /// | made by | the floor holds it | it rolls |
 /// |---|---|---|
@@ -35,14 +36,14 @@ pub struct Wheel {
     radius_m: f32,
     position_m: Vec2,
     direction: Angle,
-    /// Of the roller that touches the floor; `None` for a tyre, which rolls nowhere but ahead.
+    /// Of the roller on the floor; `None` for a tyre, which rolls only ahead.
     roller_axis: Option<Angle>,
     reversed: bool,
     steering: Option<(MotorKey, Angle)>,
 }
 
 impl Wheel {
-    /// Takes a wheel with a tyre that rolls forward, at its place from the centre of mass in m.
+    /// Takes a wheel with a tyre, rolling forward, at its place from the centre of mass in m.
     #[must_use]
     pub const fn plain(motor: MotorKey, radius_m: f32, position_m: Vec2) -> Self {
         Self {
@@ -56,9 +57,9 @@ impl Wheel {
         }
     }
 
-    /// Takes a wheel with a tyre that a second motor turns about the vertical through its contact, one to one.
+    /// Takes a wheel with a tyre, turned by a second motor about the vertical through its contact, one to one.
     ///
-    /// Counter-clockwise is to the left. At the angle `zero` of that motor's shaft the wheel points forward.
+    /// Counter-clockwise is to the left. At the angle `zero` of the second motor's shaft the wheel points forward.
     #[must_use]
     pub const fn steered(
         motor: MotorKey,
@@ -70,7 +71,8 @@ impl Wheel {
         Self { steering: Some((steering, zero)), ..Self::plain(motor, radius_m, position_m) }
     }
 
-    /// Takes an omni wheel and the direction in which it rolls, counter-clockwise from forward; across it is free.
+    /// Takes an omni wheel and its rolling direction, counter-clockwise from forward; motion across this direction is
+    /// free.
     #[must_use]
     pub const fn omni(motor: MotorKey, radius_m: f32, position_m: Vec2, direction: Angle) -> Self {
         let plain = Self::plain(motor, radius_m, position_m);
@@ -78,7 +80,7 @@ impl Wheel {
     }
 
     /// Takes a mecanum wheel in the usual mounting: front left and rear right, the rollers on the floor lie at -45
-    /// degrees, front right and rear left at 45, so that the four form an O.
+    /// degrees, front right and rear left at 45, so the four form an O.
     #[must_use]
     pub const fn mecanum(motor: MotorKey, radius_m: f32, position_m: Vec2) -> Self {
         let degrees = if position_m.x * position_m.y > 0.0 { -45.0 } else { 45.0 };
@@ -103,7 +105,7 @@ impl Wheel {
         self.position_m
     }
 
-    /// Names what makes no sense.
+    /// Names the invalid parameter.
     pub(crate) fn validate(&self) -> Result<(), &'static str> {
         let near = |length: f32| length.abs() <= 1e3;
         if self.motor.is_joint() || self.steering.is_some_and(|(motor, _)| motor.is_joint()) {
@@ -118,7 +120,7 @@ impl Wheel {
         if !self.direction.is_finite() || !self.steering.is_none_or(|(_, zero)| zero.is_finite()) {
             return Err("direction");
         }
-        // A roller across the wheel turns freely whatever the wheel does.
+        // A roller across the wheel turns freely at any motion of the wheel.
         let pulls =
             self.roller_axis.is_none_or(|_| self.contact(None).reach.abs() > 0.1 * self.radius_m);
         if pulls { Ok(()) } else { Err("roller_axis") }

@@ -3,8 +3,8 @@ use core::cell::Cell;
 
 /// A source of time for the runner.
 ///
-/// An implementation must never go back and must not stand still while the loop runs; a step of one
-/// microsecond is the resolution that the crate uses. A reading that goes back counts as no time passed.
+/// An implementation must never go back and must not stand still while the loop runs; a step of one microsecond is the
+/// resolution of the crate. A reading that goes back counts as no time passed.
 ///
 /// Any closure `FnMut() -> Instant` is a clock.
 ///
@@ -31,7 +31,7 @@ impl<F: FnMut() -> Instant> Clock for F {
     }
 }
 
-/// A clock that stands until it is moved: share it by reference between a test and what is tested.
+/// A clock that stands until moved: share it by reference between a test and the tested object.
 ///
 /// # Examples
 /// ```
@@ -63,7 +63,7 @@ impl ManualClock {
         self.set(self.now() + duration);
     }
 
-    /// Sets the time, also backward: that is a fault to test.
+    /// Sets the time, also backward, as a fault to test.
     pub fn set(&self, now: Instant) {
         self.0.set(now);
     }
@@ -75,8 +75,8 @@ impl Clock for &ManualClock {
     }
 }
 
-/// The time since it was read from the operating system's monotonic clock: `std::time::Instant::now()` is a clock that starts
-/// at zero.
+/// The time since the first reading of the operating system's monotonic clock: `std::time::Instant::now()` is a clock that
+/// starts at zero.
 ///
 /// # Examples
 /// ```

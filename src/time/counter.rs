@@ -4,8 +4,8 @@ use core::num::NonZeroU32;
 
 /// Extends a free-running 16- or 32-bit hardware counter to an [`Instant`] that never wraps.
 ///
-/// It has to be read at least once in each wrap of the counter: 65 ms for 16 bits at 1 MHz. If a reading comes later, whole wraps
-/// are lost, and the time is slow without a sign of it. No 64-bit division takes place, and no time is lost to rounding: the
+/// The counter has to be read at least once in each wrap: 65 ms for 16 bits at 1 MHz. If a reading comes later, whole wraps are
+/// lost, and the time is slow without a sign of the loss. No 64-bit division takes place, and no time is lost to rounding: the
 /// remainder is carried.
 ///
 /// # Examples
@@ -37,9 +37,9 @@ impl ExtendedCounter {
     /// Takes the frequency of a counter that wraps at 2^16.
     ///
     /// # Errors
-    /// Above 6 553 600 Hz, where the counter wraps in less than 10 ms: a loop that reads it each 1 ms and stalls once would lose a
-    /// wrap. For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not leave room
-    /// for the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 999 983 Hz does not.
+    /// Above 6 553 600 Hz, where the counter wraps in less than 10 ms: a loop that reads the counter each 1 ms and stalls once
+    /// would lose a wrap. For 0 Hz, and for a frequency whose ratio to 1 MHz, in lowest terms `numerator / denominator`, does not
+    /// leave room for the carried remainder: `(numerator + 1) * (denominator - 1)` must fit 32 bits. 999 983 Hz does not.
     pub const fn new_16_bit(ticks_per_second: u32) -> Result<Self, ConfigError> {
         let (value, most) = (ticks_per_second as f32, Self::FASTEST_16_BIT as f32);
         if ticks_per_second > Self::FASTEST_16_BIT {
@@ -173,7 +173,7 @@ mod tests {
             let mask = if wide { u32::MAX } else { 0xFFFF };
             let mut total = 0_u128;
             for (step, short_of_whole) in steps {
-                // Most steps leave one of the largest rests, which is where an intermediate is largest.
+                // Most steps leave one of the largest rests, where an intermediate is largest.
                 let whole = u128::from(step & mask) / denominator * denominator;
                 let near = whole + denominator.saturating_sub(u128::from(short_of_whole));
                 let step = if near <= mask.into() && short_of_whole > 0 { near } else { (step & mask).into() };

@@ -37,8 +37,8 @@ impl Duration {
         Self(secs.saturating_mul(1_000_000))
     }
 
-    /// Takes seconds, rounded to the nearest microsecond that `f32` can tell: 0 to 4294 s. `None` outside
-    /// of that, and for NaN.
+    /// Takes seconds, rounded to the nearest microsecond within the resolution of `f32`: 0 to 4294 s. `None` outside of
+    /// this range, and for NaN.
     #[must_use]
     pub const fn from_secs_f32(secs: f32) -> Option<Self> {
         if secs >= 0.0 && secs <= 4294.0 {

@@ -1,9 +1,9 @@
 use super::Instant;
 
-/// The beginning or the end of a condition `C` that is not that of a motor: of a bus, or of a source of data.
+/// The beginning or the end of a condition `C` of a bus or of a source of data.
 ///
-/// It is latched until it is read, and read once. The edge that was read last tells the present state. The edges of a motor
-/// are [`motor::Edge`](crate::motor::Edge)s, which name the motor too.
+/// The edge is latched until read, and read once. The last edge read tells the present state. The edges of a motor are
+/// [`motor::Edge`](crate::motor::Edge)s, which name the motor too.
 ///
 /// # Examples
 /// ```
@@ -18,11 +18,11 @@ use super::Instant;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ConditionEdge<C> {
-    /// What changed.
+    /// The condition.
     pub condition: C,
-    /// Whether it began; otherwise it ended.
+    /// Whether the condition began; otherwise it ended.
     pub began: bool,
-    /// When it began, the first time since the last reading; or when it ended, the last time.
+    /// Time of the beginning, the first since the last reading; or of the end, the last.
     pub at: Instant,
 }
 

@@ -1,6 +1,6 @@
 use super::Duration;
 
-/// A point in time: microseconds since a start that the clock chooses. It never wraps.
+/// A point in time: microseconds since a start chosen by the clock. It never wraps.
 ///
 /// # Examples
 /// ```
@@ -32,13 +32,13 @@ impl Instant {
         self.0
     }
 
-    /// Returns the time that passed since `earlier`; zero when `earlier` is later.
+    /// Returns the time elapsed since `earlier`; zero when `earlier` is later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration::from_micros(self.0.saturating_sub(earlier.0))
     }
 
-    /// Returns the low 32 bits: the stamp that a motor slot keeps.
+    /// Returns the low 32 bits: the stamp in a motor slot.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "stamps are compared by wrapping difference"

@@ -1,6 +1,6 @@
-//! Time as an argument: instants, durations, and where they come from.
+//! Time as an argument: instants, durations, and their sources.
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Instant`], [`Duration`] | microseconds in 64 bits; they never wrap |
 //! | [`Clock`] | the source of `now`, used by the runner only |

@@ -1,9 +1,9 @@
 use super::{Duration, Instant};
 use core::num::NonZeroU32;
 
-/// One step of the control loop: when it takes place, and the time since the one before.
+/// One step of the control loop: its time, and the time since the last step.
 ///
-/// Made by a [`Ticker`], or by hand in tests and in loops that a hardware timer starts.
+/// Made by a [`Ticker`], or by hand in tests and in loops started by a hardware timer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tick {
@@ -12,9 +12,9 @@ pub struct Tick {
 }
 
 impl Tick {
-    /// Takes the time of this step and the seconds since the one before.
+    /// Takes the time of this step and the seconds since the last step.
     ///
-    /// Any `dt_s` is accepted: what a controller does with zero, negative, NaN or very long is in its docs.
+    /// Any `dt_s` is accepted: each controller documents its reaction to zero, negative, NaN and very long steps.
     #[must_use]
     pub const fn new(now: Instant, dt_s: f32) -> Self {
         Self { now, dt_s }
@@ -33,13 +33,12 @@ impl Tick {
     }
 }
 
-/// Keeps the cadence of the control loop: no drift, and every period that was missed is counted.
+/// Keeps the cadence of the control loop: no drift, and every missed period is counted.
 ///
-/// Call [`due`](Self::due) as often as you like. Steps stay on the grid `first call + n * period`; a step
-/// that comes late does not move the later ones. Periods that passed without a call are skipped, not made
-/// up for: the step after them carries the real `dt_s`, and [`overruns`](Self::overruns) grows by their number.
-/// If the clock goes back behind the last step, a step with a `dt_s` of 0 is due at once, so that the devices notice, and
-/// the grid starts anew there.
+/// Call [`due`](Self::due) as often as you like. Steps stay on the grid `first call + n * period`; a late step does not
+/// move the following steps. Periods without a call are skipped, not made up for: the step after them carries the real
+/// `dt_s`, and [`overruns`](Self::overruns) grows by their number. If the clock goes back behind the last step, a step
+/// with a `dt_s` of 0 is due at once, so the devices notice, and the grid starts anew there.
 ///
 /// # Examples
 /// ```
@@ -76,7 +75,7 @@ impl Ticker {
         Self { period_us, next: None, last: Instant::START, overruns: 0 }
     }
 
-    /// Returns the step that is due at `now`, or `None` when the next one lies ahead.
+    /// Returns the step due at `now`, or `None` when the next step lies ahead.
     ///
     /// The first call starts the cadence and carries one nominal period as `dt_s`.
     pub fn due(&mut self, now: Instant) -> Option<Tick> {
@@ -99,7 +98,7 @@ impl Ticker {
         Some(tick)
     }
 
-    /// Leaves out the steps that passed, and stays on the grid.
+    /// Leaves out the elapsed steps, and stays on the grid.
     #[cold]
     #[inline(never)]
     fn skip(&mut self, next: Instant, late: Duration) {
@@ -133,7 +132,7 @@ impl Ticker {
         self.last
     }
 
-    /// Returns the number of periods that were skipped; `u32::MAX` after a single pause of over 71 minutes.
+    /// Returns the number of skipped periods; `u32::MAX` after a single pause of over 71 minutes.
     #[must_use]
     pub const fn overruns(&self) -> u32 {
         self.overruns

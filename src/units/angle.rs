@@ -61,7 +61,7 @@ impl Angle {
         self.0 * (1.0 / TAU)
     }
 
-    /// Returns the angle in -180 to 180 degrees, the upper end excluded, that points the same way.
+    /// Returns the angle in -180 to 180 degrees, the upper end excluded, of the same direction.
     ///
     /// The shortest way from `a` to `b` is `(b - a).wrapped()`. Errors, NaN and infinity are those of
     /// [`wrap_pi`](crate::math::wrap_pi).
@@ -81,9 +81,10 @@ impl Angle {
         Self(wrap_pi(self.0))
     }
 
-    /// Returns the angle in 0 to 360 degrees, the upper end excluded, that points the same way.
+    /// Returns the angle in 0 to 360 degrees, the upper end excluded, of the same direction.
     ///
-    /// For display and for programs that count so. Errors, NaN and infinity are those of [`wrap_tau`](crate::math::wrap_tau).
+    /// For display and for programs with this range. Errors, NaN and infinity are those of
+    /// [`wrap_tau`](crate::math::wrap_tau).
     ///
     /// # Examples
     /// ```

@@ -1,4 +1,4 @@
-//! Newtypes for the quantities that this field writes in more than one unit.
+//! Newtypes for quantities that this field writes in more than one unit.
 //!
 //! | type | stored as | also read and written as |
 //! |---|---|---|
@@ -7,8 +7,8 @@
 //! | [`Current`] | A | mA |
 //! | [`Voltage`] | V | mV |
 //!
-//! Everything else in this crate is a plain SI `f32` with the unit in its name (`radius_m`, `dt_s`).
-//! A newtype accepts any `f32`, NaN included: what cannot be used is refused where it would be used.
+//! Everything else in this crate is a plain SI `f32` with the unit in its name (`radius_m`, `dt_s`). A newtype accepts
+//! any `f32`, NaN included: the function that uses the value refuses an invalid value.
 //!
 //! ```
 //! use drivetrain::units::{Angle, AngularVelocity};
@@ -25,7 +25,7 @@ pub use angle::Angle;
 pub use angular_velocity::AngularVelocity;
 pub use electrical::{Current, Voltage};
 
-/// Gives a quantity that is a newtype over `f32` its linear arithmetic.
+/// Gives a newtype over `f32` its linear arithmetic.
 macro_rules! linear {
     ($quantity:ident) => {
         impl $quantity {
@@ -38,7 +38,7 @@ macro_rules! linear {
                 Self(self.0.abs())
             }
 
-            /// Tells whether the value is neither NaN nor infinite.
+            /// Returns whether the value is neither NaN nor infinite.
             #[must_use]
             pub const fn is_finite(self) -> bool {
                 self.0.is_finite()

@@ -1,8 +1,8 @@
 use crate::time::{ConditionEdge, Duration, Instant};
 
-/// The condition of a source of data: nothing came until the deadline, or what came could not be trusted.
+/// The condition of a source of data: no data until the deadline, or data not to be trusted.
 ///
-/// A source is silent before it is heard for the first time.
+/// A source is silent before its first data.
 ///
 /// # Examples
 /// ```
@@ -23,11 +23,11 @@ impl core::fmt::Display for Silence {
     }
 }
 
-/// Watches that something happens again within a time limit, and latches each change.
+/// Watches an event that repeats within a time limit, and latches each change.
 ///
-/// It begins as not live. An edge is kept until it is fetched. When the source came and went more than once
-/// between two calls of [`edge`](Self::edge), the changes that cancel each other are left out; [`losses`](Self::losses)
-/// still counts them all.
+/// At first, the source is silent. An edge is kept until read. When the source came and went more than once between two
+/// calls of [`edge`](Self::edge), changes that cancel each other are left out; [`losses`](Self::losses) still counts
+/// them all.
 #[derive(Debug, Clone)]
 pub(super) struct Deadline {
     limit: Duration,
@@ -38,7 +38,7 @@ pub(super) struct Deadline {
 }
 
 impl Deadline {
-    /// Takes the longest silence that is no loss.
+    /// Takes the longest silence without a loss.
     pub(super) const fn new(limit: Duration) -> Self {
         Self { limit, met: Instant::START, live: false, losses: 0, pending: [None; 2] }
     }
@@ -53,7 +53,7 @@ impl Deadline {
         }
     }
 
-    /// Notes that what came cannot be trusted: lost at once.
+    /// Notes data that cannot be trusted: lost at once.
     pub(super) fn revoke(&mut self, now: Instant) {
         self.expire(now);
         if self.live {
@@ -66,7 +66,7 @@ impl Deadline {
         self.live && now.since(self.met) <= self.limit
     }
 
-    /// Returns the oldest change that was not fetched yet.
+    /// Returns the oldest unread edge.
     pub(super) fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.expire(now);
         let [first, second] = self.pending;
@@ -100,7 +100,7 @@ impl Deadline {
     }
 }
 
-/// Silence that began or ended.
+/// Beginning or end of silence.
 const fn edge(began: bool, at: Instant) -> ConditionEdge<Silence> {
     ConditionEdge { condition: Silence, began, at }
 }
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_between_two_frames_is_seen_though_nobody_asked_meanwhile() {
+    fn a_loss_between_two_frames_is_latched_without_a_reading_meanwhile() {
         let mut deadline = Deadline::new(Duration::from_millis(10));
         deadline.meet(ms(0));
         assert_eq!(deadline.edge(ms(0)), Some(edge(false, ms(0))));

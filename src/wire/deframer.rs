@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// A frame that a [`Deframer`] finds in bytes: how it begins, how long it is, and what it says.
+/// A kind of frame for a [`Deframer`]: its beginning, its length, and its content.
 ///
 /// The [`Deframer`] supplies everything else.
 ///
@@ -30,20 +30,20 @@ use core::fmt;
 /// assert_eq!(decoder.read(&mut bytes), Some(Sum(42)));
 /// ```
 pub trait Decode: Sized {
-    /// What has to be known besides the bytes (a byte order, say); `()` for most frames.
+    /// Parameters besides the bytes (for example a byte order); `()` for most frames.
     type Options: Clone + fmt::Debug;
 
     /// How many bytes of a frame tell its length, the header included: at least 1.
     const PREFIX: usize;
 
-    /// Returns the bytes that every frame begins with; none for a protocol that marks only the end of a frame.
+    /// Returns the first bytes of every frame; none for a protocol that marks only the end of a frame.
     fn header(options: &Self::Options) -> &[u8];
 
-    /// Returns the length of the whole frame in bytes, from its first [`PREFIX`](Self::PREFIX) bytes; `None` when no
-    /// frame can have the length that they state.
+    /// Returns the length of the whole frame in bytes, from its first [`PREFIX`](Self::PREFIX) bytes; `None` for an
+    /// impossible length.
     fn length(options: &Self::Options, prefix: &[u8]) -> Option<usize>;
 
-    /// Returns whether it says something new; `false` when its source is frozen and repeats `previous`.
+    /// Returns whether the frame is new; `false` when its source is frozen and repeats `previous`.
     ///
     /// [`Receiver`](super::Receiver) takes only new frames for a sign of life.
     fn is_new(&self, _previous: &Self) -> bool {
@@ -53,36 +53,37 @@ pub trait Decode: Sized {
     /// Checks a whole frame and reads it.
     ///
     /// # Errors
-    /// [`Reject`] says what is wrong with the frame. After [`Reject::Foreign`] it is skipped as a whole, after any other its
+    /// [`Reject`] names the fault of the frame. After [`Reject::Foreign`] the frame is skipped as a whole, otherwise its
     /// bytes are searched again.
     fn decode(options: &Self::Options, frame: &[u8]) -> Result<Self, Reject>;
 }
 
-/// Why bytes that began like a frame gave no value.
+/// Reason for which bytes with the beginning of a frame gave no value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reject {
-    /// The end of the frame is not where it should be. Only for protocols without header.
+    /// The end of the frame is missing at its place. Only for protocols without header.
     Unframed,
-    /// A length that no frame has.
+    /// An impossible length.
     Length,
     /// The checksum does not fit.
     Checksum,
     /// The checksum fits, but this decoder does not read frames of this kind.
     Foreign,
-    /// The checksum fits, but a field has a value that it cannot have. One damaged frame in 65536 looks like this by
-    /// chance (16-bit checksum), with a good one inside.
+    /// The checksum fits, but a field has an impossible value. One damaged frame in 65536 looks like this by chance
+    /// (16-bit checksum), with a good frame inside.
     Content,
 }
 
-/// How many frames a decoder found, and what it threw away. All counts saturate.
+/// Counts of a decoder: frames, and discarded bytes. All counts saturate.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counts {
     /// Good frames.
     pub frames: u32,
-    /// Headers followed by a length of zero, or by one too large for the protocol or the buffer; frames that ended early.
+    /// Headers followed by a length of zero, or by a length too large for the protocol or the buffer; frames that ended
+    /// early.
     pub length_errors: u32,
     /// Whole frames whose checksum did not fit.
     pub checksum_errors: u32,
@@ -90,21 +91,21 @@ pub struct Counts {
     pub foreign_frames: u32,
     /// Frames with a fitting checksum, or none, and an impossible value.
     pub content_errors: u32,
-    /// Bytes that belonged to no good frame: noise, and what is left of damaged frames.
+    /// Bytes outside of good frames: noise, and the rest of damaged frames.
     pub skipped_bytes: u32,
 }
 
 /// A streaming decoder of one kind of frames, with a buffer of `N` bytes.
 ///
-/// It takes the bytes in any portions, and finds the same frames in them however they are split. When a frame turns
-/// out to be damaged, only its first byte is given up and the rest is searched again: a good frame that begins inside
-/// of it (after a truncated frame, after noise that looked like a header, after a length made too long) is found.
+/// The decoder takes bytes in any portions, and finds the same frames for any split. When a frame turns out to be
+/// damaged, only its first byte is discarded and the rest is searched again: the decoder finds a good frame that begins
+/// inside (after a truncated frame, after noise that looked like a header, after a length made too long).
 ///
-/// `N` is also the longest frame that is waited for: a frame that states to be longer is refused at once.
+/// `N` is also the length limit of a frame: a frame with a longer stated length is refused at once.
 ///
-/// Cost: a copy of every byte, and one checksum a frame. Damage costs at most one more checksum for each header that
-/// stands in the damaged bytes. Portions are cheap; a byte that comes alone costs about ten
-/// times one of a portion (`docs/figures.md` has the counts), so collect them where the serial port does not.
+/// Cost: a copy of every byte, and one checksum a frame. Damage costs at most one more checksum for each header in the
+/// damaged bytes. Portions are cheap; a single byte costs about ten times a byte of a portion (`docs/figures.md` has
+/// the counts), so collect bytes if the serial port does not.
 ///
 /// # Examples
 /// ```
@@ -120,7 +121,7 @@ pub struct Counts {
 pub struct Deframer<F: Decode, const N: usize> {
     options: F::Options,
     buffer: [u8; N],
-    /// How many bytes of the buffer are in use: they begin like a frame.
+    /// Number of bytes in use in the buffer: the beginning of a frame.
     length: usize,
     /// How many bytes are needed before there is anything to decide.
     wanted: usize,
@@ -149,10 +150,10 @@ impl<F: Decode, const N: usize> Deframer<F, N> {
         Self { options, buffer: [0; N], length: 0, wanted: F::PREFIX, counts: Counts::new() }
     }
 
-    /// Returns the next frame, and takes from `input` the bytes that it looked at. `None` when `input` is used up: the
-    /// last bytes may be the beginning of a frame and are kept.
+    /// Returns the next frame, and removes the bytes read from `input`. `None` when `input` is used up: the last bytes
+    /// may be the beginning of a frame and are kept.
     ///
-    /// Call it until it returns `None`, as in `while let Some(frame) = decoder.read(&mut input) { .. }`.
+    /// Call this until `None`, as in `while let Some(frame) = decoder.read(&mut input) { .. }`.
     #[must_use]
     pub fn read(&mut self, input: &mut &[u8]) -> Option<F> {
         loop {
@@ -166,16 +167,16 @@ impl<F: Decode, const N: usize> Deframer<F, N> {
         }
     }
 
-    /// Gives up the frame that was begun and not finished, and searches its bytes for shorter ones.
+    /// Discards an unfinished frame, and searches its bytes for shorter frames.
     ///
-    /// For a pause on the line that no frame contains: with it, a damaged length cannot hold back the frames behind it
-    /// until the bytes that it promises have come. Frames found are returned by [`read`](Self::read), so call that
+    /// For a pause on the line, which no frame contains: a damaged length then cannot hold back the following frames
+    /// until the stated number of bytes has come. Frames found are returned by [`read`](Self::read), so call `read`
     /// with an empty input afterwards.
     pub fn abandon(&mut self) {
         self.give_up(1);
     }
 
-    /// Returns how many frames were found, and what was thrown away.
+    /// Returns the counts of frames and of discarded bytes.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
@@ -199,8 +200,8 @@ impl<F: Decode, const N: usize> Deframer<F, N> {
         }
     }
 
-    /// Decides about the bytes in the buffer. Each call gives bytes up, asks for more, or finds a frame, so a loop
-    /// over it ends.
+    /// Decides about the bytes in the buffer. Each call discards bytes, asks for more, or finds a frame, so a loop over
+    /// it ends.
     fn step(&mut self) -> Option<F> {
         let bytes = self.buffer.get(..self.length).unwrap_or(&[]);
         let noise = noise_before(bytes, F::header(&self.options));
@@ -220,7 +221,7 @@ impl<F: Decode, const N: usize> Deframer<F, N> {
             return None;
         };
         let Some(frame) = bytes.get(..total) else {
-            // `total` is at most N, so the buffer has room for all of it.
+            // `total` is at most N, so the buffer has room for the whole frame.
             self.wanted = total;
             return None;
         };

@@ -30,7 +30,7 @@ pub enum EncodeError {
     DataTooLong {
         /// The length of the data in bytes.
         given: usize,
-        /// The most bytes that one frame takes.
+        /// The largest number of bytes in one frame.
         most: usize,
     },
 }

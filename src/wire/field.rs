@@ -54,7 +54,7 @@ impl Reader<'_> {
     }
 }
 
-/// Writes from the front, into a slice that was checked to be long enough.
+/// Writes from the front, into a slice of sufficient length.
 #[derive(Debug)]
 pub(super) struct Writer<'a> {
     out: &'a mut [u8],
@@ -77,7 +77,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Returns what was written so far.
+    /// Returns the bytes written so far.
     pub(super) fn written(&self) -> &[u8] {
         self.out.get(..self.at).unwrap_or(&[])
     }

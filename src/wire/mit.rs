@@ -1,7 +1,7 @@
 //! The payload of drives in MIT mode: Damiao, CubeMars AK, and others after the MIT Mini Cheetah.
 //!
-//! The drive applies the torque `kp * (position - measured) + kd * (velocity - measured) + torque`, all of it at the output
-//! shaft. Each field of a frame is an unsigned number that spans a range; the range is a setting of the drive.
+//! The drive applies the torque `kp * (position - measured) + kd * (velocity - measured) + torque`, all at the output
+//! shaft. Each field of a frame is an unsigned number over a range; the range is a setting of the drive.
 //!
 //! ```text
 //! command   byte 0 ..  1  position 16 | velocity 12 | kp 12 | kd 12 | torque 12 bits   byte 7
@@ -23,25 +23,25 @@
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 //!
-//! **A drive goes on with its last command** when no other comes: a cut cable, or a program that stops, leaves it driving. Only a
-//! time-out of its own ends that, and it has to be set in the drive. For Damiao it is the register `TIMEOUT` (9), in units of
-//! 50 µs, 0 for none: 2000 is 100 ms. The drive then disables itself and reports error 13. Other makes have a setting of their
-//! own. Pull the cable while the wheels are lifted to see that it is set.
+//! **A drive continues with its last command** when no other comes: after a cut of the cable or a stop of the program, the drive
+//! keeps driving. Only a time-out of its own ends this, and has to be set in the drive. For Damiao the time-out is the register
+//! `TIMEOUT` (9), in units of 50 µs, 0 for none: 2000 is 100 ms. The drive then disables itself and reports error 13. Other makes
+//! have a setting of their own. Pull the cable with lifted wheels to test the setting.
 //!
-//! A position saturates at the range of the field, so [`Feedback::position_rad`] at either end of it is no position: the shaft
-//! is there or beyond.
+//! A position saturates at the range of the field, so [`Feedback::position_rad`] at either end of the range is no position:
+//! the shaft is there or beyond.
 //!
 //! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
 
 use crate::error::ConfigError;
 
-/// The data that enables a drive.
+/// The data to enable a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);
 
-/// The data that disables a drive.
+/// The data to disable a drive.
 pub const DISABLE: [u8; 8] = special(0xFD);
 
-/// The data that makes the present position zero.
+/// The data to make the present position zero.
 pub const SET_ZERO: [u8; 8] = special(0xFE);
 
 /// The second half of the largest command below the special frames, which end with 0xFB to 0xFE.
@@ -96,7 +96,7 @@ pub struct Feedback {
     pub torque_nm: f32,
 }
 
-/// The ranges of the fields, as they are set in the drive.
+/// The ranges of the fields, as set in the drive.
 ///
 /// Position, velocity and torque go from minus to plus their range; the gains from zero. A number outside saturates. The
 /// drives truncate to the next lower count and so does this, so zero is sent as half a count below zero.
@@ -147,7 +147,7 @@ impl Ranges {
         }
     }
 
-    /// Takes ranges that are known to be valid: the three of [`new`](Self::new), and the largest gains.
+    /// Takes valid ranges without a check: the three of [`new`](Self::new), and the largest gains.
     pub(crate) const fn of([position, velocity, torque]: [f32; 3], [kp, kd]: [f32; 2]) -> Self {
         Self {
             position: Range { lower: -position, upper: position },
@@ -195,8 +195,8 @@ impl Ranges {
 
     /// Writes a command. A field outside its range saturates; if any field is NaN, the whole command is rest.
     ///
-    /// The result is never one of the special frames. The command that would be, with every field at its end, gets up to four
-    /// counts less torque.
+    /// The result is never one of the special frames. A command equal to a special frame, with every field at its end, gets
+    /// up to four counts less torque.
     #[must_use]
     pub const fn encode(&self, command: &Command) -> [u8; 8] {
         let [position, velocity, kp, kd, torque] = self.counts(command, TOP_12);
@@ -255,7 +255,7 @@ impl Ranges {
         }
     }
 
-    /// Reads the five bytes of a feedback frame: in those of Damiao, all but the first byte and the last two.
+    /// Reads the five bytes of a feedback frame: in frames of Damiao, all but the first byte and the last two.
     #[must_use]
     pub const fn decode_feedback(&self, data: &[u8; 5]) -> Feedback {
         let [a, b, c, d, e] = *data;

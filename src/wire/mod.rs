@@ -15,11 +15,10 @@
 //! | [`mit`] | motors in MIT mode | the 8 bytes of a CAN frame | that of CAN | x | x |
 //! | [`supercap`] | controllers of super-capacitors | the 8 bytes of a CAN frame | that of CAN | x | x |
 //!
-//! All of them are sans-I/O: bytes in, values out, and back; who moves the bytes (interrupt, DMA, async task, file) is
-//! no concern of theirs. The framed protocols share one decoder, [`Deframer`], and with it one law: **the frames
-//! found do not depend on how the bytes were split, and no damage to one frame loses the next.** Each frame adds
-//! only its facts ([`Decode`]). Encoders write into a slice of the caller's and return the part they filled, so that
-//! a serial port takes it as it is:
+//! All protocols are sans-I/O: bytes in, values out, and back; any interrupt, DMA, async task or file may move the
+//! bytes. The framed protocols share one decoder, [`Deframer`], and with it one law: **the frames found do not depend
+//! on how the bytes were split, and no damage to one frame loses the next.** Each frame adds only its facts
+//! ([`Decode`]). Encoders write into a slice of the caller and return the filled part, ready for a serial port:
 //!
 //! ```
 //! use drivetrain::wire::{Deframer, feetech};
@@ -37,12 +36,12 @@
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
-//! With `embedded-io` the two arrows are `port.write_all(ping)?` and `let n = port.read(&mut bytes)?;
-//! let mut received = &bytes[..n];`: nothing that would deserve a function or a dependency.
+//! With `embedded-io` the two arrows are `port.write_all(ping)?` and
+//! `let n = port.read(&mut bytes)?; let mut received = &bytes[..n];`: too little for a function or a dependency.
 //!
 //! Checksums are computed with one table of 512 bytes a polynomial ([`crc::Table<1>`]). Bit by bit, without the table, four
 //! IMUs at 400 Hz would cost an estimated 4 % of a 168 MHz core; the 16-lane table (8 KiB) would be a tenth of a small
-//! microcontroller's flash. A polynomial that is not used is not linked.
+//! microcontroller's flash. An unused polynomial is not linked.
 
 pub mod candump;
 pub mod dbus;

@@ -2,7 +2,7 @@ use super::deadline::Deadline;
 use super::{Counts, Decode, Deframer, Silence};
 use crate::time::{ConditionEdge, Duration, Instant};
 
-/// A [`Deframer`] that keeps its latest frame, and takes it away when no new one came in time.
+/// A [`Deframer`] that keeps its latest frame, and discards the frame when no new frame came in time.
 ///
 /// # Examples
 /// ```
@@ -31,7 +31,7 @@ pub struct Receiver<F: Decode, const N: usize> {
 }
 
 impl<F: Decode<Options = ()> + Copy, const N: usize> Receiver<F, N> {
-    /// Takes the age at which the last frame no longer counts, for frames without options.
+    /// Takes the age limit of the last frame, for frames without options.
     #[must_use]
     pub const fn new(deadline: Duration) -> Self {
         Self::with_options((), deadline)
@@ -39,7 +39,7 @@ impl<F: Decode<Options = ()> + Copy, const N: usize> Receiver<F, N> {
 }
 
 impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
-    /// Takes the options of the frames, and the age at which the last one no longer counts.
+    /// Takes the options of the frames, and the age limit of the last frame.
     #[must_use]
     pub const fn with_options(options: F::Options, deadline: Duration) -> Self {
         Self {
@@ -52,7 +52,7 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
 
     /// Returns the next frame of `input`, as [`Deframer::read`] does; `now` is when the bytes arrived.
     ///
-    /// Frames that only repeat the one before (see [`Decode::is_new`]) are returned too, but do not keep the link
+    /// Frames that only repeat the last frame (see [`Decode::is_new`]) are returned too, but do not keep the link
     /// alive.
     #[must_use]
     pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<F> {
@@ -66,18 +66,18 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
         Some(frame)
     }
 
-    /// Gives up a frame that was begun and not finished; see [`Deframer::abandon`].
+    /// Discards an unfinished frame; see [`Deframer::abandon`].
     pub fn abandon(&mut self) {
         self.decoder.abandon();
     }
 
-    /// Returns the latest frame; `None` before the first and when the last new one is older than the deadline.
+    /// Returns the latest frame; `None` before the first frame, and when the last new frame is older than the deadline.
     #[must_use]
     pub fn latest(&self, now: Instant) -> Option<F> {
         self.latest.filter(|_| self.deadline.is_live(now))
     }
 
-    /// Returns the oldest beginning or end of silence that was not fetched yet.
+    /// Returns the oldest unread beginning or end of silence.
     #[must_use]
     pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.deadline.edge(now)
@@ -89,13 +89,13 @@ impl<F: Decode + Copy, const N: usize> Receiver<F, N> {
         self.deadline.losses()
     }
 
-    /// Returns how many frames only repeated the one before. Saturates.
+    /// Returns the number of frames that only repeated the last frame. Saturates.
     #[must_use]
     pub const fn frozen_frames(&self) -> u32 {
         self.frozen_frames
     }
 
-    /// Returns how many frames were found, and what was thrown away.
+    /// Returns the counts of frames and of discarded bytes.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.decoder.counts()

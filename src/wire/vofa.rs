@@ -5,10 +5,10 @@
 //! text line  name:1.000,-2.500,\n                                            for people and for FireWater
 //! ```
 //!
-//! `JustFloat` has no header, no length and no checksum: its tail is the bytes of +infinity. [`justfloat`] takes care that
-//! these four bytes appear nowhere else, so that what it writes is never cut in the wrong place: +infinity is sent as the
-//! largest finite number, and the last bit of a value is changed where it would make up the tail together with its
-//! neighbour. At 115200 baud a frame of 4 channels takes 1.7 ms.
+//! `JustFloat` has no header, no length and no checksum: its tail is the bytes of +infinity. [`justfloat`] prevents these
+//! four bytes elsewhere, so its output is never cut in the wrong place: +infinity is sent as the largest finite number,
+//! and the last bit of a value is changed where the value and its neighbour would make up the tail. At 115200 baud a frame
+//! of 4 channels takes 1.7 ms.
 //!
 //! ```
 //! use drivetrain::wire::Deframer;
@@ -24,8 +24,8 @@
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
-//! Limits: a reader that starts in the middle of a frame, behind noise, may take the noise for the first channels of that
-//! one frame; nothing in the format tells them apart. [`text_line`] brings the formatting of floats into the image, about
+//! Limits: a reader that starts in the middle of a frame, behind noise, may take the noise for the first channels of this
+//! one frame; the format does not distinguish them. [`text_line`] brings the formatting of floats into the image, about
 //! 10 KB of flash.
 //!
 //! Source: VOFA+ manual, protocols `JustFloat` and `FireWater`.
@@ -38,7 +38,7 @@ use super::{Decode, EncodeError, Reject};
 /// The end of a frame: +infinity.
 const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];
 
-/// Writes one `JustFloat` frame: `values`, then the tail. Returns the part of `out` that it fills.
+/// Writes one `JustFloat` frame: `values`, then the tail. Returns the filled part of `out`.
 ///
 /// # Errors
 /// [`EncodeError::BufferTooSmall`] when `out` has less than 4 bytes a value and 4 more.
@@ -59,23 +59,23 @@ pub fn justfloat<'a>(values: &[f32], out: &'a mut [u8]) -> Result<&'a [u8], Enco
     Ok(frame.finish())
 }
 
-/// Returns whether the tail appears across the border of two values. It always includes the first byte of the second, so
-/// that another last bit there removes it.
+/// Returns whether the tail appears across the border of two values. The tail always includes the first byte of the
+/// second value, so another last bit there removes the tail.
 fn makes_tail([_, a, b, c]: [u8; 4], [d, e, f, _]: [u8; 4]) -> bool {
     [[a, b, c, d], [b, c, d, e], [c, d, e, f]].contains(&TAIL)
 }
 
-/// Writes `name:1.000,-2.500` and a line end, with three decimals. Returns the part of `out` that it fills.
+/// Writes `name:1.000,-2.500` and a line end, with three decimals. Returns the filled part of `out`.
 ///
 /// # Errors
-/// [`EncodeError::BufferTooSmall`] when the line does not fit; it says how long the line is.
+/// [`EncodeError::BufferTooSmall`] when the line does not fit, with the length of the line.
 pub fn text_line<'a>(
     name: &str,
     values: &[f32],
     out: &'a mut [u8],
 ) -> Result<&'a [u8], EncodeError> {
     let mut line = Line::new(out);
-    // `Line` takes everything, so that writing to it cannot fail.
+    // `Line` takes everything, so writing to it cannot fail.
     let _ = line.write_str(name);
     for (index, value) in values.iter().enumerate() {
         let _ = write!(line, "{}{value:.3}", if index == 0 { ':' } else { ',' });
@@ -84,7 +84,7 @@ pub fn text_line<'a>(
     line.finish()
 }
 
-/// Keeps what fits, and counts all of it.
+/// Keeps the part that fits, and counts the whole.
 #[derive(Debug)]
 pub(super) struct Line<'a> {
     out: &'a mut [u8],
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_does_not_fit_says_how_long_it_is() {
+    fn the_error_of_a_long_line_has_its_length() {
         let error = text_line("speed", &[1.0, f32::NAN], &mut [0; 10]).unwrap_err();
         assert_eq!(
             error,

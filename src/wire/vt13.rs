@@ -15,8 +15,8 @@
 //! | 2 | `left_y` | `left_x` |
 //! | 3 | `left_x` | `left_y` |
 //!
-//! Read it with a [`Receiver`](super::Receiver): when the remote control falls silent its `latest` is `None` and an edge is latched.
-//! The serial line is often that of the [`referee`] system too; give the same bytes to both.
+//! Read the line with a [`Receiver`](super::Receiver): when the remote control falls silent its `latest` is `None` and an edge is
+//! latched. The serial line is often shared with the [`referee`] system; give the same bytes to both.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
@@ -42,8 +42,8 @@
 //! ```
 //!
 //! Source: five public drivers agree on every field; three of them name channel 3 the left stick across. Some compute its sign or
-//! its order otherwise, and one leaves key C out. **Not known:** a captured frame (the vectors are computed), and how often the frames
-//! come: the drivers give the remote control up after 100 ms, one after 500 ms.
+//! its order otherwise, and one leaves key C out. **Not known:** a captured frame (the vectors are computed), and the rate of the
+//! frames: the drivers use a time-out of 100 ms, one of 500 ms.
 
 use super::dbus::Keys;
 use super::dbus::remote::{field, scaled};
@@ -53,7 +53,7 @@ use super::{Decode, Reject, referee};
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 21;
 
-/// The usual dead band: so many of 660 counts around the centre are zero. It is the option of the frames.
+/// The usual dead band, the option of the frames: this many of 660 counts around the centre are zero.
 pub const DEAD_BAND: u16 = 10;
 
 /// State of the remote control of the video link.
@@ -69,7 +69,7 @@ pub struct VideoRemote {
     pub left_x: f32,
     /// The left stick along, the same: away from the person is positive.
     pub left_y: f32,
-    /// The dial, -1 to 1. Sources do not say which way is positive.
+    /// The dial, -1 to 1. The sources do not state the positive direction.
     pub dial: f32,
     /// The mode switch.
     pub mode: ModeSwitch,
@@ -81,7 +81,7 @@ pub struct VideoRemote {
     pub button_right: bool,
     /// Whether the trigger is pulled.
     pub trigger: bool,
-    /// The counts by which the mouse of the client moved since the last frame: right is positive.
+    /// Counts of the client's mouse since the last frame: right is positive.
     pub mouse_x: i16,
     /// The same: towards the person is positive.
     pub mouse_y: i16,
@@ -145,7 +145,7 @@ impl VideoRemote {
     }
 }
 
-/// A button of the mouse: two bits, of which the sources know two values.
+/// A button of the mouse: two bits, with two known values.
 fn pressed(buttons: u64, place: u32) -> Option<bool> {
     match field(buttons, place, 3) {
         0 => Some(false),

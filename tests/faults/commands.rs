@@ -284,15 +284,16 @@ fn f43_an_emergency_stop_is_zero_at_the_next_pack_until_cleared_and_armed() {
 
 #[cfg_attr(test, test)]
 fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
-    use drivetrain::chassis::{Mode, ModeConfig, Modes};
+    use drivetrain::chassis::{ChassisMode, ModeConfig, Modes};
     use drivetrain::geometry::Twist;
     let follow = PidConfig::new(5.0, 0.0, 0.0);
     let config = ModeConfig::new(follow).with_gimbal_timeout(0.1).with_transition(0.0);
-    for (config, acting) in
-        [(config, Mode::Independent), (config.with_relax_without_gimbal(), Mode::Relax)]
-    {
+    for (config, acting) in [
+        (config, ChassisMode::Independent),
+        (config.with_relax_without_gimbal(), ChassisMode::Relax),
+    ] {
         let mut modes = Modes::new(config).unwrap();
-        modes.set_mode(Mode::FollowGimbal);
+        modes.set_mode(ChassisMode::FollowGimbal);
         let mut edges = Vec::new();
         let mut step = |yaw: Option<f32>| {
             let yaw = yaw.map(Angle::from_radians);
@@ -301,11 +302,11 @@ fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
             (modes.acting(), body)
         };
         assert_eq!(step(None).0, acting, "without any yaw");
-        assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
+        assert_eq!(step(Some(0.2)).0, ChassisMode::FollowGimbal);
         for ms in 1..1_000 {
             let (mode, body) = step((ms % 2 == 0).then_some(f32::NAN));
             match ms {
-                0..100 => assert_eq!(mode, Mode::FollowGimbal, "{ms}"),
+                0..100 => assert_eq!(mode, ChassisMode::FollowGimbal, "{ms}"),
                 102.. => {
                     assert_eq!(mode, acting, "{ms}");
                     assert!(body.is_none_or(
@@ -315,8 +316,8 @@ fn f64_a_gimbal_whose_yaw_is_lost_is_not_followed() {
                 _ => {}
             }
         }
-        assert_eq!(step(Some(0.2)).0, Mode::FollowGimbal);
-        let (lost, back) = (acting, Mode::FollowGimbal);
+        assert_eq!(step(Some(0.2)).0, ChassisMode::FollowGimbal);
+        let (lost, back) = (acting, ChassisMode::FollowGimbal);
         assert_eq!(edges, [lost, back, lost, back], "each once");
         saw(format!("{acting:?}, edges {edges:?}"));
     }

@@ -13,11 +13,11 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
     AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Ingest,
-    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, StopHomingConfig,
+    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming,
     Timeouts, VelocityDrive, Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, MeasuredLoad,
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
     Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
@@ -286,14 +286,12 @@ fn motor() {
     Capabilities::with.call();
     Capabilities::has.call();
     (|set: Capabilities| Capabilities::iter(set).count()).call();
-    StopHomingConfig::new.call();
-    StopHomingConfig::with_standing_below.call();
-    StopHomingConfig::with_window.call();
-    StopHomingConfig::with_timeout.call();
-    StopHomingConfig::with_travel.call();
-    StopHomingConfig::with_stop_at.call();
-    StopHomingConfig::with_back_off.call();
-    StopHomingConfig::validate.call();
+    StopHoming::with_standing_below.call();
+    StopHoming::with_window.call();
+    StopHoming::with_timeout.call();
+    StopHoming::with_travel.call();
+    StopHoming::with_stop_at.call();
+    StopHoming::with_back_off.call();
     StopHoming::new.call();
     StopHoming::step.call();
     StopHoming::is_done.call();
@@ -622,10 +620,6 @@ fn runner() {
         })
     })
     .call();
-    MeasuredLoad::new.call();
-    MeasuredLoad::frames_per_s.call();
-    MeasuredLoad::nominal.call();
-    MeasuredLoad::worst_case.call();
     Shell::device.call();
     Shell::device_mut.call();
     Shell::port_mut.call();

@@ -2,7 +2,7 @@ use crate::control::pid::{Pid, PidConfig};
 use crate::control::step::TimeStep;
 use crate::error::ConfigError;
 
-/// A position loop over a speed loop: the way that is left becomes a velocity, and that an effort.
+/// A position loop over a speed loop: the position error becomes a velocity, and the velocity an effort.
 ///
 /// ```text
 /// error, velocity -> PID -> velocity wanted -+
@@ -13,10 +13,10 @@ use crate::error::ConfigError;
 /// positive `kd` damps, and its output limit is the speed limit. A [`PositionActuator`](super::PositionActuator) is this with filters.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`], loop by loop: on the first call, the position loop gives P and D, since the rate is given, and the
-/// speed loop P. An error that is NaN or infinite holds the velocity that is wanted, a velocity that is
-/// NaN or infinite, or a step on hold, holds the output; each loop counts what it refused. A step that is frozen freezes the
-/// integral and D of both. After a bad velocity, the D of the speed loop rests in the next good step.
+/// As the [`Pid`], loop by loop: on the first call, the position loop gives P and D, since the rate is given, and the speed
+/// loop P. If the error is NaN or infinite, the wanted velocity is held; if the velocity is NaN or infinite, or the step on
+/// hold, the output is held; each loop counts its refused inputs. A frozen step freezes the integral and D of both. After a
+/// bad velocity, the D of the speed loop rests in the next good step.
 ///
 /// # Examples
 /// ```
@@ -86,7 +86,7 @@ impl Cascade {
         &self.position
     }
 
-    /// Returns the position loop, for stepping it alone, for changing its gains and for taking over from another controller.
+    /// Returns the position loop: to step it alone, to change its gains, to take over from another controller.
     #[inline]
     pub const fn position_mut(&mut self) -> &mut Pid {
         &mut self.position
@@ -99,7 +99,7 @@ impl Cascade {
         &self.speed
     }
 
-    /// Returns the speed loop, for stepping it alone, for changing its gains and for taking over from another controller.
+    /// Returns the speed loop: to step it alone, to change its gains, to take over from another controller.
     #[inline]
     pub const fn speed_mut(&mut self) -> &mut Pid {
         &mut self.speed
@@ -115,7 +115,7 @@ mod tests {
     const SPEED: PidConfig = PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0);
 
     #[test]
-    fn it_is_one_loop_after_the_other() {
+    fn a_cascade_equals_one_loop_after_the_other() {
         let mut cascade = Cascade::new(POSITION, SPEED).unwrap();
         let (mut position, mut speed) = (Pid::new(POSITION).unwrap(), Pid::new(SPEED).unwrap());
         for sample in 0..50_u8 {
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_that_is_wrong_is_named_by_its_parameter() {
+    fn the_invalid_loop_is_named_by_its_parameter() {
         let wrong = PidConfig::new(1.0, -1.0, 0.0);
         assert_eq!(Cascade::new(wrong, SPEED).unwrap_err().parameter(), "ki");
         assert_eq!(Cascade::new(POSITION, wrong).unwrap_err().parameter(), "ki");

@@ -1,4 +1,4 @@
-//! Whole loops for one motor: filters and controllers in the order in which they are used.
+//! Whole loops for one motor: filters and controllers in their order of use.
 //!
 //! ```text
 //! SpeedActuator      speed -> low-pass -> PID -> low-pass -> output
@@ -7,7 +7,7 @@
 //!                                                                     |
 //!                    speed -> low-pass ------------------------> PID -+-> low-pass -> output
 //! ```
-//! The two PIDs of the latter are a [`Cascade`], which the motors of a bus use without filters.
+//! The two PIDs of the latter are a [`Cascade`], used without filters by the motors of a bus.
 
 mod cascade;
 mod position;
@@ -22,13 +22,13 @@ use super::filter::LowPass;
 use super::step::TimeStep;
 use crate::error::ConfigError;
 
-/// A low-pass that may be absent.
+/// An optional low-pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct OptionalFilter(Option<LowPass>);
 
 impl OptionalFilter {
-    /// Makes the filter, and calls its cut-off by the name it has here.
+    /// Makes the filter, and names its cut-off in errors as this actuator does.
     const fn new(name: &'static str, cutoff_hz: f32) -> Result<Self, ConfigError> {
         match (positive(name, cutoff_hz), LowPass::new(cutoff_hz)) {
             (Ok(()), Ok(filter)) => Ok(Self(Some(filter))),
@@ -36,7 +36,7 @@ impl OptionalFilter {
         }
     }
 
-    /// Filters what is finite, by a time that is not on hold.
+    /// Filters a finite value, by a time step that is not on hold.
     const fn pass(&mut self, value: f32, step: &TimeStep) -> f32 {
         match &mut self.0 {
             Some(filter) => filter.pass(value, step),
@@ -44,7 +44,7 @@ impl OptionalFilter {
         }
     }
 
-    /// Lets the next value through as if it were the first.
+    /// Passes the next value as a first value.
     const fn reset(&mut self) {
         if let Some(filter) = &mut self.0 {
             filter.reset();

@@ -10,17 +10,17 @@ use crate::error::ConfigError;
 /// wanted = PID(setpoint, low-pass(angle)), every n-th step
 /// output = low-pass(PID(wanted, low-pass(speed)))
 /// ```
-/// With the angle in a unit `A`, the speed in a unit `M` and the output in a unit `U`, the gains of the angle loop are in `M/A`, those
-/// of the speed loop in `U/M`, with the seconds of [`PidConfig`]; cut-offs are in Hz.
+/// With the angle in a unit `A`, the speed in a unit `M` and the output in a unit `U`, the gains of the angle loop are in `M/A`,
+/// the gains of the speed loop in `U/M`, with the seconds of [`PidConfig`]; cut-offs are in Hz.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`](crate::control::Pid), of both loops. The first call gives their P and feed-forward, and by error the D of the
-/// angle loop too, however long ago the actuator was made. A `dt_s` that is zero, negative, NaN or infinite, and a setpoint, angle
-/// or speed that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next
-/// values pass their filters as first ones, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`]
-/// freezes the integral and D of both loops, and counts as that maximum for the filters. With a divider, the angle loop runs on the first step and then on every n-th, with the
-/// time that has passed for it; if one of the steps since was above the maximum, that freezes it too. Without `ki` an
-/// integral stays zero. Huge gains end at the output limits.
+/// As the [`Pid`](crate::control::Pid), for both loops. The first call gives their P and feed-forward, and by error the D of the
+/// angle loop too, regardless of the age of the actuator. If `dt_s` is zero, negative, NaN or infinite, or a setpoint, angle or
+/// speed is NaN or infinite, the last output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next
+/// values pass their filters as first values, and the D of both loops rests once. A `dt_s` above the maximum of the [`TimeStep`]
+/// freezes the integral and D of both loops, and counts as the maximum for the filters. With a divider, the angle loop runs on
+/// the first step and then on every n-th, with the time passed since its last run; a step above the maximum in between freezes
+/// that run too. Without `ki` an integral stays zero. Huge gains end at the output limits.
 ///
 /// # Examples
 /// ```
@@ -45,13 +45,13 @@ pub struct PositionActuator {
     rejected: u16,
     outer_divider: u8,
     until_outer: u8,
-    /// One of the steps that have passed was above the maximum.
+    /// Since the last run of the angle loop, a step was above the maximum.
     froze: bool,
 }
 
 impl PositionActuator {
-    /// Takes the angle loop, whose output is the setpoint of the speed loop, and the speed loop with its filters, which starts
-    /// anew.
+    /// Takes the angle loop, whose output is the setpoint of the speed loop, and the speed loop with its filters. The speed
+    /// loop starts anew.
     ///
     /// # Errors
     /// Names the parameter of the angle loop as [`Pid::new`] does.
@@ -99,7 +99,7 @@ impl PositionActuator {
         Ok(Self { outer_divider: divider, ..self })
     }
 
-    /// Steps by a time that was validated before, and returns the output.
+    /// Steps by a validated time step, and returns the output.
     pub fn step(&mut self, setpoint: f32, angle: f32, speed: f32, step: &TimeStep) -> f32 {
         let finite = setpoint.is_finite() && angle.is_finite() && speed.is_finite();
         if !step.admits(finite, &mut self.rejected) {
@@ -116,10 +116,10 @@ impl PositionActuator {
         self.step_speed(speed, step)
     }
 
-    /// Steps with an angle error that was formed elsewhere (from integers, on a circle): the measured speed is its rate.
+    /// Steps with a given angle error (from integers, on a circle): the measured speed is its rate.
     ///
-    /// The unit of `speed` must be that of the angle a second for the D of the angle loop to be right, which is there from the
-    /// first call on. The angle filter does not apply.
+    /// The unit of `speed` must be the unit of the angle a second, or the D of the angle loop is wrong; D acts from the first
+    /// call on. The angle filter does not apply.
     pub fn step_error(&mut self, error: f32, speed: f32, step: &TimeStep) -> f32 {
         if !step.admits(error.is_finite() && speed.is_finite(), &mut self.rejected) {
             return self.miss(step); // the rate of the angle is given: none of it is missed
@@ -138,8 +138,8 @@ impl PositionActuator {
         self.await_outer();
     }
 
-    /// Resets, and lets the first call return `output` as [`Pid::reset_to`](crate::control::Pid::reset_to) of the speed loop does,
-    /// whatever the angle loop wants: for taking over from another controller without a jump.
+    /// Resets, and lets the first call return `output`, as [`Pid::reset_to`](crate::control::Pid::reset_to) of the speed loop
+    /// does, for any output of the angle loop: to take over from another controller without a jump.
     ///
     /// # Examples
     /// ```
@@ -190,14 +190,14 @@ impl PositionActuator {
         &mut self.cascade
     }
 
-    /// Returns the number of steps that were refused, and of those too long to be integrated; stays at 65535.
+    /// Returns the number of refused steps, and of steps too long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        // The speed loop runs in each step that is admitted, and refuses none of them.
+        // The speed loop runs in each admitted step, and refuses none of them.
         self.rejected.saturating_add(self.cascade.speed().rejected())
     }
 
-    /// The speed that was measured is too old by the time of this step: its filter takes the next one as a first one, and D rests.
+    /// The measured speed is too old at this step: its filter takes the next speed as a first value, and D rests.
     const fn miss(&mut self, step: &TimeStep) -> f32 {
         if !step.is_hold() {
             self.cascade.speed_mut().rest_derivative();
@@ -216,7 +216,7 @@ impl PositionActuator {
         (self.passed_s, self.froze, self.until_outer) = (0.0, false, 0);
     }
 
-    /// Returns the time for the angle loop when it is its turn.
+    /// Returns the time for the angle loop in its turn.
     fn outer_step(&mut self, step: &TimeStep) -> Option<TimeStep> {
         self.passed_s += step.dt_s();
         self.froze |= step.is_frozen();
@@ -224,7 +224,7 @@ impl PositionActuator {
             self.until_outer -= 1;
             return None;
         }
-        // The steps it consists of were validated: their sum is not compared with a maximum again.
+        // The steps of the sum were validated: the sum is not compared with a maximum again.
         let outer = if self.froze {
             TimeStep::new(f32::MAX, self.passed_s)
         } else {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn it_brings_an_inertia_to_its_angle_in_both_directions() {
+    fn a_position_actuator_brings_an_inertia_to_its_angle_in_both_directions() {
         for target in [1.0, -1.0] {
             let mut actuator = config().with_outer_divider(2).unwrap();
             let (mut angle, mut speed) = (0.0_f32, 0.0_f32);
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn taking_over_gives_the_output_that_was_and_then_moves_from_there() {
+    fn taking_over_starts_from_the_last_output() {
         for divider in [1, 3] {
             let speed =
                 SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0)).unwrap();
@@ -433,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_error_or_speed_leaves_the_given_rate_of_the_angle_as_it_is() {
+    fn a_bad_error_or_speed_keeps_the_given_rate_of_the_angle() {
         let damper = SpeedActuator::new(PidConfig::new(1.0, 0.0, 0.0)).unwrap();
         let config = PositionActuator::new(PidConfig::new(0.0, 0.0, 1.0), damper).unwrap();
         let mut actuator = config;
@@ -442,7 +442,8 @@ mod tests {
         actuator.step_error(0.0, f32::NAN, &TimeStep::of(DT_S));
         actuator.step_error(0.0, 5.0, &TimeStep::of(DT_S));
         assert_eq!(actuator.cascade().position().terms().d, -5.0); // and not that of two steps ago
-        // By angles, the travel since the last good one is not that of one step: D keeps its value once.
+        // By angles, the travel since the last good sample spans more than one step: D keeps its
+        // value once.
         let mut actuator = config;
         actuator.step(0.0, 0.0, 0.0, &TimeStep::of(DT_S));
         actuator.step(0.0, 0.002, 0.0, &TimeStep::of(DT_S));

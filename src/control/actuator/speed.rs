@@ -8,15 +8,14 @@ use crate::error::ConfigError;
 /// ```text
 /// output = low-pass(PID(setpoint, low-pass(speed)))
 /// ```
-/// With the speed in a unit `M` and the output in a unit `U` the gains are those of [`PidConfig`]; cut-offs are in Hz.
+/// With the speed in a unit `M` and the output in a unit `U`, the gains are those of [`PidConfig`]; cut-offs are in Hz.
 ///
 /// # Edge behaviour
-/// That of the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward, however
-/// long ago the actuator was made. A `dt_s` that is zero, negative, NaN or infinite, and a setpoint or speed that is NaN or
-/// infinite: the last output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next speed passes its
-/// filter as a first one, and D rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and counts
-/// as that maximum for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold
-/// behind the filter too.
+/// As the [`Pid`]. The first speed is the first output of its filter, and the first call gives P and feed-forward, regardless of
+/// the age of the actuator. If `dt_s` is zero, negative, NaN or infinite, or a setpoint or speed is NaN or infinite, the last
+/// output is returned and [`rejected`](Self::rejected) grows; after a bad input, the next speed passes its filter as a first
+/// value, and D rests once. A `dt_s` above the maximum of the [`TimeStep`] freezes the integral and D, and counts as the maximum
+/// for the filters. Without `ki` the integral stays zero. Huge gains end at the output limits, which hold behind the filter too.
 ///
 /// # Examples
 /// ```
@@ -35,7 +34,7 @@ pub struct SpeedActuator {
     pub(super) filters: SpeedFilters,
 }
 
-/// The filters about a speed loop, and what comes out of them.
+/// The filters around a speed loop, and the filtered output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct SpeedFilters {
@@ -48,8 +47,8 @@ impl SpeedFilters {
     const NONE: Self =
         Self { feedback: OptionalFilter(None), output: OptionalFilter(None), value: 0.0 };
 
-    /// Runs the loop on the filtered speed, and returns what it gives, filtered and within its limits: a filter may
-    /// pass its input by a rounding step, and limits may have been narrowed since its last one.
+    /// Runs the loop on the filtered speed, and returns its output, filtered and within its limits: a filter may pass
+    /// its input by a rounding step, and limits may have been narrowed since the last step.
     #[inline]
     pub(super) fn around(
         &mut self,
@@ -66,7 +65,7 @@ impl SpeedFilters {
         self.value
     }
 
-    /// Lets the next speed through as if it were the first: the last one is too old.
+    /// Passes the next speed as a first value: the last speed is too old.
     pub(super) const fn miss(&mut self, step: &TimeStep) {
         if !step.is_hold() {
             self.interrupt();
@@ -83,7 +82,7 @@ impl SpeedFilters {
         self.value = output;
     }
 
-    /// Lets the next speed through as if it were the first, and keeps what comes out.
+    /// Passes the next speed as a first value, and keeps the output.
     pub(super) const fn interrupt(&mut self) {
         self.feedback.reset();
     }
@@ -129,7 +128,7 @@ impl SpeedActuator {
         Ok(self)
     }
 
-    /// Steps by a time that was validated before, and returns the output.
+    /// Steps by a validated time step, and returns the output.
     pub fn step(&mut self, setpoint: f32, speed: f32, step: &TimeStep) -> f32 {
         if step.is_hold() || !setpoint.is_finite() || !speed.is_finite() {
             self.pid.refuse(!step.is_hold());
@@ -151,7 +150,8 @@ impl SpeedActuator {
         self.filters.reset_to(self.pid.output());
     }
 
-    /// Keeps the integral over a gap in the measurements, as [`Pid::interrupt`] does; the next speed passes its filter as a first one.
+    /// Keeps the integral over a gap in the measurements, as [`Pid::interrupt`] does; the next speed passes its filter as a first
+    /// value.
     ///
     /// # Examples
     /// ```
@@ -188,7 +188,7 @@ impl SpeedActuator {
         &mut self.pid
     }
 
-    /// Returns the number of steps that were refused, and of those too long to be integrated; stays at 65535.
+    /// Returns the number of refused steps, and of steps too long to be integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.pid.rejected()
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn without_filters_it_is_its_pid() {
+    fn a_speed_actuator_without_filters_equals_its_pid() {
         let config = PidConfig::new(1.0, 2.0, 0.01).with_output_limit(5.0);
         let mut actuator = SpeedActuator::new(config).unwrap();
         let mut pid = Pid::new(config).unwrap();
@@ -270,7 +270,8 @@ mod tests {
 
     #[test]
     fn the_limit_holds_behind_the_output_filter_to_the_last_bit() {
-        // From one end to the other, a filter that lets nearly all through may come out a spacing of f32 beyond it.
+        // From one end to the other, a filter with a high cut-off may come out a spacing of f32
+        // beyond the end.
         for parts in 1..2_000_u16 {
             let pid =
                 PidConfig::new(1.0, 0.0, 0.0).with_output_range(-0.37 * f32::from(parts), 1.1);

@@ -13,13 +13,13 @@ use crate::math;
 /// Computed in the transposed direct form II. Source: Bristow-Johnson, "Cookbook formulae for audio equalizer biquad
 /// filter coefficients".
 ///
-/// Rounding grows as the cut-off falls: at a thousandth of the sample rate it reaches 0.2 % of the signal, and soon after it
-/// would grow without bound. Below that use a [`LowPass`](super::LowPass), or filter every tenth sample.
+/// Rounding grows as the cut-off falls: at a thousandth of the sample rate, rounding reaches 0.2 % of the signal, and soon
+/// after would grow without bound. At lower cut-offs use a [`LowPass`](super::LowPass), or filter every tenth sample.
 ///
 /// # Edge behaviour
-/// The first sample is the first output, at rest. It knows no time: after a gap in the samples, [`reset`](Self::reset) it. A
-/// sample that is NaN or infinite: the last output is returned, the state stays and [`rejected`](Self::rejected) grows. The
-/// same when a sum overflows; then the next sample is a first one.
+/// The first sample is the first output, at rest. The filter knows no time: after a gap in the samples, call
+/// [`reset`](Self::reset). If a sample is NaN or infinite, the last output is returned, the state stays and
+/// [`rejected`](Self::rejected) grows. The same when a sum overflows; then the next sample is a first sample.
 ///
 /// # Examples
 /// ```
@@ -54,7 +54,7 @@ impl Biquad {
     /// The quality of a Butterworth low-pass: flat in the pass band, 71 % (-3 dB) at the cut-off.
     pub const BUTTERWORTH: f32 = core::f32::consts::FRAC_1_SQRT_2;
 
-    /// Lets through what is below `cutoff_hz`. A `q` of [`BUTTERWORTH`](Self::BUTTERWORTH) is flat; a larger one peaks.
+    /// Passes frequencies below `cutoff_hz`. A `q` of [`BUTTERWORTH`](Self::BUTTERWORTH) is flat; a larger `q` peaks.
     ///
     /// # Errors
     /// Names `cutoff`, `q` or `sample_hz` when NaN, infinite, zero or negative; `cutoff` when not from 0.001 to 0.499 of `sample_hz`,
@@ -109,13 +109,14 @@ impl Biquad {
             (self.value, self.s1, self.s2) = (value, s1, s2);
         } else {
             self.rejected = self.rejected.saturating_add(1);
-            // What overflows with a good sample is the past: it starts anew with the next one.
+            // If a good sample overflows, the past is the cause: the filter starts anew with the
+            // next sample.
             self.started = self.started && !input.is_finite();
         }
         self.value
     }
 
-    /// Forgets the past: the next sample is the first one.
+    /// Forgets the past: the next sample counts as the first.
     pub const fn reset(&mut self) {
         self.reset_to(0.0);
         self.started = false;
@@ -139,7 +140,7 @@ impl Biquad {
         self.value
     }
 
-    /// Returns the number of samples that were refused; stays at 65535.
+    /// Returns the number of refused samples; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -173,7 +174,7 @@ const fn check_all(
 mod tests {
     use super::*;
 
-    /// The part of a sine of this frequency that passes, at 1 kHz.
+    /// The gain for a sine of this frequency, at 1 kHz.
     fn gain_at(mut filter: Biquad, frequency_hz: f32) -> f32 {
         let step = core::f32::consts::TAU * frequency_hz / 1000.0;
         let power: f32 = (0..4000_u16)
@@ -246,7 +247,7 @@ mod tests {
         }
     }
 
-    /// Law: whatever is taken, its poles lie within the unit circle, by a hundred roundings at least.
+    /// Law: for every accepted parameter, the poles lie within the unit circle, by a hundred roundings at least.
     #[test]
     fn every_filter_that_is_taken_is_stable() {
         let parts = (0..=498_u16).map(|thousandth| f32::from(thousandth + 1) * 1e-3);

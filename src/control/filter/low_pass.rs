@@ -12,11 +12,11 @@ use crate::error::ConfigError;
 /// frequency as long as `dt` is well below `T`.
 ///
 /// # Edge behaviour
-/// The first sample is the first output. `dt_s` zero, negative, NaN or infinite, or an input that is NaN or infinite: the
+/// The first sample is the first output. If `dt_s` is zero, negative, NaN or infinite, or the input is NaN or infinite, the
 /// last output is returned and [`rejected`](Self::rejected) grows. There is no maximum: after a long `dt_s` the old value
 /// rightly counts for little. Every cut-off works: near `f32::MAX` the input passes, near zero the first sample stays. A
-/// change smaller than half the spacing of `f32` at the value is lost, so it stands still within `6e-8 (1 + T / dt)` of the
-/// value: 1e-5 of it for 1 Hz at 1 kHz, 1e-2 for 1 mHz.
+/// change smaller than half the spacing of `f32` at the value is lost, so the output stands still within
+/// `6e-8 (1 + T / dt)` of the value: 1e-5 of the value for 1 Hz at 1 kHz, 1e-2 for 1 mHz.
 ///
 /// # Examples
 /// ```
@@ -43,7 +43,7 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// Takes the frequency at which a sine is let through at 71 % (-3 dB), in Hz.
+    /// Takes the frequency at which a sine passes at 71 % (-3 dB), in Hz.
     ///
     /// # Errors
     /// Names `cutoff` when NaN, infinite, zero or negative.
@@ -59,7 +59,7 @@ impl LowPass {
         self.step(input, &TimeStep::new(dt_s, f32::MAX))
     }
 
-    /// Steps by a time that was validated before, and returns the new value.
+    /// Steps by a validated time step, and returns the new value.
     #[inline]
     pub const fn step(&mut self, input: f32, step: &TimeStep) -> f32 {
         if step.admits(input.is_finite(), &mut self.rejected) {
@@ -68,7 +68,7 @@ impl LowPass {
         self.value
     }
 
-    /// Steps by a time that is not on hold, to an input that is finite.
+    /// Steps to a finite input, by a time step that is not on hold.
     #[inline]
     pub(in crate::control) const fn pass(&mut self, input: f32, step: &TimeStep) -> f32 {
         if self.started {
@@ -80,7 +80,7 @@ impl LowPass {
         self.value
     }
 
-    /// Forgets the past: the next sample is the first one.
+    /// Forgets the past: the next sample counts as the first.
     pub const fn reset(&mut self) {
         self.value = 0.0;
         self.started = false;
@@ -98,7 +98,7 @@ impl LowPass {
         self.value
     }
 
-    /// Returns the number of samples that were refused; stays at 65535.
+    /// Returns the number of refused samples; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stands_still_no_further_off_than_the_documentation_says() {
+    fn a_low_pass_stands_still_within_the_documented_distance() {
         for (cutoff_hz, part) in [(1.0, 1e-5), (1e-3, 1e-2)] {
             let mut filter = LowPass::new(cutoff_hz).unwrap();
             filter.reset_to(100.0 * (1.0 - 2.0 * part));

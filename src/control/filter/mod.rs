@@ -7,8 +7,8 @@
 //! | [`Window::mean`] | noise, and a disturbance of exactly `N` samples | `(N - 1) / 2` samples | fixed |
 //! | [`Window::median`] | single wrong samples | `(N - 1) / 2` samples | fixed |
 //!
-//! A filter starts at rest on its first sample, so that there is no transient from zero. A sample that is NaN or infinite
-//! changes nothing: the last output is returned and the sample is counted.
+//! A filter starts at rest on its first sample, so there is no transient from zero. A NaN or infinite sample changes
+//! nothing: the last output is returned and the sample is counted.
 
 mod biquad;
 mod low_pass;

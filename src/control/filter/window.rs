@@ -5,14 +5,14 @@ use crate::control::number::finite;
 /// ```text
 /// mean = (x + x1 + ... + x(N-1)) / N
 /// ```
-/// The mean takes out a disturbance whose period is `N` samples: the moving average. It adds up `N` numbers, so there is no running
-/// sum that could drift. In the median single wrong samples vanish, and edges stay sharp. For an even number of samples it is the
-/// lower one of the two in the middle; it takes `N` times `N` comparisons.
+/// The mean takes out a disturbance with a period of `N` samples: the moving average. Each call adds up `N` numbers, so there is
+/// no running sum to drift. In the median single wrong samples vanish, and edges stay sharp. For an even number of samples, the
+/// median is the lower of the two in the middle; a median takes `N` times `N` comparisons.
 ///
 /// # Edge behaviour
-/// Before `N` samples, mean and median are those of the samples there are; zero before the first one. It knows no time: after a
-/// gap in the samples, [`reset`](Self::reset) it. A sample that is NaN or infinite changes nothing and is counted. Of samples
-/// whose sum is beyond `f32` the mean is right all the same.
+/// Before `N` samples, mean and median are taken over the samples so far; zero before the first. The window knows no time:
+/// after a gap in the samples, call [`reset`](Self::reset). A NaN or infinite sample changes nothing and is counted. If the sum
+/// of the samples is beyond `f32`, the mean is still right.
 ///
 /// # Examples
 /// ```
@@ -39,7 +39,7 @@ pub struct Window<const N: usize> {
 }
 
 impl<const N: usize> Window<N> {
-    /// Starts without samples. `N` must be at least 1, or it does not compile.
+    /// Starts without samples. `N` must be at least 1, or the code does not compile.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N > 0, "a window needs at least one sample") }
@@ -64,7 +64,7 @@ impl<const N: usize> Window<N> {
         self.samples.iter().copied().take(self.filled)
     }
 
-    /// Returns the mean of the samples; zero before the first one.
+    /// Returns the mean of the samples; zero before the first.
     #[must_use]
     pub fn mean(&self) -> f32 {
         if self.filled == 0 {
@@ -80,7 +80,7 @@ impl<const N: usize> Window<N> {
         }
     }
 
-    /// Returns the median of the samples; zero before the first one.
+    /// Returns the median of the samples; zero before the first.
     #[must_use]
     pub fn median(&self) -> f32 {
         let samples = self.samples.get(..self.filled).unwrap_or_default();
@@ -103,7 +103,7 @@ impl<const N: usize> Window<N> {
         (self.oldest, self.filled) = (0, 0);
     }
 
-    /// Returns the number of samples that were refused; stays at 65535.
+    /// Returns the number of refused samples; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected

@@ -13,19 +13,19 @@ pub(super) const DERIVATIVE_FILTER: u16 = 1 << 6;
 pub(super) const DERIVATIVE_ON_ERROR: u16 = 1 << 7;
 pub(super) const TRACKING: u16 = 1 << 8;
 pub(super) const BACK_CALCULATION: u16 = 1 << 9;
-/// The options that the plain step does not know.
+/// The options outside of the plain step.
 pub(super) const NOT_PLAIN: u16 = (1 << 10) - 1;
 pub(super) const INCREMENTAL: u16 = 1 << 10;
-/// Set by a refused sample until the next good step: how far the measurement came in that time is not known.
+/// Set by a refused sample until the next good step: the travel of the measurement in that time is unknown.
 pub(super) const REST_DERIVATIVE: u16 = 1 << 11;
-/// Set by `reset_to` until the first step after it.
+/// Set by `reset_to` until the next step.
 pub(super) const TRACK_OUTPUT: u16 = 1 << 12;
-/// Of a step whose error and rate are given.
+/// The step has a given error and rate.
 pub(super) const GIVEN: u16 = 1 << 13;
-/// The options that such a step does not know.
+/// The options outside of such a step.
 pub(super) const OF_SETPOINT: u16 = FEED_FORWARD | PERIOD | DERIVATIVE_ON_ERROR | TRACKING;
 
-/// The numbers of a [`PidConfig`] that a controller stores as they are.
+/// The numbers of a [`PidConfig`] stored by a controller as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -48,7 +48,7 @@ pub(super) struct Parameters {
     pub(super) drain_time_s: f32,
 }
 
-/// What a [`Pid`](super::Pid) is made from: three gains, and options that are off until named.
+/// Configuration of a [`Pid`](super::Pid): three gains, and options that are off until named.
 ///
 /// With the output in a unit `U` and the measurement in a unit `M`, `kp` is in `U/M`, `ki` in `U/(M s)` and `kd`
 /// in `U s/M`: the gains of the continuous-time controller, the same at every loop rate.
@@ -81,7 +81,7 @@ pub(super) struct Parameters {
 pub struct PidConfig {
     pub(super) parameters: Parameters,
     pub(super) integral_limit: f32,
-    /// Zero without one.
+    /// Zero without a limit.
     pub(super) period: f32,
     /// Zero without tracking.
     pub(super) tracking_r: f32,
@@ -90,7 +90,7 @@ pub struct PidConfig {
 }
 
 impl PidConfig {
-    /// An option that is a threshold or a rate, and off.
+    /// An option given as a threshold or a rate, off at first.
     pub(super) const OFF: f32 = f32::MAX;
 
     /// Takes the gains: proportional, integral (1/s times the unit of `kp`) and derivative (s times the unit of `kp`).
@@ -167,7 +167,7 @@ impl PidConfig {
         self
     }
 
-    /// Uses back-calculation instead of conditional integration: what the limits cut off the output drains the
+    /// Uses back-calculation instead of conditional integration: the part of the output beyond the limits drains the
     /// integral with the time constant `time_s`, more than zero.
     #[must_use]
     pub const fn with_back_calculation(mut self, time_s: f32) -> Self {
@@ -182,10 +182,11 @@ impl PidConfig {
         self
     }
 
-    /// Counts an error smaller than `width` as none; one of exactly `width` counts in full. Zero or more; zero, the default, is off.
+    /// Counts an error smaller than `width` as zero; an error of exactly `width` counts in full. Zero or more; zero, the default,
+    /// is off.
     ///
-    /// Inside the band P is zero and the integral moves towards zero only: it does not grow, but one that is wound up
-    /// is not frozen either.
+    /// Inside the band P is zero and the integral moves towards zero only: the integral does not grow, and a wound-up
+    /// integral is not frozen either.
     #[must_use]
     pub const fn with_dead_band(mut self, width: f32) -> Self {
         self.parameters.dead_band = width;
@@ -194,9 +195,9 @@ impl PidConfig {
 
     /// Adds `static_gain * sign(setpoint) + velocity_gain * setpoint` to the output. Zero or more; zero by default.
     ///
-    /// For speed loops: the effort that overcomes dry friction (in units of the output), and the effort a unit of speed takes.
-    /// The setpoint is taken as `measurement + e`. On a circle, that is the setpoint next to the measurement, whatever its turn. A
-    /// setpoint that rounding removes from the error counts as zero. A step with a given error has no feed-forward.
+    /// For speed loops: the effort to overcome dry friction (in units of the output), and the effort for a unit of speed. The
+    /// setpoint is taken as `measurement + e`: on a circle, the setpoint next to the measurement, in any turn. A setpoint
+    /// removed from the error by rounding counts as zero. A step with a given error has no feed-forward.
     #[must_use]
     pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
         self.parameters.static_gain = static_gain;
@@ -206,9 +207,9 @@ impl PidConfig {
 
     /// Lets the output change by at most `per_s` a second, more than zero. Off by default.
     ///
-    /// The output starts from zero, or from the value given to [`Pid::reset_to`](super::Pid::reset_to). What it cuts off
-    /// counts as saturation. A change in a step of less than half the spacing of `f32` at the output is none: 4e-3 a second at an
-    /// output of 100 and 1 kHz.
+    /// The output starts from zero, or from the value given to [`Pid::reset_to`](super::Pid::reset_to). The part cut off counts
+    /// as saturation. A change in a step of less than half the spacing of `f32` at the output is lost: 4e-3 a second at an output
+    /// of 100 and 1 kHz.
     #[must_use]
     pub const fn with_slew_limit(mut self, per_s: f32) -> Self {
         self.parameters.slew_per_s = per_s;
@@ -231,7 +232,7 @@ impl PidConfig {
         self
     }
 
-    /// Takes the derivative of the error, so that D answers changes of the setpoint too.
+    /// Takes the derivative of the error, so D also responds to changes of the setpoint.
     ///
     /// The default is the derivative of the measurement, without a kick when the setpoint jumps.
     #[must_use]
@@ -243,9 +244,9 @@ impl PidConfig {
     /// Leads the setpoint through a linear tracking differentiator of speed `r` in 1/s, more than zero. Off by default.
     ///
     /// A step of the setpoint is followed to 4 % after `5 / r` seconds, without overshoot, from the first measurement on: see
-    /// [`Differentiator::linear`](crate::control::Differentiator::linear). A time step longer than `1 / r` counts as `1 / r`, which is as fast as
-    /// the setpoint can be followed without overshoot. With an error formed elsewhere there is no setpoint to follow. Not with a
-    /// period: a [`Differentiator::optimal`](crate::control::Differentiator::optimal) in front of the controller follows an angle.
+    /// [`Differentiator::linear`](crate::control::Differentiator::linear). A time step longer than `1 / r` counts as `1 / r`, the
+    /// fastest tracking without overshoot. With a given error there is no setpoint to follow. Excludes a period: a
+    /// [`Differentiator::optimal`](crate::control::Differentiator::optimal) in front of the controller follows an angle.
     ///
     /// # Examples
     /// ```
@@ -268,7 +269,7 @@ impl PidConfig {
 
     /// Takes the incremental form: the output is the memory. Off by default.
     ///
-    /// Step by step it gives what the positional form does. New gains never move the output, and
+    /// Each step gives the output of the positional form. New gains never move the output, and
     /// [`Pid::reset_to`](super::Pid::reset_to) starts from any output, with `ki` zero too: see [`Pid`](super::Pid).
     ///
     /// # Examples
@@ -311,7 +312,7 @@ impl PidConfig {
         (self.parameters.output_lower, self.parameters.output_upper)
     }
 
-    /// Returns the period of the circle; zero without one.
+    /// Returns the period of the circle; zero without a circle.
     #[must_use]
     pub const fn period(&self) -> f32 {
         self.period
@@ -320,7 +321,8 @@ impl PidConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the first parameter that is NaN, infinite, negative, zero where it must not be, or reversed; `r` with a period.
+    /// Names the first parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed; `r` with a
+    /// period.
     pub const fn validate(&self) -> Result<(), ConfigError> {
         let p = &self.parameters;
         check!(gains(p.kp, p.ki, p.kd));
@@ -345,7 +347,7 @@ impl PidConfig {
         off_or_positive("r", self.tracking_r)
     }
 
-    /// Returns the options that are in use.
+    /// Returns the options in use.
     pub(super) const fn options(&self) -> u16 {
         const OFF: f32 = PidConfig::OFF;
         const fn set(option: u16, is_on: bool) -> u16 {
@@ -366,7 +368,7 @@ impl PidConfig {
     }
 }
 
-/// Zero means off: what is no more than that, but was given, is kept as the NaN that is refused.
+/// Zero means off: a given value of zero or less is stored as NaN, which is refused.
 const fn not_off(value: f32) -> f32 {
     // Half a period must be a normal number too.
     if value >= 2.0 * f32::MIN_POSITIVE { value } else { f32::NAN }

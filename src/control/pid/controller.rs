@@ -17,8 +17,8 @@ use crate::error::ConfigError;
 /// feed-forward, integral limit, sum, slew limit, output limits, anti-windup.
 ///
 /// # Forms
-/// Step by step, both forms are one law: the increments of the incremental form add up to the terms of the positional one. The
-/// forms differ in what the memory, [`Terms::i`], may hold:
+/// Step by step, both forms are one law: the increments of the incremental form add up to the terms of the positional form.
+/// The forms differ in the content of the memory, [`Terms::i`]:
 ///
 /// | | positional | [incremental](PidConfig::with_incremental_form) |
 /// |---|---|---|
@@ -28,26 +28,28 @@ use crate::error::ConfigError;
 /// | new gains: the memory takes up the change of | P and feed-forward, if `ki` is above zero | P, D and feed-forward |
 ///
 /// # Edge behaviour
-/// * The first call gives P and feed-forward only: there is no interval yet to integrate or to differentiate over.
-///   It does not matter how long ago the controller was made. [`step_error`](Self::step_error) gives D too: the rate is given.
+/// * The first call gives P and feed-forward only, regardless of the age of the controller: there is no interval yet to
+///   integrate or to differentiate over. [`step_error`](Self::step_error) gives D too: the rate is given.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
 /// * `dt_s` above the maximum of the [`TimeStep`](crate::control::TimeStep): the integral and D stay for this step, P and
-///   feed-forward follow, a tracked setpoint moves on by that maximum, and [`rejected`](Self::rejected) grows, except in a first
+///   feed-forward follow, a tracked setpoint moves on by the maximum, and [`rejected`](Self::rejected) grows, except in a first
 ///   call. A loop slower than 10 Hz has to set its longest step (`TimeStep::new(dt_s, 0.5)`): with the 0.1 s of
-///   [`TimeStep::of`](crate::control::TimeStep::of) it has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms in turn.
-/// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D rests
-///   in the next good step: it keeps its value, since the travel of the time that is missing is not that of one step.
-/// * `ki` zero: the integral is zero and stays zero; the memory of the incremental form stays as it is.
-/// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without one), never NaN, and
-///   what is stored stays finite.
+///   [`TimeStep::of`](crate::control::TimeStep::of) such a loop has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms
+///   in turn.
+/// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D
+///   rests in the next good step and keeps its value, since the travel of the missing time spans more than one step.
+/// * `ki` zero: the integral is zero and stays zero; the memory of the incremental form stays.
+/// * Gains or inputs so large that `f32` overflows: the output is the limit (±`f32::MAX` without a limit), never NaN,
+///   and every stored value stays finite.
 /// * An increment of the integral smaller than half the spacing of `f32` at it (6e-8 of the integral) is lost: the integral
-///   stands still where `ki |e| dt` is less than that. At an integral of 10, 1 kHz and `ki` = 1 those are errors below 6e-4.
-/// * At the threshold itself: an error of exactly the dead band's width counts in full, one of exactly the integral's separation
-///   is integrated, and the ends of the variable rate are those of the line between them.
+///   stands still where `ki |e| dt` is less than the half spacing. At an integral of 10, 1 kHz and `ki` = 1 the limit is an
+///   error of 6e-4.
+/// * At the threshold itself: an error of exactly the dead band's width counts in full, an error of exactly the integral's
+///   separation is integrated, and the ends of the variable rate have the rates of the line between them.
 ///
 /// # Examples
 /// The gains are those of continuous time: one second of a constant error of 1 integrates to `ki` at any rate, and a
-/// measurement that grows by 1 a second gives a D of `-kd`.
+/// measurement growing by 1 a second gives a D of `-kd`.
 /// ```
 /// use drivetrain::control::{Pid, PidConfig, TimeStep};
 ///
@@ -68,7 +70,7 @@ use crate::error::ConfigError;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-// What each step stores stands first, and what it reads next to it.
+// The values written by each step stand first, next to the values that it reads.
 #[repr(C)]
 pub struct Pid {
     pub(super) output: f32,
@@ -78,12 +80,12 @@ pub struct Pid {
     pub(super) integral: f32,
     /// Of the integral; closed unless the controller is plain.
     pub(super) integral_gate: u32,
-    /// Of the output; that of the integral unless the controller is plain.
+    /// Of the output; of the integral too unless the controller is plain.
     pub(super) output_gate: u32,
     /// Of half the period; or the bits of the speed of tracking.
     pub(super) way_gate: u32,
     pub(super) parameters: Parameters,
-    /// Of the setpoint that is followed.
+    /// Of the tracked setpoint.
     pub(super) tracking_rate: f32,
     pub(super) options: u16,
     pub(super) rejected: u16,
@@ -94,8 +96,8 @@ const _: () = assert!(size_of::<Pid>() <= 92, "two for each motor of a bus");
 
 /// The parts of the last output, in its unit.
 ///
-/// Their sum is the output, as long as that is within its limits and its slew limit. Beyond them, `i` is the integral that
-/// anti-windup has left for the next step.
+/// Their sum is the output, within its limits and its slew limit. Beyond the limits, `i` is the integral left by
+/// anti-windup for the next step.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -104,7 +106,7 @@ pub struct Terms {
     pub p: f32,
     /// Integral, within its limit; the memory of the incremental form.
     pub i: f32,
-    /// Derivative: `-kd` times the rate of the measurement, filtered where that was asked for.
+    /// Derivative: `-kd` times the rate of the measurement, filtered if configured.
     pub d: f32,
     /// Feed-forward: `kS sign(setpoint) + kV setpoint`; on a circle for the setpoint next to the measurement.
     pub feed_forward: f32,
@@ -114,7 +116,7 @@ impl Pid {
     /// Takes and checks the configuration.
     ///
     /// # Errors
-    /// Names the parameter that is NaN, infinite, negative, zero where it must not be, or reversed.
+    /// Names the parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed.
     pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
         check!(config.validate());
         let mut pid = Self {
@@ -143,8 +145,8 @@ impl Pid {
         self.options &= !TRACK_OUTPUT;
     }
 
-    /// Keeps the integral, and forgets what the next step would integrate, differentiate and track from: for a gap in the
-    /// measurements. The next step gives what a first one does, and the integral as it was.
+    /// Keeps the integral, and forgets the values from which the next step would integrate, differentiate and track: for
+    /// a gap in the measurements. The next step gives the output of a first step, and the integral as before.
     ///
     /// # Examples
     /// ```
@@ -167,11 +169,11 @@ impl Pid {
         self.set_options(self.options & !REST_DERIVATIVE);
     }
 
-    /// Resets, and lets the first call return `output`, within the limits, whatever its error: for taking over from
-    /// another controller without a jump.
+    /// Resets, and lets the first call return `output`, within the limits, for any error: to take over from another
+    /// controller without a jump.
     ///
-    /// The memory carries the difference to P, as far as its limit reaches. In the positional form with `ki` zero there is none,
-    /// and `output` is only where a slew limit starts from. NaN and infinity count as zero.
+    /// The memory carries the difference to P, as far as its limit reaches. In the positional form with `ki` zero there is no
+    /// memory, and `output` is only the start of a slew limit. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, output: f32) {
         self.reset();
         self.output = self.within_output_range(if output.is_finite() { output } else { 0.0 });
@@ -180,12 +182,12 @@ impl Pid {
 
     /// Changes the gains without a jump of P: the memory takes up the difference.
     ///
-    /// In the positional form, a new `kd` shows at once, in D, which passes: the integral would keep it after the shaft has come
-    /// to rest. With `ki` zero the integral is dropped, since nothing would ever drain it; then the output moves to P and D. In the
-    /// incremental form nothing moves. If the output is at a limit and stays there, the memory takes up nothing.
+    /// In the positional form, a new `kd` acts at once, in D, which passes: the integral would keep the change after the shaft
+    /// has come to rest. With `ki` zero the integral is dropped, since nothing would ever drain it; then the output moves to P
+    /// and D. In the incremental form nothing moves. If the output is at a limit and stays there, the memory takes up nothing.
     ///
     /// # Errors
-    /// Names the gain that is NaN, infinite or negative; then nothing changes.
+    /// Names a gain that is NaN, infinite or negative; then nothing changes.
     pub fn set_gains(&mut self, kp: f32, ki: f32, kd: f32) -> Result<(), ConfigError> {
         gains(kp, ki, kd)?;
         self.change(&self.config().with_gains(kp, ki, kd));
@@ -222,7 +224,7 @@ impl Pid {
         }
     }
 
-    /// Returns the last output; before the first call zero, or what was given to [`reset_to`](Self::reset_to).
+    /// Returns the last output; before the first call zero, or the value given to [`reset_to`](Self::reset_to).
     #[must_use]
     pub const fn output(&self) -> f32 {
         self.output
@@ -242,36 +244,36 @@ impl Pid {
         }
     }
 
-    /// Returns the number of steps that were refused for their time or for an input that was NaN or infinite, and of those too
-    /// long to be integrated; stays at 65535.
+    /// Returns the number of steps refused for their time or for a NaN or infinite input, and of steps too long to be
+    /// integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
     }
 
-    /// Tells whether the plain step knows all options that are on: gains, integral limit, one output limit.
+    /// Returns whether the plain step knows all options in use: gains, integral limit, one output limit.
     pub(crate) const fn is_plain(&self) -> bool {
         self.options & NOT_PLAIN == 0
     }
 
-    /// Takes what was let through of the last output by a limit beyond this loop, and keeps the integral within its
-    /// size: an integral that alone asks for more than passes would be wound up. NaN counts as zero.
+    /// Takes the part of the last output passed by a limit beyond this loop, and keeps the integral within its size: a
+    /// larger integral would be wound up. NaN counts as zero.
     pub(crate) const fn keep_integral_within(&mut self, passed: f32) {
         let most = if passed.is_nan() { 0.0 } else { passed.abs() };
         self.keep_integral_between(-most, most);
     }
 
-    /// Keeps the integral between the ends of a range of the output that contains zero.
+    /// Keeps the integral within a range of the output around zero.
     pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
         self.integral = limited(self.integral, lowest, highest);
     }
 
-    /// Returns what the output limits leave of `value`.
+    /// Returns `value` within the output limits.
     pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
         limited(value, self.parameters.output_lower, self.parameters.output_upper)
     }
 
-    /// Tells whether the memory may hold a value.
+    /// Returns whether the memory may hold a value.
     pub(super) const fn has_memory(&self) -> bool {
         self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
     }
@@ -281,7 +283,7 @@ impl Pid {
         if self.integral_gate != CLOSED { self.integral_gate } else { self.output_gate }
     }
 
-    /// Returns the period of a controller that does not track.
+    /// Returns the period of a controller without tracking.
     #[inline]
     pub(super) const fn period(&self) -> f32 {
         2.0 * limit_of(self.way_gate)
@@ -292,7 +294,7 @@ impl Pid {
         f32::from_bits(self.way_gate)
     }
 
-    /// Returns the feed-forward for the setpoint as [`terms`](Self::terms) can know it too.
+    /// Returns the feed-forward for the setpoint, as far as [`terms`](Self::terms) knows the setpoint too.
     #[inline]
     pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
         let setpoint = measurement + error;
@@ -306,8 +308,8 @@ impl Pid {
         }
     }
 
-    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel is not
-    /// that of one step.
+    /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
+    /// spans more than one step.
     pub(in crate::control) const fn refuse(&mut self, rests: bool) -> f32 {
         self.rejected = self.rejected.saturating_add(1);
         if rests {
@@ -320,7 +322,7 @@ impl Pid {
         self.set_options(self.options | REST_DERIVATIVE);
     }
 
-    /// Stores a configuration that was checked.
+    /// Stores a validated configuration.
     const fn store(&mut self, config: &PidConfig) {
         self.parameters = config.parameters;
         let tracks = config.tracking_r > 0.0;
@@ -331,7 +333,7 @@ impl Pid {
         self.set_options(config.options() | state);
     }
 
-    /// Opens the plain step, or closes it.
+    /// Opens or closes the plain step.
     pub(super) const fn set_options(&mut self, options: u16) {
         let limit = self.integral_limit_gate();
         let is_plain = options & (NOT_PLAIN | REST_DERIVATIVE) == 0;
@@ -405,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dt_that_is_no_time_holds_the_output_and_is_counted() {
+    fn an_invalid_dt_holds_the_output_and_is_counted() {
         for config in [PidConfig::new(2.0, 10.0, 0.1), every_option()] {
             let mut pid = pid(config);
             pid.step(3.0, 1.0, &TimeStep::of(DT_S));
@@ -438,7 +440,7 @@ mod tests {
 
     /// A loop of 9.9 Hz had no integral, and nothing said so.
     #[test]
-    fn a_loop_slower_than_its_longest_step_counts_what_it_leaves_out() {
+    fn a_loop_slower_than_its_longest_step_counts_the_steps_left_out() {
         for config in [
             PidConfig::new(0.0, 1.0, 0.0),
             every_option(),
@@ -710,7 +712,7 @@ mod tests {
                 pid.step(direction * -0.9, 0.0, &TimeStep::of(DT_S));
             }
             assert!(pid.terms().i.abs() < wound_up - 5.0);
-            // ... and short of it, inside the band, it does not grow.
+            // ... and short of it, inside the band, the integral does not grow.
             let before = pid.terms().i;
             pid.step(direction * 0.9, 0.0, &TimeStep::of(DT_S));
             pid.step(direction * 0.9, 0.0, &TimeStep::of(DT_S));
@@ -764,7 +766,7 @@ mod tests {
     }
 
     #[test]
-    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+    fn an_increment_below_half_a_spacing_is_lost_and_a_larger_increment_is_kept() {
         // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
         for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
             let mut pid = pid(PidConfig::new(0.0, 1.0, 0.0));
@@ -887,7 +889,7 @@ mod tests {
     }
 
     #[test]
-    fn back_calculation_drains_what_the_limit_cuts_off() {
+    fn back_calculation_drains_the_part_cut_off_by_the_limit() {
         let config =
             PidConfig::new(1.0, 100.0, 0.0).with_output_limit(10.0).with_back_calculation(0.01);
         let mut pid = pid(config);
@@ -1035,7 +1037,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_configuration_comes_back_as_it_was_given(
+        fn the_configuration_is_returned_unchanged(
             config in any_config(), separation in 0.1_f32..100.0, edges in (0.0_f32..40.0, 41.0_f32..100.0),
         ) {
             let rates = config.with_integral_separation(separation).with_variable_integral(edges.0, edges.1);
@@ -1127,7 +1129,8 @@ mod tests {
             config in any_config(), period in prop::sample::select(&[360.0_f32, 8192.0, 7.5, 1.0]),
             samples in prop::collection::vec((0_u16..5760, 0_u16..5760, -50_i8..50, -50_i8..50), 1..30),
         ) {
-            // Feed-forward is for the setpoint next to the measurement: it sees turns of that. Sixteenths are exact in f32.
+            // Feed-forward is for the setpoint next to the measurement, and changes with the turns
+            // of the measurement. Sixteenths are exact in f32.
             let config = PidConfig { tracking_r: 0.0, ..config.with_period(period) };
             let turning = config.options() & FEED_FORWARD == 0;
             let (mut here, mut turned) = (pid(config), pid(config));
@@ -1157,7 +1160,7 @@ mod tests {
         }
 
         #[test]
-        fn at_the_limit_a_plain_controller_does_what_one_with_options_does(
+        fn at_the_limit_a_plain_controller_equals_a_controller_with_options(
             gains in (0.0_f32..10.0, 0.0_f32..100.0, 0.0_f32..0.01),
             windup in 0_u8..3,
             samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0), 2..60),
@@ -1283,7 +1286,7 @@ mod incremental {
     }
 
     #[test]
-    fn it_leaves_the_limit_at_once() {
+    fn the_incremental_form_leaves_the_limit_at_once() {
         let mut pid = pid(incremental(0.0, 100.0, 0.0).with_output_limit(10.0));
         for _ in 0..10_000 {
             pid.step(9.0, 0.0, &TimeStep::of(DT_S));
@@ -1333,7 +1336,7 @@ mod incremental {
     }
 
     #[test]
-    fn an_increment_of_less_than_half_a_spacing_is_lost_and_one_of_more_is_not() {
+    fn an_increment_below_half_a_spacing_is_lost_and_a_larger_increment_is_kept() {
         // At 10, the spacing is 9.5e-7; with ki = 1 at 1 kHz, half of it is an error of 4.8e-4.
         for (error, moves) in [(4.7e-4, false), (4.9e-4, true)] {
             let mut pid = pid(incremental(0.0, 1.0, 0.0));
@@ -1367,7 +1370,8 @@ mod incremental {
 
     #[test]
     fn a_setpoint_that_comes_back_leaves_no_trace_of_the_limit() {
-        // P of 200 and of 180 are both cut to 50; what comes next is P again, and not 50 less the difference.
+        // P of 200 and of 180 are both cut to 50; the next output is P again, and not 50 less the
+        // difference.
         for ki in [0.0, 5.0] {
             let config = incremental(2.0, ki, 0.0).with_output_limit(50.0);
             let mut pid = pid(config);
@@ -1413,7 +1417,7 @@ mod incremental {
     }
 
     #[test]
-    fn without_ki_the_incremental_form_keeps_its_memory_and_the_positional_one_has_none() {
+    fn without_ki_the_incremental_form_keeps_its_memory_and_the_positional_form_has_no_memory() {
         let step = TimeStep::of(DT_S);
         for (config, kept) in
             [(PidConfig::new(2.0, 0.0, 0.1), 0.0), (incremental(2.0, 0.0, 0.1), 1.0)]
@@ -1500,7 +1504,7 @@ mod incremental {
 
     proptest! {
         #[test]
-        fn with_tracking_it_is_a_differentiator_in_front_of_the_controller(
+        fn tracking_equals_a_differentiator_in_front_of_the_controller(
             r in 1.0_f32..500.0, gains in (0.0_f32..10.0, 0.0_f32..10.0, 0.0_f32..0.1), incremental in any::<bool>(),
             samples in prop::collection::vec((-50.0_f32..50.0, -1.0_f32..1.0, 1_u16..2000), 1..80),
         ) {
@@ -1517,7 +1521,7 @@ mod incremental {
         }
 
         #[test]
-        fn a_tracked_setpoint_never_overshoots_whatever_its_speed_and_the_time_step(
+        fn a_tracked_setpoint_never_overshoots_at_any_speed_and_time_step(
             r in 1e-3_f32..1e6, target in -1e6_f32..1e6, steps in prop::collection::vec(1_u32..=200_000, 1..200),
         ) {
             let mut pid = pid(PidConfig::new(1.0, 0.0, 0.0).with_tracking(r));
@@ -1528,11 +1532,12 @@ mod incremental {
         }
 
         #[test]
-        fn with_limits_it_equals_the_positional_form_with_conditional_integration(
+        fn the_incremental_form_with_limits_equals_the_positional_form_with_conditional_integration(
             kp in 0_u8..16, ki in 0_u8..64, kd in 0_u8..8, limit in 1_u8..60,
             samples in prop::collection::vec((-50_i8..50, -50_i8..50), 1..80),
         ) {
-            // All of it is exact in f32: quarters, a step of 2^-6 s, and a derivative in whole numbers.
+            // All values are exact in f32: quarters, a step of 2^-6 s, and a derivative in whole
+            // numbers.
             let step = TimeStep::of(1.0 / 64.0);
             let gains = (f32::from(kp) / 4.0, f32::from(ki), f32::from(kd) / 64.0);
             let limit = f32::from(limit);
@@ -1548,7 +1553,7 @@ mod incremental {
         }
 
         #[test]
-        fn without_limits_it_equals_the_positional_form(
+        fn the_incremental_form_without_limits_equals_the_positional_form(
             kp in 0.0_f32..10.0, ki in 0.0_f32..10.0, kd in 0.0_f32..0.1,
             samples in prop::collection::vec((-50.0_f32..50.0, -50.0_f32..50.0, 1_u8..10), 1..50),
         ) {
@@ -1595,13 +1600,13 @@ mod limited_beyond {
     }
 
     #[test]
-    fn a_loop_that_is_told_what_passed_does_not_wind_up() {
+    fn a_loop_told_the_passed_output_does_not_wind_up() {
         assert!(after_a_second(false) > 100.0);
         assert!((after_a_second(true) - 3.1).abs() < 1e-4); // P and the 2 that passed, and a step's growth
     }
 
     #[test]
-    fn the_sign_stays_and_what_is_no_number_takes_all() {
+    fn the_sign_stays_and_a_share_of_nan_removes_the_whole_output() {
         let mut pid = Pid::new(PidConfig::new(0.0, 100.0, 0.0)).unwrap();
         for _ in 0..=100 {
             pid.step(-1.0, 0.0, &TimeStep::of(0.001));

@@ -22,7 +22,7 @@ pub(crate) enum Input {
         setpoint: f32,
         measurement: f32,
     },
-    /// An error that was formed elsewhere, and a measured rate of change.
+    /// A given error, and a measured rate of change.
     Given {
         error: f32,
         rate: f32,
@@ -30,7 +30,7 @@ pub(crate) enum Input {
 }
 
 impl Pid {
-    /// Steps by a time that was validated before, and returns the output.
+    /// Steps by a validated time step, and returns the output.
     ///
     /// # Examples
     /// ```
@@ -58,7 +58,7 @@ impl Pid {
         }
     }
 
-    /// Steps with an error that was formed elsewhere (from integers, on a circle) and the measured rate of change.
+    /// Steps with a given error (from integers, on a circle) and the measured rate of change.
     ///
     /// D is `-kd * rate`, on the first call too, so a positive `kd` damps. Period, tracking, feed-forward and the derivative of the
     /// error do not apply. Everything else is as for [`step`](Self::step); both may be mixed.
@@ -85,8 +85,8 @@ impl Pid {
     /// The step of a [plain](Self::is_plain) controller.
     ///
     /// # Errors
-    /// If the step takes more than that (options, the first call, bad arguments, overflow), nothing changes. The value returned is
-    /// finite if setpoint and measurement, or the given error, are.
+    /// If the step needs more than the plain step (options, the first call, bad arguments, overflow), nothing changes. The
+    /// returned value is finite if setpoint and measurement, or the given error, are.
     #[inline]
     pub(crate) fn step_plain(&mut self, input: Input, step: &TimeStep) -> Result<f32, f32> {
         let (setpoint, measurement, error, rate) = match input {
@@ -119,8 +119,8 @@ impl Pid {
 
     /// The step of any controller, with error and rate as the plain step takes them.
     ///
-    /// Unless `GUARDED`, a value that is not finite shows before anything has changed, and the guarded step takes over. So do bad
-    /// arguments, a step that is not normal and the first call, whose unknown values are not finite.
+    /// Unless `GUARDED`, a value that is not finite shows before anything has changed, and the guarded step takes over. Bad
+    /// arguments, a step that is not normal and the first call, whose unknown values are not finite, show in the same way.
     #[inline(never)]
     fn step_in_full<const GUARDED: bool>(
         &mut self,
@@ -195,8 +195,8 @@ impl Pid {
         self.step_in_full::<true>((valid, measurement), (error, rate), travel, step, options)
     }
 
-    /// Returns the error and the filtered rate of change that count, and the rate of a tracked setpoint. Unless `GUARDED`, an error
-    /// or a rate that is not finite if either cannot be told.
+    /// Returns the effective error, the filtered rate of change, and the rate of a tracked setpoint. Unless `GUARDED`, an unknown
+    /// error or rate is not finite.
     #[inline(always)]
     fn differences<const GUARDED: bool>(
         &self,
@@ -242,7 +242,7 @@ impl Pid {
         (error, rate, tracking_rate)
     }
 
-    /// Returns P, and what I adds to the integral.
+    /// Returns P, and the increment of I.
     #[inline(always)]
     fn proportional_and_growth<const GUARDED: bool>(
         &self,
@@ -274,7 +274,7 @@ impl Pid {
         (proportional, growth)
     }
 
-    /// Tells whether the output has limits.
+    /// Returns whether the output has limits.
     #[inline]
     pub(crate) const fn is_limited(&self) -> bool {
         self.parameters.output_upper < f32::MAX
@@ -294,7 +294,7 @@ impl Pid {
         self.parameters.ki * step.half_dt_s * (error + self.error)
     }
 
-    /// Tells whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
+    /// Returns whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
     #[inline]
     const fn is_short(&self, way: f32) -> bool {
         passes(way, self.way_gate)
@@ -313,7 +313,7 @@ impl Pid {
         if self.is_short(rest) { rest } else { f32::NAN }
     }
 
-    /// Returns the error of the setpoint that is followed, and its rate: the linear tracking differentiator by Euler's rule.
+    /// Returns the error of the tracked setpoint, and its rate: the linear tracking differentiator by Euler's rule.
     ///
     /// The setpoint of the step before is `measurement + error`, so only its rate has to be stored.
     #[inline(always)]
@@ -328,14 +328,14 @@ impl Pid {
         (finite(before + dt_s * rate), finite(rate + dt_s * pull))
     }
 
-    /// Returns the part of its rate at which the integral works at an error beyond that of the full rate.
+    /// Returns the share of its rate at which the integral works at an error beyond the full rate.
     #[inline]
     fn weight(&self, error: f32) -> f32 {
         let (size, none) = (error.abs(), self.parameters.no_rate_above);
         if size >= none { 0.0 } else { (none - size) / (none - self.parameters.full_rate_below) }
     }
 
-    /// Returns the integral after anti-windup, for an `excess` that the limits cut off the output.
+    /// Returns the integral after anti-windup, for an `excess` cut off the output by the limits.
     #[inline]
     fn without_windup(&self, excess: f32, before: f32, integral: f32, step: &TimeStep) -> f32 {
         if self.options & BACK_CALCULATION == 0 {
@@ -355,23 +355,23 @@ impl Pid {
     }
 }
 
-/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
+/// Marks a stored error or measurement as unknown: arithmetic with NaN never passes a [`gate`].
 pub(super) const UNKNOWN: f32 = f32::INFINITY;
 
-/// A gate that nothing passes.
+/// A gate passed by no value.
 pub(super) const CLOSED: u32 = 0;
 
-/// Encodes a limit so that one integer comparison tells whether a value is within ±`limit`, and neither NaN nor infinite.
+/// Encodes a limit for one integer comparison: the value is within ±`limit`, and neither NaN nor infinite.
 pub(super) const fn gate(limit: f32) -> u32 {
     open_gate(limit) + 1
 }
 
-/// As [`gate`], but what is just `limit` does not pass. Zero gives [`CLOSED`].
+/// As [`gate`], but exactly `limit` does not pass. Zero gives [`CLOSED`].
 pub(super) const fn open_gate(limit: f32) -> u32 {
     limit.to_bits() << 1
 }
 
-/// Returns the limit that a gate encodes.
+/// Returns the limit encoded by a gate.
 #[inline]
 pub(super) const fn limit_of(gate: u32) -> f32 {
     f32::from_bits(gate >> 1)
@@ -382,7 +382,7 @@ pub(super) const fn passes(value: f32, gate: u32) -> bool {
     magnitude(value) < gate
 }
 
-/// Sizes in an order that one integer comparison tells; NaN is larger than all numbers.
+/// Sizes in an order for one integer comparison; NaN is larger than all numbers.
 #[inline]
 const fn magnitude(value: f32) -> u32 {
     value.to_bits() << 1
@@ -414,7 +414,7 @@ mod tests {
     }
 
     proptest! {
-        /// Law: the plain path is the controller, bit by bit, whatever the options, the arguments and the time.
+        /// Law: the plain path is the controller, bit by bit, for all options, arguments and times.
         #[test]
         fn a_step_that_was_tried_is_a_step(
             limit in prop::option::of(0.1_f32..100.0),

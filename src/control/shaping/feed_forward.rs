@@ -2,14 +2,14 @@ use crate::control::error::{check, not_negative};
 use crate::control::number::finite;
 use crate::error::ConfigError;
 
-/// The effort that a motion takes: `kS sign(velocity) + kV velocity + kA acceleration`.
+/// The effort of a motion: `kS sign(velocity) + kV velocity + kA acceleration`.
 ///
-/// `kS` overcomes dry friction, `kV` what grows with speed (viscous friction, back-EMF), `kA` the inertia. With the output in
-/// a unit `U` (A, V) and the velocity in `M`/s they are in `U`, `U s/M` and `U s²/M`.
+/// `kS` overcomes dry friction, `kV` the resistance that grows with speed (viscous friction, back-EMF), `kA` the inertia.
+/// With the output in a unit `U` (A, V) and the velocity in `M`/s they are in `U`, `U s/M` and `U s²/M`.
 ///
 /// # Edge behaviour
-/// It has no state and knows no time. At rest, the sign is that of the acceleration: the effort to set off. NaN or infinity in
-/// an argument gives zero, and a sum that overflows ±`f32::MAX`, however large the gains.
+/// Feed-forward has no state and knows no time. At rest, the sign is that of the acceleration: the effort to set off. NaN or
+/// infinity in an argument gives zero, and an overflowing sum ±`f32::MAX`, for any gains.
 ///
 /// # Examples
 /// ```
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_odd() {
+    fn the_time_optimal_acceleration_is_odd() {
         let feed_forward = FeedForward::new(0.3, 0.05, 0.01).unwrap();
         for (velocity, acceleration) in [(3.0, 1.0), (-3.0, 1.0), (0.0, 2.0), (0.0, 0.0)] {
             let forward = feed_forward.effort(velocity, acceleration);

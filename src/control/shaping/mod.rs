@@ -1,11 +1,11 @@
-//! Setpoints that a mechanism can follow, and the effort it takes to follow them.
+//! Setpoints within the reach of a mechanism, and the effort to follow them.
 //!
 //! | type | bounds | use it when |
 //! |---|---|---|
 //! | [`SlewLimiter`] | the rate of change | the target keeps moving: a stick, another controller |
 //! | [`Profile`] with [`MotionLimits::new`] | speed and acceleration (trapezoid) | a move from A to B, rigid mechanics |
 //! | [`Profile`] with [`MotionLimits::with_jerk`] | jerk as well (S-curve) | a move from A to B, and nothing may shake |
-//! | [`FeedForward`] | | what the profile asks for is known: leave the rest to the PID |
+//! | [`FeedForward`] | | the effort of the profile is known: leave the rest to the PID |
 
 mod feed_forward;
 mod profile;

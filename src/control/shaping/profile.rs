@@ -70,13 +70,15 @@ pub struct ProfileState {
 ///        /        \          tv  full speed
 ///       tj ta tj tv tj ta tj     distance = peak speed (2 tj + ta + tv)
 /// ```
-/// A short move has no part at full speed, and a shorter one no part at full acceleration either. It is planned once and
-/// then asked for any moment; the second half mirrors the first, so the end is exact.
+/// A short move has no part at full speed, and a shorter move no part at full acceleration either. A profile is planned
+/// once and then evaluated at any moment; the second half mirrors the first, so the end is exact.
 ///
 /// # Edge behaviour
-/// It has no state: any moment may be asked for first, and after any pause. Before the start, and for a time that is NaN, it is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest
-/// at exactly the end. A move of no length lasts 0 s, and so does one that would be over within 1e-38 s. A move whose length, or time, is beyond `f32` is an error. A rise that is
-/// shorter than `f32` can tell (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps its limit.
+/// A profile has no state: any moment may be evaluated first, and after any pause. Before the start, and for a time of NaN, the
+/// profile is at rest at the start; from [`duration_s`](Self::duration_s) on, at rest at exactly the end. A move of no length
+/// lasts 0 s, and so does a move shorter than 1e-38 s. A move whose length or duration is beyond `f32` is an error. A rise
+/// shorter than the resolution of `f32` (1e-38 s, of an acceleration near `f32::MAX`) is a jump of the speed, which still keeps
+/// its limit.
 ///
 /// # Examples
 /// ```
@@ -108,8 +110,8 @@ impl Profile {
     /// Plans the move from `start` to `end`.
     ///
     /// # Errors
-    /// Names the limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
-    /// move is longer, or takes longer, than `f32` can tell.
+    /// Names a limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
+    /// length or duration of the move is beyond `f32`.
     pub fn plan(start: f32, end: f32, limits: &MotionLimits) -> Result<Self, ConfigError> {
         limits.validate()?;
         finite("start", start)?;
@@ -297,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acceleration_or_a_jerk_near_the_largest_number_leaves_the_speed_limit_as_it_is() {
+    fn an_acceleration_or_a_jerk_near_the_largest_number_keeps_the_speed_limit() {
         for huge in [1e30, 1e38, 3e38, f32::MAX] {
             for limits in [
                 MotionLimits::new(1.0, huge),
@@ -327,7 +329,7 @@ mod tests {
 
     /// The fuzzer found a speed above its limit: the time of the move had three digits left.
     #[test]
-    fn a_move_that_is_shorter_than_f32_can_tell_is_over_at_once() {
+    fn a_move_shorter_than_the_resolution_of_f32_is_over_at_once() {
         for (end, velocity) in [(5.6e-44, 0.0316), (1e-45, 1e-6), (-1e-39, 1.0)] {
             let limits = MotionLimits::new(velocity, f32::MAX);
             let profile = Profile::plan(0.0, end, &limits).unwrap();
@@ -339,7 +341,7 @@ mod tests {
 
     /// The fuzzer found a speed of minus infinity: a ratio overflowed, and the time at full acceleration was below zero.
     #[test]
-    fn a_jerk_near_zero_leaves_the_speed_limit_as_it_is() {
+    fn a_jerk_near_zero_keeps_the_speed_limit() {
         for (acceleration, jerk) in [(6e-9, 1e-45), (1.0, 1e-39), (f32::MAX, 1e-39), (1e30, 1e-8)] {
             let limits = MotionLimits::new(2.7, acceleration).with_jerk(jerk);
             let profile = Profile::plan(3e38, -1.0, &limits).unwrap();
@@ -352,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn before_the_start_and_at_no_time_it_rests_at_the_start() {
+    fn before_the_start_and_at_a_time_of_nan_a_profile_rests_at_the_start() {
         let profile = Profile::plan(1.0, 2.0, &S_CURVE).unwrap();
         for time_s in [0.0, -1.0, f32::NAN, f32::NEG_INFINITY] {
             assert_eq!(
@@ -383,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_planned_is_named() {
+    fn an_impossible_move_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             for (limits, name) in [
                 (MotionLimits::new(bad, 1.0), "velocity"),

@@ -3,7 +3,7 @@ use crate::control::number::limited;
 use crate::control::step::TimeStep;
 use crate::error::ConfigError;
 
-/// Bounds the rate at which a value rises and falls.
+/// Limits the rate of rise and fall of a value.
 ///
 /// ```text
 /// value += target - value, but no more than up dt, and no less than -down dt
@@ -12,11 +12,11 @@ use crate::error::ConfigError;
 /// towards zero apart from them.
 ///
 /// # Edge behaviour
-/// Starts from zero, or from what was given to [`reset_to`](Self::reset_to). `dt_s` zero, negative, NaN or infinite, or a target
-/// that is NaN or infinite: the last output is returned and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s (see
-/// [`with_max_step`](Self::with_max_step)), in the first call too, counts as that: a pause is no permission to jump. Steps smaller than the spacing of
-/// `f32` at the value add up: it arrives, however slow the rate. However large the rate, the value stays between where it was
-/// and the target.
+/// Starts from zero, or from the value given to [`reset_to`](Self::reset_to). If `dt_s` is zero, negative, NaN or infinite, or
+/// the target is NaN or infinite, the last output is returned and [`rejected`](Self::rejected) grows. `dt_s` above 0.1 s (see
+/// [`with_max_step`](Self::with_max_step)), in the first call too, counts as 0.1 s: a pause is no permission to jump. Steps
+/// smaller than the spacing of `f32` at the value add up: the value arrives, at any slow rate. At any fast rate, the value stays
+/// between its last value and the target.
 ///
 /// # Examples
 /// ```
@@ -32,11 +32,11 @@ use crate::error::ConfigError;
 pub struct SlewLimiter {
     up_per_s: f32,
     down_per_s: f32,
-    /// Towards zero; zero unless it was set.
+    /// Towards zero; zero unless set.
     braking_per_s: f32,
     max_step_s: f32,
     value: f32,
-    /// What the value could not take yet of the way it may go.
+    /// The part of the permitted way not yet contained in the value.
     rest: f32,
     rejected: u16,
 }
@@ -63,7 +63,7 @@ impl SlewLimiter {
 
     /// Sets the largest change a second towards zero, more than zero; away from zero, the rise and the fall hold.
     ///
-    /// In a step that passes zero, the rest of the time is at the rate away from it.
+    /// In a step across zero, the rest of the time is at the rate away from zero.
     ///
     /// # Errors
     /// Names `braking` when NaN, infinite, zero or negative.
@@ -84,7 +84,7 @@ impl SlewLimiter {
         Ok(Self { braking_per_s: per_s, ..self })
     }
 
-    /// Sets the longest step in seconds that is believed.
+    /// Sets the longest step in seconds that counts in full.
     ///
     /// # Errors
     /// Names `max_step` when NaN, infinite, zero or negative.
@@ -102,7 +102,8 @@ impl SlewLimiter {
             let highest = self.rest + self.reach(self.up_per_s, is_below, step.dt_s);
             let left = target - self.value;
             let change = limited(left, lowest, highest);
-            // Rounding must take it neither past the target nor, with a rest of the way before, back.
+            // Rounding must take the value neither past the target nor, with a rest of the way
+            // before, back.
             let (nearest, farthest) =
                 if left > 0.0 { (self.value, target) } else { (target, self.value) };
             let value = limited(self.value + change, nearest, farthest);
@@ -117,7 +118,7 @@ impl SlewLimiter {
         self.value
     }
 
-    /// Returns how far the value may go in one direction: at `per_s`, but at the braking rate as far as zero.
+    /// Returns the largest change in one direction: at `per_s`, but at the braking rate as far as zero.
     const fn reach(&self, per_s: f32, is_towards_zero: bool, dt_s: f32) -> f32 {
         if !is_towards_zero || self.braking_per_s <= 0.0 {
             return per_s * dt_s;
@@ -142,7 +143,7 @@ impl SlewLimiter {
         self.value
     }
 
-    /// Returns the number of steps that were refused; stays at 65535.
+    /// Returns the number of refused steps; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn braking_has_its_own_rate_in_both_directions_and_none_is_left_out_at_zero() {
+    fn braking_has_its_own_rate_in_both_directions_and_no_time_is_lost_at_zero() {
         for direction in [1.0_f32, -1.0] {
             // 2 up, 3 down, 10 towards zero; a step of 0.1 s.
             let away = if direction > 0.0 { 0.3 } else { 0.2 };
@@ -195,9 +196,9 @@ mod tests {
         assert_eq!(limiter.value(), 1000.0);
     }
 
-    /// The fuzzer found both: a rest of the sum that was greater than the next step, and a product that underflowed.
+    /// The fuzzer found both: a rest of the sum greater than the next step, and a product that underflowed.
     #[test]
-    fn rounding_neither_takes_it_back_nor_lets_it_jump() {
+    fn rounding_neither_reverses_the_value_nor_makes_a_jump() {
         for (start, fall) in [(0.3, 1.9), (0.4, 0.9), (0.6, 2.7)] {
             let mut limiter = SlewLimiter::new(1e-30, fall).unwrap().with_max_step(1.0).unwrap();
             limiter.reset_to(start);
@@ -211,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn from_one_end_of_f32_to_the_other_it_stays_finite() {
+    fn a_way_from_one_end_of_f32_to_the_other_stays_finite() {
         let mut limiter = SlewLimiter::new(f32::MAX, 1.0).unwrap();
         limiter.reset_to(f32::MIN);
         let mut last = f32::MIN;

@@ -1,8 +1,8 @@
 //! Finding gains and judging them.
 //!
-//! 1. [`RelayTuner`] swings the plant with two output values and measures how it answers: [`RelayTuner::ultimate`].
-//! 2. [`RelayTuner::pid`] turns that into gains by a [`TuningRule`] with a name and a source.
-//! 3. [`StepResponse`] measures what the loop with these gains does.
+//! 1. [`RelayTuner`] swings the plant between two output values and measures the response: [`RelayTuner::ultimate`].
+//! 2. [`RelayTuner::pid`] calculates gains from the response by a [`TuningRule`] with a name and a source.
+//! 3. [`StepResponse`] measures the loop with these gains.
 //!
 //! Where mass and wheels of a robot are known, [`WheelTuning`] reckons gains to begin with.
 

@@ -14,13 +14,14 @@ use core::f32::consts::PI;
 /// Source: Åström and Hägglund, "Automatic tuning of simple regulators with specifications on phase and amplitude
 /// margins", Automatica 20 (1984).
 ///
-/// The mechanism moves while this runs: choose the amplitude so that it may, and keep the safety limits on.
+/// The mechanism moves during the measurement: choose an amplitude within its range, and keep the safety limits on.
 ///
 /// # Edge behaviour
-/// `dt_s` zero, negative, NaN or infinite, and a setpoint or measurement that is NaN or infinite: the last output is returned,
-/// nothing changes and [`rejected`](Self::rejected) grows. The first call starts the measurement, whenever it comes; a `dt_s` above
-/// [`TimeStep::MAX_S`] spoils it: it starts anew. When done or failed, the output is the bias. A swing faster than
-/// [`LEAST_SAMPLES`](Self::LEAST_SAMPLES) a half-period, one within the hysteresis and one beyond `f32` are a [`failure`](Self::failure).
+/// If `dt_s` is zero, negative, NaN or infinite, or the setpoint or measurement is NaN or infinite, the last output is returned,
+/// nothing changes and [`rejected`](Self::rejected) grows. The first call starts the measurement at any time; a `dt_s` above
+/// [`TimeStep::MAX_S`] spoils the measurement, which starts anew. When done or failed, the output is the bias. A swing faster
+/// than [`LEAST_SAMPLES`](Self::LEAST_SAMPLES) a half-period, a swing within the hysteresis and a swing beyond `f32` are a
+/// [`failure`](Self::failure).
 ///
 /// # Examples
 /// ```
@@ -62,7 +63,7 @@ pub struct RelayTuner {
     shorter_half: u8,
     rejected: u16,
     up: bool,
-    /// One of the periods that are summed is too short to be measured.
+    /// One of the summed periods is too short to be measured.
     coarse: bool,
     state: State,
 }
@@ -77,12 +78,12 @@ enum State {
     OutOfTime,
 }
 
-/// The part by which two neighbouring swings may differ for the oscillation to count as steady.
+/// The largest relative difference of two neighbouring swings of a steady oscillation.
 const STEADY: f32 = 0.1;
 
 impl RelayTuner {
-    /// The fewest samples in half a period from which amplitude and period can be told: with 8, the period is known to an eighth
-    /// and the peak of a sine to 2 %.
+    /// The fewest samples in half a period for amplitude and period: with 8, the period is known to an eighth and the peak of a
+    /// sine to 2 %.
     pub const LEAST_SAMPLES: u8 = 8;
 
     /// Takes the output to either side, more than zero, and how far the measurement must pass the setpoint before the output
@@ -116,10 +117,10 @@ impl RelayTuner {
         })
     }
 
-    /// Adds a constant to the output, such as what holds the weight or the speed; zero by default.
+    /// Adds a constant to the output, for example the output to hold the weight or the speed; zero by default.
     ///
     /// # Errors
-    /// Names `bias` when it, or the output with it, is not finite.
+    /// Names `bias` when `bias` or the output with it is not finite.
     pub const fn with_bias(self, bias: f32) -> Result<Self, ConfigError> {
         check!(finite("bias", bias.abs() + self.amplitude));
         Ok(Self { bias, ..self })
@@ -127,7 +128,7 @@ impl RelayTuner {
 
     /// Sets the number of periods to average over, more than zero; 4 by default.
     ///
-    /// They must follow one another with swings that differ by 10 % at most.
+    /// The periods must follow each other with swings that differ by 10 % at most.
     ///
     /// # Errors
     /// Names `cycles` when zero.
@@ -136,7 +137,7 @@ impl RelayTuner {
         Ok(Self { cycles, ..self })
     }
 
-    /// Sets the time in seconds after which it gives up, more than zero; 10 by default.
+    /// Sets the time limit in seconds, more than zero; 10 by default.
     ///
     /// # Errors
     /// Names `time_limit` when not more than zero.
@@ -219,7 +220,7 @@ impl RelayTuner {
         self.coarse = false;
     }
 
-    /// Returns the output for the plant: the bias, plus or minus the amplitude while it runs.
+    /// Returns the output for the plant: the bias, during the measurement plus or minus the amplitude.
     #[must_use]
     pub fn output(&self) -> f32 {
         match self.state {
@@ -229,13 +230,14 @@ impl RelayTuner {
         }
     }
 
-    /// Tells whether it has finished, with a result or a failure.
+    /// Returns whether the measurement has finished, with a result or a failure.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         matches!(self.state, State::Done | State::TooFast | State::OutOfTime)
     }
 
-    /// Returns why there is no result, with the parameter to change; `None` while it runs, and when there is a result.
+    /// Returns the reason for the missing result, with the parameter to change; `None` during the measurement, and with
+    /// a result.
     ///
     /// [`ConfigError::OutOfTime`], [`ConfigError::TooFewSamples`] or [`ConfigError::NoGain`].
     ///
@@ -266,16 +268,17 @@ impl RelayTuner {
         }
     }
 
-    /// Returns the number of steps that were refused; stays at 65535.
+    /// Returns the number of refused steps; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
     }
 
-    /// Returns the ultimate gain and period of the plant: `None` while it runs, and when there is a [`failure`](Self::failure).
+    /// Returns the ultimate gain and period of the plant: `None` during the measurement, and after a
+    /// [`failure`](Self::failure).
     ///
-    /// The gain `Ku` is the proportional one at which the loop would just keep oscillating, in units of the output over the
-    /// measurement; the period `Tu` is that of the oscillation in seconds.
+    /// At the proportional gain `Ku`, in units of the output over the measurement, the loop would just keep oscillating;
+    /// the period `Tu` is that of the oscillation in seconds.
     #[must_use]
     pub fn ultimate(&self) -> Option<(f32, f32)> {
         if self.state != State::Done {
@@ -341,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn it_finds_the_ultimate_gain_and_period_of_three_lags() {
+    fn relay_tuning_finds_the_ultimate_gain_and_period_of_three_lags() {
         let mut plant = ThreeLags { states: [0.0; 3], gain: 2.0, lag_s: 0.1 };
         let (gain, period_s) = swing(relay(1.0, 0.0), &mut plant).ultimate().unwrap();
         // The describing function is good to some percent.

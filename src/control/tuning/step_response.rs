@@ -3,12 +3,12 @@ use crate::control::number::{Sum, finite};
 use crate::control::step::TimeStep;
 use crate::error::ConfigError;
 
-/// Measures the answer of a loop to a step, sample by sample, without storing it.
+/// Measures the response of a loop to a step, sample by sample, without storing it.
 ///
 /// # Edge behaviour
 /// A sample that is NaN or infinite, or whose `dt_s` is zero, negative, NaN or infinite, is left out and counted. A long `dt_s`
-/// counts in full, the first one too: no time is lost, but what the value did in it is not seen. Samples after the end are left
-/// out. A value so far off that a measure is beyond `f32` counts as `f32::MAX`.
+/// counts in full, the first too: no time is lost, but the value in between is unknown. Samples after the end are left out. A
+/// measure beyond `f32` counts as `f32::MAX`.
 ///
 /// # Examples
 /// A first-order lag of 0.1 s rises in `0.1 ln 9` = 0.22 s and settles to 2 % in `0.1 ln 50` = 0.39 s.
@@ -48,8 +48,8 @@ impl StepResponse {
     /// Takes the value before the step, the new setpoint, how long to measure, and the tolerance as a part of the step (0.02 is the custom).
     ///
     /// # Errors
-    /// Names `target` when it is the start, or one of them is NaN or infinite; `duration` or `tolerance` when NaN, infinite, zero or
-    /// negative.
+    /// Names `target` when equal to the start, or when either is NaN or infinite; `duration` or `tolerance` when NaN, infinite,
+    /// zero or negative.
     pub const fn new(
         start: f32,
         target: f32,
@@ -79,7 +79,7 @@ impl StepResponse {
         })
     }
 
-    /// Takes the value `dt_s` seconds after the one before; the first, `dt_s` after the step.
+    /// Takes the value `dt_s` seconds after the last value; the first, `dt_s` after the step.
     pub fn record(&mut self, value: f32, dt_s: f32) {
         if self.is_complete() {
             return;
@@ -111,7 +111,7 @@ impl StepResponse {
         }
     }
 
-    /// Tells whether the time is over.
+    /// Returns whether the time is over.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.passed.value() >= self.duration_s
@@ -132,20 +132,20 @@ impl StepResponse {
         if self.peak > 1.0 { self.peak - 1.0 } else { 0.0 }
     }
 
-    /// Returns the seconds after which the value stayed within the tolerance; `None` while it is outside.
+    /// Returns the seconds after which the value stayed within the tolerance; `None` while the value is outside.
     #[must_use]
     pub const fn settling_time_s(&self) -> Option<f32> {
         if self.inside { Some(self.outside_until_s) } else { None }
     }
 
     /// Returns target minus value, averaged over the samples of the last tenth of the time, in units of the value; zero before
-    /// that.
+    /// the last tenth.
     #[must_use]
     pub const fn steady_error(&self) -> f32 {
         self.late_error
     }
 
-    /// Returns the number of samples that were left out; stays at 65535.
+    /// Returns the number of samples left out; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
         self.rejected
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_measured_is_named() {
+    fn an_invalid_step_response_is_named() {
         let none = StepResponse::new(1.0, 1.0, 1.0, 0.02).unwrap_err();
         assert_eq!(none.to_string(), "target: must differ from the start");
         assert_eq!(StepResponse::new(f32::NAN, 1.0, 1.0, 0.02).unwrap_err().parameter(), "target");

@@ -2,9 +2,9 @@ use crate::control::error::{check, positive};
 use crate::control::pid::PidConfig;
 use crate::error::ConfigError;
 
-/// A driven wheel of a robot, from which the gains of its speed loop follow.
+/// A driven wheel of a robot, for the gains of its speed loop.
 ///
-/// A wheel carries the inertia `J = mass_kg wheel_radius_m² / driven_wheels` of the robot that drives straight ahead. With the
+/// A wheel carries the inertia `J = mass_kg wheel_radius_m² / driven_wheels` of the robot driving straight ahead. With the
 /// torque `k` at the shaft for 1 A, a PI loop over `J` crosses over at [`BANDWIDTH_RAD_PER_S`](Self::BANDWIDTH_RAD_PER_S)
 /// `= w`, and is damped by [`DAMPING`](Self::DAMPING) `= d`:
 ///
@@ -14,11 +14,12 @@ use crate::error::ConfigError;
 /// ```
 ///
 /// A step of the speed then overshoots by 5 %. `J` leaves out wheel, gearbox and rotor, whose inertia is seldom known. The
-/// damping makes room for that: on three times the inertia a step overshoots by 12 % without friction, and by less with friction.
+/// damping makes room for these: on three times the inertia a step overshoots by 12 % without friction, and by less with
+/// friction.
 ///
-/// A loop at 1 kHz acts about 3 ms after the measurement, which costs 3 degrees of phase at `w`. A wheel that is lifted or
-/// slips carries its own inertia alone, and the crossover rises by the ratio of both inertias. The loop stays stable up to a
-/// ratio of 20: 400 rad/s and 69 degrees.
+/// A loop at 1 kHz acts about 3 ms after the measurement, at a cost of 3 degrees of phase at `w`. A lifted or slipping wheel
+/// carries its own inertia alone, and the crossover rises by the ratio of both inertias. The loop stays stable up to a ratio
+/// of 20: 400 rad/s and 69 degrees.
 ///
 /// A [`RelayTuner`](super::RelayTuner) measures the motor, and finds faster gains.
 ///
@@ -67,7 +68,7 @@ pub struct WheelTuning {
 }
 
 impl WheelTuning {
-    /// The angular frequency in rad/s at which the loop crosses over: `w`.
+    /// The angular frequency in rad/s of the loop's crossover: `w`.
     pub const BANDWIDTH_RAD_PER_S: f32 = 20.0;
 
     /// The damping ratio of the loop: `d`. A PI loop over an inertia overshoots by 13.5 % at 1, and by 4.8 % at 2.
@@ -124,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_overshoots_by_what_the_damping_says_and_not_much_more_with_three_times_the_inertia() {
+    fn a_step_overshoots_as_the_damping_predicts_and_little_more_at_three_times_the_inertia() {
         for (inertias, expected) in [(1.0, 1.048), (3.0, 1.12), (0.5, 1.03)] {
             let highest = highest(inertias, 0);
             assert!((highest - expected).abs() < 0.01, "{inertias}: {highest}");
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn three_milliseconds_late_it_is_stable_on_a_twentieth_of_the_inertia() {
+    fn a_loop_three_milliseconds_late_is_stable_on_a_twentieth_of_the_inertia() {
         // Another half of a millisecond is in the step itself.
         for inertias in [1.0, 0.2, 0.05] {
             assert!(highest(inertias, 3) < 2.0, "{inertias}");
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_field_that_makes_no_sense_is_named() {
+    fn the_first_invalid_field_is_named() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             for (wheel, name) in [
                 (WheelTuning { mass_kg: bad, ..WHEEL }, "mass_kg"),

@@ -4,7 +4,7 @@ use crate::motor::{HealthConfig, MotorName, OPENING, Timeouts};
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
-/// What a brushed motor needs to be known of.
+/// Configuration of a brushed motor.
 ///
 /// # Examples
 /// ```
@@ -34,7 +34,7 @@ pub struct BrushedConfig {
 }
 
 impl BrushedConfig {
-    /// Takes the number by which the motor is called in errors. Without encoder and loop, with full duty as its limit.
+    /// Takes the number of the motor in errors. Without encoder and loop, with full duty as its limit.
     #[must_use]
     pub const fn new(id: u8) -> Self {
         Self {
@@ -64,7 +64,7 @@ impl BrushedConfig {
         Self { filter_s: time_constant_s, ..self }
     }
 
-    /// Adds a speed loop: rad/s of the output shaft in, a share of full duty out. It needs the encoder.
+    /// Adds a speed loop: rad/s of the output shaft in, a share of full duty out. The loop needs the encoder.
     #[must_use]
     pub const fn with_speed_loop(self, speed: PidConfig) -> Self {
         Self { speed: Some(speed), ..self }
@@ -94,16 +94,16 @@ impl BrushedConfig {
         Self { timeouts, ..self }
     }
 
-    /// Sets the speed of the output shaft at full duty without load. Without it a motor that runs away is not noticed:
-    /// one whose encoder counts the wrong way, say.
+    /// Sets the speed of the output shaft at full duty without load. Without this speed, a runaway is not detected, for
+    /// example of a motor whose encoder counts the wrong way.
     #[must_use]
     pub const fn with_no_load_speed(self, speed: AngularVelocity) -> Self {
         Self { no_load: Some(speed), ..self }
     }
 
-    /// Sets what is looked for and what follows, where there is an encoder. At first as
-    /// [`HealthConfig::new`], but for a stall, which relaxes: an encoder that is cut off looks the same, and a
-    /// speed loop would drive the motor at full duty for ever.
+    /// Sets the monitored conditions and reactions of a motor with an encoder. At first as [`HealthConfig::new`], but a
+    /// stall relaxes: a broken encoder line looks the same, and a speed loop would drive the motor at full duty for
+    /// ever.
     #[must_use]
     pub const fn with_health(self, config: &'static HealthConfig) -> Self {
         Self { health: config, ..self }
@@ -112,7 +112,7 @@ impl BrushedConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the first that is not usable.
+    /// Names the first invalid parameter.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let bad = |number: f32| !(number.is_finite() && number > 0.0);
         if let Err(parameter) = self.health.validate() {
@@ -138,7 +138,7 @@ impl BrushedConfig {
     pub(super) fn make_loop(&self) -> Result<Option<Pid>, ConfigError> {
         let Some(speed) = self.speed else { return Ok(None) };
         let (lower, upper) = speed.output_range();
-        // Written so that NaN stays, and is refused.
+        // In this form NaN stays, and is refused.
         let lower = if lower < -self.limit { -self.limit } else { lower };
         let upper = if upper > self.limit { self.limit } else { upper };
         Pid::new(speed.with_output_range(lower, upper)).map(Some)

@@ -5,37 +5,37 @@ use crate::time::Instant;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
 
-/// What is looked for unless the configuration says otherwise.
+/// The monitored conditions by default.
 pub(super) static USUAL: HealthConfig =
     HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Relax);
 
-/// What turns when the no-load speed is not known, as a share of it: no stall, and never a runaway.
+/// Speed of a turning shaft when the no-load speed is not known, as a share of it: no stall, and never a runaway.
 const TURNS: f32 = 0.1;
 
-/// It turns when it moves a count in this time.
+/// A shaft turns if it moves a count in this time.
 const COUNT_S: f32 = 0.05;
 
-/// Health: what is wrong with the motor, and every change of it.
+/// Health: conditions of the motor, and every change of a condition.
 impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
-    /// Returns what is wrong with the motor.
+    /// Returns the present conditions of the motor.
     #[must_use]
     pub const fn conditions(&self) -> Conditions {
         self.guard.conditions()
     }
 
-    /// Returns how the motor is; without an encoder it has neither rate nor gap.
+    /// Returns the health of the motor; without an encoder there is neither rate nor gap.
     #[must_use]
     pub fn health(&self) -> Health {
         self.watch.health(self.config.name, &self.guard, &self.vitals())
     }
 
-    /// Returns the oldest change of a condition that was not read yet. None is lost, however late it is read; while it
-    /// waits, the same change is not noted again.
+    /// Returns the oldest unread edge. No edge is lost, however late the reading; while an edge waits, the same change
+    /// is not noted again.
     pub fn next_edge(&mut self) -> Option<Edge> {
         self.guard.next_edge(self.config.name)
     }
 
-    /// Looks after the motor, which may be relaxed for what is found; returns the share of its limit that it is left with.
+    /// Monitors the motor, and relaxes it if configured; returns the remaining share of its limit.
     pub(super) fn look(&mut self, now: Instant) -> f32 {
         let vitals = self.vitals();
         self.watch.look(&mut self.guard, || vitals, now)

@@ -79,7 +79,7 @@ fn the_pulse_is_off_while_the_direction_changes_and_both_pins_are_never_high() {
 }
 
 #[test]
-fn without_counts_it_is_not_armed_and_without_new_ones_it_stops() {
+fn a_motor_without_counts_is_not_armed_and_without_new_counts_stops() {
     let log = Log::default();
     let mut motor = motor(&log, WHEEL);
     assert_eq!(motor.arm(at_ms(1)).unwrap_err().to_string(), "no feedback from brushed #3");
@@ -97,7 +97,7 @@ fn without_counts_it_is_not_armed_and_without_new_ones_it_stops() {
 }
 
 #[test]
-fn what_it_offers_is_what_it_takes() {
+fn the_capabilities_are_the_accepted_targets() {
     let bare = BrushedConfig::at_once(1);
     let heard = bare.with_encoder(1_320.0, 16);
     for (config, text) in [
@@ -192,7 +192,7 @@ fn a_stop_opens_the_bridge_where_the_pulse_cannot_be_taken_away() {
 }
 
 #[test]
-fn pins_of_which_one_failed_are_set_again_whatever_comes_next() {
+fn after_a_failed_pin_both_pins_are_set_again() {
     for next in [0.5, -0.5] {
         let log = Log::default();
         let mut motor = motor(&log, BrushedConfig::at_once(1));
@@ -215,7 +215,7 @@ fn pins_of_which_one_failed_are_set_again_whatever_comes_next() {
 }
 
 #[test]
-fn parameters_that_make_no_sense_are_named() {
+fn invalid_parameters_are_named() {
     let config = BrushedConfig::at_once(1);
     let bad_gain = PidConfig::new(f32::NAN, 0.0, 0.0);
     for (config, name) in [
@@ -324,7 +324,7 @@ fn lost_counts_are_late_and_then_offline_each_once_with_its_time() {
     assert_eq!(seen, [(Condition::Late, true, 11), (Condition::Offline, true, 101)]);
     let seen = run(&mut motor, 300..330, 1.0, |_| Some(0));
     assert_eq!(seen, [(Condition::Late, false, 309), (Condition::Offline, false, 309)]);
-    // A thousand gaps that nobody reads of are one.
+    // A thousand unread gaps are one.
     for gap in 0..1_000 {
         motor.ingest_counts(0, at_ms(400 + gap * 20));
         motor.update(tick(400 + gap * 20)).unwrap();
@@ -364,7 +364,7 @@ static CARELESS: HealthConfig =
     HealthConfig::new().with_reaction(Condition::Stalled, Reaction::Ignore);
 
 #[test]
-fn a_stall_that_is_ignored_is_none() {
+fn an_ignored_stall_is_not_reported() {
     let log = Log::default();
     let mut motor = motor(&log, WHEEL.with_health(&CARELESS));
     motor.ingest_counts(0, at_ms(0));

@@ -15,7 +15,7 @@ fn armed(log: &Log, config: RcConfig) -> RcPwm<Pin<'_>> {
 }
 
 #[test]
-fn it_takes_targets_only_after_neutral_for_its_arming_time() {
+fn targets_are_taken_only_after_neutral_for_the_arming_time() {
     let log = Log::default();
     let mut esc = RcPwm::new(pin("esc", &log), RcConfig::at_once()).unwrap();
     esc.update(tick(0)).unwrap();
@@ -183,7 +183,7 @@ fn velocities_need_a_full_speed_and_are_not_measured() {
 }
 
 #[test]
-fn parameters_that_make_no_sense_are_named() {
+fn invalid_parameters_are_named() {
     let config = RcConfig::at_once();
     for (config, name) in [
         (config.with_pulses_us(2_000, 1_500, 1_000), "low pulse"),

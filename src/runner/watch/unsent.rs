@@ -1,28 +1,28 @@
-//! Command frames that the driver refused or gave back: how long each has waited.
+//! Command frames refused or given back by the driver: the time that each has waited.
 
 use super::{BUS_LOST_AFTER, Watch};
 use crate::runner::BusCondition;
 use crate::time::{Duration, Instant};
 
-/// A frame that the device does not offer any more is not waited for: neither after this time nor after so many ticks, in which each
-/// of many devices has its turn. A frame that is sent seldom, such as the limits of a drive, may be refused once.
+/// A frame that the device no longer offers is forgotten: after this time, or after this number of ticks, in which each of many
+/// devices has its turn. A frame sent seldom, such as the limits of a drive, may be refused once.
 const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
 
-/// A command frame that the driver has not taken.
+/// A command frame not taken by the driver.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unsent {
     header: u32,
     since: Instant,
     offered: Instant,
-    /// The tick in which the driver took it, as long as it may come back.
+    /// The tick in which the driver took the frame, as long as the frame may come back.
     accepted: Option<Instant>,
-    /// Whether it was called back after it had waited for a whole tick: then it was not sent, though the driver takes it.
+    /// Whether the frame was called back after a whole tick: then the frame was not sent, although the driver takes it.
     returns: bool,
     tries: u8,
-    /// Ticks since it was offered.
+    /// Ticks since the frame was offered.
     idle: u8,
 }
 
@@ -41,7 +41,7 @@ impl Watch {
         }
     }
 
-    /// Notes a frame that the driver did not take; returns how often in a row.
+    /// Notes a frame not taken by the driver; returns the number of refusals in a row.
     pub(in crate::runner) fn refused(&mut self, header: u32, now: Instant) -> u8 {
         let Some(unsent) = self.unsent.iter_mut().flatten().find(|it| it.header == header) else {
             self.begin(header, now);
@@ -64,7 +64,7 @@ impl Watch {
         }
     }
 
-    /// Notes a frame that was called back because it had waited in the controller for a whole tick.
+    /// Notes a frame called back after a whole tick in the controller.
     #[cold]
     pub(in crate::runner) fn called_back(&mut self, header: u32, now: Instant) {
         self.evicted(header, now);

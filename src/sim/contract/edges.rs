@@ -1,4 +1,4 @@
-//! Rules about what a device tells of its motors.
+//! Rules about the edges of the motors of a device.
 
 use super::run::Run;
 use super::{Outcome, Rule, Subject};
@@ -14,13 +14,13 @@ const MOST_MOTORS: usize = 64;
 /// Edges are stamped in units of this.
 const UNIT: Duration = Duration::from_micros(1_024);
 
-/// The changes that were read: of each motor, what began and what ended.
+/// The edges read: the conditions of each motor that began and ended.
 struct Told([(Conditions, Conditions); MOST_MOTORS]);
 
 impl Told {
     const NONE: Self = Self([(Conditions::NONE, Conditions::NONE); MOST_MOTORS]);
 
-    /// Reads all that waits. Each change comes once and names a motor; nothing waits afterwards.
+    /// Reads all pending edges. Each change comes once and names a motor; nothing is pending afterwards.
     fn read<S: Subject>(run: &mut Run<S>, rule: Rule) -> Result<Self, super::Violation> {
         let mut told = Self::NONE;
         while let Some(edge) = run.subject.device().next_edge() {
@@ -36,7 +36,7 @@ impl Told {
         Ok(told)
     }
 
-    /// Tells whether a change was among them.
+    /// Returns whether a change was among them.
     fn has(&self, motor: usize, condition: Condition, began: bool) -> bool {
         self.0.get(motor).is_some_and(|told| {
             let (begun, ended) = told;
@@ -45,12 +45,12 @@ impl Told {
     }
 }
 
-/// Returns which motor of the subject has a name.
+/// Returns the motor of the subject with this name.
 fn index<S: Subject>(run: &mut Run<S>, name: MotorName) -> Option<usize> {
     (0..run.subject.motors()).find(|motor| called(run, *motor) == Some(name))
 }
 
-/// Returns how a motor of the subject is called. Of motors that share an id, the claims have the order of the motors.
+/// Returns the name of a motor of the subject. For motors with a shared id, the claims have the order of the motors.
 fn called<S: Subject>(run: &mut Run<S>, motor: usize) -> Option<MotorName> {
     let id = run.subject.feedback(motor)?.id();
     let shares = |other: &usize| run.subject.feedback(*other).is_some_and(|frame| frame.id() == id);
@@ -62,7 +62,7 @@ fn called<S: Subject>(run: &mut Run<S>, motor: usize) -> Option<MotorName> {
     claims.filter(|name| last.replace(*name) != Some(*name)).nth(before)
 }
 
-/// Motors fall silent one after the other, and each change is read in the millisecond in which it happens.
+/// Motors fall silent one after the other, and each edge is read in the millisecond of its change.
 pub(super) fn per_change<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     let rule = Rule::ChangeIsAnEdge;
     for silent in 0..make().motors() {
@@ -93,7 +93,7 @@ pub(super) fn per_change<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     Ok(())
 }
 
-/// What nobody reads for long waits, with the time at which it was noticed.
+/// An edge unread for long stays pending, with the time of its detection.
 pub(super) fn wait<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::EdgesWait;
     let motors = run.subject.motors();
@@ -126,7 +126,7 @@ pub(super) fn wait<S: Subject>(mut run: Run<S>) -> Outcome {
     run.expect(rest.is_none(), rule)
 }
 
-/// What comes and goes again and again before it is read is one edge each way.
+/// A condition that comes and goes again and again before the reading is one edge each way.
 pub(super) fn flood<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::EdgesDoNotFlood;
     for _ in 0..20 {
@@ -147,7 +147,7 @@ pub(super) fn flood<S: Subject>(mut run: Run<S>) -> Outcome {
     Ok(())
 }
 
-/// A target that grew too old is told, and that there is a new one.
+/// An expired target is an edge, and a new target too.
 pub(super) fn lost_command<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::ChangeIsAnEdge;
     let lost = |edge: &Edge, began| edge.condition == Condition::CommandLost && edge.began == began;
@@ -171,7 +171,7 @@ pub(super) fn lost_command<S: Subject>(mut run: Run<S>) -> Outcome {
     run.expect(begun > 0 && ended == begun, rule)
 }
 
-/// An error that comes and goes at up to 1 kHz is one edge; one that stays refuses arming.
+/// An error that comes and goes at up to 1 kHz is one edge; a permanent error refuses arming.
 pub(super) fn fault<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     for motor in 0..make().motors() {
         let mut run = Run::driving(make())?;
@@ -187,10 +187,10 @@ pub(super) fn fault<S: Subject>(make: &impl Fn() -> S) -> Outcome {
             run.expect(taken, Rule::ClaimsFeedback)
         };
         for ms in 0..1_000 {
-            // Not in step with a device that looks at one motor after the other.
+            // Not in step with a device that checks one motor after the other.
             hear(&mut run, ms % 5 < 2)?;
         }
-        // For some devices it holds as long as it flickers.
+        // For some devices the condition lasts as long as the flicker.
         for _ in 0..50 {
             hear(&mut run, false)?;
         }
@@ -215,7 +215,7 @@ pub(super) fn fault<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     Ok(())
 }
 
-/// Another node sends a command of the device: one after the other.
+/// Another node sends the commands of the device: one after the other.
 pub(super) fn second_master<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     let rule = Rule::SecondMasterIsNotArmed;
     let commands = |run: &mut Run<S>, nth| {

@@ -1,4 +1,4 @@
-//! Checks any device, yours too, against what [`Devices`] promises: for tests only.
+//! Checks any device, also of the application, against the promises of [`Devices`]: for tests only.
 
 mod edges;
 mod rules;
@@ -7,7 +7,7 @@ mod run;
 use crate::frame::CanFrame;
 use crate::motor::{Claim, Devices, TargetError};
 
-/// What [`check_contract`] has to know of a device.
+/// A device under test, as needed by [`check_contract`].
 pub trait Subject {
     /// The device.
     type Device: Devices;
@@ -15,53 +15,51 @@ pub trait Subject {
     /// Returns the device.
     fn device(&mut self) -> &mut Self::Device;
 
-    /// Returns how many motors it has that are heard; 0 for one that reports nothing, such as a servo, and what is about
-    /// feedback is not asked of it then.
+    /// Returns the number of motors with feedback; 0 for a device without feedback, such as a servo, for which rules
+    /// about feedback are skipped.
     fn motors(&self) -> usize;
 
-    /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame, in which it stands still. Motors that
-    /// share an id have the order of the device's claims.
+    /// Plays a motor, by its index below [`motors`](Self::motors): its feedback frame at standstill. Motors with a shared id
+    /// have the order of the device's claims.
     fn feedback(&self, motor: usize) -> Option<CanFrame>;
 
-    /// Sets the targets of all motors to this share of something that moves them, and so gives commands that are not
-    /// zero; NaN is passed on.
+    /// Sets the targets of all motors to this share of a moving target, so the commands are not zero; NaN is passed on.
     ///
     /// # Errors
     /// The first error.
     fn drive(&mut self, share: f32) -> Result<(), TargetError>;
 
-    /// Sets some target that the motors do not offer, by their capabilities.
+    /// Sets a target outside of the capabilities of the motors.
     ///
     /// # Errors
-    /// Says why not, as has to be; and so it does by default, for a device whose functions offer no such thing.
+    /// Names the reason, as required; also the default, for a device without functions for such a target.
     fn drive_unsupported(&mut self) -> Result<(), TargetError> {
         Err(TargetError::Unsupported)
     }
 
-    /// Plays a motor whose ESC reports something for which it must not be driven; `None` for one that reports no errors.
+    /// Plays a motor whose ESC reports an error that forbids driving; `None` for a motor that reports no errors.
     fn fault(&self, motor: usize) -> Option<CanFrame> {
         let _ = motor;
         None
     }
 
-    /// Plays another controller on the bus, by a frame with the id of one of the device's commands: eight zeros, unless
-    /// said otherwise. `None` when the device does not look for one.
+    /// Plays another controller on the bus, by a frame with the id of one of the device's commands: eight zeros by
+    /// default. `None` when the device does not check for a second controller.
     fn rival(&self, command: &Claim) -> Option<CanFrame> {
         embedded_can::Frame::new(command.id(), &[0; 8])
     }
 
-    /// Tells whether a command frame asks for nothing: eight zeros, unless said otherwise.
+    /// Returns whether a command frame asks for nothing: eight zeros, unless said otherwise.
     fn is_zero(&self, command: &CanFrame) -> bool {
         *command.bytes() == [0; 8]
     }
 
-    /// Returns the milliseconds after which lost feedback has to be zero output, one tick included.
+    /// Returns the milliseconds from the loss of feedback to zero output, one tick included.
     fn late_ms(&self) -> u64 {
         11
     }
 
-    /// Returns the milliseconds that an emergency stop may take until it is on its way: 0, unless the protocol has it wait
-    /// for an answer.
+    /// Returns the milliseconds until an emergency stop is sent: 0, unless the protocol makes the stop wait for an answer.
     fn stop_ms(&self) -> u64 {
         0
     }
@@ -71,43 +69,42 @@ pub trait Subject {
         220
     }
 
-    /// Returns the milliseconds of feedback after which it can be armed, or driven after it had no target: 0, unless its drives are
-    /// asked for their settings or enabled first.
+    /// Returns the milliseconds of feedback before arming, or before driving after a time without target: 0, unless its drives
+    /// are asked for their settings or enabled first.
     fn settle_ms(&self) -> u64 {
         0
     }
 
-    /// Returns the milliseconds after which a target no longer counts, one tick included.
+    /// Returns the milliseconds after which a target expires, one tick included.
     fn command_ms(&self) -> u64 {
         101
     }
 }
 
-/// What a device has to do.
+/// The rules of a device.
 ///
-/// Each rule is the invariant of that name in `docs/faults.md`, or a sentence of [`Devices`].
+/// Each rule is the invariant of the same name in `docs/faults.md`, or a sentence of [`Devices`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Rule {
-    /// Its claims have the ids that its motors send, and no two of them clash.
+    /// The claims have the ids of the motors' frames, and no two claims collide.
     ClaimsFeedback,
-    /// Each frame that it offers is a data frame with an id that it claims as a command, or a remote frame with one that it claims as
-    /// feedback (I3).
+    /// Each offered frame is a data frame with an id claimed as a command, or a remote frame with an id claimed as feedback (I3).
     SendsWhatItClaims,
-    /// It offers no more than 64 frames between two updates.
+    /// The device offers no more than 64 frames between two updates.
     IsBounded,
-    /// Disarmed, it asks for nothing and refuses targets.
+    /// Disarmed, the device commands nothing and refuses targets.
     DisarmedIsZero,
     /// Arming fails as long as a motor is not heard, and the error counts the missing.
     MissingAreNamed,
-    /// With all motors heard it can be armed, and a target then leads to a command.
+    /// With feedback of all motors, arming succeeds, and a target then leads to a command.
     ArmedDrives,
     /// Foreign, remote and extended frames are handed back and change nothing (I5).
     ForeignIsUnrelated,
-    /// Feedback that is too short is not taken and changes nothing (I5).
+    /// Feedback that is too short is refused and changes nothing (I5).
     ShortIsNotTaken,
-    /// Frames that were not taken do not count as signs of life.
+    /// Refused frames do not count as signs of life.
     RejectedIsNotFresh,
     /// Without feedback a motor's output is zero within a tick of the limit (I4).
     LateIsZero,
@@ -115,35 +112,36 @@ pub enum Rule {
     OthersGoOn,
     /// Without new targets the output is zero within a tick of the deadline (I4).
     OldTargetsAreZero,
-    /// A target that is refused without fresh feedback takes the older one away: it does not act when the feedback is back.
+    /// A target refused without fresh feedback also removes the older target: the older target does not act when the
+    /// feedback is back.
     RefusedTargetsAreZero,
-    /// A target that is NaN is an error and gives zero.
+    /// A target of NaN is an error and gives zero.
     NanIsZero,
-    /// A target that is not offered is an error, and changes nothing (I5).
+    /// A target outside of the capabilities is an error, and changes nothing (I5).
     UnsupportedIsAnError,
     /// A second bad time step in a row gives zero.
     BadStepsAreZero,
     /// An update that does not lie after the one before gives zero in that cycle, and until the device is armed again.
     LostTimeTrips,
-    /// After a trip, a request to arm that is repeated in each tick is never granted, and one after a pause is.
+    /// After a trip, a request to arm repeated in each tick is never granted, and a request after a pause is.
     ArmingIsAGesture,
-    /// A frame that is given back is taken, waits for the next update, and comes again with the newest values (I7).
+    /// A frame given back is taken, waits for the next update, and comes again with the newest values (I7).
     RequeuedComesAgain,
-    /// A frame that is not its own is not taken back.
+    /// A frame of another device is not taken back.
     ForeignIsNotRequeued,
-    /// After an emergency stop all that comes is zero, and arming fails, until it is cleared and armed.
+    /// After an emergency stop all commands are zero, and arming fails, until the stop is cleared and the device armed.
     EmergencyStopStays,
-    /// After disarming, and after arming again, all that comes is zero until there is a target (I9).
+    /// After disarming, and after arming again, all commands are zero until there is a target (I9).
     StartsFromZero,
-    /// As long as a motor reports a fault it is not armed.
+    /// While a motor reports a fault, arming is refused.
     FaultIsNotArmed,
-    /// While another node sends one of its commands it is not armed.
+    /// While another node sends a command of the device, arming is refused.
     SecondMasterIsNotArmed,
-    /// Each change is an edge that names its motor and has its time, and a healthy motor has none.
+    /// Each change is an edge with its motor and time, and a healthy motor has no edges.
     ChangeIsAnEdge,
-    /// An edge waits until it is read, and is read once.
+    /// An edge waits until read, and is read once.
     EdgesWait,
-    /// What comes and goes before it is read is one edge each way.
+    /// A condition that comes and goes before the reading is one edge each way.
     EdgesDoNotFlood,
     /// The same inputs give the same frames (I10).
     IsDeterministic,
@@ -167,8 +165,8 @@ impl core::fmt::Display for Violation {
 
 impl core::error::Error for Violation {}
 
-/// Checks a device against what [`Devices`] promises, yours too: makes fresh ones, plays their motors, and watches
-/// what they send.
+/// Checks a device against the promises of [`Devices`]: makes fresh devices, plays their motors, and checks their
+/// frames.
 ///
 /// # Examples
 /// ```

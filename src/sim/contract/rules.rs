@@ -85,7 +85,7 @@ fn armed<S: Subject>(mut run: Run<S>) -> Outcome {
     run.expect(armed && output.driving > 0, Rule::ArmedDrives)
 }
 
-/// Frames of others, or that only look like a motor's: on one device of two that must not differ.
+/// Frames of others, or only similar to a motor's: on one device of two, without any difference.
 fn rejected<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
     let count = run.subject.motors();
     for round in 0..40 {
@@ -104,7 +104,7 @@ fn rejected<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
             let outcome = run.subject.device().ingest(&foreign, now);
             run.expect(outcome == Ingest::Unrelated, Rule::ForeignIsUnrelated)?;
         }
-        // With feedback and without: a motor that is late must stay so.
+        // With feedback and without: a late motor must stay late.
         let (one, two) = if round < 20 {
             (run.step()?, other.step()?)
         } else {
@@ -148,7 +148,7 @@ fn late<S: Subject>(mut run: Run<S>) -> Outcome {
     Ok(())
 }
 
-/// One motor after the other falls silent; what waits for it is no other's fault.
+/// One motor after the other falls silent; frames that wait for a silent motor do not stop the others.
 fn others<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     let motors = make().motors();
     if motors < 2 {
@@ -202,7 +202,7 @@ fn nan<S: Subject>(mut run: Run<S>) -> Outcome {
     Ok(())
 }
 
-/// On one device of two: the other must not differ.
+/// On one device of two: without any difference to the other.
 fn unsupported<S: Subject>(mut run: Run<S>, mut other: Run<S>) -> Outcome {
     for _ in 0..20 {
         let outcome = run.subject.drive_unsupported();
@@ -242,7 +242,7 @@ fn lost_time<S: Subject>(make: &impl Fn() -> S) -> Outcome {
     Ok(())
 }
 
-/// After a trip: a request that is repeated is never granted, and one after a pause is.
+/// After a trip: a repeated request is never granted, and a request after a pause is.
 fn gesture<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::ArmingIsAGesture;
     for round in 0..150 {
@@ -277,7 +277,7 @@ fn requeue<S: Subject>(mut run: Run<S>) -> Outcome {
     let taken = run.subject.device().requeue(&frame);
     let waiting = run.drain()?.frames;
     run.expect(taken && waiting == 0, Rule::RequeuedComesAgain)?;
-    // The newest value is to relax: the old one must not come back.
+    // The newest value is to relax: the old value must not come back.
     run.subject.device().disarm();
     run.drain()?;
     run.subject.device().requeue(&frame);
@@ -295,7 +295,7 @@ fn emergency_stop<S: Subject>(mut run: Run<S>) -> Outcome {
     let rule = Rule::EmergencyStopStays;
     let tick = Tick::new(run.now(), 0.001);
     run.subject.device().update(tick);
-    // In the middle of a cycle: what waits now must be zero already.
+    // In the middle of a cycle: pending frames must be zero already.
     run.subject.device().emergency_stop();
     let output = run.drain()?;
     let mut frames = output.frames;
@@ -368,7 +368,7 @@ fn shorter(frame: &CanFrame) -> impl Iterator<Item = CanFrame> + '_ {
         .filter_map(|length| CanFrame::new(frame.id(), frame.data().get(..length)?))
 }
 
-/// A frame with an id that no motor has.
+/// A frame with an id of no motor.
 fn unclaimed(device: &mut impl Devices) -> Option<CanFrame> {
     let mut free = |id: &StandardId| {
         let probe = Claim::new(*id, Role::Feedback, crate::motor::MotorName::new("foreign", 0));

@@ -6,11 +6,11 @@ use crate::time::{Instant, Tick};
 /// More frames than a device may offer between two updates.
 const MOST_FRAMES: u32 = 64;
 
-/// What came out between two updates.
+/// The frames between two updates.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Output {
     pub(super) frames: u32,
-    /// Frames that ask for something.
+    /// Frames with a command other than rest.
     pub(super) driving: u32,
     /// The last frame.
     pub(super) last: Option<CanFrame>,
@@ -39,7 +39,7 @@ impl<S: Subject> Run<S> {
         Ok(run)
     }
 
-    /// Waits until it can be armed.
+    /// Waits until arming succeeds.
     pub(super) fn settle(&mut self) -> Outcome {
         for _ in 0..self.subject.settle_ms() {
             self.step()?;
@@ -89,7 +89,7 @@ impl<S: Subject> Run<S> {
         frame.is_some_and(|frame| self.subject.device().ingest(&frame, now) == Ingest::Taken)
     }
 
-    /// A millisecond with feedback from all motors, and a time step that says something else.
+    /// A millisecond with feedback from all motors, and another time step in the tick.
     pub(super) fn step_for(&mut self, dt_s: f32) -> Result<Output, Violation> {
         self.ms += 1;
         for motor in 0..self.subject.motors() {
@@ -127,7 +127,7 @@ impl<S: Subject> Run<S> {
         self.drain()
     }
 
-    /// Takes every frame that waits.
+    /// Takes every pending frame.
     pub(super) fn drain(&mut self) -> Result<Output, Violation> {
         let mut output = Output::default();
         while let Some(frame) = self.subject.device().next_frame(self.turn) {

@@ -127,7 +127,7 @@ impl DamiaoDrive {
         (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
     }
 
-    /// Tells whether the drive follows commands.
+    /// Returns whether the drive follows commands.
     #[must_use]
     pub const fn is_enabled(&self) -> bool {
         self.is_enabled

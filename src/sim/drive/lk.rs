@@ -133,7 +133,7 @@ impl LkDrive {
         self.clear_turns();
     }
 
-    /// Tells whether the drive follows commands.
+    /// Returns whether the drive follows commands.
     #[must_use]
     pub const fn is_on(&self) -> bool {
         self.is_on

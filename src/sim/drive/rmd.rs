@@ -190,13 +190,13 @@ impl RmdDrive {
         };
     }
 
-    /// Tells whether the drive follows a command.
+    /// Returns whether the drive follows a command.
     #[must_use]
     pub fn is_on(&self) -> bool {
         self.command != Command::None && !self.is_expired && self.errors == 0
     }
 
-    /// Tells whether the holding brake keeps the shaft.
+    /// Returns whether the holding brake keeps the shaft.
     #[must_use]
     pub fn is_locked(&self) -> bool {
         self.opening_s.is_none_or(|left| left > 0.0)

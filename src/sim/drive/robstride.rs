@@ -154,7 +154,7 @@ impl RobStrideDrive {
         (self.is_enabled, self.faults, self.operation) = (false, 0, [0.0; 5]);
     }
 
-    /// Tells whether the drive follows commands.
+    /// Returns whether the drive follows commands.
     #[must_use]
     pub const fn is_enabled(&self) -> bool {
         self.is_enabled

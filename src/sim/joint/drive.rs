@@ -8,11 +8,11 @@ use crate::snake::{IDS, PULSES_PER_TURN, Register};
 use crate::units::{AngularVelocity, Current};
 use embedded_can::{Frame, StandardId};
 
-/// The longest time that a reply is later than the least. An estimate.
+/// The longest delay of a reply beyond the least. An estimate.
 const JITTER_NS: u32 = 100_000;
 /// The shaft follows the profile with this time constant. An estimate.
 const LAG_S: f32 = 0.002;
-/// What friction takes from a disabled shaft, in pulses a second²: 20 turns a second². An estimate.
+/// Deceleration of a disabled shaft by friction, in pulses a second²: 20 turns a second². An estimate.
 const FRICTION: f32 = 20.0 * PULSES_PER_TURN as f32;
 
 /// The drive of a joint, and its shaft.
@@ -30,13 +30,13 @@ pub(crate) struct Drive {
     profile_velocity: f32,
     /// Where the shaft was when the counter started.
     zero: f64,
-    /// What was asked for, and when it will be answered.
+    /// The request, and the time of its answer.
     due: Option<(u64, Register)>,
     replies: u32,
     pub(crate) collisions: u32,
 }
 
-/// As they were written last; a drive starts with nothing.
+/// As written last; a drive starts with nothing.
 #[derive(Debug, Default, Clone, Copy)]
 struct Registers {
     current: i32,
@@ -121,7 +121,7 @@ impl Drive {
         self.due.map(|(at_ns, _)| at_ns)
     }
 
-    /// Hands the reply that is due to the bus, unless a fault keeps it back.
+    /// Hands the due reply to the bus, unless a fault suppresses it.
     pub(crate) fn reply(&mut self, silent: bool) {
         let Some((_, register)) = self.due.take() else { return };
         let value = match register {
@@ -138,7 +138,7 @@ impl Drive {
         }
     }
 
-    /// Gives the supply or takes it away. A fresh start forgets everything, and counts from where it is.
+    /// Gives or removes the supply. A fresh start forgets everything, and counts from the present angle.
     pub(crate) fn set_powered(&mut self, powered: bool) {
         if powered && !self.powered {
             self.registers = Registers::default();
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_supply_it_forgets_registers_and_zero() {
+    fn a_joint_without_supply_forgets_registers_and_zero() {
         let mut drive = drive();
         steps(&mut drive, 5_000);
         drive.set_powered(false);

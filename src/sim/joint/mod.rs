@@ -1,4 +1,4 @@
-//! Joint motors: drives that hold their own position loop.
+//! Joint motors: drives with a position loop of their own.
 
 mod drive;
 
@@ -9,10 +9,10 @@ use crate::time::Duration;
 
 /// A joint of a snake robot to attach to a [`Simulation`].
 ///
-/// It speaks the protocol of [`snake`](crate::snake). **Its behaviour is an estimate**: it goes to its target with the
-/// speed, acceleration and deceleration of its registers, its shaft 2 ms behind; it answers 150 to 250 µs after a request;
-/// disabled, friction stops it; without a command it goes on for ever; without a supply it forgets every register and
-/// where its zero was.
+/// A joint speaks the protocol of [`snake`](crate::snake). **Its behaviour is an estimate**: the joint moves to its target
+/// with the speed, acceleration and deceleration of its registers, its shaft 2 ms behind; it answers 150 to 250 µs after a
+/// request; disabled, friction stops the shaft; without a command the joint continues for ever; without a supply, every
+/// register and the zero are lost.
 ///
 /// # Examples
 /// ```
@@ -55,7 +55,7 @@ pub struct JointConfig {
 }
 
 impl JointConfig {
-    /// Takes the id that is set on the joint: 1 to 12.
+    /// Takes the id of the joint: 1 to 12.
     #[must_use]
     pub const fn new(id: u8) -> Self {
         Self { id, line: Line::Can1, position: None, latency: Duration::from_micros(150) }
@@ -73,7 +73,7 @@ impl JointConfig {
         Self { position: Some(pulses), ..self }
     }
 
-    /// Sets the least time until it answers; 150 µs at first.
+    /// Sets the least time until an answer; 150 µs at first.
     #[must_use]
     pub const fn with_latency(self, latency: Duration) -> Self {
         Self { latency, ..self }

@@ -6,10 +6,10 @@ use super::ParseError;
 use crate::frame::CanFrame;
 use crate::time::Instant;
 
-/// The bit that candump sets in the id of an error frame (`CAN_ERR_FLAG`).
+/// The bit set by candump in the id of an error frame (`CAN_ERR_FLAG`).
 const ERROR_FRAME: u32 = 0x2000_0000;
 
-/// A place in a line. Every step moves it forward or fails, so that reading a line takes time in its length.
+/// A place in a line. Every step moves forward or fails, so the time to read a line grows with its length only.
 pub(super) struct Cursor<'a> {
     line: &'a [u8],
     at: usize,
@@ -20,7 +20,7 @@ impl<'a> Cursor<'a> {
         Self { line, at: 0 }
     }
 
-    /// Says what is wrong here.
+    /// Makes the error for this place.
     pub(super) fn error(&self, what: impl FnOnce(usize) -> ParseError) -> ParseError {
         what(self.at + 1)
     }
@@ -47,7 +47,7 @@ impl<'a> Cursor<'a> {
         while self.accept(b' ') || self.accept(b'\t') {}
     }
 
-    /// Takes what stands before the next blank.
+    /// Takes the text before the next blank.
     fn word(&mut self) -> &'a [u8] {
         let rest = self.line.get(self.at..).unwrap_or(&[]);
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
@@ -135,7 +135,7 @@ impl<'a> Cursor<'a> {
         id.ok_or(error)
     }
 
-    /// Reads what follows `#`.
+    /// Reads the text after `#`.
     pub(super) fn packed(&mut self, id: Id) -> Result<CanFrame, ParseError> {
         if self.peek() == Some(b'#') {
             return Err(self.error(ParseError::CanFd));
@@ -155,7 +155,7 @@ impl<'a> Cursor<'a> {
         self.packed_end(frame)
     }
 
-    /// Reads what may stand behind a packed frame: the raw length code of an 8-byte frame (`_9` to `_F`), the direction.
+    /// Reads the optional end of a packed frame: the raw length code of an 8-byte frame (`_9` to `_F`), the direction.
     fn packed_end(&mut self, frame: CanFrame) -> Result<CanFrame, ParseError> {
         if frame.length() == 8 && self.accept(b'_') {
             let code = self.peek().and_then(nibble).filter(|code| *code > 8);

@@ -1,4 +1,4 @@
-//! The text that SocketCAN's `candump` prints: one CAN frame a line.
+//! The text output of SocketCAN's `candump`: one CAN frame a line.
 //!
 //! ```text
 //!   can0  201   [8]  0E 16 00 00 FF FD 21 00                          candump can0
@@ -30,11 +30,11 @@ use self::cursor::Cursor;
 use crate::frame::CanFrame;
 use crate::time::Instant;
 
-/// One line of candump: a frame, where it was seen, and when.
+/// One line of candump: a frame, its interface, and its time.
 ///
-/// `{}` writes the form of `candump -L`, `{:#}` the columns. Both are read again by [`parse`](Self::parse) to an equal
-/// record, as long as `interface` is a name that candump could print: 1 to 15 printable ASCII characters without
-/// a space, the first of them not `(`.
+/// `{}` writes the form of `candump -L`, `{:#}` the columns. [`parse`](Self::parse) reads both again to an equal
+/// record, if `interface` is a valid name for candump: 1 to 15 printable ASCII characters without a space, the first of
+/// them not `(`.
 ///
 /// # Examples
 /// ```
@@ -48,7 +48,8 @@ use crate::time::Instant;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Record<'a> {
-    /// The time stamp as candump printed it: since 1970 (`-ta`, `-L`) or since its start (`-tz`); `None` without one.
+    /// The time stamp as printed by candump: since 1970 (`-ta`, `-L`) or since its start (`-tz`); `None` without a
+    /// stamp.
     pub time: Option<Instant>,
     /// The name of the CAN interface: `can0`.
     pub interface: &'a str,
@@ -60,7 +61,7 @@ impl<'a> Record<'a> {
     /// Reads one line, with or without its line end.
     ///
     /// # Errors
-    /// [`ParseError`] names what was wrong and the column where it was seen. No line makes it panic.
+    /// [`ParseError`] names the fault and its column. No line causes a panic.
     pub fn parse(line: &'a [u8]) -> Result<Self, ParseError> {
         let mut cursor = Cursor::new(line.trim_ascii_end());
         cursor.skip_spaces();
@@ -76,7 +77,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// What a line of candump has wrong, and where: the byte at which reading stopped, counted from 1.
+/// Fault of a line of candump, and its place: the byte at which reading stopped, counted from 1.
 ///
 /// # Examples
 /// ```
@@ -92,7 +93,7 @@ impl<'a> Record<'a> {
 pub enum ParseError {
     /// The line is blank.
     Blank(usize),
-    /// There is no time stamp `(seconds.fraction)` that fits 64 bits of microseconds; dates (`-tA`) are not read.
+    /// There is no time stamp `(seconds.fraction)` within 64 bits of microseconds; dates (`-tA`) are not read.
     Time(usize),
     /// There is no name of 1 to 15 printable ASCII characters.
     Interface(usize),
@@ -310,7 +311,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read_again(
+        fn a_written_record_is_read_again(
             micros in prop::option::of(any::<u64>()),
             interface in "[!-'*-~][!-~]{0,14}",
             frame in any_frame(),
@@ -344,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_says_column_and_what_was_expected() {
+    fn an_error_names_the_column_and_the_expectation() {
         let error = Record::parse(b"can0 201#0E1").unwrap_err();
         assert_eq!(std::format!("{error}"), "column 13: expected two hexadecimal digits");
     }

@@ -1,4 +1,4 @@
-//! DBUS: what a DR16 receiver hears of a remote control. 100000 baud, 8 data bits, even parity, inverted.
+//! DBUS: the output of a DR16 receiver of a remote control. 100000 baud, 8 data bits, even parity, inverted.
 //!
 //! ```text
 //! bits 0..44   4 channels of 11 bits, 364..=1684, centre 1024      bytes  6..12  mouse x, y, z i16
@@ -7,9 +7,9 @@
 //! all low byte, low bit first                                      bytes 16..18  dial like a channel, 0: none
 //! ```
 //!
-//! A frame has neither header nor checksum. It is told apart by the pause before it (18 bytes take 2.2 ms, one frame
-//! comes every 14 ms), and believed only when every field has a value that it can have. What is not believed is not
-//! used in part: the state is neutral at once, until the next good frame.
+//! A frame has neither header nor checksum. The pause before a frame marks its start (18 bytes take 2.2 ms, one frame
+//! comes every 14 ms), and a frame counts only if every field has a possible value. A refused frame is not used in
+//! part: the state is neutral at once, until the next good frame.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
@@ -28,9 +28,9 @@
 //! assert_eq!(dbus.remote(later), Remote::default()); // lost: neutral
 //! ```
 //!
-//! Call [`read`](Dbus::read) with every portion of bytes soon after it came, at least every 2 ms, or from the interrupt
-//! that the serial port raises in a pause: with several frames in one late portion the pauses between them are not seen.
-//! Even so they are read, but noise between them is found only by its values.
+//! Call [`read`](Dbus::read) with every portion of bytes soon after its arrival, at least every 2 ms, or from the
+//! interrupt of the serial port in a pause: in a late portion of several frames, the pauses between them are lost. The
+//! frames are still read, but noise between them shows only by its values.
 //!
 //! Source: taproot (GPL, facts only), librm; a public dump. Older headers, made after the first manual, put Q, E, Shift and
 //! Ctrl into bits 4 to 7 of the keys.
@@ -47,7 +47,7 @@ use crate::time::{ConditionEdge, Duration, Instant};
 /// The length of a frame in bytes.
 pub const FRAME_LENGTH: usize = 18;
 
-/// A streaming decoder of DBUS that watches the signal.
+/// A streaming decoder of DBUS, with supervision of the signal.
 #[derive(Debug, Clone)]
 pub struct Dbus {
     pause: Duration,
@@ -85,9 +85,9 @@ impl Dbus {
         }
     }
 
-    /// Sets the silence that separates two frames. It must be longer than the time between two calls of
-    /// [`read`](Self::read) within a frame, and shorter than the pause of the receiver (11.8 ms, 4.8 ms for a
-    /// receiver that sends every 7 ms).
+    /// Sets the silence between two frames. The silence must be longer than the time between two calls of
+    /// [`read`](Self::read) within a frame, and shorter than the pause of the receiver (11.8 ms; 4.8 ms for a receiver
+    /// with a frame every 7 ms).
     #[must_use]
     pub const fn with_pause(self, pause: Duration) -> Self {
         Self { pause, ..self }
@@ -106,8 +106,8 @@ impl Dbus {
         Self { dead_band: if counts < 659 { counts } else { 659 }, ..self }
     }
 
-    /// Returns the next frame, and takes from `input` the bytes that it looked at; `now` is when they arrived. `None`
-    /// when `input` is used up.
+    /// Returns the next frame, and removes the bytes read from `input`; `now` is their time of arrival. `None` when
+    /// `input` is used up.
     #[must_use]
     pub fn read(&mut self, input: &mut &[u8], now: Instant) -> Option<Remote> {
         if input.is_empty() {
@@ -136,9 +136,9 @@ impl Dbus {
         None
     }
 
-    /// Notes that the line was silent: the next byte begins a frame.
+    /// Notes a silence of the line: the next byte begins a frame.
     ///
-    /// For the idle interrupt of a serial port. Without it, [`read`](Self::read) tells a pause by its time.
+    /// For the idle interrupt of a serial port. Without it, [`read`](Self::read) detects a pause by its time.
     pub fn note_pause(&mut self) {
         if self.length > 0 {
             count(&mut self.counts.length_errors, 1);
@@ -148,7 +148,7 @@ impl Dbus {
         self.lost_step = false;
     }
 
-    /// Returns what the remote control shows; neutral before the first frame, when the signal is lost, and after an
+    /// Returns the state of the remote control; neutral before the first frame, when the signal is lost, and after an
     /// implausible frame.
     #[must_use]
     pub fn remote(&self, now: Instant) -> Remote {
@@ -161,16 +161,16 @@ impl Dbus {
         self.deadline.is_live(now)
     }
 
-    /// Returns the oldest beginning or end of silence that was not fetched yet.
+    /// Returns the oldest unread beginning or end of silence.
     #[must_use]
     pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.deadline.edge(now)
     }
 
-    /// Returns how many frames came, and what was thrown away.
+    /// Returns the counts of frames and of discarded bytes.
     ///
-    /// A content error is a frame with a value that its field cannot have; a length error is one that ended early: less than
-    /// 18 bytes before a pause. There are no others, because a frame has no checksum.
+    /// A content error is a frame with an impossible value in a field; a length error is a frame that ended early: less than
+    /// 18 bytes before a pause. There are no other errors, because a frame has no checksum.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts

@@ -5,7 +5,7 @@ const CENTRE: u16 = 1024;
 /// The channels' largest distance from the centre.
 const SPAN: u16 = 660;
 
-/// What a remote control shows. The default is neutral: nothing moved, nothing pressed, switches absent.
+/// State of a remote control. The default is neutral: nothing moved, nothing pressed, switches absent.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -18,14 +18,13 @@ pub struct Remote {
     pub left_x: f32,
     /// The left stick along, the same: away from the person is positive.
     pub left_y: f32,
-    /// The dial at the corner: -1 to 1; 0 from receivers that do not send it.
+    /// The dial at the corner: -1 to 1; 0 from receivers without the dial.
     pub dial: f32,
     /// The switch above the right stick.
     pub right_switch: Switch,
     /// The switch above the left stick.
     pub left_switch: Switch,
-    /// The counts by which the mouse of the computer that the remote control is plugged into moved since the last frame:
-    /// right is positive.
+    /// Counts of the mouse since the last frame, at the computer of the remote control: right is positive.
     pub mouse_x: i16,
     /// The same: towards the person is positive.
     pub mouse_y: i16,
@@ -35,7 +34,7 @@ pub struct Remote {
     pub mouse_left: bool,
     /// Whether the right button of the mouse is down.
     pub mouse_right: bool,
-    /// The keyboard of that computer.
+    /// The keyboard of the same computer.
     pub keys: Keys,
 }
 
@@ -55,7 +54,7 @@ pub enum Switch {
     Middle,
 }
 
-/// The keys that are down, one bit a key, as it came.
+/// The pressed keys, one bit a key, as received.
 ///
 /// # Examples
 /// ```
@@ -119,7 +118,7 @@ impl Remote {
         keys: Keys(0),
     };
 
-    /// Reads a frame; `None` when one of its fields has a value that it cannot have.
+    /// Reads a frame; `None` when a field has an impossible value.
     pub(super) fn from_frame(frame: &[u8; FRAME_LENGTH], dead_band: u16) -> Option<Self> {
         let [c0, c1, c2, c3, c4, c5, mouse @ .., l, r, k0, k1, d0, d1] = *frame;
         let [x0, x1, y0, y1, z0, z1] = mouse;

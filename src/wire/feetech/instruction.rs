@@ -55,7 +55,7 @@ pub fn reg_write<'a>(
     addressed(id, REG_WRITE, address, data, out)
 }
 
-/// Puts what [`reg_write`] left in the servos into effect.
+/// Executes the writes left in the servos by [`reg_write`].
 ///
 /// # Errors
 /// [`EncodeError::BufferTooSmall`] when `out` has less than 6 bytes.
@@ -71,7 +71,7 @@ pub fn reset(id: ServoId, out: &mut [u8]) -> Result<&[u8], EncodeError> {
     simple(id, RESET, out)
 }
 
-/// Asks several servos for `count` bytes each, from register `address` on. They answer one after the other.
+/// Asks several servos for `count` bytes each, from register `address` on. The servos answer one after the other.
 ///
 /// # Errors
 /// [`EncodeError`] when the buffer is too small or there are more than 251 servos.
@@ -87,7 +87,7 @@ pub fn sync_read<'a>(
     Ok(seal(frame))
 }
 
-/// Writes `K` bytes into each of several servos, from register `address` on. None of them answers.
+/// Writes `K` bytes into each of several servos, from register `address` on. None of the servos answers.
 ///
 /// # Examples
 /// ```

@@ -5,11 +5,11 @@
 //! status       FF FF | id | length | error bits  | parameters | checksum
 //! length = parameters + 2        checksum = complement of the sum from id to the last parameter
 //! ```
-//! Numbers have their low byte first (those of the older SCS servos the high byte; these are not read here). Signed
+//! Numbers have their low byte first (older SCS servos have the high byte first; these are not read here). Signed
 //! numbers are sign and magnitude, not two's complement.
 //!
-//! A servo answers every instruction but those to [`ServoId::BROADCAST`]. Status and instruction look the same, so on an
-//! adapter that hears itself, throw as many received bytes away as were sent before giving the rest to the decoder.
+//! A servo answers every instruction except to [`ServoId::BROADCAST`]. Status and instruction look the same, so on an
+//! adapter with an echo, discard as many received bytes as were sent before giving the rest to the decoder.
 //!
 //! ```
 //! use drivetrain::wire::{Deframer, feetech::{self, Goal, Present, ServoId, Status, MAX_FRAME}};
@@ -56,7 +56,7 @@ pub use values::{COUNTS_PER_TURN, Goal, Present, from_sign_magnitude, to_sign_ma
 pub struct ServoId(u8);
 
 impl ServoId {
-    /// The number of a servo as it is delivered.
+    /// The number of a servo at delivery.
     pub const ONE: Self = Self(1);
     /// All servos; none of them answers.
     pub const BROADCAST: Self = Self(254);

@@ -24,7 +24,7 @@ pub const GOAL_TIME: u8 = 44;
 pub const GOAL_SPEED: u8 = 46;
 /// Two bytes, in 0.1 % of the stall torque.
 pub const TORQUE_LIMIT: u8 = 48;
-/// 0: the EEPROM can be written, 1: it is locked.
+/// 0: the EEPROM can be written, 1: the EEPROM is locked.
 pub const LOCK: u8 = 55;
 /// Two bytes with sign, in counts.
 pub const PRESENT_POSITION: u8 = 56;

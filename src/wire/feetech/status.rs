@@ -1,10 +1,10 @@
 use super::checksum;
 use crate::wire::{Decode, Reject};
 
-/// The most parameters that a [`Status`] holds: a longer reply is refused by its length.
+/// The largest number of parameters in a [`Status`]: a longer reply is refused by its length.
 pub const MAX_PARAMETERS: usize = 32;
 
-/// The longest status frame that is read, in bytes, and a good buffer size for instructions.
+/// The longest status frame in bytes, and a good buffer size for instructions.
 pub const MAX_FRAME: usize = MAX_PARAMETERS + OVERHEAD;
 
 /// Header, id, length, error and checksum in bytes.
@@ -39,7 +39,7 @@ impl Status {
         self.id
     }
 
-    /// Returns the error bits as they came; 0 without an error.
+    /// Returns the error bits as received; 0 without an error.
     #[must_use]
     pub const fn errors(&self) -> u8 {
         self.errors
@@ -75,7 +75,7 @@ impl Status {
         self.errors & 1 << 5 != 0
     }
 
-    /// Returns the bytes that were asked for; none after a ping or a write.
+    /// Returns the requested bytes; none after a ping or a write.
     #[must_use]
     pub fn parameters(&self) -> &[u8] {
         self.parameters.get(..usize::from(self.length)).unwrap_or(&[])

@@ -5,7 +5,8 @@ use crate::wire::field::Reader;
 /// Position counts in one turn of the shaft.
 pub const COUNTS_PER_TURN: u16 = 4096;
 
-/// Returns a number as the servo writes it: bit 15 is the sign, bits 0 to 14 are the magnitude. -32768 becomes -32767.
+/// Returns a number in the format of the servo: bit 15 is the sign, bits 0 to 14 are the magnitude. -32768 becomes
+/// -32767.
 ///
 /// # Examples
 /// ```
@@ -22,7 +23,7 @@ pub const fn to_sign_magnitude(value: i16) -> u16 {
     if value < 0 { magnitude | 0x8000 } else { magnitude }
 }
 
-/// Reads a number as the servo writes it; -0 is 0.
+/// Reads a number in the format of the servo; -0 is 0.
 #[must_use]
 pub const fn from_sign_magnitude(raw: u16) -> i16 {
     let magnitude = (raw & 0x7FFF).cast_signed();
@@ -60,7 +61,7 @@ impl Goal {
     }
 }
 
-/// What a servo measures: the eight registers from [`ADDRESS`](Self::ADDRESS) on.
+/// Measurements of a servo: the eight registers from [`ADDRESS`](Self::ADDRESS) on.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -83,7 +84,7 @@ impl Present {
     /// The number of registers.
     pub const LENGTH: u8 = 8;
 
-    /// Reads the answer to `read(id, Present::ADDRESS, Present::LENGTH, ..)`; `None` when it has another length.
+    /// Reads the answer to `read(id, Present::ADDRESS, Present::LENGTH, ..)`; `None` for another length.
     #[must_use]
     pub fn from_status(status: &Status) -> Option<Self> {
         let bytes: [u8; 8] = status.parameters().try_into().ok()?;

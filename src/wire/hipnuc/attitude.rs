@@ -1,4 +1,4 @@
-//! Orientation: from the quaternion on the wire, and as the angles that firmware calls roll, pitch and yaw.
+//! Orientation: from the quaternion on the wire, and as the angles named roll, pitch and yaw by the firmware.
 
 use super::Imu;
 use crate::geometry::{Attitude, AttitudeSource, Rotation3};
@@ -7,7 +7,7 @@ use crate::time::Instant;
 use crate::units::Angle;
 use crate::wire::Receiver;
 
-/// Takes w, x, y, z; `None` when they are further than 10 % from length 1, or not finite.
+/// Takes w, x, y, z; `None` when the length differs from 1 by more than 10 %, or is not finite.
 pub(super) fn normalised(quaternion: [f32; 4]) -> Option<Rotation3> {
     let square: f32 = quaternion.iter().map(|part| part * part).sum();
     if !(0.9 * 0.9..=1.1 * 1.1).contains(&square) {
@@ -17,9 +17,9 @@ pub(super) fn normalised(quaternion: [f32; 4]) -> Option<Rotation3> {
     Rotation3::from_quaternion(w, x, y, z).ok()
 }
 
-/// Which axis is called roll depends on the firmware, and with it the order of the three rotations. Yaw is about z in both.
-/// The middle angle, pitch, is in ±90°, the others are in ±180°. Where pitch is ±90° the other two are not determined.
-/// With `micromath` the angles are up to 0.3° off.
+/// The firmware determines the axis of roll, and so the order of the three rotations. Yaw is about z in both. The middle
+/// angle, pitch, is in ±90°, the others are in ±180°. At a pitch of ±90° the other two are not determined. With `micromath`
+/// the angles are up to 0.3° off.
 impl Imu {
     /// Returns roll, pitch and yaw as `Rz(yaw) Ry(pitch) Rx(roll)`, the usual order in robotics: x points forward.
     ///
@@ -55,7 +55,7 @@ impl<const N: usize> AttitudeSource for Receiver<Imu, N> {
     }
 }
 
-/// Takes sine and cosine of roll and yaw, each times that of pitch.
+/// Takes sine and cosine of roll and yaw, each times the cosine of pitch.
 fn angles(roll: (f32, f32), pitch_sine: f32, yaw: (f32, f32)) -> (Angle, Angle, Angle) {
     let angle = |y, x| Angle::from_radians(atan2(y, x));
     let pitch_cosine = sqrt((1.0 - pitch_sine * pitch_sine).max(0.0));

@@ -14,12 +14,13 @@
 //! The 82 bytes of a `91` frame take 7.1 ms at 115200 baud: 100 Hz is the limit there, 400 Hz needs 460800 baud.
 //!
 //! **Use the quaternion.** It is normalised here (a live sensor was seen to send 0.99904), and a frame without a usable
-//! one is refused. The three Euler angles on the wire mean different rotations in different firmware, and no field says
-//! which; [`Imu::euler_roll_x`] and [`Imu::euler_pitch_x`] compute them from the quaternion, each in its order.
+//! quaternion is refused. The three Euler angles on the wire mean different rotations in different firmware, and no
+//! field names the firmware; [`Imu::euler_roll_x`] and [`Imu::euler_pitch_x`] compute them from the quaternion, each in
+//! its order.
 //!
-//! A heading that stands still may be a robot at rest or a dead sensor. Read it with a
-//! [`Receiver`](super::Receiver): frames whose time stamp does not move do not count, and its `latest` is `None` and an edge is
-//! latched when no new one came in time.
+//! A heading that stands still may be a robot at rest or a dead sensor. Read the sensor with a [`Receiver`](super::Receiver):
+//! frames with a standing time stamp do not count, and if no new frame comes in time, its `latest` is `None` and an edge is
+//! latched.
 //!
 //! ```
 //! use drivetrain::time::{Duration, Instant};
@@ -55,32 +56,32 @@ const OVERHEAD: usize = 6;
 
 static CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_XMODEM);
 
-/// One measurement of a HiPNUC IMU. Its numbers are finite, but for pressure and magnetic field on sensors that have none.
+/// One measurement of a HiPNUC IMU. Its numbers are finite, except pressure and magnetic field on sensors without them.
 ///
 /// Axes are those printed on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Imu {
-    /// Status bits, as they came.
+    /// Status bits, as received.
     pub status: u16,
     /// Temperature of the sensor in degrees Celsius.
     pub temperature_c: i8,
-    /// Air pressure in pascals, as it came; anything, NaN included, on sensors without barometer.
+    /// Air pressure in pascals, as received; anything, NaN included, on sensors without barometer.
     pub pressure_pa: f32,
-    /// Milliseconds since the sensor started, wrapping; `None` in a `92` frame, whose sources disagree on it.
+    /// Milliseconds since the start of the sensor, wrapping; `None` in a `92` frame, whose sources disagree.
     pub time_ms: Option<u32>,
     /// Acceleration along x, y, z in m/s², gravity included: +9.8 upwards at rest.
     pub acceleration_m_s2: [f32; 3],
     /// Angular velocity around x, y, z; counter-clockwise is positive.
     pub angular_velocity: [AngularVelocity; 3],
-    /// Magnetic field along x, y, z in microtesla, as it came.
+    /// Magnetic field along x, y, z in microtesla, as received.
     pub magnetic_field_ut: [f32; 3],
-    /// Roll as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
+    /// Roll as computed by the sensor; the axis depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub roll: Angle,
-    /// Pitch as the sensor computed it; which axis it means depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
+    /// Pitch as computed by the sensor; the axis depends on the firmware, see [`euler_pitch_x`](Self::euler_pitch_x).
     pub pitch: Angle,
-    /// Yaw as the sensor computed it.
+    /// Yaw as computed by the sensor.
     pub yaw: Angle,
     /// The orientation, from the quaternion of the frame, normalised: turns the sensor's axes into the world's (z up).
     pub attitude: Rotation3,
@@ -124,7 +125,7 @@ impl Decode for Imu {
 }
 
 impl Imu {
-    /// Tells whether everything that motion is computed from is finite.
+    /// Returns whether all inputs of the motion are finite.
     fn is_finite(&self) -> bool {
         self.acceleration_m_s2.iter().all(|acceleration| acceleration.is_finite())
             && self.angular_velocity.iter().all(|rate| rate.is_finite())

@@ -4,7 +4,7 @@ use super::{Imu, attitude};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::field::Reader;
 
-/// Standard gravity, by which the sensor's unit g is meant (the vendor's C code takes 9.8, its Python code this).
+/// Standard gravity, the sensor's unit g (the vendor's C code takes 9.8, its Python code this).
 const G_M_S2: f32 = 9.806_65;
 
 /// Scales of the `92` frame, by the vendor's decoder of that time.

@@ -10,7 +10,7 @@ const HEADER: [u8; 6] = [0xAA, 0x55, 0x01, 0x4B, 0x31, 0x10];
 /// The numbers of the four values behind the joints.
 const TAGS: [u8; 4] = [13, 14, 15, 16];
 
-/// What the computer wants of the robot.
+/// Command of the computer to the robot.
 ///
 /// # Examples
 /// ```
@@ -33,7 +33,7 @@ pub struct HostCommand {
     pub c610_position: i16,
     /// Target of the gripper's STS3032 servo in degrees.
     pub sts3032_degrees: i16,
-    /// What to do besides.
+    /// Additional order.
     pub reset: Reset,
 }
 
@@ -57,7 +57,7 @@ pub struct JointTarget {
 }
 
 impl JointTarget {
-    /// Returns the speed in pulses per second, rounded down, as the joint motors take it.
+    /// Returns the speed in pulses per second, rounded down, as taken by the joint motors.
     #[must_use]
     pub const fn speed_pulses_per_s(&self) -> i32 {
         self.speed_rpm as i32 * PULSES_PER_TURN / 60
@@ -109,7 +109,7 @@ impl Reset {
 }
 
 impl HostCommand {
-    /// Writes the frame, and returns the part of `out` that it fills.
+    /// Writes the frame, and returns the filled part of `out`.
     ///
     /// # Errors
     /// [`EncodeError::BufferTooSmall`] when `out` has less than [`COMMAND_LENGTH`] bytes.

@@ -10,20 +10,20 @@
 //! 75  10  reset: 1 re-zero, 6 disable, 9 enable       71  4 IMUs x 3 angles f32
 //! 77  CRC                                            119  CRC
 //! ```
-//! Integers are big-endian. The CRC is that of Modbus over everything before it, but its high byte comes first.
+//! Integers are big-endian. The CRC is that of Modbus over all bytes before, but its high byte comes first.
 //!
 //! Where the sources differ:
 //!
 //! | question | the robot's document | its newer firmware | here |
 //! |---|---|---|---|
-//! | header of telemetry | `AA 55` | `BB 66` | both; the firmware's is the default: what runs speaks it, and it cannot be taken for a command ([`TelemetryFormat`]) |
+//! | header of telemetry | `AA 55` | `BB 66` | both; the firmware's is the default: the running firmware sends this header, and it differs from that of a command ([`TelemetryFormat`]) |
 //! | byte order of the floats | not said | little-endian: memory of a Cortex-M | both; little-endian is the default, as the only one seen |
 //! | `4B` in the command | up to the CRC | 75 bytes from the function code, CRC included | the firmware's, the only count that fits |
 //! | the four tags | left out | skipped unread | written as 13 to 16, skipped when read |
 //! | IMUs | USART 2, 7, 8, 6; pitch, roll, yaw | USART 6, 2, 7, 8 | in the order of the wire, without names |
 //!
-//! A host that is silent must not keep a robot going: read its commands with a [`Receiver`](super::Receiver), and relax
-//! the motors while its `latest` is `None`.
+//! A silent host must not keep a robot going: read its commands with a [`Receiver`](super::Receiver), and relax the
+//! motors while its `latest` is `None`.
 //!
 //! ```
 //! use drivetrain::wire::Deframer;
@@ -40,7 +40,7 @@
 //! # Ok::<(), drivetrain::wire::EncodeError>(())
 //! ```
 //!
-//! Source: the robot's data-flow document, and where that is wrong or silent its public firmware (`uart3.c`,
+//! Source: the robot's data-flow document, and where the document is wrong or silent, its public firmware (`uart3.c`,
 //! `chasis_task.c`).
 
 mod command;
@@ -60,7 +60,7 @@ pub const PULSES_PER_TURN: i32 = 65_536;
 
 static CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_MODBUS);
 
-/// Compares the last two bytes with the CRC of those before.
+/// Compares the last two bytes with the CRC of the bytes before.
 fn check(frame: &[u8]) -> Result<Reader<'_>, Reject> {
     let (body, crc) = frame.split_last_chunk().ok_or(Reject::Length)?;
     if CRC.checksum(body) == u16::from_be_bytes(*crc) {
@@ -70,7 +70,7 @@ fn check(frame: &[u8]) -> Result<Reader<'_>, Reject> {
     }
 }
 
-/// Appends the CRC of what was written, and gives the frame back.
+/// Appends the CRC of the written bytes, and returns the frame.
 fn seal(mut writer: Writer<'_>) -> &[u8] {
     let crc = CRC.checksum(writer.written());
     writer.put(&crc.to_be_bytes());

@@ -8,7 +8,7 @@ pub const TELEMETRY_LENGTH: usize = 121;
 /// The length byte: the payload without header, length and CRC.
 const PAYLOAD: u8 = 116;
 
-/// What the robot reports.
+/// Report of the robot.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,12 +21,12 @@ pub struct Telemetry {
     pub gm6020_position: i32,
     /// Multi-turn position of the gripper's C610, in the firmware's unit.
     pub c610_position: i32,
-    /// Euler angles of the four IMUs in degrees, in the order of the wire, as they came: the document calls them pitch,
-    /// roll and yaw, and nothing confirms it. May be NaN.
+    /// Euler angles of the four IMUs in degrees, in the order of the wire, as received: the document calls them pitch,
+    /// roll and yaw, without confirmation. May be NaN.
     pub imu_angles_deg: [[f32; 3]; 4],
 }
 
-/// The format of [`Telemetry`] frames: the two things in which the sources differ.
+/// The format of [`Telemetry`] frames: the two points in which the sources differ.
 ///
 /// # Examples
 /// ```
@@ -52,7 +52,7 @@ pub struct TelemetryFormat {
 }
 
 impl TelemetryFormat {
-    /// Header `BB 66`, floats low byte first: what the newer firmware sends.
+    /// Header `BB 66`, floats low byte first: the format of the newer firmware.
     #[must_use]
     pub const fn new() -> Self {
         Self { document_header: false, big_endian_floats: false }
@@ -64,13 +64,13 @@ impl TelemetryFormat {
         Self { document_header: true, ..self }
     }
 
-    /// Puts the high byte of the Euler angles first. The integers and the CRC have it first in any case.
+    /// Puts the high byte of the Euler angles first. The integers and the CRC always have their high byte first.
     #[must_use]
     pub const fn with_big_endian_floats(self) -> Self {
         Self { big_endian_floats: true, ..self }
     }
 
-    /// Writes the frame, and returns the part of `out` that it fills.
+    /// Writes the frame, and returns the filled part of `out`.
     ///
     /// # Errors
     /// [`EncodeError::BufferTooSmall`] when `out` has less than [`TELEMETRY_LENGTH`] bytes.

@@ -13,10 +13,10 @@
 //! | `0207` | 7 bytes | [`ShotData`] |
 //! | others, and these with another length | up to [`MAX_DATA`] bytes | [`RawMessage`] |
 //!
-//! The layouts change with the seasons, and no field names the version: the length alone tells them apart. Those of before 2024
-//! (27 bytes of `0201`, for one) are [`RawMessage`]s.
+//! The layouts change with the seasons, and no field names the version: the length alone distinguishes the layouts. Layouts of
+//! before 2024 (for example 27 bytes of `0201`) are [`RawMessage`]s.
 //!
-//! [`Referee`] reads the bytes, and says which power limit and which buffer energy hold now, for
+//! [`Referee`] reads the bytes, and returns the valid power limit and buffer energy for
 //! [`chassis::PowerBuffer`](crate::chassis::PowerBuffer):
 //!
 //! ```
@@ -47,15 +47,15 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
-//! Limits: a frame of more than [`MAX_DATA`] bytes of data is refused by its length, and its bytes are searched for shorter ones. A robot
-//! receives none (`0301` between robots has 118); `0310`, of 300 bytes, goes from a robot to its custom client. Of the
-//! bytes `A5` in noise, one in 131 000 has a fitting length and CRC-8 behind it: the frames that follow then wait until so many bytes have
-//! come. [`Referee::abandon`] in a pause of the line frees them.
+//! Limits: a frame of more than [`MAX_DATA`] bytes of data is refused by its length, and its bytes are searched for shorter
+//! frames. A robot receives none (`0301` between robots has 118); `0310`, of 300 bytes, goes from a robot to its custom client.
+//! Among the bytes `A5` in noise, one in 131 000 is followed by a fitting length and CRC-8: the next frames then wait until so
+//! many bytes have come. [`Referee::abandon`] in a pause of the line frees them.
 //!
-//! Source: frame and checksums: taproot (GPL, facts only), librm, the self-test of a public driver. Layouts: four public drivers each of
-//! the versions before and since 2.0.0, agreeing in lengths and offsets. The structure of `0202` in the document of 2026 has two
-//! bytes less than its table; public drivers follow the table (buffer energy at byte 8, 14 bytes), and so does this module. **Not known:**
-//! a captured frame of a match; whether the baud rate is another one on the video link.
+//! Source: frame and checksums: taproot (GPL, facts only), librm, the self-test of a public driver. Layouts: four public drivers
+//! each of the versions before and since 2.0.0, agreeing in lengths and offsets. The structure of `0202` in the document of 2026
+//! has two bytes less than its table; public drivers follow the table (buffer energy at byte 8, 14 bytes), and so does this
+//! module. **Not known:** a captured frame of a match; whether the baud rate differs on the video link.
 
 mod payload;
 mod receiver;
@@ -66,10 +66,10 @@ pub use receiver::Referee;
 use super::field::{Reader, Writer};
 use super::{Decode, EncodeError, Reject};
 
-/// The longest data of a frame that is read, in bytes.
+/// The longest data of a frame, in bytes.
 pub const MAX_DATA: usize = 128;
 
-/// A buffer for every frame that is read.
+/// A buffer size for every frame.
 pub const MAX_FRAME: usize = MAX_DATA + OVERHEAD;
 
 /// Header, command and CRC-16 in bytes.
@@ -92,7 +92,7 @@ const CRC_8: crc::Algorithm<u8> = crc::Algorithm {
     residue: 0x00,
 };
 
-/// Returns whether the last two bytes are the CRC-16 of those before, and those before.
+/// Checks that the last two bytes are the CRC-16 of the bytes before, and returns the bytes before.
 pub(super) fn checked(frame: &[u8]) -> Result<&[u8], Reject> {
     let (body, crc) = frame.split_last_chunk().ok_or(Reject::Length)?;
     if CRC.checksum(body) == u16::from_le_bytes(*crc) { Ok(body) } else { Err(Reject::Checksum) }
@@ -198,9 +198,10 @@ impl Decode for RefereeMessage {
     }
 }
 
-/// Writes a frame with this command, sequence number and data, and returns the part of `out` that it fills.
+/// Writes a frame with this command, sequence number and data, and returns the filled part of `out`.
 ///
-/// For messages to the referee system (drawings of the client, messages between robots) and for a simulated one.
+/// For messages to the referee system (drawings of the client, messages between robots) and for a simulated referee
+/// system.
 ///
 /// # Examples
 /// ```
@@ -239,7 +240,7 @@ pub fn encode<'a>(
 mod tests {
     use super::*;
 
-    /// The checks that the sources state; the second is vector `crc.rm_referee.crc16.check` of `tests/data/wire/vectors.json`.
+    /// The checks of the sources; the second is vector `crc.rm_referee.crc16.check` of `tests/data/wire/vectors.json`.
     #[test]
     fn the_checksums_are_those_of_the_referee_system() {
         assert_eq!(HEADER_CRC.checksum(b"123456789"), 0x0B);
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn data_that_no_length_field_can_tell_is_refused() {
+    fn data_too_long_for_the_length_field_is_refused() {
         let data = std::vec![0; 65_536];
         let error = encode(1, 0, &data, &mut []).unwrap_err();
         assert_eq!(error, EncodeError::DataTooLong { given: 65_536, most: 65_535 });

@@ -1,8 +1,8 @@
-//! The data of the messages that are read. `None`: too short, or a value that it cannot have.
+//! The data of decoded messages. `None`: too short, or an impossible value.
 
 use crate::wire::field::Reader;
 
-/// Length of the data of `0201` with the limit of the muzzle velocity; behind the twelve bytes that both versions share.
+/// Length of the data of `0201` with the limit of the muzzle velocity; behind the twelve bytes shared by both versions.
 const WITH_SPEED_LIMIT: usize = 5;
 /// Length of the heats of `0202` with a second 17 mm barrel, behind the buffer energy.
 const WITH_SECOND_BARREL: usize = 6;
@@ -26,9 +26,9 @@ pub struct RobotState {
     pub max_hp: u16,
     /// Heat by which the barrel cools each second.
     pub barrel_cooling_per_s: u16,
-    /// Heat at which the barrel is punished.
+    /// Heat limit of the barrel.
     pub barrel_heat_limit: u16,
-    /// Power limit of the chassis in W, as it came. [`Referee::power_limit_w`](super::Referee::power_limit_w) is the one to use.
+    /// Power limit of the chassis in W, as received. Use [`Referee::power_limit_w`](super::Referee::power_limit_w) instead.
     pub chassis_power_limit_w: u16,
     /// Limit of the muzzle velocity in m/s; `None` in the layout of before version 2.0.0.
     pub muzzle_velocity_limit_m_s: Option<f32>,
@@ -46,15 +46,15 @@ pub struct RobotState {
 /// 8 bytes reserved, u16 J, u16 heat 17 mm, (u16 heat of the second 17 mm until 2025), u16 heat 42 mm
 /// ```
 ///
-/// The reserved bytes were voltage, current and power of the chassis until 2024. Nothing in the frame tells whether they still are, so
+/// The reserved bytes were voltage, current and power of the chassis until 2024. No field of the frame confirms these values, so
 /// they are not read.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PowerHeat {
-    /// Charge of the buffer in J, as it came. [`Referee::buffer_energy_j`](super::Referee::buffer_energy_j) is the one to use.
+    /// Charge of the buffer in J, as received. Use [`Referee::buffer_energy_j`](super::Referee::buffer_energy_j) instead.
     pub buffer_energy_j: u16,
-    /// Heat of the 17 mm barrel, of the first if there are two.
+    /// Heat of the 17 mm barrel; of the first barrel if there are two.
     pub heat_17mm: u16,
     /// Heat of the second 17 mm barrel; `None` in the layout of 2026.
     pub heat_17mm_second: Option<u16>,
@@ -84,9 +84,9 @@ pub struct BarrelHeat {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShotData {
-    /// Type of the projectile, as it came: 1 is 17 mm, 2 is 42 mm.
+    /// Type of the projectile, as received: 1 is 17 mm, 2 is 42 mm.
     pub projectile: u8,
-    /// Number of the shooter, as it came: 1 is 17 mm, 3 is 42 mm; 2 was the second 17 mm until 2025.
+    /// Number of the shooter, as received: 1 is 17 mm, 3 is 42 mm; 2 was the second 17 mm until 2025.
     pub shooter: u8,
     /// Rate of fire in 1/s.
     pub rate_hz: u8,
@@ -133,7 +133,7 @@ pub(super) fn shot(mut data: Reader<'_>) -> Option<ShotData> {
     })
 }
 
-/// A velocity in m/s that is finite, and zero or more.
+/// A finite velocity in m/s, zero or more.
 fn velocity(data: &mut Reader<'_>) -> Option<f32> {
     data.f32_le().filter(|velocity| velocity.is_finite() && *velocity >= 0.0)
 }

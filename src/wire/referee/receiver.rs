@@ -6,23 +6,23 @@ use crate::wire::{Counts, Deframer, Silence};
 /// A buffer energy above this is no reading: a public super-capacitor controller (HKUST, 2024) counts no more either.
 const MOST_BUFFER_J: u16 = 300;
 
-/// The same controller switches itself off when it is told a higher limit.
+/// The same controller switches itself off at a higher limit.
 const HIGHEST_LIMIT_W: u16 = 250;
 
 /// A heat limit or a cooling above this is not believed. A bound of this crate: robots have a few hundred.
 const HIGHEST_HEAT: u16 = 2_000;
 
-/// Reads the referee system, and says which power limit, buffer energy and barrel heat hold now.
+/// Reads the referee system, and returns the valid power limit, buffer energy and barrel heat.
 ///
-/// | what is heard | power limit | buffer energy |
+/// | received frames | power limit | buffer energy |
 /// |---|---|---|
-/// | nothing yet, or nothing in time | the safe limit, or the last that was heard if that is lower | `None` |
+/// | none yet, or none in time | the safe limit, or the last received limit if lower | `None` |
 /// | a first frame | the same | `None` |
 /// | two frames or more | the lower of the last two | the lower of the last two |
-/// | a value that cannot be | as if the frame had not come | as if the frame had not come |
+/// | an impossible value | as without the frame | as without the frame |
 ///
-/// So a limit falls with the first frame that says so and rises with the second, and neither silence nor a single frame raises one.
-/// Both are only numbers: no message arms a motor, moves one, or stops one.
+/// So a limit falls with the first frame of a lower value and rises with the second frame of a higher value, and neither silence
+/// nor a single frame raises it. Both are only numbers: no message arms a motor, moves a motor, or stops a motor.
 ///
 /// # Examples
 /// ```
@@ -56,10 +56,10 @@ pub struct Referee {
 }
 
 impl Referee {
-    /// Takes the power limit in W that holds while nothing is heard: the lowest that the rules give the robot.
+    /// Takes the power limit in W during silence: the lowest limit that the rules give the robot.
     ///
-    /// A limit above 250 W is not believed. The limit is lost 500 ms after the last frame that told it (five at 10 Hz), the buffer energy
-    /// after 250 ms: at 160 W with a limit of 80 W that costs 20 J of the buffer.
+    /// A limit above 250 W is ignored. The limit is lost 500 ms after its last frame (five at 10 Hz), the buffer energy after 250
+    /// ms: at 160 W with a limit of 80 W, the delay costs 20 J of the buffer.
     #[must_use]
     pub const fn new(safe_limit_w: u16) -> Self {
         Self {
@@ -74,7 +74,7 @@ impl Referee {
         }
     }
 
-    /// Sets the highest power limit in W that is believed. Frames with a higher one do not count.
+    /// Sets the highest accepted power limit in W. Frames with a higher limit do not count.
     #[must_use]
     pub const fn with_highest_limit_w(self, highest_limit_w: u16) -> Self {
         Self { highest_limit_w, ..self }
@@ -111,7 +111,7 @@ impl Referee {
         Some(message)
     }
 
-    /// Gives up a frame that was begun and not finished; see [`Deframer::abandon`].
+    /// Discards an unfinished frame; see [`Deframer::abandon`].
     pub fn abandon(&mut self) {
         self.decoder.abandon();
     }
@@ -168,30 +168,30 @@ impl Referee {
         })
     }
 
-    /// Returns whether a power limit that is believed came in time.
+    /// Returns whether an accepted power limit came in time.
     #[must_use]
     pub fn is_live(&self, now: Instant) -> bool {
         self.limit_w.deadline.is_live(now)
     }
 
-    /// Returns the oldest edge of the power limit's silence that was not fetched yet.
+    /// Returns the oldest unread edge of the power limit's silence.
     #[must_use]
     pub fn edge(&mut self, now: Instant) -> Option<ConditionEdge<Silence>> {
         self.limit_w.deadline.edge(now)
     }
 
-    /// Returns how many frames were found, and what was thrown away. A header with a wrong CRC-8 is a length error.
+    /// Returns the counts of frames and of discarded bytes. A header with a wrong CRC-8 is a length error.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.decoder.counts()
     }
 }
 
-/// A number that is what the last two frames agree on at least.
+/// The value agreed on by the last two frames at least.
 #[derive(Debug, Clone)]
 struct LowerOfTwo {
     previous: u16,
-    /// Of the last frame that counted; the largest number before the first.
+    /// Value of the last frame that counted; the largest number before the first.
     latest: u16,
     is_second: bool,
     deadline: Deadline,

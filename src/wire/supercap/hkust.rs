@@ -14,13 +14,13 @@
 //! | 5 | no supply |
 //! | 6 | fault of the capacitor |
 //!
-//! * The energy is the square of the capacitor's voltage over that of its highest (28.8 V).
-//! * After an error that switches it off for good, the output comes back when bit 0 was seen cleared and set again.
-//! * It raises a limit below 30 W to 30 W, and switches itself off at one above 250 W.
+//! * The energy is the square of the capacitor's voltage over the square of its highest voltage (28.8 V).
+//! * After an error with a permanent switch-off, the output comes back when bit 0 was seen cleared and set again.
+//! * The controller raises a limit below 30 W to 30 W, and switches itself off at a limit above 250 W.
 //!
 //! Source: `hkustenterprize/RM2024-SuperCapacitorController`, `Communication.cpp`, `PowerManager.cpp`, `Config.hpp` (facts only).
-//! **Not known:** what a later firmware sends. Drivers of 2025 read the powers as two integers at the same id, and nothing in
-//! the frame tells which firmware it is; a frame of it is refused here only if its power is none.
+//! **Not known:** the frame of a later firmware. Drivers of 2025 read the powers as two integers at the same id, and nothing in
+//! the frame names its firmware; a frame of it is refused here only if its power is impossible.
 
 use crate::frame::CanFrame;
 
@@ -30,13 +30,13 @@ pub const COMMAND_ID: u16 = 0x061;
 /// The usual id of the frame from the controller.
 pub const STATE_ID: u16 = 0x051;
 
-/// The limits between which the firmware takes one as it is, in W.
+/// The limits between which the firmware takes a limit unchanged, in W.
 const LIMITS_W: (u16, u16) = (30, 250);
 
-/// A power of the chassis beyond this is none, in W: the controller is built for 22.5 A at 28.8 V.
+/// A larger power of the chassis is impossible, in W: the controller is built for 22.5 A at 28.8 V.
 const MOST_W: f32 = 2_000.0;
 
-/// State that the controller reports.
+/// State reported by the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -45,9 +45,9 @@ pub struct HkustState {
     pub errors: u8,
     /// Whether the output is on: the capacitor is charged and discharged.
     pub is_on: bool,
-    /// Power that the chassis takes, in W; below zero while it feeds back.
+    /// Power taken by the chassis, in W; below zero while the chassis feeds back.
     pub chassis_w: f32,
-    /// Power that the controller can give the chassis, in W.
+    /// Power available from the controller for the chassis, in W.
     pub chassis_limit_w: u16,
     /// Share of the energy of a full capacitor, 0 to 1, from zero volts on.
     pub share: f32,
@@ -61,9 +61,10 @@ impl HkustState {
     }
 }
 
-/// Returns the data of the frame to the controller: whether it is to work, the power limit in W and the charge of the buffer in J.
+/// Returns the data of the frame to the controller: on or off, the power limit in W and the charge of the buffer in J.
 ///
-/// A limit below 30 W switches it off, because it would take 30 W. A limit above 250 W is sent as 250 W. It is never told to restart.
+/// A limit below 30 W switches the controller off, because it would take 30 W. A limit above 250 W is sent as 250 W. The frame
+/// never requests a restart.
 ///
 /// # Examples
 /// ```

@@ -1,16 +1,16 @@
 //! Controllers of super-capacitors: the payload of their CAN frames.
 //!
-//! A controller stands between the supply of the referee system and the chassis. The controller draws the commanded power from the
-//! supply: power that the chassis leaves charges the capacitor, and power that the chassis needs beyond comes from the capacitor.
+//! A controller stands between the supply of the referee system and the chassis. The controller draws the commanded power from
+//! the supply: surplus power charges the capacitor, and missing power comes from the capacitor.
 //!
 //! | module | controller | told | tells |
 //! |---|---|---|---|
 //! | [`hkust`] | HKUST Enterprize, 2024 | switch, power limit, buffer energy | energy, errors, power of the chassis |
 //! | [`pacific_spirit`] | Pacific Spirit (UBC), 2024 | power to take from the supply | energy, state, power of the supply |
 //!
-//! Teams assign ids of their own, so these modules only name the usual ones, which collide with no motor of [`dji`](crate::dji)
-//! (`0x1FE` to `0x20B`, `0x2FE`, `0x2FF`). No frame has a checksum but that of CAN. Keep each state with the
-//! time at which it came, and give [`chassis::CapacitorPlan`](crate::chassis::CapacitorPlan) no energy when the state is too old:
+//! Teams assign ids of their own, so these modules only name the usual ids, which collide with no motor of [`dji`](crate::dji)
+//! (`0x1FE` to `0x20B`, `0x2FE`, `0x2FF`). No frame has a checksum except the CRC of CAN. Keep each state with its time of
+//! arrival, and give [`chassis::CapacitorPlan`](crate::chassis::CapacitorPlan) no energy when the state is too old:
 //!
 //! ```
 //! use drivetrain::chassis::CapacitorPlan;

@@ -11,13 +11,14 @@
 //! | 3, 4 | voltage of the supply too high, too low |
 //! | 5 | voltage of the capacitor too high |
 //!
-//! * The energy is counted from the voltage at which the controller starts up, so it may be a little below zero.
-//! * Only the power to take counts for the controller; the firmware limits it to a range of its own.
-//! * It has no time-out: it goes on with the last power it was told.
+//! * The energy is counted from the voltage at which the controller starts up, so the energy may be a little below
+//!   zero.
+//! * Only the power to take counts for the controller; the firmware limits this power to a range of its own.
+//! * The controller has no time-out: it continues with the last commanded power.
 //!
-//! Source: `wele0612/PSP_supercapacitor`, `cap_canmsg_protocal.h`, `g474_fdcan.c`, `dcdc.c` (facts only), and the drivers of two other
-//! teams. One version of that firmware has the two ids exchanged, the protocol's header and the drivers have not. **Not known:** whether
-//! a firmware checks the two fixed words; one driver sends them high byte first and is served as well.
+//! Source: `wele0612/PSP_supercapacitor`, `cap_canmsg_protocal.h`, `g474_fdcan.c`, `dcdc.c` (facts only), and the drivers of two
+//! other teams. One version of this firmware has the two ids exchanged, the protocol's header and the drivers have not. **Not
+//! known:** whether a firmware checks the two fixed words; one driver sends them high byte first and is served as well.
 
 use crate::frame::CanFrame;
 
@@ -27,18 +28,18 @@ pub const COMMAND_ID: u16 = 0x2C7;
 /// The usual id of the frame from the controller.
 pub const STATE_ID: u16 = 0x2C8;
 
-/// State that the controller reports.
+/// State reported by the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PacificSpiritState {
-    /// State of the controller, as it came: 2 is on.
+    /// State of the controller, as received: 2 is on.
     pub state: u16,
-    /// Power that the capacitor can give now, in W.
+    /// Power available from the capacitor now, in W.
     pub discharge_w: f32,
-    /// Power that is taken from the supply, in W.
+    /// Power taken from the supply, in W.
     pub supply_w: f32,
-    /// Share of the energy that can be used, 0 to 1.
+    /// Usable share of the energy, 0 to 1.
     pub share: f32,
 }
 
