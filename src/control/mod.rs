@@ -43,6 +43,7 @@ mod actuator;
 mod differentiator;
 mod error;
 mod filter;
+mod motion;
 mod number;
 mod pid;
 mod shaping;
@@ -52,6 +53,7 @@ mod tuning;
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
+pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
 pub(crate) use number::limited;
 
 pub(crate) use pid::Input;
