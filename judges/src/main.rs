@@ -11,12 +11,14 @@
 //! drivetrain-judges rmd ...               the same of motors of MyActuator: see `rmd`
 //! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
 //! drivetrain-judges odrive VERB           see `odrive`
+//! drivetrain-judges motion ...            plans of `control::Motion`: see `motion`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
 mod lk;
+mod motion;
 mod odrive;
 mod rmd;
 mod robstride;
@@ -25,7 +27,7 @@ mod vesc;
 
 use defect::Defect;
 use drivetrain::damiao::{Model, Register};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter, Write};
 use std::process::ExitCode;
 
 /// What goes wrong, as a text for a person.
@@ -94,6 +96,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["odrive", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         odrive::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["motion", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        motion::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

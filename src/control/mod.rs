@@ -45,6 +45,7 @@ mod actuator;
 mod differentiator;
 pub(crate) mod error;
 mod filter;
+mod motion;
 mod number;
 mod observer;
 mod pid;
@@ -55,6 +56,7 @@ mod tuning;
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
+pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
 pub(crate) use number::limited;
 pub use observer::LoadObserver;
 

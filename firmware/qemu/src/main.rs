@@ -15,6 +15,7 @@ mod cycle;
 mod drives;
 mod joints;
 mod meter;
+mod motion;
 mod rows;
 mod wiring;
 
@@ -35,6 +36,7 @@ fn main() -> ! {
         drives::rows();
         rows::control();
         controllers::rows();
+        motion::rows();
         rows::math();
         rows::space();
         bytes::rows();

@@ -47,6 +47,11 @@ impl MotionLimits {
         }
         Ok(())
     }
+
+    /// Returns the limits of velocity, acceleration and jerk.
+    pub(in crate::control) const fn parts(&self) -> (f32, f32, Option<f32>) {
+        (self.velocity, self.acceleration, self.jerk)
+    }
 }
 
 /// Where a [`Profile`] is at a moment, in units of the position and seconds.

@@ -1,0 +1,214 @@
+use crate::control::motion::planner::Planner;
+use crate::control::number::finite;
+use crate::control::shaping::{MotionLimits, ProfileState};
+use crate::error::ConfigError;
+
+/// Where a [`Motion`] ends: a position, and the velocity there; the acceleration there is zero.
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::MotionTarget;
+///
+/// assert_eq!(MotionTarget::at_rest(1.5), MotionTarget { position: 1.5, velocity: 0.0 });
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MotionTarget {
+    /// Position.
+    pub position: f32,
+    /// Velocity, in units of the position a second.
+    pub velocity: f32,
+}
+
+impl MotionTarget {
+    /// Returns a target with a velocity of zero.
+    #[must_use]
+    pub const fn at_rest(position: f32) -> Self {
+        Self { position, velocity: 0.0 }
+    }
+}
+
+/// The phases of a motion from its start to its end, in seconds.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Phases {
+    pub(super) brake_s: f32,
+    pub(super) brake_hold_s: f32,
+    /// From the acceleration of the state to the first peak, at it, and to zero.
+    pub(super) rise_s: f32,
+    pub(super) hold_s: f32,
+    pub(super) fall_s: f32,
+    pub(super) cruise_s: f32,
+    /// The same to the second peak, and to zero at the end.
+    pub(super) last_rise_s: f32,
+    pub(super) last_hold_s: f32,
+    pub(super) last_fall_s: f32,
+}
+
+impl Phases {
+    pub(super) fn duration_s(&self) -> f32 {
+        let braking_s = self.brake_s + self.brake_hold_s;
+        let first_s = self.rise_s + self.hold_s + self.fall_s;
+        let last_s = self.last_rise_s + self.last_hold_s + self.last_fall_s;
+        finite(braking_s + first_s + self.cruise_s + last_s)
+    }
+}
+
+/// The fastest motion from any position, velocity and acceleration to a position and a velocity, within [`MotionLimits`].
+///
+/// ```text
+/// acceleration        first peak
+///                      ______
+///                     /      \
+///  state, braked into_/        \__cruise__            end: acceleration zero
+///  its limits                             \        /
+///                                          \______/
+///                                         second peak         either sign
+/// ```
+///
+/// # Examples
+/// ```
+/// use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
+///
+/// // 1 rad/s already, and 2 rad to go within 2 rad/s, 4 rad/s², 40 rad/s³.
+/// let joint = MotionLimits::new(2.0, 4.0).with_jerk(40.0);
+/// let now = ProfileState { velocity: 1.0, ..ProfileState::default() };
+/// let motion = Motion::plan(&now, &MotionTarget::at_rest(2.0), &joint)?;
+/// // Up to 2 rad/s: 0.35 s, 0.525 rad; down from it: 0.6 s, 0.6 rad; 0.875 rad between them.
+/// assert!((motion.duration_s() - 1.3875).abs() < 1e-6);
+/// assert!((motion.at(0.5).velocity - 2.0).abs() < 1e-6);
+/// assert_eq!(motion.at(9.0).position, 2.0);
+/// # Ok::<(), drivetrain::error::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Motion {
+    pub(super) start: ProfileState,
+    pub(super) end: MotionTarget,
+    /// From the start to the end.
+    pub(super) way: f32,
+    pub(super) duration_s: f32,
+    pub(super) phases: Phases,
+    /// With the sign that it has in the first rise; that of braking apart.
+    pub(super) jerk: f32,
+    pub(super) brake_jerk: f32,
+    /// Accelerations: the first with its sign, the second with the opposite one.
+    pub(super) first_peak: f32,
+    pub(super) second_peak: f32,
+}
+
+impl Motion {
+    /// Plans the fastest motion.
+    ///
+    /// # Errors
+    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or what is NaN or infinite of `position`, `velocity`,
+    /// `acceleration`, `target` and `target_velocity`.
+    pub fn plan(
+        from: &ProfileState,
+        to: &MotionTarget,
+        limits: &MotionLimits,
+    ) -> Result<Self, ConfigError> {
+        Ok(Planner::new(from, 0.0, to, limits)?.fastest())
+    }
+
+    /// Returns position, velocity and acceleration `time_s` seconds after the start.
+    #[must_use]
+    pub fn at(&self, time_s: f32) -> ProfileState {
+        let sample = self.sample(time_s);
+        let position = if sample.is_last {
+            self.end.position - sample.way
+        } else {
+            self.start.position + sample.way
+        };
+        sample.state(finite(position))
+    }
+
+    /// Returns the jerk `time_s` seconds after the start, in units of the position a second cubed.
+    #[must_use]
+    pub fn jerk_at(&self, time_s: f32) -> f32 {
+        self.sample(time_s).jerk
+    }
+
+    /// Returns the time from start to end in seconds.
+    #[must_use]
+    pub const fn duration_s(&self) -> f32 {
+        self.duration_s
+    }
+
+    /// Returns the end.
+    #[must_use]
+    pub const fn end(&self) -> MotionTarget {
+        self.end
+    }
+
+    /// Returns how far it is from the start.
+    pub(super) fn way_at(&self, sample: &Sample) -> f32 {
+        if sample.is_last { self.way - sample.way } else { sample.way }
+    }
+
+    /// The first part walks from the start, and the last one back from the end, so that both ends are exact.
+    pub(super) fn sample(&self, time_s: f32) -> Sample {
+        let time_s = if time_s > 0.0 { time_s } else { 0.0 };
+        let left_s = self.duration_s - time_s;
+        if left_s <= 0.0 {
+            return Sample { is_last: true, ..Sample::new(0.0, self.end.velocity) };
+        }
+        let phases = &self.phases;
+        if left_s < phases.last_fall_s + phases.last_hold_s + phases.last_rise_s {
+            let mut walk = Sample::new(left_s, self.end.velocity);
+            _ = walk.ends_in(phases.last_fall_s, 0.0, self.jerk)
+                || walk.ends_in(phases.last_hold_s, self.second_peak, 0.0)
+                || walk.ends_in(f32::INFINITY, self.second_peak, -self.jerk);
+            return Sample { acceleration: -walk.acceleration, is_last: true, ..walk };
+        }
+        let braked = self.start.acceleration + self.brake_jerk * phases.brake_s;
+        let mut walk = Sample::new(time_s, self.start.velocity);
+        _ = walk.ends_in(phases.brake_s, self.start.acceleration, self.brake_jerk)
+            || walk.ends_in(phases.brake_hold_s, braked, 0.0)
+            || walk.ends_in(phases.rise_s, braked, self.jerk)
+            || walk.ends_in(phases.hold_s, self.first_peak, 0.0)
+            || walk.ends_in(phases.fall_s, self.first_peak, -self.jerk)
+            || walk.ends_in(f32::INFINITY, 0.0, 0.0);
+        walk
+    }
+}
+
+/// A moment of a motion, found by a walk over its phases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    left_s: f32,
+    /// From the start, or in the last part to the end.
+    pub(super) way: f32,
+    pub(super) is_last: bool,
+    pub(super) velocity: f32,
+    pub(super) acceleration: f32,
+    pub(super) jerk: f32,
+}
+
+impl Sample {
+    const fn new(left_s: f32, velocity: f32) -> Self {
+        Self { left_s, way: 0.0, is_last: false, velocity, acceleration: 0.0, jerk: 0.0 }
+    }
+
+    pub(super) const fn state(&self, position: f32) -> ProfileState {
+        ProfileState {
+            position,
+            velocity: finite(self.velocity),
+            acceleration: finite(self.acceleration),
+        }
+    }
+
+    /// Goes over a phase, or as far as the time allows: then it ends there.
+    #[inline]
+    const fn ends_in(&mut self, phase_s: f32, acceleration: f32, jerk: f32) -> bool {
+        let ends = self.left_s < phase_s;
+        let time_s = if ends { self.left_s } else { phase_s };
+        let change = jerk * time_s;
+        self.way += time_s * (self.velocity + time_s * (0.5 * acceleration + change * (1.0 / 6.0)));
+        self.velocity += time_s * (acceleration + 0.5 * change);
+        self.left_s -= time_s;
+        (self.acceleration, self.jerk) = (acceleration + change, jerk);
+        ends
+    }
+}
