@@ -103,8 +103,8 @@ impl Limiter {
             torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
             speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
         });
-        let cut = self.fit.model().cut(loads, self.allowed_w);
-        bus.scale_outputs(wheels, cut.scale);
+        let (scale, _) = self.fit.model().cut(loads, self.allowed_w);
+        bus.scale_outputs(wheels, scale);
     }
 
     /// Learns the losses of the motors from the power that the controller measures.
