@@ -3,7 +3,7 @@
 #![no_main]
 
 use drivetrain::chassis::{
-    Chassis, ChassisLimits, Differential, Kinematics, Mecanum, ChassisMode, ModeConfig, Modes,
+    Chassis, ChassisLimits, ChassisMode, Differential, Kinematics, Mecanum, ModeConfig, Modes,
     ModuleState, Omni, Swerve, SwerveSteering, WheelSpeed,
 };
 use drivetrain::control::PidConfig;

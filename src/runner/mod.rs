@@ -39,7 +39,7 @@ pub use statistics::{ErrorCounts, Statistics};
 pub use stop::EmergencyStop;
 
 use crate::frame::CanFrame;
-use crate::motor::{ArmError, Ask, BusLoad, Devices};
+use crate::motor::{ArmError, Ask, Devices};
 use crate::time::{Clock, ConditionEdge, Duration, Instant, Tick, Ticker};
 use statistics::{Meter, increment};
 use watch::Watch;
@@ -357,47 +357,6 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     #[must_use]
     pub const fn heartbeat(&self) -> u32 {
         self.watch.heartbeat
-    }
-
-    /// Returns the load of the bus in the last window of a second or a little more, by the frames sent and received here;
-    /// `None` in the first window.
-    ///
-    /// Frames are counted by their length. Compare the result with [`Bus::load`](crate::dji::Bus::load), calculated from the
-    /// rates of the motors: if the measured load is above, another node sends, or an ESC has another rate.
-    ///
-    /// # Limits
-    /// **Frames dropped by the filter of the controller are not counted**, nor are frames lost in an overrun, error frames
-    /// and repetitions. A sent frame counts when the driver takes it, and no longer when the driver gives it back.
-    ///
-    /// # Examples
-    /// Three M3508 at 1 kHz, whose three feedback frames of 8 bytes are the only traffic:
-    /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::runner::{Nb, Runner};
-    /// use drivetrain::sim::{MotorConfig, Simulation};
-    /// use drivetrain::time::Duration;
-    ///
-    /// let world = Simulation::new(1);
-    /// let mut bus = Bus::new();
-    /// for id in 1..=3 {
-    ///     world.attach(MotorConfig::m3508(id))?;
-    ///     bus.attach(Config::<M3508>::new(id))?;
-    /// }
-    /// let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    /// for _ in 0..2_100 {
-    ///     world.advance(Duration::from_millis(1));
-    ///     runner.poll(16);
-    ///     if let Some(tick) = runner.due() {
-    ///         runner.tick(tick);
-    ///     }
-    /// }
-    /// let load = runner.measured_load().ok_or("two seconds are over")?;
-    /// assert!((load.nominal() - 0.333).abs() < 0.03, "{load}"); // and a zero frame each 10 ms
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub const fn measured_load(&self) -> Option<BusLoad> {
-        self.meter.last()
     }
 
     /// Returns the device.

@@ -164,8 +164,8 @@ fn held(compliance: f32, dt_s: f32) -> f32 {
 
 /// Returns the largest eigenvalue of `J M^-1 J'`, with a row of `J` for each held direction, or a little more.
 ///
-/// The bound is the row sum of the 3x3 matrix `M^-1/2 J' J M^-1/2`. A tyre's two rows add up to the same in every
-/// direction of the tyre.
+/// The 3x3 matrix `M^-1/2 J' J M^-1/2` has the same largest eigenvalue, and its largest row sum is an upper bound of it. A
+/// tyre's two rows add up to the same in every direction of the tyre.
 fn compliance(contacts: impl Iterator<Item = Contact>, mass: f32, yaw_inertia: f32) -> f32 {
     let (x_scale, yaw_scale) = (1.0 / sqrt(mass), 1.0 / sqrt(yaw_inertia));
     let mut matrix = [[0.0_f32; 3]; 3];

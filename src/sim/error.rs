@@ -20,7 +20,7 @@ pub enum SimError {
         /// The requested id.
         id: u8,
     },
-    /// A parameter of the chassis, by its name, makes no sense; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
+    /// A parameter of the chassis, by its name, is invalid; see [`ChassisConfig::validate`](super::ChassisConfig::validate).
     Chassis(&'static str),
     /// There are already 16 faults that are not over.
     TooManyFaults,
@@ -30,7 +30,7 @@ pub enum SimError {
     BusOff,
     /// Frames were missed because the receive queue was full. Reported once; the frames before are still there.
     Overrun,
-    /// [`Fault::DriverErrors`](super::Fault::DriverErrors) wants the call of the driver to fail.
+    /// [`Fault::DriverErrors`](super::Fault::DriverErrors) makes the call of the driver fail.
     Scripted,
     /// A blocking call waited for a second.
     TimedOut,
@@ -39,20 +39,22 @@ pub enum SimError {
 impl core::fmt::Display for SimError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Full => write!(f, "a world holds {MOTORS} motors"),
+            Self::Full => write!(f, "the simulation holds {MOTORS} motors and has no place left"),
             Self::Id { model, id } => write!(f, "{model} has no id {id}"),
             Self::Joint { id } => write!(f, "no joint has the id {id}, or there are 12 already"),
-            Self::Chassis(name) => write!(f, "{name} of the chassis makes no sense"),
-            Self::TooManyFaults => {
-                f.write_str("a world keeps 16 faults at a time: schedule more when some are over")
+            Self::Chassis(name) => {
+                write!(f, "{name} of the chassis is out of its range, see ChassisConfig::validate")
             }
+            Self::TooManyFaults => f.write_str(
+                "the simulation holds 16 faults at a time: schedule more when some have ended",
+            ),
             Self::NoFaultOfJoint => {
                 f.write_str("a joint can be silent or without supply, and has no other fault")
             }
             Self::BusOff => f.write_str("the controller is bus-off"),
             Self::Overrun => f.write_str("frames were missed: the receive queue was full"),
-            Self::Scripted => f.write_str("a scripted error of the driver"),
-            Self::TimedOut => f.write_str("waited for a simulated second"),
+            Self::Scripted => f.write_str("the driver failed by Fault::DriverErrors"),
+            Self::TimedOut => f.write_str("a blocking call timed out after a simulated second"),
         }
     }
 }

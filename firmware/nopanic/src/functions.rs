@@ -13,12 +13,11 @@ use drivetrain::frame::CanFrame;
 use drivetrain::math::{atan2, sin_cos, sqrt, wrap, wrap_pi, wrap_positive, wrap_tau};
 use drivetrain::motor::{
     AngleDrive, BusLoad, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Ingest,
-    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming,
-    Timeouts, VelocityDrive, Visitor, Vitals, WrongSetting,
+    Measured, Missing, MotorName, Order, Own, OwnMotor, Role, StopHoming, Timeouts, VelocityDrive,
+    Visitor, Vitals, WrongSetting,
 };
 use drivetrain::runner::{
-    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender,
-    Nb, Runner,
+    BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
 };
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
