@@ -308,7 +308,6 @@ const fn count(counter: &mut u16) {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "what was sent is what holds")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
