@@ -121,7 +121,7 @@ impl Limiter {
 
 /// To and fro, 2.5 m/s, each way for 1.5 s.
 fn wanted(time_s: f32) -> Twist<drivetrain::geometry::Body> {
-    if time_s < 0.5 || time_s >= STANDS_S {
+    if !(0.5..STANDS_S).contains(&time_s) {
         return Twist::ZERO;
     }
     let ahead = (time_s - 0.5).rem_euclid(3.0) < 1.5;

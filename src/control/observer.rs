@@ -156,7 +156,6 @@ impl LoadObserver {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -1,9 +1,8 @@
 use crate::wire::referee::BarrelHeat;
 
-/// Heat of the barrel as it is now: what the referee system reported, or more, by the shots that were let go since.
+/// Heat of the barrel: the larger of the report of the referee system and of the sum over shots that were let go.
 ///
-/// The larger of both counts. A shot that is counted too often cools down like any other; one that is counted too seldom is in the
-/// next report.
+/// The heat of a shot that was counted twice cools down like any other. The heat of a shot that was missed is in the next report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Heat {

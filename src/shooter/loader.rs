@@ -13,7 +13,7 @@ const BACK_S: f32 = 0.2;
 /// The way back, in chambers.
 const BACK_SHARE: f32 = 0.5;
 
-/// How a step of the loader ended.
+/// Result of a step of the loader.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Feed {
     /// No shot is on its way.
@@ -75,7 +75,7 @@ pub(super) struct Loader {
     counted: Chamber,
     waiting: u8,
     stood_s: f32,
-    /// What is left of the time for the way back, and the way left when it began.
+    /// Rest of the time for the way back in s, and the way to the goal in rad when the way back began.
     back: Option<(f32, f32)>,
     tries: u8,
 }

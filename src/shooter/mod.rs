@@ -19,8 +19,8 @@
 //! | [`Cooling`](ShooterState::Cooling) | speed | 0 | the next shot fits below the heat limit |
 //! | [`Fault`](ShooterState::Fault) | 0 | 0 | the order is `Rest`, or the robot is disarmed |
 //!
-//! A shot is let go when the wheels are within 1 % and its heat fits. Heat counts from then on, before the referee system reports
-//! it, so a burst does not run into the limit during the 100 ms between two reports.
+//! The shooter lets a shot go when the wheels are within 1 % and the heat of the shot fits below the limit. The heat counts from then on,
+//! before the referee system reports it: a burst then does not exceed the limit during the 100 ms between two reports.
 //!
 //! ```
 //! use drivetrain::shooter::{Order, Shooter, ShooterConfig, ShooterFeedback, ShooterState};

@@ -2,7 +2,7 @@ use crate::encoder::Position;
 use crate::units::AngularVelocity;
 use crate::wire::referee::BarrelHeat;
 
-/// What the pilot wants of a shooter, in each tick.
+/// Order of the pilot to a shooter, given in each tick.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -12,14 +12,14 @@ pub enum Order {
     Rest,
     /// The wheels turn, and nothing is shot.
     Spin,
-    /// The wheels turn, and so many shots are let go: 1 for a single one, 255 for as long as the trigger is held up to 255.
+    /// The wheels turn, and the shooter lets this number of shots go: 1 for a single shot, 255 for long fire.
     ///
-    /// A burst begins when the order changes to `Fire`. While the order stays, nothing more is shot; when it changes back, the rest
-    /// of the burst is dropped. An order that is held while the robot is armed begins nothing: the trigger has to be released first.
+    /// A burst begins when the order changes to `Fire`. While the order stays, no further shot follows. When the order changes back,
+    /// the rest of the burst is dropped. If the trigger was held while the robot was armed, it has to be released first.
     Fire(u8),
 }
 
-/// What a shooter does.
+/// State of a shooter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -41,7 +41,7 @@ pub enum ShooterState {
     Fault(ShooterFault),
 }
 
-/// Why a shooter stopped.
+/// Cause of a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -78,7 +78,7 @@ pub struct LoaderFeedback {
     pub velocity: AngularVelocity,
 }
 
-/// What a shooter is told in each tick. The default is a robot that is disarmed and knows nothing.
+/// Feedback that a shooter takes in each tick. The default is a robot that is disarmed and has no feedback.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ShooterFeedback {

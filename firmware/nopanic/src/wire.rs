@@ -23,7 +23,10 @@ pub fn call_all() {
     Parameter::range.call();
     Parameters::<4>::new.call();
     Parameters::<4>::with_expiry.call();
-    (|parameters: &mut Parameters<4>, input: &mut &'static [u8], now| parameters.read(input, now)).call();
+    (|parameters: &mut Parameters<4>, input: &mut &'static [u8], now| {
+        Parameters::read(parameters, input, now)
+    })
+    .call();
     Parameters::<4>::value.call();
     Parameters::<4>::counts.call();
     Dbus::new.call();

@@ -87,6 +87,7 @@ fn the_check_runs_in_the_compiler_and_takes_what_physics_takes() {
 
 /// A loop in raw units needs no type of its own: the same loop in A per rad/s sends the same words.
 #[test]
+#[expect(clippy::cast_possible_truncation, reason = "at most 2000 rpm")]
 fn a_speed_loop_in_words_per_rpm_and_its_conversion_send_the_same_words() {
     use crate::dji::WordGains;
     let (kp, ki) = (8.0_f64, 5.0);

@@ -6,8 +6,8 @@
 //! ?                   asks for the table
 //! ```
 //!
-//! VOFA+ sends such lines from a button or a slider whose command is `wheel_kp=%.3f\n`; any serial terminal does too. What the
-//! program wants to see goes back by [`vofa`](super::vofa).
+//! VOFA+ sends such lines from a button or a slider whose command is `wheel_kp=%.3f\n`, and any serial terminal does. The module
+//! [`vofa`](super::vofa) sends the curves back.
 //!
 //! | what arrives | effect |
 //! |---|---|
@@ -17,7 +17,7 @@
 //! | a line that is none, or has more than 48 bytes | nothing changes; [`ParameterCounts::malformed`] |
 //! | half of a line, then 100 ms without a byte | the half is dropped; [`ParameterCounts::malformed`] |
 //!
-//! The values are only numbers: no line arms a motor, and a motor that is disarmed refuses every target. A **setting** holds until
+//! Values are only numbers: no line arms a motor, and a disarmed motor refuses every target. A **setting** holds until
 //! it is set again. A **target** expires, so a cable that is pulled leaves the program without a target, and the motor stops by its
 //! own time-out.
 //!
@@ -105,7 +105,7 @@ impl Parameter {
     }
 }
 
-/// What a line asked for.
+/// Request of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ParameterRequest {
@@ -308,7 +308,6 @@ const fn count(counter: &mut u16) {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "what was sent is what holds")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

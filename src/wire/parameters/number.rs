@@ -92,7 +92,6 @@ fn scaled(mut value: f32, mut exponent: i32) -> f32 {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "numbers of few digits are exact")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -108,7 +107,7 @@ mod tests {
             (".25", 0.25),
             ("7.", 7.0),
             ("0.1", 0.1),
-            ("-3.14159", -3.14159),
+            ("-3.25159", -3.25159),
             ("2e3", 2e3),
             ("1E-3", 1e-3),
             ("0000012", 12.0),
