@@ -235,7 +235,7 @@ impl Ascent {
         let rest = -(self.exit - self.entry).squared().scaled(0.25);
         let sum = velocities.narrow();
         let slope_at = |s: f32| {
-            let other = 0.5 * self.rise / s;
+            let other = if s > 0.0 { 0.5 * self.rise / s } else { 0.0 };
             0.75 * s * s + sum + other * other
         };
         let lowest = self.lowest(beginning, is_late, border);
@@ -246,7 +246,7 @@ impl Ascent {
             let (Beginning::Up(beyond) | Beginning::Down(beyond)) = beginning;
             let by_cube = lowest + math::cube_root(4.0 * beyond);
             let by_slope = lowest + beyond / slope_at(lowest);
-            guess = lesser(guess, lesser(by_cube, by_slope));
+            guess = lesser(by_slope, lesser(by_cube, guess));
         }
         let (way, end) = (self.way.narrow(), rest.narrow());
         let guess = root::<ROUGH_STEPS>(lowest, highest, guess, |s| {

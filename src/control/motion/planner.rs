@@ -126,12 +126,15 @@ impl Planner {
     fn motion(&self, goes_up: bool, curve: &Curve) -> Motion {
         let Limits { acceleration, jerk, .. } = self.limits;
         let sign = if goes_up { 1.0 } else { -1.0 };
+        let start = sign * self.task.acceleration.narrow();
         let (first, second) = (curve.first.root, curve.second.root);
+        // Rounding must not let the acceleration jump back.
+        let first = if first < start { start } else { first };
         let (brake_s, brake_hold_s) = self.braking_s();
         let phases = Phases {
             brake_s,
             brake_hold_s,
-            rise_s: self.seconds(first - sign * self.task.acceleration.narrow()),
+            rise_s: self.seconds(first - start),
             hold_s: self.seconds(curve.first.hold),
             fall_s: self.seconds(first),
             cruise_s: self.seconds(curve.cruise),
