@@ -149,6 +149,24 @@ impl Task {
 }
 
 impl Ascent {
+    /// Returns the direct motion, if it ends within rounding of the target and longer ones at first fall behind.
+    ///
+    /// They would then have to come back from afar. A target that is followed at its velocity is such a one.
+    #[cold]
+    pub(super) fn direct(&self, beginning: Beginning) -> Option<Curve> {
+        let acceleration = self.acceleration;
+        let total = match beginning {
+            Beginning::Up(_) => Slope::of(self.rise).duration(),
+            Beginning::Down(_) => {
+                let change = acceleration * acceleration - self.rise;
+                2.0 * acceleration + Slope::of(change).duration()
+            }
+        };
+        let curve = self.in_total(total);
+        let longer = self.in_total(total + 0.01 * (1.0 + total));
+        (self.way_of(&longer) < self.way_of(&curve)).then_some(curve)
+    }
+
     /// Returns the fastest motion over the way, which ends by `beyond` after that of the direct motion.
     pub(super) fn fastest(&self, beginning: Beginning) -> Curve {
         let way = self.way.narrow();

@@ -25,6 +25,7 @@
 //!
 //! # Limits
 //! The target's acceleration is zero. Limits are the same in both directions. A target velocity beyond its limit counts as the limit.
+//! A target that the direct change of velocity meets within two units in the last place of the positions counts as met.
 //! A way of more than `f32::MAX` counts as that, a duration too, and a start acceleration beyond 10^6 times its limit raises the limit.
 //!
 //! Reference: L. Berscheid and T. Kröger, Jerk-limited real-time trajectory generation with arbitrary target states, RSS 2021, whose
