@@ -4,10 +4,11 @@
 //! drivetrain-judges motion plan SAMPLES    eight f32 a motion in: position, velocity, acceleration, target position and velocity,
 //!                                          limits of velocity, acceleration and jerk; out: the duration, then SAMPLES + 1 times
 //!                                          time, position, velocity, acceleration and jerk, from the start to the end
+//! drivetrain-judges motion step SAMPLES    the same of three motions after each other in step, without the jerk: NaN
 //! ```
 
 use crate::Outcome;
-use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
+use drivetrain::control::{Motion, MotionLimits, MotionTarget, Motions, ProfileState};
 use std::io::{ErrorKind, Read, Write};
 
 /// A mistake that the judge has to find.
@@ -46,33 +47,86 @@ pub fn run(arguments: &[&str], mut input: impl Read, output: &mut impl Write) ->
         [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
         _ => (arguments, Defect::None),
     };
-    let ["plan", samples] = arguments else {
-        return Err("see the head of judges/src/motion.rs for the arguments".into());
-    };
-    let samples: u16 = samples.parse()?;
-    let mut bytes = [0; 32];
-    loop {
-        match input.read_exact(&mut bytes) {
-            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(()),
-            read => read?,
-        }
-        let mut case = [0.0; 8];
-        for (value, part) in case.iter_mut().zip(bytes.as_chunks().0) {
-            *value = f32::from_le_bytes(*part);
-        }
-        defect.plant(&mut case);
-        let [position, velocity, acceleration, target, target_velocity, top, steep, jerk] = case;
-        let limits = MotionLimits::new(top, steep).with_jerk(jerk);
-        let from = ProfileState { position, velocity, acceleration };
-        let to = MotionTarget { position: target, velocity: target_velocity };
+    match arguments {
+        ["plan", samples] => plan(samples.parse()?, defect, &mut input, output),
+        ["step", samples] => step(samples.parse()?, defect, &mut input, output),
+        _ => Err("see the head of judges/src/motion.rs for the arguments".into()),
+    }
+}
+
+fn plan(
+    samples: u16,
+    defect: Defect,
+    input: &mut impl Read,
+    output: &mut impl Write,
+) -> Outcome<()> {
+    while let Some((from, to, limits)) = read(defect, input)? {
         let motion = Motion::plan(&from, &to, &limits)?;
-        output.write_all(&motion.duration_s().to_le_bytes())?;
-        for sample in 0..=samples {
-            let time_s = motion.duration_s() * (f32::from(sample) / f32::from(samples));
-            let ProfileState { position, velocity, acceleration } = motion.at(time_s);
-            for value in [time_s, position, velocity, acceleration, motion.jerk_at(time_s)] {
-                output.write_all(&value.to_le_bytes())?;
-            }
+        let states = times(motion.duration_s(), samples)
+            .map(|time_s| (time_s, motion.at(time_s), motion.jerk_at(time_s)));
+        write(motion.duration_s(), states, output)?;
+    }
+    Ok(())
+}
+
+fn step(
+    samples: u16,
+    defect: Defect,
+    input: &mut impl Read,
+    output: &mut impl Write,
+) -> Outcome<()> {
+    while let Some(first) = read(defect, input)? {
+        let mut next =
+            || -> Outcome<Case> { Ok(read(defect, input)?.ok_or("three motions go together")?) };
+        let axes = [first, next()?, next()?];
+        let motions = Motions::plan(
+            &axes.map(|axis| axis.0),
+            &axes.map(|axis| axis.1),
+            &axes.map(|axis| axis.2),
+        )?;
+        for axis in 0..axes.len() {
+            let states = times(motions.duration_s(), samples)
+                .map(|time_s| (time_s, motions.at(time_s)[axis], f32::NAN));
+            write(motions.duration_s(), states, output)?;
         }
     }
+    Ok(())
+}
+
+type Case = (ProfileState, MotionTarget, MotionLimits);
+
+/// Reads a motion; `None` at the end of the input.
+fn read(defect: Defect, input: &mut impl Read) -> Outcome<Option<Case>> {
+    let mut bytes = [0; 32];
+    match input.read_exact(&mut bytes) {
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        read => read?,
+    }
+    let mut case = [0.0; 8];
+    for (value, part) in case.iter_mut().zip(bytes.as_chunks().0) {
+        *value = f32::from_le_bytes(*part);
+    }
+    defect.plant(&mut case);
+    let [position, velocity, acceleration, target, target_velocity, top, steep, jerk] = case;
+    let limits = MotionLimits::new(top, steep).with_jerk(jerk);
+    let from = ProfileState { position, velocity, acceleration };
+    Ok(Some((from, MotionTarget { position: target, velocity: target_velocity }, limits)))
+}
+
+fn times(duration_s: f32, samples: u16) -> impl Iterator<Item = f32> {
+    (0..=samples).map(move |sample| duration_s * (f32::from(sample) / f32::from(samples)))
+}
+
+fn write(
+    duration_s: f32,
+    states: impl Iterator<Item = (f32, ProfileState, f32)>,
+    output: &mut impl Write,
+) -> Outcome<()> {
+    output.write_all(&duration_s.to_le_bytes())?;
+    for (time_s, ProfileState { position, velocity, acceleration }, jerk) in states {
+        for value in [time_s, position, velocity, acceleration, jerk] {
+            output.write_all(&value.to_le_bytes())?;
+        }
+    }
+    Ok(())
 }

@@ -11,6 +11,7 @@
 //! | heading of a chassis | [`Pid`] | PD with `with_period`, `with_dead_band` |
 //! | a target from a stick or another computer | [`SlewLimiter`], [`Differentiator::optimal`] | the acceleration the mechanism can take |
 //! | a move from A to B | [`Profile`] and [`FeedForward`] | trapezoid; [`MotionLimits::with_jerk`] when it shakes |
+//! | a move from any state, to a target that moves, or of several axes in step | [`Motion`], [`MotionFollower`], [`Motions`] | limits of velocity, acceleration and jerk that the mechanism can take |
 //! | a noisy measurement | [`LowPass`]; [`Biquad`] when that is not steep enough | a cut-off of ten times the loop's bandwidth |
 //! | a resonance | [`Biquad::notch`] | its frequency, q = 2 |
 //! | single wrong samples | the median of a [`Window`] of 3 | |

@@ -5,8 +5,10 @@ use crate::math;
 /// A step of this share is the last but one: the next one would be of its square.
 const CLOSE: f32 = 3e-5;
 
-/// Newton's rule takes 3 to 5 steps, and 12 at most in 10^7 random states; the bracket halves where it would leave it.
-const MOST_STEPS: u32 = 16;
+/// In `f32`, where rounding may keep the steps from becoming close; then with the value in twice its precision, which takes one step,
+/// and more where the way hardly depends on the roots. The bracket halves where a step would leave it.
+const ROUGH_STEPS: u32 = 7;
+const EXACT_STEPS: u32 = 16;
 
 /// The fastest change of velocity with an acceleration of zero at both ends takes `root` of jerk twice, and `hold` between them.
 ///
@@ -147,6 +149,24 @@ impl Task {
 }
 
 impl Ascent {
+    /// Returns the direct motion, if it ends within rounding of the target and longer ones at first fall behind.
+    ///
+    /// They would then have to come back from afar. A target that is followed at its velocity is such a one.
+    #[cold]
+    pub(super) fn direct(&self, beginning: Beginning) -> Option<Curve> {
+        let acceleration = self.acceleration;
+        let total = match beginning {
+            Beginning::Up(_) => Slope::of(self.rise).duration(),
+            Beginning::Down(_) => {
+                let change = acceleration * acceleration - self.rise;
+                2.0 * acceleration + Slope::of(change).duration()
+            }
+        };
+        let curve = self.in_total(total);
+        let longer = self.in_total(total + 0.01 * (1.0 + total));
+        (self.way_of(&longer) < self.way_of(&curve)).then_some(curve)
+    }
+
     /// Returns the fastest motion over the way, which ends by `beyond` after that of the direct motion.
     pub(super) fn fastest(&self, beginning: Beginning) -> Curve {
         let way = self.way.narrow();
@@ -171,8 +191,8 @@ impl Ascent {
         let mut from = start;
         if gap < 1.0 && start <= border {
             if way < 2.0 * high + 1.0 + border * (2.0 * low + border * border) {
-                let is_late = start < -border;
-                return self.rolling(beginning, is_late, None);
+                let highest = lesser(crest.first.root + crest.second.root, 1.0 + border);
+                return self.rolling(beginning, start < -border, border, highest);
             }
             from = border;
         }
@@ -216,11 +236,11 @@ impl Ascent {
             let square = sum * sum - 0.75 * gap * gap;
             if sum < 0.0 && square > 0.0 {
                 let longest = math::sqrt(gap * gap / (2.0 * (math::sqrt(square) - sum)));
-                let first = self.lowest(beginning, holds_first);
+                let first = self.lowest(beginning, holds_first, border);
                 let reached =
                     longest * (0.25 * longest * longest + sum) - 0.25 * gap * gap / longest;
                 if first < longest && reached >= way {
-                    return Some(self.rolling(beginning, holds_first, Some(longest)));
+                    return Some(self.rolling(beginning, holds_first, border, longest));
                 }
             }
         }
@@ -228,34 +248,29 @@ impl Ascent {
     }
 
     /// Without holding: the root of `s⁴/4 + (entry + exit) s² - way s - rise²/4`.
-    fn rolling(&self, beginning: Beginning, is_late: bool, longest: Option<f32>) -> Curve {
+    fn rolling(&self, beginning: Beginning, is_late: bool, border: f32, highest: f32) -> Curve {
         let velocities = self.entry + self.exit;
         let rest = -(self.exit - self.entry).squared().scaled(0.25);
         let sum = velocities.narrow();
         let slope_at = |s: f32| {
-            let other = 0.5 * self.rise / s;
+            let other = if s > 0.0 { 0.5 * self.rise / s } else { 0.0 };
             0.75 * s * s + sum + other * other
         };
-        let lowest = self.lowest(beginning, is_late);
-        let highest = longest.unwrap_or_else(|| {
-            let crest = self.cruising(0.0);
-            let border = 1.0 + root_of(1.0 - self.rise.abs());
-            limited(crest.first.root + crest.second.root, lowest, border)
-        });
+        let lowest = self.lowest(beginning, is_late, border);
+        let highest = if highest > lowest { highest } else { lowest };
         let mut guess = highest;
         if sum >= 0.0 && !is_late {
             // The way grows at least as that of the cube, and as its slope there.
             let (Beginning::Up(beyond) | Beginning::Down(beyond)) = beginning;
             let by_cube = lowest + math::cube_root(4.0 * beyond);
             let by_slope = lowest + beyond / slope_at(lowest);
-            guess = if by_cube < guess { by_cube } else { guess };
-            guess = if by_slope < guess { by_slope } else { guess };
+            guess = lesser(by_slope, lesser(by_cube, guess));
         }
         let (way, end) = (self.way.narrow(), rest.narrow());
-        let guess = root(lowest, highest, guess, |s| {
+        let guess = root::<ROUGH_STEPS>(lowest, highest, guess, |s| {
             ((s * (0.25 * s * s + sum) - way) * s + end, s * slope_at(s))
         });
-        let s = root(lowest, highest, guess, |s| {
+        let s = root::<EXACT_STEPS>(lowest, highest, guess, |s| {
             let value = Wide::of(s).squared().scaled(0.25) + velocities;
             let value = (value * s - self.way) * s + rest;
             (value.narrow(), s * slope_at(s))
@@ -264,9 +279,9 @@ impl Ascent {
     }
 
     /// Returns the sum of both roots where a motion without holding begins, which is late after a slope that holds.
-    fn lowest(&self, beginning: Beginning, is_late: bool) -> f32 {
+    fn lowest(&self, beginning: Beginning, is_late: bool, border: f32) -> f32 {
         if is_late {
-            return 1.0 - root_of(1.0 - self.rise.abs());
+            return 1.0 - border;
         }
         let acceleration = self.acceleration;
         match beginning {
@@ -301,10 +316,10 @@ impl Ascent {
         let to = limited(top, from, to);
         let slope_at = |r: f32| (r + 1.0) * (2.0 * r * r + r + 2.0 * low);
         let end = fixed.narrow();
-        let guess = root(from, to, to, |r| {
+        let guess = root::<ROUGH_STEPS>(from, to, to, |r| {
             ((((0.5 * r + 1.0) * r + low + 0.5) * r + 2.0 * low) * r + end, slope_at(r))
         });
-        let r = root(from, to, guess, |r| {
+        let r = root::<EXACT_STEPS>(from, to, guess, |r| {
             let value = ((Wide::of(0.5 * r) + 1.0) * r + (small + 0.5)) * r + double;
             ((value * r + fixed).narrow(), slope_at(r))
         });
@@ -403,10 +418,19 @@ fn root_of(x: f32) -> f32 {
     if x > 0.0 { math::sqrt(x) } else { 0.0 }
 }
 
+const fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 /// Finds where a function passes zero upward, which it does once between `low` and `high`.
-fn root(low: f32, high: f32, guess: f32, function: impl Fn(f32) -> (f32, f32)) -> f32 {
+fn root<const STEPS: u32>(
+    low: f32,
+    high: f32,
+    guess: f32,
+    function: impl Fn(f32) -> (f32, f32),
+) -> f32 {
     let (mut low, mut high, mut x) = (low, high, guess);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..STEPS {
         let (value, slope) = function(x);
         if value > 0.0 {
             high = x;

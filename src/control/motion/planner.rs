@@ -18,6 +18,8 @@ pub(super) struct Planner {
     unit_s: f32,
     brake: Brake,
     task: Task,
+    /// What `f32` cannot tell of the positions, in the units of the task.
+    rounding: f32,
 }
 
 /// Of a way, what rounding may take from it.
@@ -52,6 +54,9 @@ impl Planner {
         };
         let (task, limits) = scale::scaled(distance, from, &end, limits);
         let brake = Brake::of(&task);
+        let size = from.position.abs() + end.position.abs();
+        let rate = limits.jerk / limits.acceleration;
+        let rounding = 2.0 * f32::EPSILON * size * rate * rate / limits.acceleration;
         Ok(Self {
             start: *from,
             end,
@@ -60,6 +65,7 @@ impl Planner {
             unit_s: limits.acceleration / limits.jerk,
             brake,
             task: brake.after(task),
+            rounding,
         })
     }
 
@@ -71,7 +77,10 @@ impl Planner {
         let goes_on = beyond >= 0.0;
         let task = if goes_on { direct } else { direct.mirrored() };
         let beginning = if goes_on { Beginning::Down(beyond) } else { Beginning::Up(-beyond) };
-        self.motion(falls == goes_on, &task.ascent().fastest(beginning))
+        let ascent = task.ascent();
+        let direct = if beyond.abs() <= self.rounding { ascent.direct(beginning) } else { None };
+        let curve = direct.unwrap_or_else(|| ascent.fastest(beginning));
+        self.motion(falls == goes_on, &curve)
     }
 
     /// Returns the shortest duration from `duration_s` on that the motion can have.
@@ -126,12 +135,15 @@ impl Planner {
     fn motion(&self, goes_up: bool, curve: &Curve) -> Motion {
         let Limits { acceleration, jerk, .. } = self.limits;
         let sign = if goes_up { 1.0 } else { -1.0 };
+        let start = sign * self.task.acceleration.narrow();
         let (first, second) = (curve.first.root, curve.second.root);
+        // Rounding must not let the acceleration jump back.
+        let first = if first < start { start } else { first };
         let (brake_s, brake_hold_s) = self.braking_s();
         let phases = Phases {
             brake_s,
             brake_hold_s,
-            rise_s: self.seconds(first - sign * self.task.acceleration.narrow()),
+            rise_s: self.seconds(first - start),
             hold_s: self.seconds(curve.first.hold),
             fall_s: self.seconds(first),
             cruise_s: self.seconds(curve.cruise),

@@ -109,5 +109,5 @@ fn exponent(x: f32) -> i32 {
 }
 
 fn power_of_two(exponent: i32) -> f32 {
-    f32::from_bits((exponent.max(-126).min(127) + 127).cast_unsigned() << 23)
+    f32::from_bits((exponent.clamp(-126, 127) + 127).cast_unsigned() << 23)
 }
