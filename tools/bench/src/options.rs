@@ -143,7 +143,7 @@ pub(crate) fn parse(arguments: Vec<std::ffi::OsString>) -> Result<Asked, String>
     }
     options.geometry = geometry.unwrap_or(options.geometry);
     let usual = match options.source {
-        Source::Simulator if options.twist.is_none() => "m3508:1-4,gm6020:5,damiao4310:1",
+        Source::Simulator if options.twist.is_none() => "m3508:1-2,gm6020:5,damiao4310:1",
         _ => "m3508:1-4",
     };
     options.motors = motors::parse(list.as_deref().unwrap_or(usual))?;
@@ -225,7 +225,7 @@ mod tests {
     fn without_arguments_a_simulated_robot_is_shown() {
         let options = parsed("").unwrap();
         assert_eq!((options.command, options.source), (Command::Window, Source::Simulator));
-        assert_eq!(options.motors.len(), 6);
+        assert_eq!(options.motors.len(), 4);
         assert!(!options.arm);
     }
 

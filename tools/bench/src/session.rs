@@ -390,12 +390,13 @@ impl Session {
     fn take_edges(&mut self, now: Instant) -> Vec<String> {
         let mut changes = Vec::new();
         while let Some(edge) = self.runner.device_mut().next_edge() {
+            let text = without_time(&edge);
             if edge.began && edge.condition == Condition::SecondMaster {
-                self.messages.push(format!("{edge}: another program or board commands it too"));
+                self.messages.push(format!("{text}: another program or board commands it too"));
             }
-            changes.push(edge.to_string());
+            changes.push(text);
         }
-        changes.extend(self.runner.edges().map(|edge| edge.to_string()));
+        changes.extend(self.runner.edges().map(|edge| without_time(&edge)));
         self.edges.extend(changes.iter().map(|text| (now, text.clone())));
         changes
     }
@@ -434,6 +435,12 @@ impl Session {
         let ends = tap.recorders.into_iter().map(|recorder| recorder.finish(&mut say));
         ends.filter_map(Result::err).collect()
     }
+}
+
+/// An edge without the time on the clock of the device, beside which the session's time stands.
+fn without_time(edge: &impl ToString) -> String {
+    let text = edge.to_string();
+    text.rsplit_once(" at ").map_or(text.clone(), |(text, _)| text.to_owned())
 }
 
 #[cfg(test)]

@@ -70,7 +70,10 @@ impl embedded_can::nb::Can for Tap {
                 Some(Heard::Frame(frame)) => {
                     self.traffic.note(&frame, self.time.read());
                     self.record(&text::of(&frame), false);
-                    return Ok(frame);
+                    // The commands in a recording are those of a program like this one, and no second master.
+                    if self.link.sends() || !self.traffic.is_command(&frame) {
+                        return Ok(frame);
+                    }
                 }
                 Some(Heard::Error(class, data, kind)) => {
                     self.record(&text::of_parts(class, 8, &data), false);

@@ -64,6 +64,13 @@ impl Traffic {
         row.last = *frame;
     }
 
+    /// Tells whether a frame is a command to one of the motors, and no answer of any.
+    pub(crate) fn is_command(&self, frame: &CanFrame) -> bool {
+        let has =
+            |role| self.claims.iter().any(|claim| claim.role() == role && claim.covers(frame.id()));
+        has(Role::Command) && !has(Role::Feedback)
+    }
+
     /// Ends the window of the rates, if it is over.
     pub(crate) fn turn(&mut self, now: Instant) {
         let begun = *self.window.get_or_insert(now);

@@ -54,6 +54,10 @@ pub(crate) struct Outcome {
 
 #[derive(Debug)]
 enum Stage {
+    /// It comes to rest, whatever it did.
+    Rest {
+        left_s: f32,
+    },
     /// By the present gains.
     Before(StepResponse),
     RunUp {
@@ -87,7 +91,7 @@ pub(crate) enum Next {
 }
 
 impl Tuning {
-    /// Begins with a step by the present gains.
+    /// Begins at rest, with a step by the present gains.
     ///
     /// # Errors
     /// Names the value of the plan that is none.
@@ -110,12 +114,14 @@ impl Tuning {
             before,
             after: None,
         };
-        Ok(Self { plan, stage: Stage::Before(response(&plan)?), outcome, found: None })
+        response(&plan)?;
+        Ok(Self { plan, stage: Stage::Rest { left_s: PAUSE_S }, outcome, found: None })
     }
 
     /// What is being done, for a person who waits.
     pub(crate) fn stage(&self) -> &'static str {
         match self.stage {
+            Stage::Rest { .. } => "rest",
             Stage::Before(_) => "step with the present gains",
             Stage::RunUp { .. } => "run-up",
             Stage::Swing(_) => "relay",
@@ -128,6 +134,16 @@ impl Tuning {
     pub(crate) fn step(&mut self, speed: f32, effort: Option<f32>, dt_s: f32) -> Next {
         let about = self.plan.about;
         match &mut self.stage {
+            Stage::Rest { left_s } => {
+                *left_s -= dt_s;
+                if *left_s <= 0.0 {
+                    match response(&self.plan) {
+                        Ok(response) => self.stage = Stage::Before(response),
+                        Err(error) => return Next::Done(Err(error)),
+                    }
+                }
+                Next::Ask(Target::Velocity(0.0))
+            }
             Stage::Before(response) => {
                 response.record(speed, dt_s);
                 if response.is_complete() {

@@ -126,7 +126,7 @@ pub(crate) fn plan(
 ) -> Plan {
     let robot = session.robot();
     let (about, hysteresis, share) =
-        if robot.unit(motor) == "V" { (8.0, 3.0, 0.4) } else { (15.0, 0.5, 0.5) };
+        if robot.unit(motor) == "V" { (8.0, 4.0, 0.4) } else { (15.0, 0.5, 0.5) };
     let rpm = options.and_then(|options| options.rpm);
     Plan {
         about: rpm.map_or(about, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),

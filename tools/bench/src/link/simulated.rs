@@ -8,7 +8,7 @@ use drivetrain::lk::Series;
 use drivetrain::odrive::Firmware;
 use drivetrain::sim::{
     DamiaoDrive, DriveShaft, Fault, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive, RmdDrive,
-    RobStrideDrive, Simulation, VescDrive, VescMotor,
+    RobStrideDrive, Sender, Simulation, VescDrive, VescMotor,
 };
 use drivetrain::time::{Duration, Instant};
 use embedded_can::{Error as _, nb::Can};
@@ -76,6 +76,10 @@ impl Simulated {
         let mut answers = Vec::new();
         let motors = &mut self.motors;
         self.world.advance_with(STEP, |record| {
+            // The answers of LK have the id of its commands.
+            if record.sender != Sender::Controller {
+                return;
+            }
             for motor in motors.iter_mut().filter(|motor| motor.silent_until <= now) {
                 if let Place::Own(kind) = &mut motor.place {
                     answers.extend(kind.hear(&record.frame));

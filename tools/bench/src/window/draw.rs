@@ -117,15 +117,28 @@ fn cells(motor: &Motor, is_selected: bool) -> [String; 11] {
         if is_selected { ">".into() } else { String::new() },
         motor.name.clone(),
         if motor.is_heard { format!("{:?}", motor.link) } else { "not heard".into() },
-        or_dash(motor.target_rpm.map(|rpm| format!("{rpm:.1}"))),
-        if motor.is_heard { format!("{:.1}", motor.rpm) } else { "-".into() },
+        or_dash(motor.target_rpm.map(|rpm| fixed(rpm, 1))),
+        if motor.is_heard { fixed(motor.rpm, 1) } else { "-".into() },
         or_dash(motor.turns.map(|turns| format!("{turns:.2}"))),
-        or_dash(motor.effort.map(|effort| format!("{effort:.2} {}", motor.measured_unit))),
+        or_dash(motor.effort.map(|effort| format!("{} {}", fixed(effort, 2), motor.measured_unit))),
         or_dash(motor.temperature_c.map(|degrees| degrees.to_string())),
         motor.feedback_hz.to_string(),
         if motor.is_armed { motor.program.clone() } else { "relaxed".into() },
         wrong.join(", "),
     ]
+}
+
+/// A number with so many places, and without the sign of a zero.
+fn fixed(value: f32, places: usize) -> String {
+    let text = format!("{value:.places$}");
+    let is_zero = !text.contains(|sign: char| ('1'..='9').contains(&sign));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// A number with so many places at most.
+fn short(value: f32, places: usize) -> String {
+    let text = fixed(value, places);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn draw_strip(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
@@ -134,6 +147,7 @@ fn draw_strip(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
     let motor = view.snapshot.motors.get(ui.selected);
     let (name, gains) = motor.map_or((String::new(), String::new()), |motor| {
         let (kp, ki, kd) = motor.gains;
+        let [kp, ki, kd] = [kp, ki, kd].map(|gain| short(gain, 3));
         (
             motor.name.clone(),
             format!("kp {kp} {unit} per rad/s  ki {ki} {unit} per rad  kd {kd}", unit = motor.unit),
@@ -291,5 +305,11 @@ mod tests {
         }
         let text = screen(&view(false), &Ui { page: Page::Bus, ..Ui::default() }, (140, 36));
         assert!(text.contains("received 7") && !text.contains("sent 0"), "{text}");
+    }
+
+    #[test]
+    fn numbers_have_no_sign_at_zero_and_no_zeros_at_the_end() {
+        assert_eq!([fixed(-0.001, 2), fixed(-0.5, 1), fixed(12.0, 1)], ["0.00", "-0.5", "12.0"]);
+        assert_eq!([short(1.9, 3), short(36.110_233, 3), short(0.0, 3)], ["1.9", "36.11", "0"]);
     }
 }
