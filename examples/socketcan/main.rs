@@ -8,8 +8,10 @@
 //! It turns an M3508 with id 1 at 30 rpm for 5 s, by a current of at most 3 A. The smallest whole program: zeros also where it is
 //! halted, a full queue, other motors and a record are what the bench does (`cargo run --release -p drivetrain-bench`).
 
+#[cfg(target_os = "linux")]
 #[path = "../arguments/mod.rs"]
 mod arguments;
+#[cfg(target_os = "linux")]
 #[path = "../console/mod.rs"]
 mod console;
 

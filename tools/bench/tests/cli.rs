@@ -43,23 +43,30 @@ fn arguments_that_make_no_sense_end_it_with_code_2_and_help_with_0() {
     assert!(String::from_utf8_lossy(&missing.stderr).contains("no-such-interface"));
 }
 
+/// All families, three at a time: at 1 kHz eight motors are more than a bus of 1 Mbit/s carries.
+const GROUPS: [&str; 3] = [
+    "m3508:1,gm6020:5,damiao4310:1",
+    "mg4005e-i10:2,rmd-x8-90:3,cybergear:4",
+    "odrive0.5:5,odrive0.6:7,vesc7:6",
+];
+
 #[test]
 fn nothing_moves_without_arm_and_with_it_all_families_turn() {
-    let motors =
-        "m3508:1,gm6020:5,damiao4310:1,mg4005e-i10:2,rmd-x8-90:3,cybergear:4,odrive0.5:5,vesc7:6";
-    let still = lines(&format!("spin --rpm 60 --motors {motors} --seconds 1"));
-    assert!(still.iter().any(|line| line == "nothing is sent without --arm"), "{still:?}");
-    assert!(still.iter().any(|line| line == "sent 0"), "{still:?}");
-    let objects = objects(&format!("spin --rpm 60 --motors {motors} --seconds 4 --arm --json"));
-    let last = objects.iter().rev().find(|object| object["stage"] == "ARMED").unwrap();
-    let motors = last["motors"].as_array().unwrap();
-    assert_eq!(motors.len(), 8);
-    for motor in motors {
-        let rpm = motor["rpm"].as_f64().unwrap();
-        assert!((rpm - 60.0).abs() < 6.0 && motor["armed"] == true, "{motor}");
+    for group in GROUPS {
+        let still = lines(&format!("spin --rpm 60 --motors {group} --seconds 1"));
+        assert!(still.iter().any(|line| line == "nothing is sent without --arm"), "{still:?}");
+        assert!(still.iter().any(|line| line == "sent 0"), "{still:?}");
+        let objects = objects(&format!("spin --rpm 60 --motors {group} --seconds 4 --arm --json"));
+        let last = objects.iter().rev().find(|object| object["stage"] == "ARMED").unwrap();
+        let motors = last["motors"].as_array().unwrap();
+        assert_eq!(motors.len(), 3);
+        for motor in motors {
+            let rpm = motor["rpm"].as_f64().unwrap();
+            assert!((rpm - 60.0).abs() < 6.0 && motor["armed"] == true, "{motor}");
+        }
+        let counts = &objects.last().unwrap()["counts"];
+        assert!(counts["sent"].as_u64().unwrap() > 1_000, "{counts}");
     }
-    let counts = &objects.last().unwrap()["counts"];
-    assert!(counts["sent"].as_u64().unwrap() > 1_000, "{counts}");
 }
 
 #[test]
