@@ -122,11 +122,6 @@ fn a_usage_error_is_said_and_ends_each_example_with_code_2() {
         let output = program(name).args(arguments).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{name} {arguments:?}: {output:?}");
     }
-    if cfg!(target_os = "linux") {
-        let both = ["--rpm", "9", "--mecanum", "1,0,0"];
-        let output = program("socketcan").args(both).output().unwrap();
-        assert_eq!(output.status.code(), Some(2), "{output:?}");
-    }
 }
 
 #[test]

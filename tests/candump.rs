@@ -4,6 +4,8 @@
 
 #[path = "../examples/candump/motor.rs"]
 mod motor;
+#[path = "../examples/motors/mod.rs"]
+mod motors;
 #[path = "../examples/candump/options.rs"]
 mod options;
 #[path = "../examples/candump/replay.rs"]
@@ -301,7 +303,7 @@ fn wrong_options_say_what_is_wrong() {
         assert!(error.contains(message), "{arguments}: {error}");
     }
     assert!(matches!(options::parse(["--help".to_owned()].into_iter()), Ok(Asked::Help)));
-    assert!(options::HELP.contains("--motors"));
+    assert!(options::help().contains("--motors") && options::help().contains("cybergear"));
 }
 
 /// The program, which `cargo test` builds beside the tests.

@@ -6,6 +6,8 @@
 #[path = "../arguments/mod.rs"]
 mod arguments;
 mod motor;
+#[path = "../motors/mod.rs"]
+mod motors;
 mod options;
 mod replay;
 mod report;
@@ -19,9 +21,9 @@ use options::{Asked, Options};
 fn main() -> ExitCode {
     let options = match options::parse(arguments::of("candump")) {
         Ok(Asked::Run(options)) => options,
-        Ok(Asked::Help) => return finish(writeln!(io::stdout(), "{}", options::HELP)),
+        Ok(Asked::Help) => return finish(writeln!(io::stdout(), "{}", options::help())),
         Err(message) => {
-            arguments::refuse("candump", format_args!("{message}\n\n{}", options::HELP))
+            arguments::refuse("candump", format_args!("{message}\n\n{}", options::help()))
         }
     };
     let input: Box<dyn BufRead> = match options.file.as_deref() {

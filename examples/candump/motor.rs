@@ -1,6 +1,7 @@
 //! The motors of a log, of each family.
 
-use drivetrain::dji::{AnyHandle, Bus, Config, Model};
+use super::motors::{Model, Spec};
+use drivetrain::dji::{self, AnyHandle, Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508};
 use drivetrain::encoder::{GearRatio, Position};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
@@ -8,7 +9,7 @@ use drivetrain::motor::{
 };
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
-use drivetrain::{damiao, lk, odrive, robstride, vesc};
+use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 use embedded_can::{Frame, StandardId};
 use std::fmt::{self, Debug};
 
@@ -198,83 +199,70 @@ impl Listener for Lk {
     }
 }
 
-type Outcome = Result<Box<dyn Listener>, String>;
+/// Makes the motor that the command line names.
+pub(crate) fn listener(spec: Spec) -> Result<Box<dyn Listener>, String> {
+    let Spec { id, host, .. } = spec;
+    // Limits and control modes count for commands only, and feedback is the same in each of them.
+    let (any_nm, any_speed) = (1.0, AngularVelocity::from_rpm(1.0));
+    let impedance = || ImpedanceControl::new(any_nm).map_err(text);
+    match spec.model {
+        Model::M3508 => dji::<M3508>(id),
+        Model::M2006 => dji::<M2006>(id),
+        Model::Gm6020 => dji::<Gm6020Voltage>(id),
+        Model::Gm6020Current => dji::<Gm6020Current>(id),
+        Model::Damiao(model) => {
+            let motor = damiao::Motor::new(model, id, impedance()?).map_err(text)?;
+            own(match host {
+                Some(master) => motor.with_master_id(master).map_err(text)?,
+                None => motor,
+            })
+        }
+        Model::Lk(model) => {
+            // Refuses an id that is none.
+            lk::Motor::new(model, id, lk::Mode::position_velocity(any_speed)).map_err(text)?;
+            Ok(Box::new(Lk { model, id, drive: None, state: None, rotor: 0 }))
+        }
+        Model::Rmd(model) => {
+            let mode = lk::Mode::position_velocity(any_speed);
+            own(rmd::Motor::new(model, id, mode).map_err(text)?)
+        }
+        Model::RobStride(model) => {
+            let motor = robstride::Motor::new(model, id, impedance()?).map_err(text)?;
+            own(match host.map(u8::try_from) {
+                Some(Ok(host)) => motor.with_host_id(host).map_err(text)?,
+                Some(Err(_)) => return Err("a host id of RobStride is at most 255".into()),
+                None => motor,
+            })
+        }
+        Model::Odrive(firmware) => {
+            let model = odrive::Model::new("ODrive", 100.0).map_err(text)?;
+            let mode = odrive::Mode::velocity(any_nm);
+            own(odrive::Motor::new(model, firmware, id, any_speed, mode).map_err(text)?)
+        }
+        Model::Vesc(pole_pairs) => {
+            let model = vesc::Model {
+                name: "VESC",
+                pole_pairs,
+                gear: GearRatio::DIRECT,
+                torque_constant_nm_per_a: 1.0,
+                current_limit_a: 1.0,
+                max_velocity: any_speed,
+                is_reversed: false,
+            };
+            let motor = vesc::Motor::new(model, id, vesc::Mode::velocity()).map_err(text)?;
+            Ok(Box::new(Vesc(Own::new(motor))))
+        }
+    }
+}
 
-pub(crate) fn dji<M: Model>(id: u8) -> Outcome {
+fn own<M: OwnMotor + 'static>(motor: M) -> Result<Box<dyn Listener>, String> {
+    Ok(Box::new(Own::new(motor)))
+}
+
+fn dji<M: dji::Model>(id: u8) -> Result<Box<dyn Listener>, String> {
     let mut bus = Bus::new();
     let motor = bus.attach(Config::<M>::new(id)).map_err(text)?.erase();
     Ok(Box::new(Dji { bus, motor, name: MotorName::new(M::FACTS.name, id) }))
-}
-
-/// Makes a motor of another family; `None` if no family has a model of this name.
-pub(crate) fn of_family(name: &str, id: u8) -> Option<Outcome> {
-    [damiao, lk, robstride, odrive, vesc].iter().find_map(|family| family(name, id))
-}
-
-/// A motor of Damiao with a name such as `damiao4310` or `damiaoh6215`, that answers to the master id 0x10 above its own.
-fn damiao(name: &str, id: u8) -> Option<Outcome> {
-    let number = name.strip_prefix("damiao")?.to_ascii_uppercase();
-    let is_called = |model: &&damiao::Model| {
-        let name = model.name().trim_start_matches("DM-");
-        name == number || name.trim_start_matches('J') == number
-    };
-    let model = *damiao::Model::ALL.iter().find(is_called)?;
-    // Feedback is the same in each control mode.
-    let mode = ImpedanceControl::new(model.tmax_nm()).map_err(text);
-    let motor = mode.and_then(|mode| damiao::Motor::new(model, id, mode).map_err(text));
-    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
-}
-
-/// A motor of LK-TECH by its name, such as `mg4005e-i10`.
-fn lk(name: &str, id: u8) -> Option<Outcome> {
-    let model = *lk::Model::ALL.iter().find(|model| model.name().eq_ignore_ascii_case(name))?;
-    // Refuses an id that is none.
-    let motor =
-        lk::Motor::new(model, id, lk::Mode::position_velocity(AngularVelocity::from_rpm(1.0)));
-    let listener = Lk { model, id, drive: None, state: None, rotor: 0 };
-    Some(motor.map(|_| Box::new(listener) as _).map_err(text))
-}
-
-/// A motor of RobStride, such as `rs02`, or `cybergear`, with the host id 0xFD.
-fn robstride(name: &str, id: u8) -> Option<Outcome> {
-    let models = robstride::Model::ALL.iter();
-    let model = *models.into_iter().find(|model| model.name().eq_ignore_ascii_case(name))?;
-    let mode = ImpedanceControl::new(model.tmax_nm()).map_err(text);
-    let motor = mode.and_then(|mode| robstride::Motor::new(model, id, mode).map_err(text));
-    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
-}
-
-/// A motor at an ODrive, `odrive0.5` or `odrive0.6`: the shaft is that of the motor.
-fn odrive(name: &str, id: u8) -> Option<Outcome> {
-    use odrive::{Firmware, Mode, Model, Motor};
-    let firmware = match name {
-        "odrive0.5" => Firmware::V0_5,
-        "odrive0.6" => Firmware::V0_6,
-        _ => return None,
-    };
-    // The motor and its limits count for commands only.
-    let model = Model::new("ODrive", 100.0).map_err(text);
-    let fastest = AngularVelocity::from_rpm(1.0);
-    let motor = model.and_then(|model| {
-        Motor::new(model, firmware, id, fastest, Mode::velocity(1.0)).map_err(text)
-    });
-    Some(motor.map(|motor| Box::new(Own::new(motor)) as _))
-}
-
-/// A motor on a VESC, by its pole pairs, as in `vesc7`: the shaft is that of the motor.
-fn vesc(name: &str, id: u8) -> Option<Outcome> {
-    let model = vesc::Model {
-        name: "VESC",
-        pole_pairs: name.strip_prefix("vesc")?.parse().ok()?,
-        gear: GearRatio::DIRECT,
-        // What follows counts for commands only.
-        torque_constant_nm_per_a: 1.0,
-        current_limit_a: 1.0,
-        max_velocity: AngularVelocity::from_rpm(1.0),
-        is_reversed: false,
-    };
-    let motor = vesc::Motor::new(model, id, vesc::Mode::velocity()).map_err(text);
-    Some(motor.map(|motor| Box::new(Vesc(Own::new(motor))) as _))
 }
 
 fn all_turns(position: Position) -> f64 {

@@ -1,8 +1,8 @@
-//! Two CAN controllers on one bus, the example on `can0` and the robot on `can1`. Unlike `vcan0` these have drivers: a frame
+//! Two CAN controllers on one bus, the bench on `can0` and the robot on `can1`. Unlike `vcan0` these have drivers: a frame
 //! leaves by a transmit queue and comes by an interrupt, and an interface that is taken down drops what waits in its queue.
 
 use super::{
-    END, Example, MARKER, RPM, Robot, Witness, output, queue, queueing_on, said, wait_until,
+    Bench, END, MARKER, RPM, Robot, Witness, output, queue, queueing_on, said, wait_until,
 };
 use crate::ends::{ends, is_there, signal};
 use crate::judge::end_with_zeros;
@@ -11,7 +11,7 @@ use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
 use std::fs;
 use std::io::{BufRead, Write};
 
-/// The interface of the example.
+/// The interface of the bench.
 const NEAR: &str = "can0";
 /// The interface of the robot.
 const FAR: &str = "can1";
@@ -20,7 +20,7 @@ const COMMANDS: [&str; 2] = ["200", "2FF"];
 struct Bus {
     robot: Robot,
     motors: Vec<MotorKey>,
-    /// Writes markers behind the frames of the example.
+    /// Writes markers behind the frames of the bench.
     near: CanSocket,
     seen_near: Witness,
     seen_far: Witness,
@@ -28,7 +28,7 @@ struct Bus {
 }
 
 /// Half a second later the motors turn.
-fn driven() -> (Bus, Example) {
+fn driven() -> (Bus, Bench) {
     let world = Simulation::new(4);
     let mut configs: Vec<_> = (1..=4).map(MotorConfig::m3508).collect();
     configs.push(MotorConfig::gm6020_voltage(5));
@@ -42,20 +42,20 @@ fn driven() -> (Bus, Example) {
         steps: 0,
     };
     let rpm = RPM.to_string();
-    let mut example =
-        Example::start(&["--interface", NEAR, "--motors", "m3508:1-4,gm6020:5", "--rpm", &rpm]);
+    let mut bench =
+        Bench::start(&["--interface", NEAR, "--motors", "m3508:1-4,gm6020:5", "--rpm", &rpm]);
     // It listens when it has answered.
-    example.step();
-    bus.drive(&mut example, 500);
+    bench.step();
+    bus.drive(&mut bench, 500);
     assert!(!bus.is_left_at_zero());
-    (bus, example)
+    (bus, bench)
 }
 
 impl Bus {
-    fn drive(&mut self, example: &mut Example, ms: u32) {
+    fn drive(&mut self, bench: &mut Bench, ms: u32) {
         for _ in 0..ms {
             self.feed_back();
-            example.step();
+            bench.step();
             self.deliver();
         }
     }
@@ -65,14 +65,14 @@ impl Bus {
         self.steps.to_le_bytes()[0]
     }
 
-    /// A millisecond of the robot. Returns when the example's interface has its frames.
+    /// A millisecond of the robot. Returns when the bench's interface has its frames.
     fn feed_back(&mut self) {
         self.steps += 1;
         self.robot.feed_back();
         self.robot.mark(&self.seen_near, MARKER, self.step());
     }
 
-    /// Returns when the robot has every frame that the example's interface took.
+    /// Returns when the robot has every frame that the bench's interface took.
     fn deliver(&mut self) {
         let marker = CanFrame::new(StandardId::new(END).unwrap(), &[self.step()]).unwrap();
         self.near.write_frame(&marker).unwrap();
@@ -81,11 +81,11 @@ impl Bus {
     }
 
     /// A bus on which frames that go first leave 16 ms to each command. Returns when the queue is full of commands.
-    fn congest(&mut self, example: &mut Example) {
+    fn congest(&mut self, bench: &mut Bench) {
         queueing_on(NEAR, "add", "netem rate 8kbit limit 5");
         for _ in 0..20 {
             self.feed_back();
-            example.step();
+            bench.step();
         }
         assert!(queue(NEAR).1 > 2, "nothing waits");
         self.robot.receive();
@@ -115,7 +115,7 @@ fn counted(interface: &str, counter: &str) -> u64 {
     fs::read_to_string(file).unwrap().trim().parse().unwrap()
 }
 
-/// What the example counted.
+/// What the bench counted.
 fn reported(report: &[String], name: &str) -> u64 {
     let count = report.iter().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
     count.unwrap_or_else(|| panic!("no {name} in {report:?}")).parse().unwrap()
@@ -136,11 +136,11 @@ fn two_controllers_drive_motors_and_their_drivers_count_the_same_frames() {
     ];
     let count = || COUNTERS.map(|(interface, counter)| counted(interface, counter));
     let before = count();
-    let (mut bus, mut example) = driven();
-    bus.drive(&mut example, 1_000);
+    let (mut bus, mut bench) = driven();
+    bus.drive(&mut bench, 1_000);
     let speeds = |motor| bus.robot.world.motor(motor).unwrap().velocity.as_rpm();
     let reached: Vec<f32> = bus.motors.iter().copied().map(speeds).collect();
-    let report = example.end();
+    let report = bench.end();
     bus.steps += 1;
     bus.deliver();
     end_with_zeros(&bus.robot.received, &COMMANDS);
@@ -160,17 +160,17 @@ fn two_controllers_drive_motors_and_their_drivers_count_the_same_frames() {
 #[test]
 #[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
 fn a_congested_bus_refuses_commands_loses_none_and_ends_with_zeros() {
-    let (mut bus, mut example) = driven();
-    bus.congest(&mut example);
-    signal("-TERM", &example);
-    writeln!(example.steps).unwrap();
-    assert!(ends(&mut example).success(), "{}", said());
+    let (mut bus, mut bench) = driven();
+    bus.congest(&mut bench);
+    signal("-TERM", &bench);
+    writeln!(bench.steps).unwrap();
+    assert!(ends(&mut bench).success(), "{}", said());
     wait_until("an empty queue", || queue(NEAR).1 == 0);
     let dropped = queue(NEAR).0;
     queueing_on(NEAR, "del", "");
     bus.deliver();
     assert!(bus.is_left_at_zero());
-    let report: Vec<String> = example.answers.lines().map(Result::unwrap).collect();
+    let report: Vec<String> = bench.answers.lines().map(Result::unwrap).collect();
     let refused = reported(&report, "refused");
     assert_eq!(reported(&report, "sent"), bus.received_commands());
     assert_eq!((refused, 0), (dropped, reported(&report, "send_errors")));
@@ -183,25 +183,24 @@ fn a_congested_bus_refuses_commands_loses_none_and_ends_with_zeros() {
 #[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
 fn an_interface_that_goes_down_stops_all_and_no_stale_command_follows() {
     for comes_back in [true, false] {
-        let (mut bus, mut example) = driven();
-        bus.congest(&mut example);
+        let (mut bus, mut bench) = driven();
+        bus.congest(&mut bench);
         output("ip", &["link", "set", NEAR, "down"]);
         bus.robot.receive();
         bus.robot.received.clear();
         wait_until("a word of it", || {
             bus.robot.feed_back();
-            _ = writeln!(example.steps);
-            said().contains("socketcan: can0 takes no zeros: cut the battery\n")
+            _ = writeln!(bench.steps);
+            said().contains("bench: can0 takes no zeros: cut the battery\n")
         });
-        assert!(said().starts_with("socketcan: all stop: "), "{}", said());
-        assert!(is_there(&mut example), "it left the motors as they were");
+        assert!(said().starts_with("bench: all stop: "), "{}", said());
+        assert!(is_there(&mut bench), "it left the motors as they were");
         if comes_back {
             output("ip", &["link", "set", NEAR, "up"]);
         }
-        assert_eq!(ends(&mut example).code(), Some(1));
+        assert_eq!(ends(&mut bench).code(), Some(1));
         if !comes_back {
-            let end =
-                "socketcan: can0 takes no zeros, and the last command may stand. Cut the battery";
+            let end = "bench: can0 takes no zeros, and the last command may stand. Cut the battery";
             assert!(said().contains(end), "{}", said());
             output("ip", &["link", "set", NEAR, "up"]);
         }

@@ -1,7 +1,7 @@
-//! Whatever ends the example or holds up what it says, the motors are left at zero. What a drive does with its last current
+//! Whatever ends the bench or holds up what it says, the motors are left at zero. What a drive does with its last current
 //! when nobody sends it another is not known.
 
-use super::{END, Example, Robot, Witness, output, queueing, result, said, wait_until};
+use super::{Bench, END, Robot, Witness, output, queueing, result, said, wait_until};
 use crate::judge::end_with_zeros;
 use drivetrain::sim::{MotorConfig, Simulation};
 use std::fs::File;
@@ -21,19 +21,19 @@ fn robot() -> Robot {
 }
 
 /// Half a second later the motor turns.
-fn driven(more: &[&str]) -> (Robot, Example) {
+fn driven(more: &[&str]) -> (Robot, Bench) {
     let mut robot = robot();
-    let mut example = Example::start(&[&ASKED, more].concat());
+    let mut bench = Bench::start(&[&ASKED, more].concat());
     for _ in 0..500 {
-        example.step();
+        bench.step();
         robot.step();
     }
     assert_ne!(robot.received.last().unwrap(), ZEROS);
-    (robot, example)
+    (robot, bench)
 }
 
-pub(crate) fn signal(name: &str, example: &Example) {
-    output("busybox", &["kill", name, &example.child.id().to_string()]);
+pub(crate) fn signal(name: &str, bench: &Bench) {
+    output("busybox", &["kill", name, &bench.child.id().to_string()]);
 }
 
 /// What comes before the marker is all that it sent.
@@ -43,22 +43,22 @@ fn is_left_at_zero(robot: &mut Robot, witness: &Witness) {
     end_with_zeros(&robot.received, &["200"]);
 }
 
-pub(crate) fn ends(example: &mut Example) -> ExitStatus {
-    wait_until("the end of the example", || example.child.try_wait().unwrap().is_some());
-    example.child.wait().unwrap()
+pub(crate) fn ends(bench: &mut Bench) -> ExitStatus {
+    wait_until("the end of the bench", || bench.child.try_wait().unwrap().is_some());
+    bench.child.wait().unwrap()
 }
 
 /// As people use it, by the clock; the others here go step by step.
 struct ByTheClock {
     robot: Robot,
-    example: Example,
+    bench: Bench,
 }
 
 impl ByTheClock {
     /// Driven, for a second and more.
     fn start(seconds: &str) -> Self {
         let (robot, arguments) = (robot(), [&ASKED[..], &["--seconds", seconds]].concat());
-        let mut running = Self { robot, example: Example::in_real_time(&arguments) };
+        let mut running = Self { robot, bench: Bench::in_real_time(&arguments) };
         wait_until("a motor that is driven", || {
             running.millisecond();
             running.robot.received.iter().any(|frame| frame != ZEROS)
@@ -74,13 +74,13 @@ impl ByTheClock {
 
     /// Goes on with `meanwhile` until it ends.
     fn end(mut self, meanwhile: fn(&mut Self)) -> ExitStatus {
-        wait_until("the end of the example", || {
+        wait_until("the end of the bench", || {
             meanwhile(&mut self);
-            !is_there(&mut self.example)
+            !is_there(&mut self.bench)
         });
         is_left_at_zero(&mut self.robot, &Witness::new());
-        assert!(self.example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
-        self.example.child.wait().unwrap()
+        assert!(self.bench.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+        self.bench.child.wait().unwrap()
     }
 }
 
@@ -89,7 +89,7 @@ impl ByTheClock {
 fn the_motors_are_left_at_zero_when_the_time_is_over_or_somebody_ends_it() {
     assert!(ByTheClock::start("3").end(ByTheClock::millisecond).success(), "{}", said());
     let running = ByTheClock::start("100");
-    signal("-INT", &running.example);
+    signal("-INT", &running.bench);
     assert!(running.end(ByTheClock::millisecond).success(), "{}", said());
 }
 
@@ -98,7 +98,7 @@ fn the_motors_are_left_at_zero_when_the_time_is_over_or_somebody_ends_it() {
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_motor_that_falls_silent_at_the_end_is_named() {
     let running = ByTheClock::start("100");
-    signal("-INT", &running.example);
+    signal("-INT", &running.bench);
     assert_eq!(running.end(|silent| silent.robot.receive()).code(), Some(1));
     let end = "M3508 #1 is not heard, and the last command may stand";
     assert!(said().contains(end), "{}", said());
@@ -107,14 +107,14 @@ fn a_motor_that_falls_silent_at_the_end_is_named() {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_motor_that_falls_silent_stops_all_and_is_named() {
-    let (mut robot, mut example) = driven(&[]);
-    wait_until("the end of the example", || {
-        _ = writeln!(example.steps);
-        !is_there(&mut example)
+    let (mut robot, mut bench) = driven(&[]);
+    wait_until("the end of the bench", || {
+        _ = writeln!(bench.steps);
+        !is_there(&mut bench)
     });
-    assert_eq!(ends(&mut example).code(), Some(1));
+    assert_eq!(ends(&mut bench).code(), Some(1));
     is_left_at_zero(&mut robot, &Witness::new());
-    assert!(said().starts_with("socketcan: all stop: M3508 #1: "), "{}", said());
+    assert!(said().starts_with("bench: all stop: M3508 #1: "), "{}", said());
 }
 
 /// Room for four frames, and none leaves: the last command stands, and so do those in the queue.
@@ -122,23 +122,21 @@ fn a_motor_that_falls_silent_stops_all_and_is_named() {
 #[ignore = "needs vcan0 and tc: tests/vcan/run starts a Linux that has them"]
 fn zeros_that_the_interface_does_not_take_are_waited_for_and_said() {
     for code in [0, 1] {
-        let (mut robot, mut example) = driven(&[]);
+        let (mut robot, mut bench) = driven(&[]);
         queueing("add", "plug limit 64");
         for _ in 0..5 {
-            example.step();
+            bench.step();
             robot.step();
         }
         assert_ne!(robot.received.last().unwrap(), ZEROS);
-        signal("-TERM", &example);
-        writeln!(example.steps).unwrap();
-        wait_until("a word of it", || {
-            said() == "socketcan: vcan0 takes no zeros: cut the battery\n"
-        });
-        assert!(is_there(&mut example), "it left the motor as it was");
+        signal("-TERM", &bench);
+        writeln!(bench.steps).unwrap();
+        wait_until("a word of it", || said() == "bench: vcan0 takes no zeros: cut the battery\n");
+        assert!(is_there(&mut bench), "it left the motor as it was");
         if code == 0 {
             queueing("change", "plug release_indefinite");
         }
-        assert_eq!(ends(&mut example).code(), Some(code));
+        assert_eq!(ends(&mut bench).code(), Some(code));
         queueing("del", "");
         if code == 0 {
             is_left_at_zero(&mut robot, &Witness::new());
@@ -152,10 +150,10 @@ fn zeros_that_the_interface_does_not_take_are_waited_for_and_said() {
 fn the_motors_are_left_at_zero_when_a_terminal_is_closed_or_would_halt_it() {
     let witness = Witness::new();
     for name in ["-HUP", "-TSTP"] {
-        let (mut robot, mut example) = driven(&[]);
-        signal(name, &example);
-        writeln!(example.steps).unwrap();
-        assert!(ends(&mut example).success(), "{name}");
+        let (mut robot, mut bench) = driven(&[]);
+        signal(name, &bench);
+        writeln!(bench.steps).unwrap();
+        assert!(ends(&mut bench).success(), "{name}");
         is_left_at_zero(&mut robot, &witness);
     }
 }
@@ -164,58 +162,58 @@ fn the_motors_are_left_at_zero_when_a_terminal_is_closed_or_would_halt_it() {
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn the_motors_are_left_at_zero_when_nobody_can_read_what_it_says() {
     let witness = Witness::new();
-    let (mut robot, mut example) = driven(&[]);
-    example.answers.get_ref().shutdown(Shutdown::Both).unwrap();
-    wait_until("the end of the example", || {
+    let (mut robot, mut bench) = driven(&[]);
+    bench.answers.get_ref().shutdown(Shutdown::Both).unwrap();
+    wait_until("the end of the bench", || {
         robot.step();
-        _ = writeln!(example.steps);
-        example.child.try_wait().unwrap().is_some()
+        _ = writeln!(bench.steps);
+        bench.child.try_wait().unwrap().is_some()
     });
-    assert!(!ends(&mut example).success());
-    assert!(said().starts_with("socketcan: standard output: "), "{}", said());
+    assert!(!ends(&mut bench).success());
+    assert!(said().starts_with("bench: standard output: "), "{}", said());
     is_left_at_zero(&mut robot, &witness);
 }
 
 /// A thousand answers that nobody reads, as with a full pipe or Ctrl-S: the motor is driven on, and a signal ends that at once.
 /// Then only what is to be read waits.
-fn unread() -> (Robot, Example) {
-    let (mut robot, mut example) = driven(&[]);
+fn unread() -> (Robot, Bench) {
+    let (mut robot, mut bench) = driven(&[]);
     for _ in 0..1_000 {
         let seen = robot.received.len();
-        writeln!(example.steps).unwrap();
+        writeln!(bench.steps).unwrap();
         wait_until("a command", || {
             robot.receive();
             robot.received.len() > seen
         });
         robot.step();
     }
-    end_held_up(&mut robot, &mut example);
-    (robot, example)
+    end_held_up(&mut robot, &mut bench);
+    (robot, bench)
 }
 
 /// The motors are safe at once, whatever is still to be written.
-fn end_held_up(robot: &mut Robot, example: &mut Example) {
+fn end_held_up(robot: &mut Robot, bench: &mut Bench) {
     assert_ne!(robot.received.last().unwrap(), ZEROS);
-    signal("-TERM", example);
-    writeln!(example.steps).unwrap();
+    signal("-TERM", bench);
+    writeln!(bench.steps).unwrap();
     wait_until("zeros", || {
         robot.receive();
         robot.received.iter().rev().take_while(|frame| *frame == ZEROS).count() >= 2
     });
     std::thread::sleep(std::time::Duration::from_millis(50));
-    assert!(is_there(example), "nobody held it up");
+    assert!(is_there(bench), "nobody held it up");
 }
 
-pub(crate) fn is_there(example: &mut Example) -> bool {
-    example.child.try_wait().unwrap().is_none()
+pub(crate) fn is_there(bench: &mut Bench) -> bool {
+    bench.child.try_wait().unwrap().is_none()
 }
 
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_reader_who_does_not_read_holds_up_no_motor() {
-    let (mut robot, mut example) = unread();
-    let said: Vec<String> = (&mut example.answers).lines().map(Result::unwrap).collect();
-    assert!(ends(&mut example).success());
+    let (mut robot, mut bench) = unread();
+    let said: Vec<String> = (&mut bench.answers).lines().map(Result::unwrap).collect();
+    assert!(ends(&mut bench).success());
     is_left_at_zero(&mut robot, &Witness::new());
     let answered = said.iter().take_while(|line| *line == ".").count();
     let unread = said.iter().find_map(|line| line.strip_prefix("unread ")).unwrap();
@@ -228,16 +226,15 @@ fn a_reader_who_does_not_read_holds_up_no_motor() {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_second_signal_ends_it_for_a_reader_who_does_not_read() {
-    let (mut robot, mut example) = unread();
-    let waits =
-        "socketcan: nothing more is sent; waits for standard output, and a signal ends that\n";
+    let (mut robot, mut bench) = unread();
+    let waits = "bench: nothing more is sent; waits for standard output, and a signal ends that\n";
     wait_until("a word of it", || said() == waits);
     wait_until("its end by a signal", || {
         // It may be about to reckon with one.
-        _ = Command::new("busybox").args(["kill", &example.child.id().to_string()]).output();
-        !is_there(&mut example)
+        _ = Command::new("busybox").args(["kill", &bench.child.id().to_string()]).output();
+        !is_there(&mut bench)
     });
-    assert_eq!(ends(&mut example).signal(), Some(15));
+    assert_eq!(ends(&mut bench).signal(), Some(15));
     is_left_at_zero(&mut robot, &Witness::new());
 }
 
@@ -252,14 +249,14 @@ fn a_log_that_takes_nothing_holds_up_no_motor() {
         let pipe = pipe.to_owned();
         move || File::open(pipe).unwrap()
     });
-    let (mut robot, mut example) = driven(&["--log", pipe]);
+    let (mut robot, mut bench) = driven(&["--log", pipe]);
     for _ in 0..1_000 {
-        example.step();
+        bench.step();
         robot.step();
     }
-    end_held_up(&mut robot, &mut example);
+    end_held_up(&mut robot, &mut bench);
     let log = std::io::read_to_string(reader.join().unwrap()).unwrap();
-    assert!(ends(&mut example).success());
+    assert!(ends(&mut bench).success());
     is_left_at_zero(&mut robot, &Witness::new());
     let commands = |frames: &mut dyn Iterator<Item = &str>| -> Vec<String> {
         frames.filter(|frame| frame.starts_with("200#")).map(str::to_owned).collect()
@@ -271,16 +268,16 @@ fn a_log_that_takes_nothing_holds_up_no_motor() {
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
 fn a_log_on_a_full_disk_holds_up_no_motor_and_is_an_error_at_the_end() {
-    let (mut robot, mut example) = driven(&["--log", "/dev/full"]);
+    let (mut robot, mut bench) = driven(&["--log", "/dev/full"]);
     for _ in 0..100 {
-        example.step();
+        bench.step();
         robot.step();
     }
     assert_ne!(robot.received.last().unwrap(), ZEROS);
-    signal("-TERM", &example);
-    writeln!(example.steps).unwrap();
-    assert_eq!(ends(&mut example).code(), Some(1));
+    signal("-TERM", &bench);
+    writeln!(bench.steps).unwrap();
+    assert_eq!(ends(&mut bench).code(), Some(1));
     is_left_at_zero(&mut robot, &Witness::new());
-    assert!(said().starts_with("socketcan: --log: "), "{}", said());
-    assert!(example.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
+    assert!(said().starts_with("bench: --log: "), "{}", said());
+    assert!(bench.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
 }

@@ -19,6 +19,6 @@ $bb stty -F /dev/ttyS1 -opost
     for interface in can0 can1; do
         /bin/ip link set $interface up type can bitrate 1000000 || echo "no $interface"
     done
-    VCAN_RESULTS=/results VCAN_EXAMPLE=/bin/socketcan vcan --ignored --nocapture --test-threads 1 </dev/null
+    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 </dev/null
 } >/dev/ttyS1 2>&1
 $bb poweroff -f

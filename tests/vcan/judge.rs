@@ -1,4 +1,4 @@
-//! Compares what three parties saw: candump, the example, and the robot.
+//! Compares what three parties saw: candump, the bench, and the robot.
 
 use socketcan::{CanFrame, EmbeddedFrame, Frame};
 use std::collections::HashMap;
@@ -60,13 +60,13 @@ fn doubled(frames: &[String]) -> u64 {
     frames.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64
 }
 
-/// Commands that the kernel doubled. Its copies have lost their sender, so that the example receives them: frames of its own
+/// Commands that the kernel doubled. Its copies have lost their sender, so that the bench receives them: frames of its own
 /// ids, which it has to hand back.
 fn doubled_commands(frames: &[String]) -> u64 {
     frames.windows(2).filter(|pair| pair[0] == pair[1] && is_command(&pair[0])).count() as u64
 }
 
-/// Commands that the example sent, by its own log.
+/// Commands that the bench sent, by its own log.
 fn sent(ours: &[String], seen: &[String]) -> u64 {
     let commands = ours.iter().filter(|frame| is_command(frame)).count() as u64;
     commands - doubled_commands(seen)
@@ -85,7 +85,7 @@ pub(crate) fn end_with_zeros(frames: &[String], ids: &[&str]) {
     }
 }
 
-/// What the form of a frame says that the example has to count it as.
+/// What the form of a frame says that the bench has to count it as.
 fn class(frame: &str) -> &'static str {
     let (id, data) = frame.split_once('#').unwrap();
     let attached = ["201", "202", "203", "204", "209"].contains(&id);
@@ -120,18 +120,18 @@ impl Judge {
     }
 
     fn count(&self, name: &str) -> u64 {
-        *self.counts.get(name).unwrap_or_else(|| panic!("the example reports no {name}"))
+        *self.counts.get(name).unwrap_or_else(|| panic!("the bench reports no {name}"))
     }
 
-    /// Everything that candump saw of the robot, the example received, in this order; everything that candump saw of the
-    /// example, the robot received, and the example says that it sent it.
+    /// Everything that candump saw of the robot, the bench received, in this order; everything that candump saw of the
+    /// bench, the robot received, and the bench says that it sent it.
     pub(crate) fn bytes_are_equal(&self) {
         let of = |frames: &[String], ours: bool| -> Vec<String> {
             frames.iter().filter(|frame| is_command(frame) == ours).cloned().collect()
         };
         let (seen, received) = (of(&self.candump, false), of(&self.ours, false));
         assert_eq!(seen.len(), received.len());
-        assert!(seen == received, "candump and the example saw different frames");
+        assert!(seen == received, "candump and the bench saw different frames");
         let commands = of(&self.candump, true);
         // The copies of its own frames come back to the robot as well.
         let received = of(&self.robot_received, true);
@@ -216,7 +216,7 @@ impl Judge {
     }
 
     pub(crate) fn print_table(&self) {
-        println!("phase         robot  example  refused     lost  doubled  candump  (frames)");
+        println!("phase         robot  bench  refused     lost  doubled  candump  (frames)");
         let mut total = [0; 6];
         let (seen, ours) = (self.split(&self.candump), self.split(&self.ours));
         for ((phase, seen), ours) in self.phases.iter().zip(seen).zip(ours) {
@@ -231,11 +231,8 @@ impl Judge {
             );
             total.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         }
-        let [robot, example, refused, lost, doubled, candump] = total;
-        println!(
-            "{:<12}{robot:>7}{example:>9}{refused:>9}{lost:>9}{doubled:>9}{candump:>9}",
-            "all"
-        );
+        let [robot, bench, refused, lost, doubled, candump] = total;
+        println!("{:<12}{robot:>7}{bench:>9}{refused:>9}{lost:>9}{doubled:>9}{candump:>9}", "all");
         let counts = [
             "received",
             "taken",
@@ -253,7 +250,7 @@ impl Judge {
             "send_errors",
         ];
         let counts = counts.map(|name| format!("{name} {}", self.count(name)));
-        println!("the example counts, to its end: {}", counts.join(", "));
-        assert!(robot + example > 100_000, "not 100 000 frames");
+        println!("the bench counts, to its end: {}", counts.join(", "));
+        assert!(robot + bench > 100_000, "not 100 000 frames");
     }
 }

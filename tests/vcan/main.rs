@@ -1,12 +1,12 @@
-//! A real CAN stack: the example `socketcan` on a `vcan0` of Linux, a simulated robot on its other side, and candump as the
+//! A real CAN stack: the bench on a `vcan0` of Linux, a simulated robot on its other side, and candump as the
 //! witness of both. [`run`](../run) emulates a PC with a Linux of its own, so that nothing of the host's kernel is needed.
 //!
 //! The two go in lock-step, a millisecond for each line: so no step depends on the clock. The interface loses and doubles frames,
 //! and its queue is full for a while; among the robot's frames are foreign, remote, extended, malformed and error
 //! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
-//! And a chassis has to move as the example is asked to.
+//! And a chassis has to move as the bench is asked to.
 //!
-//! Two CAN controllers with drivers carry the same example in [`controllers`].
+//! Two CAN controllers with drivers carry the same bench in [`controllers`].
 
 #![cfg(test)]
 #![cfg(target_os = "linux")]
@@ -93,19 +93,19 @@ fn result(name: &str) -> String {
     folder.join(name).to_str().unwrap().to_owned()
 }
 
-/// What the last example said on standard error.
+/// What the last bench said on standard error.
 fn said() -> String {
     fs::read_to_string(result("said")).unwrap()
 }
 
-/// The example, one millisecond after the other.
-struct Example {
+/// The bench, one millisecond after the other.
+struct Bench {
     child: Child,
     steps: ChildStdin,
     answers: BufReader<UnixStream>,
 }
 
-impl Example {
+impl Bench {
     fn start(arguments: &[&str]) -> Self {
         Self::in_real_time(&[&["--lock-step"], arguments].concat())
     }
@@ -113,8 +113,8 @@ impl Example {
     fn in_real_time(arguments: &[&str]) -> Self {
         // Full after some hundred lines which nobody reads; a pipe would take 32 000.
         let (answers, stdout) = UnixStream::pair().unwrap();
-        let mut child = Command::new(std::env::var("VCAN_EXAMPLE").unwrap())
-            .args(["--interface", BUS, "--arm"])
+        let mut child = Command::new(std::env::var("VCAN_BENCH").unwrap())
+            .args(["spin", "--interface", BUS, "--arm"])
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(OwnedFd::from(stdout))
@@ -143,7 +143,7 @@ impl Example {
 
 /// A socket that gets the test's own frames only. The kernel gives a frame to all sockets at once and keeps the order: when
 /// this one has a frame, everybody has everything that went before it. Without it a busy machine may be late with the last
-/// frames, and the example would end before them.
+/// frames, and the bench would end before them.
 struct Witness(CanSocket);
 
 impl Witness {
@@ -274,7 +274,7 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
     let keys: Vec<_> = configs.into_iter().map(|config| world.attach(config).unwrap()).collect();
     let mut robot = Robot::new(world);
     let (motors, rpm, log) = ("m3508:1-4,gm6020:5", RPM.to_string(), result("ours.log"));
-    let mut example = Example::start(&["--motors", motors, "--rpm", &rpm, "--log", &log]);
+    let mut bench = Bench::start(&["--motors", motors, "--rpm", &rpm, "--log", &log]);
     let mut candump = Command::new("candump")
         .args(["-L", "-r", "16777216", &format!("{BUS},0:0,#FFFFFFFF")])
         .stdout(File::create(result("candump.log")).unwrap())
@@ -293,7 +293,7 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
         robot.written = Written::default();
         for _ in 0..ms {
             robot.step();
-            example.step();
+            bench.step();
         }
         if discipline.starts_with("plug") {
             queueing("change", "plug release_indefinite");
@@ -306,22 +306,22 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
         // What still came, then the marker. With frames of the robot before the commands: where one of the last two was lost,
         // the other would be followed by its like.
         robot.step();
-        example.step();
+        bench.step();
         let written = robot.written;
         robot.receive();
         robot.mark(&witness, MARKER, u8::try_from(index).unwrap());
-        example.step();
+        bench.step();
         phases.push(Phase { name, written, dropped });
     }
     for _ in 0..200 {
         robot.step();
-        example.step();
+        bench.step();
     }
     robot.mark(&witness, MARKER, u8::try_from(PHASES.len()).unwrap());
-    example.step();
+    bench.step();
     let reached: Vec<f32> =
         keys.iter().map(|key| robot.world.motor(*key).unwrap().velocity.as_rpm()).collect();
-    let report = example.end();
+    let report = bench.end();
     robot.mark(&witness, END, 0);
     robot.receive();
     // candump is slower than the others, and writes in blocks: it has caught up when what comes last is in its file.
@@ -344,7 +344,7 @@ fn every_frame_on_a_real_can_stack_is_accounted_for() {
     println!("motors at the end: {reached:.1?} rpm, {RPM} asked for");
 }
 
-/// The body is the simulator's and knows nothing of the kinematics. Ids 1 to 4 stand as the example's help says: front right,
+/// The body is the simulator's and knows nothing of the kinematics. Ids 1 to 4 stand as the bench's help says: front right,
 /// front left, rear left, rear right.
 #[test]
 #[ignore = "needs vcan0: tests/vcan/run starts a Linux that has it"]
@@ -362,13 +362,13 @@ fn a_mecanum_chassis_moves_as_it_is_asked_and_is_left_at_zero() {
         .collect();
     world.attach_chassis(ChassisConfig::new(&wheels)).unwrap();
     let mut robot = Robot::new(world);
-    let mut example = Example::start(&["--mecanum", &format!("{ahead},{left},{turn}")]);
+    let mut bench = Bench::start(&["--mecanum", &format!("{ahead},{left},{turn}")]);
     for _ in 0..2_000 {
-        example.step();
+        bench.step();
         robot.step();
     }
     let moved = robot.world.chassis().unwrap().twist;
-    example.end();
+    bench.end();
     robot.mark(&Witness::new(), END, 0);
     robot.receive();
     end_with_zeros(&robot.received, &["200"]);

@@ -5,12 +5,30 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
+/// What a text is written to, which may have an end of its own.
+pub(crate) trait Sink: Write + Send + 'static {
+    /// Writes the end.
+    ///
+    /// # Errors
+    /// That of the write.
+    fn close(&mut self) -> io::Result<()> {
+        self.flush()
+    }
+}
+
+impl Sink for std::fs::File {}
+impl Sink for io::Stdout {}
+impl Sink for io::Stderr {}
+
 /// Lines that a thread of its own writes: a reader who reads no more, or a disk that hangs, does not hold up who drives motors.
+#[derive(Debug)]
 pub(crate) struct Outlet {
     name: String,
     lines: SyncSender<String>,
     writer: JoinHandle<io::Result<()>>,
     lost: u32,
+    /// What [`is_full`](Self::is_full) could not leave yet.
+    refused: Option<String>,
 }
 
 impl Outlet {
@@ -18,14 +36,14 @@ impl Outlet {
     ///
     /// # Errors
     /// Where there can be no thread more.
-    pub(crate) fn new(
-        name: &str,
-        sink: impl Write + Send + 'static,
-        room: usize,
-    ) -> io::Result<Self> {
+    pub(crate) fn new(name: &str, sink: impl Sink, room: usize) -> io::Result<Self> {
         let (lines, waiting) = sync_channel(room);
-        let writer = Builder::new().spawn(|| write(waiting, BufWriter::new(sink)))?;
-        Ok(Self { name: name.into(), lines, writer, lost: 0 })
+        let writer = Builder::new().spawn(|| write(waiting, sink))?;
+        Ok(Self { name: name.into(), lines, writer, lost: 0, refused: None })
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.name
     }
 
     /// Leaves a text to be written, or loses it where there is no room. Returns whether anybody can still read it.
@@ -36,6 +54,17 @@ impl Outlet {
                 self.lost = self.lost.saturating_add(1);
                 matches!(refused, TrySendError::Full(_))
             }
+        }
+    }
+
+    /// Tells whether there is no room now.
+    pub(crate) fn is_full(&mut self) -> bool {
+        match self.lines.try_send(self.refused.take().unwrap_or_default()) {
+            Err(TrySendError::Full(text)) => {
+                self.refused = Some(text);
+                true
+            }
+            Ok(()) | Err(TrySendError::Disconnected(_)) => false,
         }
     }
 
@@ -75,13 +104,14 @@ impl Outlet {
     }
 }
 
-fn write(waiting: Receiver<String>, mut sink: impl Write) -> io::Result<()> {
+fn write(waiting: Receiver<String>, sink: impl Sink) -> io::Result<()> {
+    let mut sink = BufWriter::new(sink);
     while let Ok(first) = waiting.recv() {
         sink.write_all(first.as_bytes())?;
         waiting.try_iter().try_for_each(|text| sink.write_all(text.as_bytes()))?;
         sink.flush()?;
     }
-    Ok(())
+    sink.get_mut().close()
 }
 
 #[cfg(test)]
@@ -96,6 +126,8 @@ mod tests {
         may_go_on: Receiver<()>,
         written: Arc<Mutex<String>>,
     }
+
+    impl Sink for HeldUp {}
 
     impl Write for HeldUp {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -131,6 +163,7 @@ mod tests {
     #[test]
     fn who_can_read_no_more_is_noticed_and_the_reason_is_kept() {
         struct Gone;
+        impl Sink for Gone {}
         impl Write for Gone {
             fn write(&mut self, _: &[u8]) -> io::Result<usize> {
                 Err(io::ErrorKind::BrokenPipe.into())

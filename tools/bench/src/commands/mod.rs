@@ -1,0 +1,207 @@
+//! The commands without a window.
+
+mod drive;
+pub(crate) use drive::plan;
+mod look;
+mod setup;
+
+use crate::end::End;
+use crate::link::{Link, Replay, Simulated, Slcan};
+use crate::options::{Command, Options, Source};
+use crate::outlet::Outlet;
+use crate::pace::Pace;
+use crate::record::{self, Recorder};
+use crate::robot::Robot;
+use crate::session::{Pilot, Session};
+use crate::time::Time;
+use std::io::{self, BufRead};
+use std::process::ExitCode;
+
+/// Texts that wait for a reader.
+const ROOM: usize = 64;
+
+/// What a command does in each tick: `false` ends it.
+pub(crate) trait Task {
+    /// What is asked for before the first tick.
+    fn begin(&mut self, session: &mut Session) {
+        _ = session;
+    }
+
+    fn ticked(&mut self, session: &mut Session, ticks: u64, out: &mut Out) -> bool;
+
+    /// What is said at the end, after all else.
+    fn report(&mut self, session: &mut Session, out: &mut Out) -> String;
+
+    /// Whether the end of the time is a failure.
+    fn is_missed(&self) -> bool {
+        false
+    }
+}
+
+/// Standard output.
+#[derive(Debug)]
+pub(crate) struct Out {
+    outlet: Outlet,
+    is_open: bool,
+    pub(crate) is_json: bool,
+}
+
+impl Out {
+    pub(crate) fn say(&mut self, text: String) {
+        self.is_open &= self.outlet.offer(text);
+    }
+
+    pub(crate) fn lost(&self) -> u32 {
+        self.outlet.lost()
+    }
+}
+
+/// Leads a session by a task.
+struct Lead<'a, T> {
+    task: T,
+    seconds: Option<f32>,
+    is_lock_step: bool,
+    out: Out,
+    errors: &'a mut Outlet,
+    ticks: u64,
+}
+
+impl<T: Task> Pilot for Lead<'_, T> {
+    fn goes_on(&mut self, session: &mut Session) -> bool {
+        if self.is_lock_step {
+            return matches!(io::stdin().lock().skip_until(b'\n'), Ok(1..));
+        }
+        let is_over = matches!(&session.tap().link, Link::Replay(replay) if replay.is_over());
+        let is_late =
+            self.seconds.is_some_and(|seconds| session.elapsed().as_secs_f32() >= seconds);
+        !is_over && !is_late
+    }
+
+    fn ticked(&mut self, session: &mut Session) -> bool {
+        self.ticks += 1;
+        session.messages().into_iter().for_each(|text| say(self.errors, &text));
+        let goes_on = !session.has_failed() && self.task.ticked(session, self.ticks, &mut self.out);
+        if self.is_lock_step {
+            self.out.say(".\n".into());
+        }
+        goes_on && self.out.is_open
+    }
+}
+
+fn say(errors: &mut Outlet, text: &str) {
+    _ = errors.offer(format!("bench: {text}\n"));
+}
+
+/// Makes the session that the options ask for.
+///
+/// # Errors
+/// Says which option cannot be met.
+pub(crate) fn session(options: &Options, simulator: fn() -> Pace) -> Result<Session, String> {
+    let robot = Robot::new(&options.motors, options.twist.is_some())?;
+    let recorders = options.logs.iter().map(|(option, path)| Recorder::create(option, path));
+    let recorders = recorders.collect::<Result<_, _>>()?;
+    let real = || {
+        if options.lock_step { Pace::LockStep(Time::manual()) } else { Pace::Real(Time::real()) }
+    };
+    let (link, pace) = match &options.source {
+        Source::Simulator => {
+            (Link::Simulated(Simulated::new(&options.motors, options.seed)?), simulator())
+        }
+        #[cfg(target_os = "linux")]
+        Source::Interface(name) => (Link::Socket(crate::link::Socket::open(name)?), real()),
+        #[cfg(not(target_os = "linux"))]
+        Source::Interface(_) => return Err("SocketCAN is a part of Linux: try --serial".into()),
+        Source::Serial(path) => (Link::Slcan(Slcan::open(path)?), real()),
+        Source::Recording(path) => {
+            let pace = simulator();
+            (Link::Replay(Replay::open(path, pace.time())?), pace)
+        }
+    };
+    Ok(Session::new(robot, link, pace, recorders))
+}
+
+/// Runs a command to its end.
+///
+/// # Errors
+/// Says which option cannot be met.
+pub(crate) fn run(options: &Options, end: &End) -> Result<ExitCode, String> {
+    let fast = || Pace::Fast(Time::manual());
+    let seconds = options.seconds;
+    if let (Command::Replay, Source::Recording(from), Some(to)) =
+        (&options.command, &options.source, &options.output)
+    {
+        let count = record::convert(from, to)?;
+        println(&format!("{count} frames to {to}"));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let needs_arm = matches!(options.command, Command::Tune | Command::Identify);
+    if needs_arm && !options.arm {
+        return Err("the motors move: --arm says that they may".into());
+    }
+    let session = session(options, fast)?;
+    match &options.command {
+        Command::Scan => {
+            lead(session, options, end, look::Scan::new(options.asks), Some(seconds.unwrap_or(2.0)))
+        }
+        Command::Record | Command::Replay => {
+            let seconds = if options.command == Command::Replay {
+                None
+            } else {
+                Some(seconds.unwrap_or(5.0))
+            };
+            lead(session, options, end, look::Watch, seconds)
+        }
+        Command::Tune | Command::Identify => {
+            let task = drive::Tune::new(options);
+            lead(session, options, end, task, seconds)
+        }
+        Command::Get(_) | Command::Set(..) | Command::SetId(_) => {
+            let task = setup::Setup::new(options)?;
+            lead(session, options, end, task, Some(seconds.unwrap_or(2.0)))
+        }
+        Command::Watch | Command::Spin | Command::Window => {
+            let task = drive::Spin::new(options)?;
+            lead(session, options, end, task, Some(seconds.unwrap_or(5.0)))
+        }
+    }
+}
+
+/// Runs a task, and says at the end what it came to.
+fn lead(
+    mut session: Session,
+    options: &Options,
+    end: &End,
+    task: impl Task,
+    seconds: Option<f32>,
+) -> Result<ExitCode, String> {
+    let outlet = |name, sink| Outlet::new(name, sink, ROOM).map_err(|error| error.to_string());
+    let mut errors =
+        Outlet::new("standard error", io::stderr(), ROOM).map_err(|error| error.to_string())?;
+    let out = Out {
+        outlet: outlet("standard output", io::stdout())?,
+        is_open: true,
+        is_json: options.json,
+    };
+    let is_lock_step = options.lock_step;
+    let mut lead = Lead { task, seconds, is_lock_step, out, errors: &mut errors, ticks: 0 };
+    lead.task.begin(&mut session);
+    session.run(end, &mut lead);
+    let Lead { mut task, mut out, .. } = lead;
+    session.messages().into_iter().for_each(|text| say(&mut errors, &text));
+    let mut has_failed = session.has_failed() || (task.is_missed() && !end.is_asked_for());
+    let report = task.report(&mut session, &mut out);
+    let said = out.outlet.finish(report, |text| say(&mut errors, &text));
+    let mut failures = session.finish(|text| say(&mut errors, &text));
+    failures.extend(said.err());
+    for failure in failures {
+        say(&mut errors, &failure);
+        has_failed = true;
+    }
+    errors.finish(String::new(), |_| {})?;
+    Ok(if has_failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Writes a line on standard output, for somebody who may have stopped reading.
+pub(crate) fn println(text: &str) {
+    _ = io::Write::write_all(&mut io::stdout(), format!("{text}\n").as_bytes());
+}

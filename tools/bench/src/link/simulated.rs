@@ -1,0 +1,260 @@
+//! The simulated robot: motors with lifted wheels on one bus of the simulator.
+
+use super::{Heard, Taken};
+use crate::drive::MOTOR_NM_PER_A;
+use crate::motors::{Model, Spec};
+use drivetrain::frame::CanFrame;
+use drivetrain::lk::Series;
+use drivetrain::odrive::Firmware;
+use drivetrain::sim::{
+    DamiaoDrive, DriveShaft, Fault, Line, LkDrive, MotorConfig, MotorKey, OdriveDrive, RmdDrive,
+    RobStrideDrive, Sender, Simulation, VescDrive, VescMotor,
+};
+use drivetrain::time::{Duration, Instant};
+use embedded_can::{Error as _, nb::Can};
+
+/// The bus of the robot.
+const BUS: Line = Line::Can1;
+
+/// The time that the world moves on at once.
+const STEP: Duration = Duration::from_micros(250);
+
+/// A drive that hears each frame of the bus.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "a dozen of them")]
+enum Kind {
+    Damiao(DamiaoDrive),
+    Lk(LkDrive),
+    Rmd(RmdDrive),
+    RobStride(RobStrideDrive),
+    Odrive(OdriveDrive),
+    Vesc(VescDrive),
+}
+
+#[derive(Debug)]
+enum Place {
+    Dji(MotorKey),
+    Own(Kind),
+}
+
+#[derive(Debug)]
+struct Motor {
+    place: Place,
+    /// A drive of another family is cut off until then.
+    silent_until: Instant,
+}
+
+/// The simulated motors, in the order in which the command line names them.
+#[derive(Debug)]
+pub(crate) struct Simulated {
+    world: Simulation,
+    motors: Vec<Motor>,
+    steps: u64,
+}
+
+impl Simulated {
+    /// # Errors
+    /// Names the motor that the simulator does not have.
+    pub(crate) fn new(specs: &[Spec], seed: u64) -> Result<Self, String> {
+        let world = Simulation::new(seed);
+        let motors = specs.iter().map(|spec| {
+            let place = match dji(*spec) {
+                Some(config) => {
+                    Place::Dji(world.attach(config).map_err(|error| error.to_string())?)
+                }
+                None => Place::Own(kind(*spec).ok_or("a motor that is not simulated")?),
+            };
+            Ok(Motor { place, silent_until: Instant::START })
+        });
+        let motors = motors.collect::<Result<_, String>>()?;
+        Ok(Self { world, motors, steps: 0 })
+    }
+
+    /// Moves the world on by a quarter of a millisecond.
+    pub(crate) fn advance(&mut self) -> Duration {
+        let now = self.world.now();
+        let mut answers = Vec::new();
+        let motors = &mut self.motors;
+        self.world.advance_with(STEP, |record| {
+            // The answers of LK have the id of its commands.
+            if record.sender != Sender::Controller {
+                return;
+            }
+            for motor in motors.iter_mut().filter(|motor| motor.silent_until <= now) {
+                if let Place::Own(kind) = &mut motor.place {
+                    answers.extend(kind.hear(&record.frame));
+                }
+            }
+        });
+        for motor in motors {
+            if let Place::Own(kind) = &mut motor.place {
+                kind.step(self.steps, &mut answers);
+            }
+        }
+        self.steps += 1;
+        for answer in answers {
+            // A bus that is full of foreign frames loses an answer, as a real one does.
+            _ = self.world.inject(BUS, answer);
+        }
+        STEP
+    }
+
+    /// Cuts a motor off for a while.
+    pub(crate) fn silence(&mut self, motor: usize, time: Duration) {
+        let (now, until) = (self.world.now(), self.world.now() + time);
+        let Some(motor) = self.motors.get_mut(motor) else { return };
+        match &motor.place {
+            // Refused only if 16 faults last already.
+            Place::Dji(key) => _ = self.world.fault(Fault::Silent(*key), now..until),
+            Place::Own(_) => motor.silent_until = until,
+        }
+    }
+
+    pub(crate) fn send(&mut self, frame: &CanFrame) -> Taken {
+        match self.world.controller_on(BUS).transmit(frame) {
+            Ok(_) => Taken::Yes,
+            Err(nb::Error::WouldBlock) => Taken::Full,
+            Err(nb::Error::Other(error)) => Taken::Failed(error.kind()),
+        }
+    }
+
+    pub(crate) fn receive(&mut self) -> Option<Heard> {
+        match self.world.controller_on(BUS).receive() {
+            Ok(frame) => Some(Heard::Frame(frame)),
+            Err(nb::Error::WouldBlock) => None,
+            Err(nb::Error::Other(error)) => Some(Heard::Failed(error.kind())),
+        }
+    }
+
+    /// The word or the torque at a motor, for a test.
+    #[cfg(test)]
+    pub(crate) fn is_at_rest(&self, motor: usize) -> bool {
+        match &self.motors[motor].place {
+            Place::Dji(key) => self.world.motor(*key).unwrap().command == 0,
+            Place::Own(kind) => kind.torque_nm() == 0.0,
+        }
+    }
+
+    /// The velocity of a shaft in rad/s, for a test.
+    #[cfg(test)]
+    pub(crate) fn velocity(&self, motor: usize) -> f32 {
+        match &self.motors[motor].place {
+            Place::Dji(key) => self.world.motor(*key).unwrap().velocity.as_rad_per_s(),
+            Place::Own(kind) => kind.shaft().velocity_rad_per_s(),
+        }
+    }
+}
+
+/// A motor of DJI as the simulator has it.
+fn dji(spec: Spec) -> Option<MotorConfig> {
+    let Spec { id, .. } = spec;
+    Some(match spec.model {
+        Model::M3508 => MotorConfig::m3508(id),
+        Model::M2006 => MotorConfig::m2006(id),
+        Model::Gm6020 => MotorConfig::gm6020_voltage(id),
+        Model::Gm6020Current => MotorConfig::gm6020_current(id),
+        _ => return None,
+    })
+}
+
+/// An unloaded shaft that its motor's gentle torque brings to 30 rad/s in half a second.
+fn shaft(limit_nm: f32) -> DriveShaft {
+    DriveShaft::new(limit_nm / 60.0, limit_nm / 300.0)
+}
+
+/// A drive of another family.
+fn kind(spec: Spec) -> Option<Kind> {
+    let Spec { id, host, .. } = spec;
+    Some(match spec.model {
+        Model::Damiao(model) => {
+            let master = host.unwrap_or(0x10 + u16::from(id));
+            let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
+            let drive = DamiaoDrive::new(id, master, ranges).with_register(10, 1.0);
+            Kind::Damiao(drive.with_shaft(shaft(0.3 * model.tmax_nm())))
+        }
+        Model::Lk(model) => {
+            let amperes = match model.series() {
+                Series::Mf => 33.0 / 4096.0,
+                Series::Mg => 66.0 / 4096.0,
+            };
+            let (constant, gear) = (model.torque_constant(), model.gear());
+            let drive = LkDrive::new(id, amperes, constant, gear, model.encoder_bits());
+            Kind::Lk(drive.with_shaft(shaft(0.3 * model.max_torque_nm())))
+        }
+        Model::Rmd(model) => {
+            let drive = RmdDrive::new(id, model.torque_constant());
+            Kind::Rmd(drive.with_shaft(shaft(0.3 * model.max_torque_nm())))
+        }
+        Model::RobStride(model) => {
+            let drive = if model.has_timeout() && model.name() != "CyberGear" {
+                let most = model.most();
+                let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
+                let [pmax, vmax, tmax] = ranges;
+                RobStrideDrive::new(id, [pmax, vmax, tmax, most.stiffness, most.damping])
+            } else {
+                RobStrideDrive::cybergear(id)
+            };
+            Kind::RobStride(drive.with_shaft(shaft(0.3 * model.tmax_nm())))
+        }
+        Model::Odrive(firmware) => {
+            let is_0_6 = firmware == Firmware::V0_6;
+            let drive = OdriveDrive::new(id, is_0_6, MOTOR_NM_PER_A, 1.0).with_periods(0.1, 0.002);
+            Kind::Odrive(drive.with_shaft(shaft(0.35)))
+        }
+        Model::Vesc(pole_pairs) => {
+            let motor = VescMotor {
+                pole_pairs,
+                gear: 1.0,
+                torque_constant_nm_per_a: MOTOR_NM_PER_A.into(),
+                current_max_a: 60.0,
+                no_load_rad_per_s: 600.0,
+            };
+            let drive = VescDrive::new(id, motor).with_timeout(0.1, 0.0);
+            Kind::Vesc(drive.with_shaft(shaft(0.35)))
+        }
+        Model::M3508 | Model::M2006 | Model::Gm6020 | Model::Gm6020Current => return None,
+    })
+}
+
+/// Does the same with a drive of whatever family.
+macro_rules! each {
+    ($kind:expr, $drive:ident => $work:expr) => {
+        match $kind {
+            Kind::Damiao($drive) => $work,
+            Kind::Lk($drive) => $work,
+            Kind::Rmd($drive) => $work,
+            Kind::RobStride($drive) => $work,
+            Kind::Odrive($drive) => $work,
+            Kind::Vesc($drive) => $work,
+        }
+    };
+}
+
+impl Kind {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        each!(self, drive => drive.hear(frame))
+    }
+
+    /// Moves the drive on, and has it report what it reports by itself: a VESC at 500 Hz.
+    fn step(&mut self, steps: u64, answers: &mut Vec<CanFrame>) {
+        each!(self, drive => drive.step(0.000_25));
+        match self {
+            Self::Odrive(drive) => answers.extend(drive.next_frame()),
+            Self::Vesc(drive) if steps.is_multiple_of(8) => {
+                answers.extend(drive.report(9));
+            }
+            Self::Vesc(drive) if steps.is_multiple_of(401) => answers.extend(drive.report(16)),
+            _ => {}
+        }
+    }
+
+    #[cfg(test)]
+    fn torque_nm(&self) -> f32 {
+        self.shaft().torque_nm()
+    }
+
+    #[cfg(test)]
+    fn shaft(&self) -> &DriveShaft {
+        each!(self, drive => drive.shaft())
+    }
+}

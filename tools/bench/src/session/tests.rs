@@ -1,0 +1,217 @@
+use super::*;
+use crate::link::Simulated;
+use crate::motors;
+
+/// All families, three at a time: at 1 kHz eight motors are more than a bus of 1 Mbit/s carries.
+const GROUPS: [&str; 3] = [
+    "m3508:1,gm6020:5,damiao4310:1",
+    "mg4005e-i10:2,rmd-x8-90:3,rs02:4",
+    "odrive0.5:5,odrive0.6:7,vesc7:6",
+];
+
+fn session(list: &str) -> Session {
+    let specs = motors::parse(list).unwrap();
+    let link = Link::Simulated(Simulated::new(&specs, 1).unwrap());
+    Session::new(Robot::new(&specs, false).unwrap(), link, Pace::Fast(Time::manual()), Vec::new())
+}
+
+/// Does something at each tick.
+struct Each<F>(u64, F);
+
+impl<F: FnMut(&mut Session, u64) -> bool> Pilot for Each<F> {
+    fn goes_on(&mut self, _: &mut Session) -> bool {
+        true
+    }
+
+    fn ticked(&mut self, session: &mut Session) -> bool {
+        self.0 += 1;
+        (self.1)(session, self.0)
+    }
+}
+
+fn run(session: &mut Session, each: impl FnMut(&mut Session, u64) -> bool) {
+    session.run(&End::none(), &mut Each(0, each));
+}
+
+fn simulated(session: &mut Session) -> &mut Simulated {
+    match &mut session.tap().link {
+        Link::Simulated(simulated) => simulated,
+        _ => panic!("not simulated"),
+    }
+}
+
+fn is_at_rest(session: &mut Session) -> bool {
+    let count = session.robot().len();
+    let simulated = simulated(session);
+    (0..count).all(|motor| simulated.is_at_rest(motor))
+}
+
+/// Armed, at 10 rad/s for so long, and then `then`.
+fn driven(session: &mut Session, ms: u64, mut then: impl FnMut(&mut Session) -> bool) {
+    run(session, |session, tick| {
+        if tick == 1 {
+            for motor in 0..session.robot().len() {
+                session.start_program(motor, Program::Speed(10.0));
+            }
+            session.arm(None);
+        }
+        tick < ms || then(session)
+    });
+}
+
+#[test]
+fn motors_of_each_family_turn_and_are_left_at_rest() {
+    for group in GROUPS {
+        let mut session = session(group);
+        let mut reached = Vec::new();
+        driven(&mut session, 4_000, |session| {
+            let count = session.robot().len();
+            let simulated = simulated(session);
+            reached = (0..count).map(|motor| simulated.velocity(motor)).collect();
+            false
+        });
+        assert!(!session.has_failed(), "{:?}", session.messages());
+        let is_there = |rad_per_s: &f32| (rad_per_s - 10.0).abs() < 0.5;
+        assert!(reached.len() == 3 && reached.iter().all(is_there), "{group}: {reached:?}");
+        assert!(is_at_rest(&mut session));
+    }
+}
+
+#[test]
+fn nothing_is_sent_without_arming() {
+    for group in GROUPS {
+        let mut session = session(group);
+        run(&mut session, |_, tick| tick < 1_000);
+        let sent = session.counts().into_iter().find(|(name, _)| *name == "sent");
+        assert_eq!(sent, Some(("sent", 0)));
+    }
+    let mut session = session("m3508:1");
+    run(&mut session, |_, tick| tick < 100);
+    assert!(session.robot().reading(0).is_some_and(|reading| reading.is_heard()));
+}
+
+#[test]
+fn a_pilot_that_panics_leaves_the_motors_at_rest() {
+    let mut session = session("m3508:1,damiao4310:1");
+    driven(&mut session, 1_000, |session| {
+        assert!(!is_at_rest(session), "driven");
+        panic!("a defect of the pilot")
+    });
+    assert!(session.has_failed() && is_at_rest(&mut session));
+    assert_eq!(session.messages(), ["a defect of this program; all stop"]);
+}
+
+#[test]
+fn a_signal_leaves_the_motors_at_rest() {
+    let mut session = session("m3508:1,damiao4310:1");
+    let end = End::none();
+    let mut pilot = Each(0, |session: &mut Session, tick| {
+        if tick == 1 {
+            session.start_program(0, Program::Speed(10.0));
+            session.arm(None);
+        } else if tick == 500 {
+            end.ask();
+        }
+        true
+    });
+    session.run(&end, &mut pilot);
+    assert_eq!(pilot.0, 500);
+    assert!(!session.has_failed() && is_at_rest(&mut session));
+}
+
+#[test]
+fn a_motor_that_is_lost_stops_all() {
+    for motor in 0..2 {
+        let mut session = session("m3508:1,damiao4310:1");
+        let mut stopped = None;
+        let mut ticks = 0;
+        driven(&mut session, 1_000, |session| {
+            ticks += 1;
+            if ticks == 1 {
+                simulated(session).silence(motor, Duration::from_millis(400));
+            }
+            if session.has_failed() && stopped.is_none() {
+                stopped = Some(ticks);
+            }
+            stopped.is_none_or(|at| ticks < at + 20)
+        });
+        assert!(stopped.is_some_and(|ticks| ticks < 150), "{stopped:?} ms");
+        assert!(is_at_rest(&mut session));
+        let said = session.messages();
+        let name = session.robot().names().nth(motor).unwrap().to_string();
+        assert!(
+            said.iter().any(|text| text.contains("all stop") && text.contains(&name)),
+            "{said:?}"
+        );
+    }
+}
+
+#[test]
+fn after_a_lost_motor_it_is_armed_again_by_a_request() {
+    let mut session = session("m3508:1,damiao4310:1");
+    let mut armed_again = None;
+    driven(&mut session, 1_000, |session| {
+        let ms = session.elapsed().as_micros() / 1_000;
+        match (session.stage(), session.has_failed()) {
+            (Stage::Armed, false) => simulated(session).silence(0, Duration::from_millis(400)),
+            (Stage::Listening, true) => session.arm(Some(Duration::from_secs(3))),
+            (Stage::Armed, true) => armed_again = armed_again.or(Some(ms)),
+            _ => {}
+        }
+        armed_again.is_none() && ms < 10_000
+    });
+    assert!(armed_again.is_some(), "{:?}", session.messages());
+}
+
+#[test]
+fn motors_that_are_not_there_are_named_and_nothing_is_left_behind() {
+    let present = motors::parse("m3508:1").unwrap();
+    let link = Link::Simulated(Simulated::new(&present, 1).unwrap());
+    let robot = Robot::new(&motors::parse("m3508:1-2").unwrap(), false).unwrap();
+    let mut session = Session::new(robot, link, Pace::Fast(Time::manual()), Vec::new());
+    run(&mut session, |session, tick| {
+        if tick == 1 {
+            session.arm(Some(Duration::from_millis(500)));
+        }
+        tick == 1 || session.stage() != Stage::Listening
+    });
+    assert_eq!(session.messages(), ["not armed: no feedback from M3508 #2"]);
+}
+
+#[test]
+fn tuning_finds_gains_that_settle_faster() {
+    for list in ["m3508:1", "gm6020:1", "damiao4310:1"] {
+        let mut session = session(list);
+        let mut outcome = None;
+        driven(&mut session, 1, |session| {
+            if session.stage() == Stage::Armed
+                && matches!(session.program(0), Some(Program::Speed(_)))
+            {
+                let plan = crate::commands::plan(session, 0, None, false);
+                session.start_tuning(0, plan).unwrap();
+            }
+            outcome = session.outcomes().pop();
+            outcome.is_none()
+                && !session.has_failed()
+                && session.elapsed() < Duration::from_secs(20)
+        });
+        let outcome = outcome
+            .unwrap_or(Err("no outcome".into()))
+            .unwrap_or_else(|error| panic!("{list}: {error}"));
+        let after = outcome.after.unwrap();
+        assert!(
+            outcome.ultimate_period_s > 0.005 && outcome.ultimate_period_s < 0.2,
+            "{outcome:?}"
+        );
+        assert!(after.settled_s.is_some_and(|s| s < 0.6), "{list}: {outcome:?}");
+        assert!(after.overshoot < 0.3 && after.steady_error.abs() < 0.5, "{list}: {outcome:?}");
+        assert_eq!(session.robot().gains(0), after.gains);
+        let rust = outcome.rust();
+        assert!(
+            rust.starts_with("PidConfig::new(") && rust.contains("with_output_limit("),
+            "{rust}"
+        );
+        assert!(outcome.toml().contains("kp = "));
+        assert!(is_at_rest(&mut session));
+    }
+}

@@ -1,0 +1,169 @@
+//! Keys, and what they ask for.
+
+use super::remote::Action;
+use super::view::View;
+use drivetrain::units::AngularVelocity;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+/// A press of an arrow, in rpm, and ten times that with Shift.
+const JOG_RPM: f32 = 10.0;
+
+/// The sine and the steps, in rpm.
+const SWING_RPM: f32 = 60.0;
+
+/// What the window shows in its middle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Page {
+    #[default]
+    Motors,
+    Bus,
+    Help,
+}
+
+/// What of the window is not of the session.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ui {
+    pub(crate) page: Page,
+    pub(crate) selected: usize,
+    /// Gains that are being typed.
+    pub(crate) input: Option<String>,
+    pub(crate) hint: Option<String>,
+    pub(crate) has_changed: bool,
+}
+
+impl Ui {
+    /// Tells whether the window must be drawn anew, once.
+    pub(crate) fn has_changed(&mut self) -> bool {
+        std::mem::take(&mut self.has_changed)
+    }
+
+    pub(crate) fn change(&mut self) {
+        self.has_changed = true;
+    }
+
+    /// Takes a key; returns what it asks for.
+    pub(crate) fn press(&mut self, key: KeyEvent, view: Option<&View>) -> Option<Action> {
+        self.has_changed = true;
+        self.hint = None;
+        let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
+        // From anywhere, also while gains are typed.
+        if key.code == KeyCode::Char(' ') {
+            self.input = None;
+            return Some(Action::Stop);
+        }
+        if is_control && matches!(key.code, KeyCode::Char('c' | 'z' | 'd')) {
+            return Some(Action::Quit);
+        }
+        if self.input.is_some() {
+            return self.type_gains(key.code);
+        }
+        let motors = view.map_or(0, |view| view.snapshot.motors.len());
+        let motor = self.selected;
+        let swing = AngularVelocity::from_rpm(SWING_RPM).as_rad_per_s();
+        let factor = if key.modifiers.contains(KeyModifiers::SHIFT) { 10.0 } else { 1.0 };
+        let target =
+            view.and_then(|view| view.snapshot.motors.get(motor)?.target_rpm).unwrap_or(0.0);
+        let jog =
+            |rpm: f32| Some(Action::Jog(motor, AngularVelocity::from_rpm(rpm).as_rad_per_s()));
+        match key.code {
+            KeyCode::Esc if self.page == Page::Help => self.page = Page::Motors,
+            KeyCode::Esc => return Some(Action::Stop),
+            KeyCode::Char('q') => return Some(Action::Quit),
+            KeyCode::Char('A') => return Some(Action::Arm),
+            KeyCode::Char('a') => self.hint = Some("Shift-A arms: lift the wheels first".into()),
+            KeyCode::Down | KeyCode::Tab | KeyCode::Char('j') => {
+                self.selected = (motor + 1).checked_rem(motors).unwrap_or(0);
+            }
+            KeyCode::Up | KeyCode::Char('k') => {
+                self.selected = (motor + motors.saturating_sub(1)).checked_rem(motors).unwrap_or(0);
+            }
+            KeyCode::Right => return jog(target + factor * JOG_RPM),
+            KeyCode::Left => return jog(target - factor * JOG_RPM),
+            KeyCode::Char('0') => return jog(0.0),
+            KeyCode::Char('s') => return Some(Action::Sine(motor, swing)),
+            KeyCode::Char('e') => return Some(Action::Steps(motor, swing)),
+            KeyCode::Char('t') => return Some(Action::Tune { motor, only_identifies: false }),
+            KeyCode::Char('i') => return Some(Action::Tune { motor, only_identifies: true }),
+            KeyCode::Char('r') => return Some(Action::Record),
+            KeyCode::Char('x') => return Some(Action::Silence(motor)),
+            KeyCode::Char('.') => return Some(Action::Advance(100)),
+            KeyCode::Char(':') => return Some(Action::Advance(1_000)),
+            KeyCode::Char('b') if self.page == Page::Bus => self.page = Page::Motors,
+            KeyCode::Char('b') => self.page = Page::Bus,
+            KeyCode::Char('?') => self.page = Page::Help,
+            KeyCode::Char('g') => {
+                let gains = view.and_then(|view| Some(view.snapshot.motors.get(motor)?.gains));
+                self.input = gains.map(|(kp, ki, kd)| format!("{kp},{ki},{kd}"));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    fn type_gains(&mut self, code: KeyCode) -> Option<Action> {
+        let input = self.input.as_mut()?;
+        match code {
+            KeyCode::Char(sign) if input.len() < 60 => input.push(sign),
+            KeyCode::Backspace => _ = input.pop(),
+            KeyCode::Esc => self.input = None,
+            KeyCode::Enter => {
+                let numbers: Result<Vec<f32>, _> =
+                    input.split(',').map(|part| part.trim().parse()).collect();
+                let gains = numbers.ok().and_then(|numbers| <[f32; 3]>::try_from(numbers).ok());
+                if let Some([kp, ki, kd]) = gains {
+                    self.input = None;
+                    return Some(Action::Gains(self.selected, (kp, ki, kd)));
+                }
+                self.hint = Some("three numbers with commas between them".into());
+            }
+            _ => {}
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn press(ui: &mut Ui, code: KeyCode) -> Option<Action> {
+        ui.press(KeyEvent::new(code, KeyModifiers::NONE), None)
+    }
+
+    #[test]
+    fn space_stops_from_anywhere_and_a_small_a_does_not_arm() {
+        for (page, input) in [
+            (Page::Motors, None),
+            (Page::Bus, None),
+            (Page::Help, None),
+            (Page::Motors, Some("1,2,3".to_owned())),
+        ] {
+            let mut ui = Ui { page, input, ..Ui::default() };
+            assert_eq!(press(&mut ui, KeyCode::Char(' ')), Some(Action::Stop));
+        }
+        let mut ui = Ui::default();
+        assert_eq!(press(&mut ui, KeyCode::Char('a')), None);
+        assert_eq!(press(&mut ui, KeyCode::Char('A')), Some(Action::Arm));
+    }
+
+    #[test]
+    fn gains_are_typed_and_nonsense_is_not_taken() {
+        let mut ui = Ui { input: Some(String::new()), selected: 2, ..Ui::default() };
+        for sign in "1.5,2".chars() {
+            assert_eq!(press(&mut ui, KeyCode::Char(sign)), None);
+        }
+        assert_eq!(press(&mut ui, KeyCode::Enter), None);
+        assert!(ui.hint.is_some() && ui.input.is_some());
+        ",0".chars().for_each(|sign| _ = press(&mut ui, KeyCode::Char(sign)));
+        assert_eq!(press(&mut ui, KeyCode::Enter), Some(Action::Gains(2, (1.5, 2.0, 0.0))));
+        assert_eq!(ui.input, None);
+    }
+
+    #[test]
+    fn control_c_and_control_z_quit() {
+        for sign in ['c', 'z'] {
+            let key = KeyEvent::new(KeyCode::Char(sign), KeyModifiers::CONTROL);
+            assert_eq!(Ui::default().press(key, None), Some(Action::Quit));
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The window as the pilot of the session.
+
+use super::Shared;
+use super::view::{LINES, Strip, View};
+use crate::commands::plan;
+use crate::link::Link;
+use crate::program::Program;
+use crate::record::Recorder;
+use crate::session::{Pilot, Session, Stage};
+use crate::snapshot;
+use drivetrain::time::{Duration, Instant};
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+/// A window that says nothing for so long, of the machine's time, is taken for lost.
+const SILENCE: std::time::Duration = std::time::Duration::from_secs(2);
+
+/// The time between two points of a strip, and between two pictures.
+const PICTURE: Duration = Duration::from_millis(50);
+
+/// Motors that are not armed by then are not there.
+const ARMING: Duration = Duration::from_secs(3);
+
+/// What a key asks for. Speeds in rad/s.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Action {
+    Alive,
+    Arm,
+    Stop,
+    Quit,
+    Jog(usize, f32),
+    Sine(usize, f32),
+    Steps(usize, f32),
+    Gains(usize, (f32, f32, f32)),
+    Tune {
+        motor: usize,
+        only_identifies: bool,
+    },
+    Record,
+    /// A fault of the simulator: a motor falls silent.
+    Silence(usize),
+    /// A simulator that stands moves on, in ms.
+    Advance(u64),
+}
+
+/// Leads the session by what the window sends.
+#[derive(Debug)]
+pub(crate) struct Remote {
+    actions: Receiver<Action>,
+    shared: Shared,
+    heard: std::time::Instant,
+    strips: Vec<Strip>,
+    log: VecDeque<String>,
+    results: Vec<String>,
+    pictured: Option<Instant>,
+    is_held: bool,
+    was_held: bool,
+}
+
+impl Remote {
+    pub(crate) fn new(
+        session: &Session,
+        actions: Receiver<Action>,
+        shared: Shared,
+        is_held: bool,
+    ) -> Self {
+        Self {
+            actions,
+            shared,
+            heard: std::time::Instant::now(),
+            strips: vec![Strip::default(); session.robot().len()],
+            log: VecDeque::new(),
+            results: Vec::new(),
+            pictured: None,
+            is_held,
+            was_held: false,
+        }
+    }
+
+    /// What is worth to be kept when the window is gone: the results of tuning.
+    pub(crate) fn results(self) -> Vec<String> {
+        self.results
+    }
+
+    fn act(&mut self, session: &mut Session, action: Action) {
+        match action {
+            Action::Alive | Action::Quit => {}
+            Action::Arm => session.arm(Some(ARMING)),
+            Action::Stop => session.stop(),
+            Action::Jog(motor, rad_per_s) => {
+                let program =
+                    if rad_per_s == 0.0 { Program::Still } else { Program::Speed(rad_per_s) };
+                session.start_program(motor, program);
+            }
+            Action::Sine(motor, amplitude) => {
+                session.start_program(
+                    motor,
+                    Program::Sine { amplitude, period_s: 2.0, passed_s: 0.0 },
+                );
+            }
+            Action::Steps(motor, height) => {
+                session.start_program(motor, Program::Steps { height, half_s: 1.0, passed_s: 0.0 });
+            }
+            Action::Gains(motor, gains) => {
+                let set = session.robot_mut().set_gains(motor, gains);
+                let (kp, ki, kd) = gains;
+                self.say(
+                    session,
+                    set.map_or_else(|error| error, |()| format!("gains: kp {kp} ki {ki} kd {kd}")),
+                );
+            }
+            Action::Tune { .. } if session.stage() != Stage::Armed => {
+                self.say(session, "arm first: the motor moves while it is tuned".into());
+            }
+            Action::Tune { motor, only_identifies } => {
+                let plan = plan(session, motor, None, only_identifies);
+                if let Err(error) = session.start_tuning(motor, plan) {
+                    self.say(session, error);
+                }
+            }
+            Action::Record => self.record(session),
+            Action::Silence(motor) => match &mut session.tap().link {
+                Link::Simulated(simulated) => simulated.silence(motor, Duration::from_secs(1)),
+                _ => self
+                    .say(session, "only the simulator has faults by a key: pull the plug".into()),
+            },
+            Action::Advance(ms) => session.pace().allow(Duration::from_millis(ms)),
+        }
+    }
+
+    /// Begins a recording in both forms under the next free name, or ends it.
+    fn record(&mut self, session: &mut Session) {
+        if !session.tap().recorders.is_empty() {
+            let recorders = std::mem::take(&mut session.tap().recorders);
+            // A disk that hangs holds up no motor.
+            std::thread::spawn(move || {
+                for recorder in recorders {
+                    _ = recorder.finish(|_| {});
+                }
+            });
+            return self.say(session, "recording ended".into());
+        }
+        let free = (1..)
+            .find(|number| !Path::new(&format!("session-{number}.mcap")).exists())
+            .unwrap_or(1);
+        for kind in ["mcap", "log"] {
+            let path = format!("session-{free}.{kind}");
+            match Recorder::create("record", &path) {
+                Ok(recorder) => {
+                    session.tap().recorders.push(recorder);
+                    self.say(session, format!("records to {path}"));
+                }
+                Err(error) => self.say(session, error),
+            }
+        }
+    }
+
+    fn say(&mut self, session: &Session, text: String) {
+        let seconds = session.elapsed().as_secs_f32();
+        for line in text.lines() {
+            self.log.push_back(format!("{seconds:8.2} s  {line}"));
+        }
+        while self.log.len() > LINES {
+            self.log.pop_front();
+        }
+    }
+
+    /// Takes what the session said.
+    fn listen(&mut self, session: &mut Session) {
+        for (_, edge) in session.edges() {
+            self.say(session, edge);
+        }
+        for message in session.messages() {
+            self.say(session, message);
+        }
+        for outcome in session.outcomes() {
+            match outcome {
+                Ok(outcome) => {
+                    outcome.lines().into_iter().for_each(|line| self.say(session, line));
+                    self.say(session, outcome.rust());
+                    self.results.push(format!("{}\n{}", outcome.rust(), outcome.toml()));
+                }
+                Err(error) => self.say(session, format!("not tuned: {error}")),
+            }
+        }
+    }
+
+    fn picture(&mut self, session: &mut Session) {
+        let snapshot = snapshot::of(session);
+        let seconds = f64::from(snapshot.seconds);
+        let now = session.pace().time().read();
+        for (motor, strip) in snapshot.motors.iter().zip(&mut self.strips) {
+            strip.push(seconds, motor.rpm.into(), motor.target_rpm.map(f64::from));
+            let topic = format!("/motor/{}", motor.name);
+            for recorder in &mut session.tap().recorders {
+                recorder.values(now, &topic, &motor.json());
+            }
+        }
+        let (strips, log) = (self.strips.clone(), self.log.clone());
+        let view = View { snapshot, strips, log, is_held: self.is_held };
+        if let Ok(mut shared) = self.shared.lock() {
+            *shared = Some(view);
+        }
+    }
+}
+
+impl Pilot for Remote {
+    fn goes_on(&mut self, session: &mut Session) -> bool {
+        loop {
+            match self.actions.try_recv() {
+                Ok(action) => {
+                    self.heard = std::time::Instant::now();
+                    let is_alive = action == Action::Alive;
+                    self.act(session, action);
+                    self.was_held &= is_alive;
+                }
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return false,
+            }
+        }
+        if self.heard.elapsed() > SILENCE && session.stage() != Stage::Listening {
+            self.heard = std::time::Instant::now();
+            self.say(session, "the window does not answer: all stop".into());
+            session.stop();
+        }
+        // A simulator that stands is pictured once more where it stands, with all that was said.
+        let is_held = session.pace().is_held();
+        if is_held && !std::mem::replace(&mut self.was_held, true) {
+            self.listen(session);
+            self.picture(session);
+        }
+        self.was_held &= is_held;
+        true
+    }
+
+    fn ticked(&mut self, session: &mut Session) -> bool {
+        self.listen(session);
+        let now = session.pace().time().read();
+        if self.pictured.is_none_or(|at| now.since(at) >= PICTURE) {
+            self.pictured = Some(now);
+            self.picture(session);
+        }
+        true
+    }
+}
