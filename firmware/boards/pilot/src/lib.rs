@@ -1,4 +1,5 @@
-//! What the boards share: a DBUS remote control and a HiPNUC IMU drive a mecanum chassis of four M3508.
+//! What the boards share: the robots without their boards. Here a DBUS remote control and a HiPNUC IMU drive a mecanum chassis of
+//! four M3508; [`sentry`] and [`snake`] are whole machines.
 //!
 //! Arm: both sticks at rest, turn the right switch from anywhere to the top. Stop: turn it away, or lose the remote.
 //! The right stick moves the chassis, the left one turns it. With an IMU that is heard, forward is where its yaw is zero;
@@ -9,16 +10,24 @@
 //! [`Pilot::hear_debug_port`].
 #![cfg_attr(not(test), no_std)]
 
+pub mod gesture;
+pub mod loader;
+pub mod sentry;
+pub mod snake;
+
+pub use gesture::Wish;
+
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::{PidConfig, WheelTuning};
 use drivetrain::dji::{Bus, Config, Handle, M3508, Model};
 use drivetrain::geometry::{Heading, Twist, Vec2};
 use drivetrain::time::{ConditionEdge, Duration, Instant, Tick};
 use drivetrain::units::{AngularVelocity, Current};
-use drivetrain::wire::dbus::{Dbus, Remote, Switch};
+use drivetrain::wire::dbus::{Dbus, Remote};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::parameters::{Parameter, ParameterCounts, Parameters};
 use drivetrain::wire::{Receiver, Silence};
+use gesture::{Gesture, at_rest};
 
 /// The robot that is driven: its mass, wheels and motors, from which the gains follow. The example `tune` measures better ones.
 const WHEEL: WheelTuning = WheelTuning {
@@ -47,17 +56,6 @@ const PARAMETERS: [Parameter; 2] = [
     Parameter::setting("wheel_ki", "A per rad", 0.0, 10.0),
 ];
 
-/// What the remote control asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
-    /// The switch was turned to the top just now.
-    Arm,
-    /// It still is there.
-    GoOn,
-    /// It is not, or the remote control is not heard.
-    Rest,
-}
-
 /// Where a stick that is pushed ahead points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Forward {
@@ -77,34 +75,19 @@ pub struct Pilot {
     dbus: Dbus,
     imu: Receiver<Imu, MAX_FRAME>,
     parameters: Parameters<2>,
-    switch: Switch,
+    gesture: Gesture,
     forward: Forward,
 }
 
 impl Pilot {
     /// Attaches the four wheels: ids 1 to 4 are front right, front left, rear left, rear right.
     pub fn new(bus: &mut Bus) -> Result<Self, &'static str> {
-        let wheel =
-            |id| Config::<M3508>::new(id).speed_loop(SPEED).with_current_limit(CURRENT_LIMIT);
-        let mut attach = |config| bus.attach(config).map_err(|_| "a wheel's id is taken");
-        let wheels = MecanumWheels {
-            front_left: attach(wheel(2))?,
-            front_right: attach(wheel(1).reversed())?,
-            rear_left: attach(wheel(3))?,
-            rear_right: attach(wheel(4).reversed())?,
-        };
-        let mut chassis = Chassis::new(
-            Mecanum::new(WHEEL.wheel_radius_m, Vec2::new(0.20, 0.18))
-                .map_err(|_| "no such chassis")?,
-        );
-        let limits =
-            ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
-        chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
+        let (wheels, chassis) = (wheels_of(bus)?, chassis_of()?);
         let imu = Receiver::new(IMU_DEADLINE);
-        let (switch, forward) = (Switch::Absent, Forward::Chassis);
+        let (gesture, forward) = (Gesture::default(), Forward::Chassis);
         let parameters =
             Parameters::new(PARAMETERS).map_err(|_| "a parameter that cannot work")?;
-        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, parameters, switch, forward })
+        Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, parameters, gesture, forward })
     }
 
     /// Takes bytes of the remote control that arrived at `now`.
@@ -154,17 +137,11 @@ impl Pilot {
 
     /// Returns what the remote control asks for; to be called once a tick.
     pub fn wish(&mut self, now: Instant) -> Wish {
-        let remote = self.dbus.remote(now);
-        let before = core::mem::replace(&mut self.switch, remote.right_switch);
-        match (before, remote.right_switch) {
-            (Switch::Up, Switch::Up) => Wish::GoOn,
-            // The turn of the switch, not its place: a remote that comes back in range must not start a robot.
-            (Switch::Middle | Switch::Down, Switch::Up) if at_rest(&remote) => {
-                self.chassis.restart();
-                Wish::Arm
-            }
-            _ => Wish::Rest,
+        let wish = self.gesture.wish(&self.dbus.remote(now));
+        if wish == Wish::Arm {
+            self.chassis.restart();
         }
+        wish
     }
 
     /// Sets the targets of the wheels.
@@ -194,8 +171,24 @@ impl Pilot {
     }
 }
 
-fn at_rest(remote: &Remote) -> bool {
-    [remote.right_x, remote.right_y, remote.left_x, remote.left_y].iter().all(|share| *share == 0.0)
+/// Attaches the four wheels: ids 1 to 4 are front right, front left, rear left, rear right.
+fn wheels_of(bus: &mut Bus) -> Result<MecanumWheels<Handle<M3508>>, &'static str> {
+    let wheel = |id| Config::<M3508>::new(id).speed_loop(SPEED).with_current_limit(CURRENT_LIMIT);
+    let mut attach = |config| bus.attach(config).map_err(|_| "a wheel's id is taken");
+    Ok(MecanumWheels {
+        front_left: attach(wheel(2))?,
+        front_right: attach(wheel(1).reversed())?,
+        rear_left: attach(wheel(3))?,
+        rear_right: attach(wheel(4).reversed())?,
+    })
+}
+
+fn chassis_of() -> Result<Chassis<Mecanum>, &'static str> {
+    let mecanum = Mecanum::new(WHEEL.wheel_radius_m, Vec2::new(0.20, 0.18));
+    let mut chassis = Chassis::new(mecanum.map_err(|_| "no such chassis")?);
+    let limits = ChassisLimits::new().with_acceleration(4.0, 12.0).with_wheel_speed(FASTEST_WHEEL);
+    chassis.set_limits(limits).map_err(|_| "a limit is not above zero")?;
+    Ok(chassis)
 }
 
 #[cfg(test)]
