@@ -127,6 +127,8 @@ const PATIENCE: u8 = 3;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
+    ///
+    /// Costs 535 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -255,11 +257,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
         let outcome = self.device.ingest(frame, now);
         if outcome != Ingest::Taken {
-            tally.rejected += 1;
-            increment(match outcome {
-                Ingest::Malformed(_) => &mut self.statistics.malformed,
-                _ => &mut self.statistics.unrelated,
-            });
+            tally.reject(outcome);
         }
         outcome
     }
@@ -270,7 +268,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let frames = frames as u32;
         self.meter.count_whole(frames.saturating_sub(tally.others));
         let taken = frames.saturating_sub(tally.rejected);
-        self.statistics.taken = self.statistics.taken.saturating_add(taken);
+        let unrelated = tally.rejected.saturating_sub(tally.malformed);
+        let counted = &mut self.statistics;
+        counted.taken = counted.taken.saturating_add(taken);
+        if tally.rejected > 0 {
+            counted.unrelated = counted.unrelated.saturating_add(unrelated);
+            counted.malformed = counted.malformed.saturating_add(tally.malformed);
+        }
         if taken > 0 {
             self.watch.hear();
         }

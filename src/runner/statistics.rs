@@ -2,8 +2,8 @@
 
 use super::{Port, Runner};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, Devices};
-use crate::time::{Clock, Duration, Instant};
+use crate::motor::{BusLoad, Ingest};
+use crate::time::{Duration, Instant};
 use embedded_can::ErrorKind;
 
 /// Counters of a runner since its creation; every counter saturates.
@@ -137,6 +137,19 @@ pub(super) struct Tally {
     /// Not of 8 bytes with an 11-bit id.
     pub(super) others: u32,
     pub(super) rejected: u32,
+    /// Of those that were rejected; the rest is unrelated.
+    pub(super) malformed: u32,
+}
+
+impl Tally {
+    /// Counts a frame that was not taken.
+    #[inline(always)]
+    pub(super) const fn reject(&mut self, outcome: Ingest) {
+        self.rejected += 1;
+        if let Ingest::Malformed(_) = outcome {
+            self.malformed += 1;
+        }
+    }
 }
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {

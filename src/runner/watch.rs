@@ -8,6 +8,7 @@ use super::statistics::increment;
 use super::{BusCondition, Port, Runner};
 use crate::motor::Devices;
 use crate::time::{Clock, Duration, Instant, Tick};
+pub(super) use unsent::take_age;
 use unsent::{Unsent, WATCHED_FRAMES};
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
@@ -38,6 +39,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// step. When the next step comes due before, the next step takes its place, with a `dt_s` that covers both, and the step
     /// left out is an overrun; a step with a `dt_s` of 0 stays. So two runners can wait for each other:
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
+    ///
+    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.standstill.take() {

@@ -1,5 +1,7 @@
 //! The bus that is measured: eight M3508, and the feedback that they send.
 
+#![allow(dead_code, reason = "two benches use it, each in part")]
+
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -8,6 +10,8 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::Ingest;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
+
+pub const START: Instant = Instant::from_micros(1_000_000);
 
 const MOTORS: usize = 8;
 const PERIOD: Duration = Duration::from_millis(1);

@@ -114,6 +114,8 @@ pub struct Profile {
 impl Profile {
     /// Plans the move from `start` to `end`.
     ///
+    /// Costs 199 instructions on a Cortex-M4F, for a trapezoid (`docs/figures.md`).
+    ///
     /// # Errors
     /// Names a limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
     /// length or duration of the move is beyond `f32`.
@@ -171,6 +173,8 @@ impl Profile {
     }
 
     /// Returns position, velocity and acceleration `time_s` seconds after the start.
+    ///
+    /// Costs 48 instructions on a Cortex-M4F, for a trapezoid (`docs/figures.md`).
     #[must_use]
     pub fn at(&self, time_s: f32) -> ProfileState {
         if time_s >= self.duration_s {
