@@ -2,8 +2,8 @@
 
 use super::{Port, Runner};
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, Ingest};
-use crate::time::{Duration, Instant};
+use crate::motor::{BusLoad, Devices, Ingest};
+use crate::time::{Clock, Duration, Instant};
 use embedded_can::ErrorKind;
 
 /// Counters of a runner since its creation; every counter saturates.

@@ -68,10 +68,10 @@ use crate::error::ConfigError;
 /// }
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 ///
 /// Takes 92 bytes on a Cortex-M4F (`docs/figures.md`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 // The values written by each step stand first, next to the values that it reads.
 #[repr(C)]
 pub struct Pid {
