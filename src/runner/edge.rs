@@ -1,5 +1,6 @@
 //! What can be wrong with a bus as a whole, and the latch that keeps it until it is read.
 
+use super::watch::take_age;
 use crate::time::{ConditionEdge, Duration, Instant};
 
 /// Something that is wrong with the bus as a whole, for a moment or for hours.
@@ -71,7 +72,8 @@ pub(super) struct Edges {
 struct Latch {
     began: Instant,
     ended: Instant,
-    seen: Instant,
+    /// A stamp: it is looked at in each tick.
+    seen: u32,
     begin_waits: bool,
     end_waits: bool,
     active: bool,
@@ -82,7 +84,7 @@ impl Edges {
         let calm = Latch {
             began: Instant::START,
             ended: Instant::START,
-            seen: Instant::START,
+            seen: 0,
             begin_waits: false,
             end_waits: false,
             active: false,
@@ -118,8 +120,8 @@ impl Edges {
     pub(super) fn settle(&mut self, now: Instant) {
         for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.latches) {
             // The clock may have gone back.
-            latch.seen = latch.seen.min(now);
-            if condition.is_repeated() && now.since(latch.seen) >= CALM {
+            let calm = take_age(now, &mut latch.seen);
+            if condition.is_repeated() && calm >= CALM {
                 latch.end(now);
             }
         }
@@ -140,7 +142,7 @@ impl Edges {
 
 impl Latch {
     fn begin(&mut self, at: Instant) -> bool {
-        self.seen = at;
+        self.seen = at.stamp();
         if self.active {
             return false;
         }

@@ -255,10 +255,9 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let outcome = self.device.ingest(frame, now);
         if outcome != Ingest::Taken {
             tally.rejected += 1;
-            increment(match outcome {
-                Ingest::Malformed(_) => &mut self.statistics.malformed,
-                _ => &mut self.statistics.unrelated,
-            });
+            if let Ingest::Malformed(_) = outcome {
+                tally.malformed += 1;
+            }
         }
         outcome
     }
@@ -269,7 +268,13 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         let frames = frames as u32;
         self.meter.count_whole(frames.saturating_sub(tally.others));
         let taken = frames.saturating_sub(tally.rejected);
-        self.statistics.taken = self.statistics.taken.saturating_add(taken);
+        let unrelated = tally.rejected.saturating_sub(tally.malformed);
+        let counted = &mut self.statistics;
+        counted.taken = counted.taken.saturating_add(taken);
+        if tally.rejected > 0 {
+            counted.unrelated = counted.unrelated.saturating_add(unrelated);
+            counted.malformed = counted.malformed.saturating_add(tally.malformed);
+        }
         if taken > 0 {
             self.watch.hear();
         }

@@ -135,6 +135,8 @@ pub(super) struct Tally {
     /// Not of 8 bytes with an 11-bit id.
     pub(super) others: u32,
     pub(super) rejected: u32,
+    /// Of those that were rejected; the rest is unrelated.
+    pub(super) malformed: u32,
 }
 
 /// How full a bus was in the last window of a second or a little more, by the frames that the runner sent and received.

@@ -8,6 +8,7 @@ use super::statistics::increment;
 use super::{BusCondition, Port, Runner};
 use crate::motor::Devices;
 use crate::time::{Clock, Duration, Instant, Tick};
+pub(super) use unsent::take_age;
 use unsent::{Unsent, WATCHED_FRAMES};
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {

@@ -1,6 +1,7 @@
 //! Command frames that the driver refused or gave back: how long each has waited.
 
 use super::{BUS_LOST_AFTER, Watch};
+use crate::motor::age;
 use crate::runner::BusCondition;
 use crate::time::{Duration, Instant};
 
@@ -11,19 +12,35 @@ const FORGOTTEN_AFTER: (Duration, u8) = (Duration::from_secs(1), 32);
 /// How many frames can wait at a time and be watched each: the five of a DJI bus, and own ones.
 pub(super) const WATCHED_FRAMES: usize = 8;
 
-/// A command frame that the driver has not taken.
+/// A command frame that the driver has not taken. Times are stamps: they are looked at in each tick.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unsent {
     header: u32,
-    since: Instant,
-    offered: Instant,
-    /// The tick in which the driver took it, as long as it may come back.
-    accepted: Option<Instant>,
+    since: u32,
+    offered: u32,
+    /// The tick in which the driver took it.
+    accepted: u32,
+    /// The driver took it, and it may come back.
+    is_accepted: bool,
     /// Whether it was called back after it had waited for a whole tick: then it was not sent, though the driver takes it.
     returns: bool,
     tries: u8,
     /// Ticks since it was offered.
     idle: u8,
+}
+
+impl Unsent {
+    /// Tells whether the driver took it in an earlier tick, and it did not come back.
+    const fn stays_sent(&self, now: Instant) -> bool {
+        self.is_accepted && self.accepted != now.stamp()
+    }
+}
+
+/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
+pub(in crate::runner) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
+    let micros = age(now.stamp(), *stamp);
+    *stamp = now.stamp().wrapping_sub(micros);
+    Duration::from_micros(micros.into())
 }
 
 impl Watch {
@@ -32,11 +49,11 @@ impl Watch {
             let Some(unsent) = place.as_mut().filter(|unsent| unsent.header == header) else {
                 continue;
             };
-            if unsent.accepted.is_some_and(|before| before != now) {
+            if unsent.stays_sent(now) {
                 *place = None;
             } else {
-                (unsent.accepted, unsent.offered, unsent.tries) = (Some(now), now, 0);
-                unsent.idle = 0;
+                (unsent.accepted, unsent.is_accepted) = (now.stamp(), true);
+                (unsent.offered, unsent.tries, unsent.idle) = (now.stamp(), 0, 0);
             }
         }
     }
@@ -47,11 +64,11 @@ impl Watch {
             self.begin(header, now);
             return 1;
         };
-        if unsent.accepted.take().is_some() {
+        if core::mem::take(&mut unsent.is_accepted) {
             // The frame of an earlier tick was taken and stayed.
-            (unsent.since, unsent.returns) = (now, false);
+            (unsent.since, unsent.returns) = (now.stamp(), false);
         }
-        (unsent.offered, unsent.idle) = (now, 0);
+        (unsent.offered, unsent.idle) = (now.stamp(), 0);
         unsent.tries = unsent.tries.saturating_add(1);
         unsent.tries
     }
@@ -59,7 +76,9 @@ impl Watch {
     /// Notes a frame that the driver had taken and gave back.
     pub(in crate::runner) fn evicted(&mut self, header: u32, now: Instant) {
         match self.unsent.iter_mut().flatten().find(|it| it.header == header) {
-            Some(unsent) => (unsent.accepted, unsent.offered, unsent.idle) = (None, now, 0),
+            Some(unsent) => {
+                (unsent.is_accepted, unsent.offered, unsent.idle) = (false, now.stamp(), 0);
+            }
             None => self.begin(header, now),
         }
     }
@@ -77,9 +96,10 @@ impl Watch {
         if let Some(place) = self.unsent.iter_mut().find(|unsent| unsent.is_none()) {
             *place = Some(Unsent {
                 header,
-                since: now,
-                offered: now,
-                accepted: None,
+                since: now.stamp(),
+                offered: now.stamp(),
+                accepted: 0,
+                is_accepted: false,
                 returns: false,
                 tries: 1,
                 idle: 0,
@@ -92,16 +112,14 @@ impl Watch {
         let mut lost = false;
         for place in &mut self.unsent {
             let Some(unsent) = place else { continue };
-            unsent.since = now.min(unsent.since);
-            unsent.offered = now.min(unsent.offered);
-            let stays_sent = unsent.accepted.is_some_and(|before| before != now);
-            let is_forgotten =
-                now.since(unsent.offered) >= FORGOTTEN_AFTER.0 || unsent.idle >= FORGOTTEN_AFTER.1;
+            let waits = take_age(now, &mut unsent.since);
+            let is_forgotten = take_age(now, &mut unsent.offered) >= FORGOTTEN_AFTER.0
+                || unsent.idle >= FORGOTTEN_AFTER.1;
             unsent.idle = unsent.idle.saturating_add(1);
-            if stays_sent || is_forgotten {
+            if unsent.stays_sent(now) || is_forgotten {
                 *place = None;
-            } else if unsent.accepted.is_none() || unsent.returns {
-                lost |= now.since(unsent.since) >= BUS_LOST_AFTER;
+            } else if !unsent.is_accepted || unsent.returns {
+                lost |= waits >= BUS_LOST_AFTER;
             }
         }
         self.has_unsent = self.unsent.iter().any(Option::is_some);
