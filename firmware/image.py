@@ -89,3 +89,10 @@ def stack_bound(graph, sizes, function, path=()):
         depth, more = stack_bound(graph, sizes, callee, (*path, function))
         deepest, unknown = max(deepest, depth), unknown | more
     return sizes.get(function, 0) + deepest, unknown
+
+
+def loaded_bytes(elf):
+    """Bytes of code, constants and initial values: what a flash holds of an image."""
+    kept = (".text", ".rodata", ".data", ".vector_table")
+    lines = [line.split() for line in llvm("llvm-size", "-A", elf).splitlines()]
+    return sum(int(fields[1]) for fields in lines if fields and fields[0] in kept)

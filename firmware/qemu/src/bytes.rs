@@ -1,7 +1,6 @@
 //! The rows of the byte protocols: a whole frame in one slice, a frame byte by byte, and noise.
 
-use crate::meter::instructions;
-use crate::row;
+use crate::meter::{instructions, row};
 use core::hint::black_box;
 use drivetrain::time::Instant;
 use drivetrain::wire::dbus::Dbus;

@@ -1,9 +1,7 @@
 //! What a program calls in its loop beside the tick: reads of the state, targets, edges; and ticks of a bus at rest.
 
-use crate::meter::instructions;
-use crate::row;
-use crate::rows::START;
-use crate::wiring::{Drive, Targets, row_tick};
+use crate::meter::{instructions, row};
+use crate::wiring::{Drive, START, Targets, row_tick};
 use drivetrain::dji::{Bus, Handle, M3508, State};
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;

@@ -1,8 +1,8 @@
 //! Shows that a figure does not depend on what a motor has seen.
 
-use crate::row;
-use crate::rows::{START, decode, tick};
-use crate::wiring::Targets;
+use crate::meter::row;
+use crate::rows::{decode, tick};
+use crate::wiring::{START, Targets};
 use drivetrain::time::Instant;
 
 const TURNS: [i64; 3] = [0, 1_000_000, 1_000_000_000_000];

@@ -1,15 +1,16 @@
 //! The rows of the controllers beside `Pid`, each through its checked `update`.
 
-use crate::meter::{CALLS, instructions};
-use crate::row;
+use crate::meter::{CALLS, instructions, row};
 use crate::rows::swinging;
 use core::hint::black_box;
+use drivetrain::chassis::Odometry;
 use drivetrain::control::{
     Biquad, Cascade, Differentiator, FeedForward, LowPass, MotionLimits, Pid, PidConfig,
     PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator, StepResponse,
     TimeStep, Window,
 };
 use drivetrain::error::ConfigError;
+use drivetrain::geometry::{Body, Twist};
 
 const DT_S: f32 = 0.001;
 
@@ -50,6 +51,12 @@ fn control_cascade(cascade: &mut Cascade, error: f32, velocity: f32, step: &Time
     cascade.step(error, velocity, step)
 }
 
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn control_odometry(odometry: &mut Odometry, twist: &Twist<Body>, dt_s: f32) -> bool {
+    odometry.advance(*twist, None, dt_s)
+}
+
 type Step<C> = fn(&mut C, f32, f32, f32) -> f32;
 type Filter<C> = fn(&mut C, f32, f32) -> f32;
 type Sampler<C> = fn(&mut C, f32) -> f32;
@@ -77,6 +84,12 @@ pub fn rows() {
         _ = effort_of(&effort, swinging(call), swinging(call + 1));
     };
     row("feed_forward", &[instructions(control_feed_forward as _, each)]);
+    let mut odometry = black_box(Odometry::default());
+    let twist = black_box(Twist::<Body>::new(1.0, 0.5, 0.25));
+    let each = |advance: fn(&mut Odometry, &Twist<Body>, f32) -> bool, _| {
+        _ = advance(&mut odometry, &twist, DT_S);
+    };
+    row("odometry", &[instructions(control_odometry as _, each)]);
     tuning();
 }
 

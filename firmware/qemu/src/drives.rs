@@ -1,7 +1,6 @@
 //! Eight own motors of each other family, as a program drives them: with our speed loop, by torque or current.
 
-use crate::meter::instructions;
-use crate::row;
+use crate::meter::{instructions, row};
 use core::fmt::Debug;
 use core::hint::black_box;
 use drivetrain::control::PidConfig;

@@ -1,7 +1,6 @@
 //! Eight joints of Damiao in MIT mode, as a program drives them: each an own motor with our speed loop.
 
-use crate::meter::instructions;
-use crate::row;
+use crate::meter::{instructions, row};
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Model, Motor};

@@ -11,7 +11,6 @@ mod calls;
 mod closed_loop;
 mod constant_time;
 mod controllers;
-mod cycle;
 mod drives;
 mod joints;
 mod meter;
@@ -29,7 +28,6 @@ fn main() -> ! {
         let (hash, frames) = closed_loop::run();
         hprintln!("closed_loop {:016x} {}", hash, frames);
         rows::motors();
-        cycle::rows();
         calls::rows();
         joints::rows();
         drives::rows();
@@ -56,13 +54,4 @@ fn fail() -> ! {
     loop {
         debug::exit(debug::EXIT_FAILURE);
     }
-}
-
-/// Prints the mean of several figures, the least and the most.
-fn row(name: &str, figures: &[u32]) {
-    let count = figures.len() as u32;
-    let mean = (figures.iter().sum::<u32>() + count / 2) / count;
-    let (least, most) =
-        figures.iter().fold((u32::MAX, 0), |(least, most), x| (least.min(*x), most.max(*x)));
-    hprintln!("row {} {} {} {}", name, mean, least, most);
 }

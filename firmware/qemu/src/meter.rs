@@ -2,6 +2,7 @@
 
 use core::hint::black_box;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use cortex_m_semihosting::hprintln;
 
 /// Calls in one measurement: the figure is their mean.
 pub const CALLS: u32 = 1_000;
@@ -75,4 +76,13 @@ fn stack_pointer() -> *mut u32 {
     // SAFETY: only reads the register.
     unsafe { core::arch::asm!("mov {}, sp", out(reg) pointer, options(nomem, nostack)) };
     pointer
+}
+
+/// Prints the mean of several figures, the least and the most.
+pub fn row(name: &str, figures: &[u32]) {
+    let count = figures.len() as u32;
+    let mean = (figures.iter().sum::<u32>() + count / 2) / count;
+    let (least, most) =
+        figures.iter().fold((u32::MAX, 0), |(least, most), x| (least.min(*x), most.max(*x)));
+    hprintln!("row {} {} {} {}", name, mean, least, most);
 }

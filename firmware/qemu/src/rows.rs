@@ -1,8 +1,7 @@
 //! The rows of the table: each measured function once, out of line, with arguments the optimiser cannot see.
 
-use crate::meter::{self, instructions};
-use crate::row;
-use crate::wiring::{Drive, Targets, feedback, row_tick};
+use crate::meter::{self, instructions, row};
+use crate::wiring::{Drive, START, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
@@ -18,8 +17,6 @@ use drivetrain::math as maths;
 use drivetrain::motor::Ingest;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-
-pub const START: Instant = Instant::from_micros(1_000_000);
 
 #[unsafe(no_mangle)]
 #[inline(never)]

@@ -9,6 +9,8 @@ use drivetrain::motor::Ingest;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 
+pub const START: Instant = Instant::from_micros(1_000_000);
+
 const MOTORS: usize = 8;
 const PERIOD: Duration = Duration::from_millis(1);
 
