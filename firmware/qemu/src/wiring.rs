@@ -1,5 +1,7 @@
 //! The bus that is measured: eight M3508, and the feedback that they send.
 
+#![allow(dead_code, reason = "two benches use it, each in part")]
+
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};

@@ -13,7 +13,6 @@ mod driver;
 #[allow(dead_code, reason = "stack is painted in the other bench")]
 mod meter;
 #[path = "../../qemu/src/wiring.rs"]
-#[allow(dead_code, reason = "the other bench uses all of it")]
 mod wiring;
 
 use core::panic::PanicInfo;

@@ -11,7 +11,6 @@ mod dearest;
 #[allow(dead_code, reason = "only the timer is used here")]
 mod meter;
 #[path = "../../qemu/src/wiring.rs"]
-#[allow(dead_code, reason = "only the frames are used here")]
 mod wiring;
 
 use core::panic::PanicInfo;
