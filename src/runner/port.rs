@@ -126,6 +126,8 @@ const PATIENCE: u8 = 3;
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Takes at most `budget` received frames from the driver; frames of others are dropped. Returns how many came.
+    ///
+    /// Costs 535 instructions on a Cortex-M4F, for 8 frames of motors (`docs/figures.md`).
     pub fn poll(&mut self, budget: usize) -> usize {
         self.poll_with(budget, |_| {})
     }
@@ -254,10 +256,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
         }
         let outcome = self.device.ingest(frame, now);
         if outcome != Ingest::Taken {
-            tally.rejected += 1;
-            if let Ingest::Malformed(_) = outcome {
-                tally.malformed += 1;
-            }
+            tally.reject(outcome);
         }
         outcome
     }

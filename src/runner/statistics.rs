@@ -1,7 +1,7 @@
 //! What a runner counts: frames, errors, and how full the bus is.
 
 use crate::frame::CanFrame;
-use crate::motor::BusLoad;
+use crate::motor::{BusLoad, Ingest};
 use crate::time::{Duration, Instant};
 use embedded_can::ErrorKind;
 
@@ -137,6 +137,17 @@ pub(super) struct Tally {
     pub(super) rejected: u32,
     /// Of those that were rejected; the rest is unrelated.
     pub(super) malformed: u32,
+}
+
+impl Tally {
+    /// Counts a frame that was not taken.
+    #[inline(always)]
+    pub(super) const fn reject(&mut self, outcome: Ingest) {
+        self.rejected += 1;
+        if let Ingest::Malformed(_) = outcome {
+            self.malformed += 1;
+        }
+    }
 }
 
 /// How full a bus was in the last window of a second or a little more, by the frames that the runner sent and received.
