@@ -27,6 +27,8 @@ use core::f32::consts::SQRT_2;
 /// let mecanum = Mecanum::<'Y'>::with_rollers(0.1, Vec2::new(0.3, 0.2));
 /// ```
 ///
+/// Takes 20 bytes on a Cortex-M4F (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// use drivetrain::chassis::Mecanum;
@@ -117,6 +119,8 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     }
 
     /// Returns the wheel velocities for the motion `twist` of the body.
+    ///
+    /// Costs 18 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn inverse(&self, twist: Twist<Body>) -> MecanumWheels<AngularVelocity> {
@@ -133,6 +137,8 @@ impl<const FLOOR: char> Mecanum<FLOOR> {
     }
 
     /// Returns the motion of the body that fits the wheel velocities best (least squares).
+    ///
+    /// Costs 19 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn forward(&self, wheels: MecanumWheels<AngularVelocity>) -> Twist<Body> {

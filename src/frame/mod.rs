@@ -60,6 +60,8 @@ impl Length {
 }
 
 /// A classic CAN data or remote frame.
+///
+/// Takes 16 bytes on a Cortex-M4F (`docs/figures.md`).
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     /// Id and flags; [`SHORT`] unless there are 8 bytes.

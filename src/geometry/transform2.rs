@@ -70,6 +70,8 @@ impl<From, To> Transform2<From, To> {
     }
 
     /// Returns the point of `From` as seen in `To`.
+    ///
+    /// Costs 14 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn apply(self, point: Point2<From>) -> Point2<To> {
@@ -81,6 +83,8 @@ impl<From, To> Transform2<From, To> {
     ///
     /// Rounding adds up as in [`Rotation2`]; call [`normalized`](Self::normalized) once in a thousand. Then 10^6 composed
     /// steps are right to 1e-3 rad and to 1e-3 of the largest distance on the way; a circle of 1 m closes to 1 cm.
+    ///
+    /// Costs 26 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn compose<Start>(self, first: Transform2<Start, From>) -> Transform2<Start, To> {
@@ -92,6 +96,8 @@ impl<From, To> Transform2<From, To> {
     }
 
     /// Returns the transform back.
+    ///
+    /// Costs 15 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn inverse(self) -> Transform2<To, From> {

@@ -85,6 +85,8 @@ impl<From, To> Transform3<From, To> {
     }
 
     /// Returns the point of `From` as seen in `To`.
+    ///
+    /// Costs 36 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn apply(self, point: Point3<From>) -> Point3<To> {
@@ -93,6 +95,8 @@ impl<From, To> Transform3<From, To> {
     }
 
     /// Returns the transform that goes through `first` and then through `self`.
+    ///
+    /// Costs 101 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn compose<Start>(self, first: Transform3<Start, From>) -> Transform3<Start, To> {
@@ -106,6 +110,8 @@ impl<From, To> Transform3<From, To> {
     }
 
     /// Returns the transform back.
+    ///
+    /// Costs 42 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     #[inline]
     pub const fn inverse(self) -> Transform3<To, From> {

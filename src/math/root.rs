@@ -3,6 +3,8 @@
 /// Rounded correctly with the feature `libm`; within one unit in the last place without it. `micromath` is
 /// never used here: its square root is up to 6 % off.
 ///
+/// Costs 52 instructions on a Cortex-M4F (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// assert_eq!(drivetrain::math::sqrt(2.25), 1.5);

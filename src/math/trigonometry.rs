@@ -11,6 +11,8 @@ use core::f32::consts::FRAC_PI_2;
 ///
 /// A quarter turn is taken off in two parts (Cody and Waite), the rest goes through minimax polynomials.
 ///
+/// Costs 58 instructions on a Cortex-M4F (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// use drivetrain::math::sin_cos;
@@ -47,6 +49,8 @@ pub const fn sin_cos(x: f32) -> (f32, f32) {
 /// The largest error is 3.2e-7; with the feature `micromath` it is 0.005, at fewer instructions, for
 /// vectors of a length from 1e-15 to 1e15, and on the negative x axis either of ±π. The zero vector has the angle 0.
 /// NaN in either argument gives NaN; so may an infinite one.
+///
+/// Costs 65 instructions on a Cortex-M4F (`docs/figures.md`).
 ///
 /// # Examples
 /// ```

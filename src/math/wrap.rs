@@ -7,6 +7,8 @@ use core::f32::consts::{PI, TAU};
 /// turns, where that spacing is a third of a turn, the result is some angle in the range.
 /// The ends are the `f32` nearest to ±π. NaN and infinity give NaN.
 ///
+/// Costs 18 instructions on a Cortex-M4F (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// use core::f32::consts::PI;

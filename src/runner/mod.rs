@@ -46,6 +46,8 @@ use watch::Watch;
 
 /// Moves frames between a driver and a device, at the pace of a clock.
 ///
+/// Takes 660 bytes on a Cortex-M4F, without driver, clock and device (`docs/figures.md`).
+///
 /// # Examples
 /// ```
 /// use drivetrain::dji::{Bus, Config, M3508};
@@ -200,6 +202,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     }
 
     /// Runs one step: update, then send. An evicted frame of others is dropped.
+    ///
+    /// Costs 644 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn tick(&mut self, tick: Tick) {
         self.tick_with(tick, |_| {});
     }

@@ -39,6 +39,8 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// comes due before, that one takes its place, with a `dt_s` that covers both, and the step that was left out is an overrun;
     /// one with a `dt_s` of 0 stays. So two runners can wait for each other:
     /// `let (Some(one), Some(other)) = (one.due(), other.due()) else { continue };` loses none.
+    ///
+    /// Costs 125 instructions on a Cortex-M4F, when a step is due (`docs/figures.md`).
     pub fn due(&mut self) -> Option<Tick> {
         let now = self.read_clock();
         if self.watch.standstill.take() {

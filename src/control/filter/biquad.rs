@@ -97,6 +97,8 @@ impl Biquad {
     }
 
     /// Takes the next sample and returns the new value.
+    ///
+    /// Costs 46 instructions on a Cortex-M4F (`docs/figures.md`).
     pub const fn update(&mut self, input: f32) -> f32 {
         if !self.started && input.is_finite() {
             self.reset_to(input);

@@ -65,6 +65,8 @@ impl<const N: usize> Window<N> {
     }
 
     /// Returns the mean of the samples; zero before the first one.
+    ///
+    /// Costs 57 instructions on a Cortex-M4F, with `push`, of 8 samples (`docs/figures.md`).
     #[must_use]
     pub fn mean(&self) -> f32 {
         if self.filled == 0 {
@@ -81,6 +83,8 @@ impl<const N: usize> Window<N> {
     }
 
     /// Returns the median of the samples; zero before the first one.
+    ///
+    /// Costs 206 instructions on a Cortex-M4F, with `push`, of 5 samples (`docs/figures.md`).
     #[must_use]
     pub fn median(&self) -> f32 {
         let samples = self.samples.get(..self.filled).unwrap_or_default();

@@ -69,6 +69,8 @@ use crate::error::ConfigError;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 // What each step stores stands first, and what it reads next to it.
+///
+/// Takes 92 bytes on a Cortex-M4F (`docs/figures.md`).
 #[repr(C)]
 pub struct Pid {
     pub(super) output: f32,

@@ -32,6 +32,8 @@ pub(crate) enum Input {
 impl Pid {
     /// Steps by a time that was validated before, and returns the output.
     ///
+    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
+    ///
     /// # Examples
     /// ```
     /// use drivetrain::control::{Pid, PidConfig, TimeStep};

@@ -43,6 +43,8 @@ impl FeedForward {
     }
 
     /// Returns the effort for this velocity and this acceleration.
+    ///
+    /// Costs 53 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     pub const fn effort(&self, velocity: f32, acceleration: f32) -> f32 {
         if !(velocity.is_finite() && acceleration.is_finite()) {

@@ -107,6 +107,8 @@ pub struct Profile {
 impl Profile {
     /// Plans the move from `start` to `end`.
     ///
+    /// Costs 199 instructions on a Cortex-M4F, for a trapezoid (`docs/figures.md`).
+    ///
     /// # Errors
     /// Names the limit that is NaN, infinite, zero or negative, or `start` or `end` when NaN or infinite, or `distance` when the
     /// move is longer, or takes longer, than `f32` can tell.
@@ -164,6 +166,8 @@ impl Profile {
     }
 
     /// Returns position, velocity and acceleration `time_s` seconds after the start.
+    ///
+    /// Costs 48 instructions on a Cortex-M4F, for a trapezoid (`docs/figures.md`).
     #[must_use]
     pub fn at(&self, time_s: f32) -> ProfileState {
         if time_s >= self.duration_s {

@@ -80,6 +80,8 @@ impl StepResponse {
     }
 
     /// Takes the value `dt_s` seconds after the one before; the first, `dt_s` after the step.
+    ///
+    /// Costs 74 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn record(&mut self, value: f32, dt_s: f32) {
         if self.is_complete() {
             return;
