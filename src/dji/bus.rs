@@ -55,6 +55,8 @@ const LONGEST_STEP_S: f32 = 0.02;
 /// ```
 #[derive(Debug)]
 // The slots first: their addresses need no offset then.
+///
+/// Takes 3784 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
 #[repr(C)]
 pub struct Bus<B = ()> {
     pub(super) slots: [Slot; SLOTS],
@@ -169,6 +171,8 @@ impl<B> Bus<B> {
     /// [`Timeouts::late`] counts as late: not at once, but within twice that time. Its low 32 bits are kept: one that is
     /// wrong by a multiple of 71 min 35 s is not noticed.
     // A call of its own costs as much as a tenth of what it does.
+    ///
+    /// Costs 31 instructions on a Cortex-M4F, for a frame of a motor (`docs/figures.md`).
     #[inline(always)]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.key().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
@@ -239,6 +243,8 @@ impl<B> Bus<B> {
     /// armed again. A `dt_s` of zero, below zero, infinite or NaN changes nothing and leaves the last commands for one update,
     /// but for motors that were relaxed; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and
     /// derivatives rest for the step.
+    ///
+    /// Costs 505 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         if !self.takes_step(tick.dt_s()) {
@@ -293,6 +299,8 @@ impl<B> Bus<B> {
     }
 
     /// Returns a command frame that waits to be sent, and takes it off the list.
+    ///
+    /// Costs 54 instructions on a Cortex-M4F, for the two frames of 8 motors and the end (`docs/figures.md`).
     #[inline]
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         self.outbox.next()
@@ -306,6 +314,8 @@ impl<B> Bus<B> {
     /// Returns what is known of a motor; `None` before its first frame, and once it is detached.
     ///
     /// Inlined: a program pays for the fields that it reads.
+    ///
+    /// Costs 160 instructions on a Cortex-M4F, when every field is read (`docs/figures.md`).
     #[must_use]
     #[inline(always)]
     pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {

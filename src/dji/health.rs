@@ -111,6 +111,8 @@ impl<B> Bus<B> {
     /// None is lost, however late it is read; while it waits, the same change is not noted again. Beyond 12 that wait,
     /// the order of the later ones is that of the motors.
     ///
+    /// Costs 6 instructions on a Cortex-M4F, when none waits (`docs/figures.md`).
+    ///
     /// # Examples
     /// ```
     /// use drivetrain::dji::{Bus, Config, M3508};

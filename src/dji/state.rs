@@ -7,6 +7,8 @@ use crate::units::{AngularVelocity, Current};
 ///
 /// The positive direction is counter-clockwise looking at the shaft, or the other one for a motor attached as
 /// [`reversed`](super::Config::reversed).
+///
+/// Takes 72 bytes on a Cortex-M4F (`docs/figures.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

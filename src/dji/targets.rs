@@ -53,6 +53,8 @@ impl<B> Bus<B> {
 
     /// Sets the velocity that the speed loop follows.
     ///
+    /// Costs 39 instructions on a Cortex-M4F (`docs/figures.md`).
+    ///
     /// # Errors
     /// See above.
     #[inline]
@@ -77,6 +79,8 @@ impl<B> Bus<B> {
     }
 
     /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
+    ///
+    /// Costs 92 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// See above.
