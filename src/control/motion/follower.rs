@@ -34,7 +34,7 @@ use crate::control::shaping::{MotionLimits, ProfileState};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionFollower<const N: usize> {
     states: [ProfileState; N],
-    /// What the start of the plan could not take of its positions.
+    /// Remainder of each position beyond the resolution of the start of the plan.
     rests: [f32; N],
     plan: Option<Plan<N>>,
     elapsed_s: Sum,

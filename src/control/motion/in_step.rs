@@ -94,7 +94,7 @@ impl<const N: usize> Motions<N> {
         self.duration_s
     }
 
-    /// Returns the positions at a time, and what `f32` leaves of them, for starts that are farther by `rests`.
+    /// Returns the positions at a time, and the remainder beyond `f32` of each, for starts that are farther by `rests`.
     pub(super) fn exactly_at(&self, time_s: f32, rests: &[f32; N]) -> [(ProfileState, f32); N] {
         let mut states = self.axes.each_ref().map(|axis| (axis.at(time_s), 0.0));
         for ((state, axis), rest) in states.iter_mut().zip(&self.axes).zip(rests) {

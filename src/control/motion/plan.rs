@@ -102,8 +102,8 @@ impl Motion {
     /// Plans the fastest motion.
     ///
     /// # Errors
-    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or what is NaN or infinite of `position`, `velocity`,
-    /// `acceleration`, `target` and `target_velocity`.
+    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or the value that is NaN or infinite: `position`, `velocity`,
+    /// `acceleration`, `target` or `target_velocity`.
     pub fn plan(
         from: &ProfileState,
         to: &MotionTarget,

@@ -18,11 +18,11 @@ pub(super) struct Planner {
     unit_s: f32,
     brake: Brake,
     task: Task,
-    /// What `f32` cannot tell of the positions, in the units of the task.
+    /// The resolution of `f32` at the positions, in the units of the task.
     rounding: f32,
 }
 
-/// Of a way, what rounding may take from it.
+/// The share of a way lost to rounding, at most.
 const ROUNDING: f32 = 2e-6;
 const HALVINGS: u32 = 30;
 
