@@ -39,9 +39,15 @@ pub fn pilot() -> (bool, [f32; 3]) {
     black_box((false, [0.0; 3]))
 }
 
-#[panic_handler]
-fn panic(_: &PanicInfo) -> ! {
+/// What a program does that cannot go on.
+#[inline(never)]
+pub fn halt() -> ! {
     loop {
         core::hint::spin_loop();
     }
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    halt()
 }

@@ -5,7 +5,7 @@
 
 mod board;
 
-use board::{Board, micros, pilot};
+use board::{Board, halt, micros, pilot};
 use core::hint::black_box;
 use cortex_m as _;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
@@ -37,8 +37,8 @@ fn attach(
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut bus = Bus::new();
-    let Ok((wheels, yaw)) = attach(&mut bus) else { loop {} };
-    let Ok(mecanum) = Mecanum::new(0.076, Vec2::new(0.20, 0.18)) else { loop {} };
+    let Ok((wheels, yaw)) = attach(&mut bus) else { halt() };
+    let Ok(mecanum) = Mecanum::new(0.076, Vec2::new(0.20, 0.18)) else { halt() };
     let mut runner = Runner::new(Nb(Board), || Instant::from_micros(micros()), bus);
     let mut was_on = true;
     loop {

@@ -5,7 +5,7 @@
 
 mod board;
 
-use board::{Board, DriverFrame, micros, pilot};
+use board::{Board, DriverFrame, halt, micros, pilot};
 use cortex_m as _;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
@@ -20,7 +20,7 @@ const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0);
 fn main() -> ! {
     let mut can = Board;
     let mut bus = Bus::new();
-    let Ok(wheel) = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)) else { loop {} };
+    let Ok(wheel) = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)) else { halt() };
     let mut ticker = Ticker::new(Duration::from_millis(1));
     let mut was_on = true;
     loop {

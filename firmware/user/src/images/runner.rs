@@ -5,7 +5,7 @@
 
 mod board;
 
-use board::{Board, micros, pilot};
+use board::{Board, halt, micros, pilot};
 use cortex_m as _;
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, M3508};
@@ -18,7 +18,7 @@ const SPEED: PidConfig = PidConfig::new(1.9, 2.4, 0.0);
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut bus = Bus::new();
-    let Ok(wheel) = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)) else { loop {} };
+    let Ok(wheel) = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED)) else { halt() };
     let mut runner = Runner::new(Nb(Board), || Instant::from_micros(micros()), bus);
     let mut was_on = true;
     loop {
