@@ -54,7 +54,7 @@ pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
 pub(crate) use number::limited;
 
-pub(crate) use pid::Input;
+pub(crate) use pid::ErrorPid;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;

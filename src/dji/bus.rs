@@ -72,7 +72,7 @@ pub struct Bus<B = ()> {
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 316 && size_of::<Bus>() <= 3784);
+const _: () = assert!(size_of::<Slot>() <= 296 && size_of::<Bus>() <= 3564);
 
 /// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use super::config::USUAL;
 use super::handle::Key;
 use super::range::Range;
 use super::{Facts, Feedback};
-use crate::control::{Input, Pid, PidConfig, TimeStep};
+use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
 use crate::motor::{HealthConfig, Monitor, MotorGuard, TargetError, Traffic};
@@ -45,7 +45,7 @@ pub(super) struct Slot {
     raw_per_unit: f32,
     goal: Goal,
     speed: Pid,
-    position: Pid,
+    position: ErrorPid,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
     ambiguous_gaps: u16,
@@ -170,7 +170,7 @@ impl Slot {
         full_limit: 0,
         ambiguous_gaps: 0,
         speed: NO_LOOP,
-        position: NO_LOOP,
+        position: *NO_LOOP.core(),
         generation: 0,
         place: Place::Nowhere,
         homing: Homing::Relative,
@@ -199,6 +199,17 @@ impl Slot {
         AngularVelocity::from_rad_per_s(f32::from(self.feedback.rpm()) * self.rad_per_s_per_rpm)
     }
 
+    /// Tells a loop from [`NO_LOOP`], the only one without limits.
+    #[inline]
+    const fn has_speed_loop(&self) -> bool {
+        self.speed.core().is_limited()
+    }
+
+    #[inline]
+    const fn has_position_loop(&self) -> bool {
+        self.position.is_limited()
+    }
+
     // Feedback.
 
     /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
@@ -220,7 +231,7 @@ impl Slot {
     #[inline]
     pub(super) fn set_velocity(&mut self, rad_per_s: f32, now: u32) -> Result<(), TargetError> {
         self.admit(rad_per_s.is_finite())?;
-        needs(&self.speed)?;
+        needs(self.has_speed_loop())?;
         self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
         Ok(())
     }
@@ -228,7 +239,7 @@ impl Slot {
     /// Takes turns and angle of the output shaft.
     pub(super) fn set_position(&mut self, position: Position, now: u32) -> Result<(), TargetError> {
         self.admit(position.is_finite())?;
-        needs(&self.position)?;
+        needs(self.has_position_loop())?;
         let (turns, phase) = self.shaft.locate(self.inside(position));
         let goal = Goal { turns: self.shaft.near(turns), value: phase };
         self.start(Action::Position, goal, now);
@@ -292,8 +303,7 @@ impl Slot {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                let input = Input::Given { error: way, rate: velocity };
-                match self.position.step_plain(input, plain) {
+                match self.position.plain((way, velocity), way, plain) {
                     Ok(goal) => goal,
                     Err(_) => return self.update_carefully(step, sent),
                 }
@@ -302,8 +312,7 @@ impl Slot {
             // Out of line too: a zero for these would be loaded in every update of every motor.
             Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
         };
-        let input = Input::Measured { setpoint: goal, measurement: velocity };
-        match self.speed.step_plain(input, plain) {
+        match self.speed.step_plain(goal, velocity, plain) {
             Ok(output) => free_to_raw(output, self.raw_per_unit),
             Err(_) => self.follow_velocity(goal, velocity, step),
         }
@@ -318,14 +327,8 @@ impl Slot {
     }
 }
 
-/// Tells a loop from [`NO_LOOP`], the only one without limits.
-#[inline]
-const fn is_loop(pid: &Pid) -> bool {
-    pid.is_limited()
-}
-
-fn needs(pid: &Pid) -> Result<(), TargetError> {
-    if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
+fn needs(is_there: bool) -> Result<(), TargetError> {
+    if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
 /// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.

@@ -1,6 +1,6 @@
 //! What a motor is configured with: at the start, and while it runs.
 
-use super::{NO_GAINS, Slot, is_loop};
+use super::{NO_GAINS, Slot};
 use crate::control::{Pid, PidConfig};
 use crate::dji::command::{Place, to_raw};
 use crate::dji::config::PlainConfig;
@@ -79,7 +79,7 @@ impl Slot {
             full_limit: limit_raw,
             guard: MotorGuard::NEW.with(config.opening, config.resumes),
             speed: speed_loop,
-            position: position_loop,
+            position: *position_loop.core(),
             generation,
             place,
             health: config.health,
@@ -130,9 +130,9 @@ impl Slot {
         let Some(facts) = self.facts else { return Capabilities::NONE };
         let set = Capabilities::of(&[Capability::Raw, facts.control, Capability::Feedback]);
         [
-            (Capability::Velocity, is_loop(&self.speed)),
-            (Capability::Angle, is_loop(&self.position)),
-            (Capability::Position, is_loop(&self.position)),
+            (Capability::Velocity, self.has_speed_loop()),
+            (Capability::Angle, self.has_position_loop()),
+            (Capability::Position, self.has_position_loop()),
             (Capability::Temperature, facts.has_temperature),
             (Capability::ErrorCodes, facts.errors != ErrorTable::None),
             (Capability::AbsoluteAngle, self.shaft.is_direct()),
@@ -148,7 +148,8 @@ impl Slot {
         let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
         let steep = steep_speed(&config, facts, self.rad_per_s_per_rpm);
         self.rest_loops();
-        let replaced = replace(&mut self.speed, config, limit, steep);
+        let replaced = checked(self.has_speed_loop(), config, limit, steep)
+            .and_then(|config| self.speed.set_config(config));
         self.settle();
         replaced
     }
@@ -162,7 +163,8 @@ impl Slot {
         let limit = no_load_velocity(facts, self.rad_per_s_per_rpm);
         let steep = steep_position(&config, facts);
         self.rest_loops();
-        let replaced = replace(&mut self.position, config, limit, steep);
+        let replaced = checked(self.has_position_loop(), config, limit, steep)
+            .and_then(|config| self.position.set_config(config));
         self.settle();
         replaced
     }
@@ -182,20 +184,21 @@ const fn within(config: Option<PidConfig>, limit: f32) -> PidConfig {
     config.with_output_range(lower, upper)
 }
 
-fn replace(
-    pid: &mut Pid,
+/// Returns the configuration for a loop that is there, narrowed to ±`limit`.
+fn checked(
+    is_there: bool,
     config: PidConfig,
     limit: f32,
     steep: Option<SteepGain>,
-) -> Result<(), ConfigError> {
-    if !is_loop(pid) {
+) -> Result<PidConfig, ConfigError> {
+    if !is_there {
         return Err(ConfigError::Unusable("handle of a motor without this loop"));
     }
     if let Some(SteepGain { parameter, value, highest }) = steep {
         let (value, most) = (value as f32, highest as f32);
         return Err(ConfigError::Range { parameter, value, least: 0.0, most });
     }
-    pid.set_config(within(Some(config), limit))
+    Ok(within(Some(config), limit))
 }
 
 /// Returns the proportional gain of a speed loop with which an error of one rpm of the rotor, the finest that feedback tells, asks

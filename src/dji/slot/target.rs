@@ -37,7 +37,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
-        needs(&self.position)?;
+        needs(self.has_position_loop())?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -57,7 +57,7 @@ impl Slot {
         timeouts: &Timeouts,
     ) -> Result<(), TargetError> {
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
-        needs(&self.position)?;
+        needs(self.has_position_loop())?;
         let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
         else {
             if self.guard.has_target() {
@@ -141,7 +141,7 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.position.step_error(way, velocity, step);
+        let goal = self.position.advance(way, velocity, step);
         self.follow_velocity(goal * self.opened_part(), velocity, step)
     }
 
