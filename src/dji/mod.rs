@@ -84,20 +84,26 @@
 //! whose manuals were not at hand, what independent public drivers agree on (taproot, librm, HNU's framework, IFR). They differ on the GM6020 voltage limit: 25000 is today's, 30000 that of old motors
 //! ([`Config::with_legacy_full_scale`]). The volts behind it are nominal: sources say 24 V or 25.2 V.
 
+mod arming;
 mod attach;
 mod budget;
 mod bus;
 mod command;
 mod config;
+mod counters;
 mod deadlines;
 mod device;
+mod drive;
 mod error;
 mod feedback;
 mod handle;
-mod health;
 mod limit;
+mod measured;
 mod model;
+mod motors;
 mod range;
+mod receiving;
+mod rounds;
 mod slot;
 mod state;
 mod targets;
@@ -105,9 +111,10 @@ mod targets;
 mod tests;
 mod word_gains;
 
-pub use bus::{Bus, Counters};
+pub use bus::Bus;
 pub use command::CommandFrame;
 pub use config::Config;
+pub use counters::Counters;
 pub use error::{AttachError, Message};
 pub use feedback::{ErrorCode, Feedback};
 pub use handle::{AnyHandle, Handle};

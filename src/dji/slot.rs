@@ -2,25 +2,27 @@
 //!
 //! What a motor needs now and then stands in the files of the folder.
 
-mod config;
-mod gap;
-mod health;
+pub(super) mod config;
+pub(super) mod gap;
+mod goal;
+pub(super) mod health;
 mod target;
 
 use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
 use super::handle::Key;
 use super::range::Range;
-use super::{Facts, Feedback};
+use super::{Facts, Feedback, State};
 use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
-use crate::motor::{HealthConfig, Monitor, MotorGuard, TargetError, Traffic};
-use crate::units::{Angle, AngularVelocity};
+use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetError, Traffic};
+use crate::units::{Angle, AngularVelocity, Current};
 
 /// The refusal of a handle whose motor is gone.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
-pub(super) use health::Look;
+use goal::{Action, Duty, Goal};
+pub(super) use health::Surroundings;
 
 /// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
 const CALM_CURRENT: i32 = 2_000;
@@ -60,89 +62,6 @@ pub(super) struct Slot {
     health: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
-}
-
-/// What a motor is asked to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-enum Action {
-    Rest,
-    Raw,
-    Velocity,
-    /// The shortest way.
-    Angle,
-    Position,
-    /// The way that another sensor leaves.
-    Measured,
-}
-
-impl Action {
-    /// Tells whether it goes to a place of the shaft.
-    const fn is_way(self) -> bool {
-        matches!(self, Self::Angle | Self::Position)
-    }
-}
-
-/// What an update does: the action, where that is as simple as it nearly always is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-enum Duty {
-    Rest,
-    /// Whatever is asked for, for the first time since a rest.
-    First,
-    Raw,
-    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
-    Velocity,
-    /// Both loops, as above.
-    Position,
-    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
-    Other,
-}
-
-/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
-#[derive(Debug, Clone, Copy)]
-struct Goal {
-    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
-    turns: u32,
-    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
-    value: i32,
-}
-
-impl Goal {
-    const NONE: Self = Self::of(0);
-
-    const fn of(value: i32) -> Self {
-        Self { turns: 0, value }
-    }
-
-    const fn raw(&self) -> i32 {
-        self.value
-    }
-
-    const fn rad_per_s(&self) -> f32 {
-        f32::from_bits(self.value.cast_unsigned())
-    }
-
-    const fn phase(&self) -> i32 {
-        self.value
-    }
-
-    const fn turns(&self) -> u32 {
-        self.turns
-    }
-
-    /// A way in rad, and the rate in rad/s that goes with it.
-    const fn measured(way: f32, rad_per_s: f32) -> Self {
-        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
-    }
-
-    const fn way(&self) -> f32 {
-        f32::from_bits(self.value.cast_unsigned())
-    }
-
-    const fn rate(&self) -> f32 {
-        f32::from_bits(self.turns)
-    }
 }
 
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
@@ -208,6 +127,74 @@ impl Slot {
     #[inline]
     const fn has_position_loop(&self) -> bool {
         self.position.is_limited()
+    }
+
+    /// Frees the slot; handles of the motor find nothing from now on.
+    pub(super) const fn free(&mut self) {
+        *self = Self { generation: self.generation + 1, ..Self::FREE };
+    }
+
+    /// Frees a slot whose handle nobody was given.
+    pub(super) const fn withdraw(&mut self) {
+        *self = Self { generation: self.generation, ..Self::FREE };
+    }
+
+    /// Returns the generation of the next motor here, or `None` when there is none left.
+    pub(super) const fn next_generation(&self) -> Option<u8> {
+        if self.generation < Key::GENERATIONS { Some(self.generation) } else { None }
+    }
+
+    pub(super) const fn name(&self) -> Option<MotorName> {
+        match self.facts {
+            Some(facts) => Some(MotorName::new(facts.name, self.id(facts))),
+            None => None,
+        }
+    }
+
+    /// Returns the id on the ESC, which the place of the command word tells.
+    const fn id(&self, facts: &Facts) -> u8 {
+        let [lower, _] = facts.command;
+        let before = if self.place.frame() as u8 == lower as u8 { 0 } else { 4 };
+        before + self.place.slot() + 1
+    }
+
+    /// Returns what is known; `None` before the first frame.
+    // The compiler leaves out what nobody reads, in line only.
+    #[inline(always)]
+    pub(super) fn state(&self) -> Option<State> {
+        let facts = self.facts?;
+        if self.guard.link() == Link::Unheard {
+            return None;
+        }
+        let amperes =
+            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
+                / f32::from(facts.current_raw);
+        Some(State {
+            motor: MotorName::new(facts.name, self.id(facts)),
+            position: self.shaft.position(),
+            homing: self.homing,
+            velocity: self.velocity(),
+            current: Current::from_amperes(amperes),
+            torque_nm: amperes * self.nm_per_a,
+            temperature_c: facts
+                .has_temperature
+                .then_some(health::celsius(self.feedback.temperature())),
+            error: facts.errors.read(self.feedback.error()),
+            rotor_counts: self.shaft.rotor_counts(),
+            ambiguous_gaps: self.ambiguous_gaps,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+            conditions: self.guard.latch().active(),
+            link: self.guard.link(),
+            feedback: self.feedback,
+        })
+    }
+
+    /// Time did not move on. A free slot loses nothing.
+    pub(super) fn lose_time(&mut self) {
+        if self.facts.is_some() {
+            self.guard.lose_time();
+        }
     }
 
     // Feedback.
@@ -291,7 +278,7 @@ impl Slot {
             && is_within(driven, calm)
             && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
             && is_within(feedback.rpm().into(), fastest)
-            && self.monitor.glance(feedback.angle(), coarse(word))
+            && self.monitor.follow(feedback.angle(), coarse(word))
     }
 
     /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that

@@ -474,7 +474,10 @@ mod tests {
                     assert_eq!(hit.step(1.0, measurement, &TimeStep::of(DT_S)), expected);
                 }
                 assert_eq!(hit.rejected(), 40);
-                assert_eq!(with_core(hit, |core| (core.rejected, core.rate) = (0, clean.core.rate)), clean);
+                assert_eq!(
+                    with_core(hit, |core| (core.rejected, core.rate) = (0, clean.core.rate)),
+                    clean
+                );
             }
         }
     }
@@ -603,7 +606,8 @@ mod tests {
                 for setpoint in [1.0, f32::MAX, f32::MIN] {
                     let output = pid.step(setpoint, measurement, &TimeStep::of(1e-6));
                     assert!(
-                        output.abs() <= config.parameters.output_upper && pid.core.integral.is_finite()
+                        output.abs() <= config.parameters.output_upper
+                            && pid.core.integral.is_finite()
                     );
                     assert!(pid.core.rate.is_finite() && pid.core.error.is_finite());
                 }

@@ -146,7 +146,8 @@ impl Pid {
                 }
                 self.core.set_options(self.core.options & !(REST_DERIVATIVE | TRACK_OUTPUT));
             }
-            let (lower, upper) = (self.core.parameters.output_lower, self.core.parameters.output_upper);
+            let (lower, upper) =
+                (self.core.parameters.output_lower, self.core.parameters.output_upper);
             if is_free && wanted <= upper && wanted >= lower {
                 self.tracking_rate = tracking_rate;
                 self.keep(wanted, measurement, error, rate, integral);
@@ -290,7 +291,11 @@ impl Pid {
     #[inline]
     fn weight(&self, error: f32) -> f32 {
         let (size, none) = (error.abs(), self.core.parameters.no_rate_above);
-        if size >= none { 0.0 } else { (none - size) / (none - self.core.parameters.full_rate_below) }
+        if size >= none {
+            0.0
+        } else {
+            (none - size) / (none - self.core.parameters.full_rate_below)
+        }
     }
 
     /// Returns the integral after anti-windup, for an `excess` that the limits cut off the output.
@@ -354,11 +359,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn stepped(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let plain = if pid.is_plain() {
-            pid.step_plain(setpoint, measurement, step).ok()
-        } else {
-            None
-        };
+        let plain =
+            if pid.is_plain() { pid.step_plain(setpoint, measurement, step).ok() } else { None };
         plain.unwrap_or_else(|| pid.step(setpoint, measurement, step))
     }
 

@@ -1,6 +1,7 @@
 //! Targets: all that is not a velocity or a position that goes on.
 
-use super::{Action, Duty, Goal, Slot, needs};
+use super::goal::{Action, Duty, Goal};
+use super::{Slot, health, needs};
 use crate::control::{Pid, TimeStep};
 use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
@@ -11,7 +12,7 @@ impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
-        self.settle();
+        self.apply_rules();
     }
 
     /// Takes a value in the unit of the command: amperes or volts.
@@ -62,7 +63,7 @@ impl Slot {
         else {
             if self.guard.has_target() {
                 self.guard.forget_target();
-                self.settle();
+                self.apply_rules();
             }
             return Err(TargetError::StaleMeasurement);
         };
@@ -73,7 +74,7 @@ impl Slot {
     #[cold]
     #[inline(never)]
     pub(super) fn refuse(&mut self, error: TargetError) -> TargetError {
-        self.settle();
+        self.apply_rules();
         error
     }
 
@@ -82,7 +83,7 @@ impl Slot {
     pub(super) fn start_anew(&mut self, action: Action, now: u32) {
         self.asked = action;
         self.guard.take_target(now);
-        self.settle();
+        self.apply_rules();
     }
 
     /// Tells whether the motor was at rest, not asked or not heard, at any time since the last usable update: its command
@@ -92,13 +93,13 @@ impl Slot {
     }
 
     /// Finds out what an update has to do. To be called wherever the guard, the range, a loop or what is asked for changes.
-    pub(in crate::dji) fn settle(&mut self) {
+    pub(in crate::dji) fn apply_rules(&mut self) {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
         }
         let is_online = self.guard.link() == Link::Online;
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
-            self.attend();
+            health::require_check(self);
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.is_plain();
         self.duty = match self.asked {
@@ -160,7 +161,7 @@ impl Slot {
         self.rest_loops();
         self.acted = Action::Rest;
         self.duty = Duty::Other;
-        self.settle();
+        self.apply_rules();
     }
 
     /// Has the loops rest as the motor did.
@@ -203,7 +204,7 @@ impl Slot {
             }
             _ => {}
         }
-        self.settle();
+        self.apply_rules();
     }
 
     const fn reset_loops(&mut self) {
@@ -256,7 +257,7 @@ mod tests {
             let now = Instant::from_micros(1_000);
             _ = bus.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), now);
             bus.arm(now).unwrap();
-            let duty = |bus: &Bus| bus.slot(motor.erase()).unwrap().duty;
+            let duty = |bus: &Bus| bus.motors.get(motor.erase().key()).unwrap().duty;
             bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
             assert_eq!(duty(&bus), Duty::First);
             bus.update(Tick::new(now, 0.001));
@@ -270,12 +271,12 @@ mod tests {
             assert_eq!(duty(&bus), Duty::Raw, "it has no loop");
             bus.set_position(motor, Position::ZERO).unwrap();
             bus.update(Tick::new(Instant::from_micros(4_000), 0.001));
-            let slot = bus.slot_mut(motor.erase()).unwrap();
+            let slot = bus.motors.get_mut(motor.erase().key()).unwrap();
             slot.range = Range::within(1_000);
-            slot.settle();
+            slot.apply_rules();
             assert_eq!(slot.duty, Duty::Other, "less than the full output");
             slot.guard.age(500_000, &Timeouts::new());
-            slot.settle();
+            slot.apply_rules();
             assert_eq!(slot.duty, Duty::Rest, "not heard");
         }
     }

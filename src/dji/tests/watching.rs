@@ -187,7 +187,8 @@ fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
         bench.run(40, CALM, 500);
         bench.hear(Told { current, ..CALM });
         let motor = bench.motor.erase();
-        let glance = |bench: &mut Bench<M3508>| bench.bus.slot_mut(motor).unwrap().is_well(raw);
+        let glance =
+            |bench: &mut Bench<M3508>| bench.bus.motors.get_mut(motor.key()).unwrap().is_well(raw);
         assert_eq!(glance(&mut bench), expected, "{raw} and {current}");
         // After something was wrong, and is over, a glance is enough again.
         bench.run(24, Told { celsius: 130, ..CALM }, 500);

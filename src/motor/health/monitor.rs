@@ -81,7 +81,7 @@ impl Monitor {
     /// As [`look`](Self::look), for a motor that is moderately driven and cool; `false` when its angle did not move, and
     /// has to be looked at.
     #[inline]
-    pub(crate) const fn glance(&mut self, angle: u16, word: i8) -> bool {
+    pub(crate) const fn follow(&mut self, angle: u16, word: i8) -> bool {
         let moved = self.frozen.has_moved(angle);
         if moved {
             self.stall = Timer::ZERO;
@@ -106,7 +106,7 @@ impl Monitor {
     }
 
     /// Looks at the motor and returns the share of the output that it is left with.
-    pub(crate) fn look(
+    pub(crate) fn check(
         &mut self,
         latch: &mut Latch,
         sample: &Sample,
@@ -401,7 +401,7 @@ const fn saturated(value: u32) -> u16 {
 mod frozen_tests {
     use super::*;
 
-    fn look(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
+    fn check(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
         let mut latch = Latch::NONE;
         #[expect(clippy::cast_possible_truncation, reason = "at most 100")]
         let word = (effort * 100.0) as i8;
