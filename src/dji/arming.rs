@@ -1,7 +1,6 @@
 //! Arming, and what forbids it.
 
-use super::handle::Key;
-use super::motors::Motors;
+use super::motors::{Key, Motors};
 use super::slot::{Slot, health};
 use crate::motor::{ArmError, Claim, Condition, Missing, MotorName, Role};
 use crate::time::Instant;

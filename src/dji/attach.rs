@@ -3,8 +3,7 @@
 use super::budget::Budget;
 use super::command::{Outbox, Place};
 use super::config::PlainConfig;
-use super::handle::Key;
-use super::motors::{FIRST_FEEDBACK_ID, Motors};
+use super::motors::{FIRST_FEEDBACK_ID, Key, Motors};
 use super::slot::config::configured;
 use super::{AttachError, Facts};
 use crate::motor::MotorName;
@@ -42,7 +41,8 @@ pub(super) const fn attach<const N: usize>(
         Err(error) => return Err(error),
     };
     let (count, commands) = (motors.count() + 1, outbox.frames_in_use_with(frame));
-    if let Some((load, ceiling_percent, feedback_hz)) = budget.overload(count, commands) {
+    let rate = motors.rounds.feedback_hz;
+    if let Some((load, ceiling_percent, feedback_hz)) = budget.overload(count, rate, commands) {
         return Err(AttachError::Load { motor, load, ceiling_percent, feedback_hz });
     }
     motors.put(id_index, index, new);

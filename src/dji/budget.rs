@@ -6,19 +6,18 @@ use crate::motor::BusLoad;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     pub(super) bit_rate: u32,
-    pub(super) feedback_hz: u32,
     pub(super) tick_hz: u32,
     pub(super) ceiling_percent: Option<u16>,
 }
 
 impl Budget {
     pub(super) const fn new() -> Self {
-        Self { bit_rate: 1_000_000, feedback_hz: 1_000, tick_hz: 1_000, ceiling_percent: None }
+        Self { bit_rate: 1_000_000, tick_hz: 1_000, ceiling_percent: None }
     }
 
-    pub(super) const fn load(&self, motors: u32, commands: u32) -> BusLoad {
+    pub(super) const fn load(&self, motors: u32, feedback_hz: u32, commands: u32) -> BusLoad {
         BusLoad::new(self.bit_rate)
-            .with_frames(motors, self.feedback_hz)
+            .with_frames(motors, feedback_hz)
             .with_frames(commands, self.tick_hz)
     }
 
@@ -31,9 +30,14 @@ impl Budget {
     }
 
     /// Returns the load, when it is above the ceiling: with that, and the feedback rate that fits.
-    pub(super) const fn overload(&self, motors: u32, commands: u32) -> Option<(BusLoad, u16, u32)> {
+    pub(super) const fn overload(
+        &self,
+        motors: u32,
+        feedback_hz: u32,
+        commands: u32,
+    ) -> Option<(BusLoad, u16, u32)> {
         let Some(ceiling) = self.ceiling_percent else { return None };
-        let load = self.load(motors, commands);
+        let load = self.load(motors, feedback_hz, commands);
         if load.worst_percent() <= ceiling as u32 {
             return None;
         }

@@ -3,10 +3,10 @@ use super::budget::Budget;
 use super::command::Outbox;
 use super::counters::{Counters, Rejects};
 use super::deadlines;
-use super::handle::Key;
-use super::motors::{FIRST_FEEDBACK_ID, IDS, Motors};
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors};
 use super::receiving;
 use super::rounds;
+use super::slot::LONGEST_STEP_S;
 use super::{AnyHandle, AttachError, CommandFrame, Config, Feedback, Handle, Model};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
@@ -17,9 +17,6 @@ use core::marker::PhantomData;
 /// All commands, and the feedback, lie from 0x1FE to 0x2FF.
 const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
 const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
-
-/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
-const LONGEST_STEP_S: f32 = 0.02;
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -63,18 +60,9 @@ pub struct Bus<B = (), const N: usize = IDS> {
     pub(super) motors: Motors<N>,
     pub(super) outbox: Outbox,
     pub(super) budget: Budget,
-    /// The last usable time step as it was given, and as the loops take it.
-    dt_s: f32,
-    step: TimeStep,
     rejects: Rejects,
     brand: PhantomData<fn() -> B>,
 }
-
-#[cfg(target_pointer_width = "32")]
-const _: () = {
-    assert!(size_of::<super::slot::Slot>() <= 296 && size_of::<Bus>() <= 3600);
-    assert!(size_of::<Bus<(), 8>>() <= 2800 && size_of::<Bus<(), 1>>() <= 640);
-};
 
 impl Bus {
     /// Makes a bus without motors.
@@ -127,8 +115,6 @@ impl<B, const N: usize> Bus<B, N> {
             motors: Motors::NONE,
             outbox: Outbox::new(),
             budget: Budget::new(),
-            dt_s: 0.001,
-            step: TimeStep::new(0.001, LONGEST_STEP_S),
             rejects: Rejects::NONE,
             brand: PhantomData,
         }
@@ -172,7 +158,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// The rate itself is set in the ESCs, with RoboMaster Assistant.
     #[must_use]
     pub const fn with_feedback_rate(mut self, hz: u32) -> Self {
-        self.budget.feedback_hz = hz;
+        self.motors.rounds.feedback_hz = hz;
         self
     }
 
@@ -297,7 +283,8 @@ impl<B, const N: usize> Bus<B, N> {
     /// ```
     #[must_use]
     pub const fn load(&self) -> BusLoad {
-        self.budget.load(self.motors.count(), self.outbox.frames_in_use())
+        let (motors, commands) = (self.motors.count(), self.outbox.frames_in_use());
+        self.budget.load(motors, self.motors.rounds.feedback_hz, commands)
     }
 
     /// Takes a received frame that arrived at `now`. Constant time for one without an error code, once the updates run;
@@ -318,6 +305,13 @@ impl<B, const N: usize> Bus<B, N> {
         } else if is_of_others(frame) {
             return Ingest::Unrelated;
         }
+        self.ingest_unusual(frame, now)
+    }
+
+    // Four words to pass: with more, the usual way would have to keep a stack ready.
+    #[cold]
+    #[inline(never)]
+    fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         receiving::ingest(&mut self.motors, &self.outbox, &mut self.rejects, frame, now)
     }
 
@@ -337,36 +331,36 @@ impl<B, const N: usize> Bus<B, N> {
     /// derivatives rest for the step.
     pub fn update(&mut self, tick: Tick) {
         let before = self.motors.guard.begin(tick.now());
-        if !self.takes_step(tick.dt_s()) {
+        let Some(step) = TimeStep::usable(tick.dt_s(), LONGEST_STEP_S) else {
             let moves_on = self.motors.guard.moves_on(before);
             return deadlines::hold(&mut self.motors, &mut self.outbox, before, moves_on);
-        }
+        };
         let is_quiet = self.motors.guard.is_quiet(before);
         if !is_quiet && !deadlines::apply(&mut self.motors, &mut self.outbox, before) {
             return deadlines::hold(&mut self.motors, &mut self.outbox, before, false);
         }
-        rounds::check_next(&mut self.motors, &self.outbox, &self.budget);
-        let step = self.step;
+        self.check_next();
         let mut rest = self.motors.taken_mut();
         while let [slot, others @ ..] = rest {
-            let raw = slot.update(&step, &self.step, &self.outbox);
+            let raw = slot.update(&step, tick.dt_s(), &self.outbox);
             self.outbox.put(slot.place, raw);
             rest = others;
         }
         self.outbox.finish_update();
     }
 
-    /// Takes over a time step, unless it is none.
+    /// Checks the motor whose turn it is.
     #[inline]
-    fn takes_step(&mut self, dt_s: f32) -> bool {
-        if dt_s.to_bits() == self.dt_s.to_bits() {
-            return true;
+    fn check_next(&mut self) {
+        let index = self.motors.rounds.next;
+        let Some(slot) = self.motors.slots.get_mut(usize::from(index)) else {
+            return rounds::check_without_slot(&mut self.motors, &self.outbox);
+        };
+        self.motors.rounds.next = index + 1;
+        let word = self.outbox.get(slot.place);
+        if !slot.is_well(word) {
+            rounds::check(&mut self.motors, index, word);
         }
-        let step = TimeStep::new(dt_s, LONGEST_STEP_S);
-        if !step.is_hold() {
-            (self.dt_s, self.step) = (dt_s, step);
-        }
-        !step.is_hold()
     }
 
     /// Returns a command frame that waits to be sent, and takes it off the list.

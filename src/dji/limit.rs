@@ -1,8 +1,7 @@
 //! A cut of commands between the update of the loops and the frames.
 
 use super::command::Outbox;
-use super::handle::Key;
-use super::motors::Motors;
+use super::motors::{Key, Motors};
 
 /// Cuts the command of a motor by a factor; see [`Bus::scale_outputs`](super::Bus::scale_outputs).
 pub(super) fn scale_output<const N: usize>(

@@ -1,7 +1,6 @@
 //! Targets that another sensor measures.
 
-use super::handle::Key;
-use super::motors::Motors;
+use super::motors::{Key, Motors};
 use crate::motor::{LONGEST_PAUSE, TargetError};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity};

@@ -13,8 +13,7 @@ use crate::motor::{Ingest, Malformed};
 use crate::time::Instant;
 
 /// Takes any frame.
-#[cold]
-#[inline(never)]
+#[inline]
 pub(super) fn ingest<const N: usize>(
     motors: &mut Motors<N>,
     outbox: &Outbox,

@@ -1,7 +1,6 @@
 //! Checks of one motor a tick, in rounds.
 
 use super::CommandFrame;
-use super::budget::Budget;
 use super::command::Outbox;
 use super::motors::Motors;
 use super::slot::{Surroundings, health};
@@ -23,6 +22,8 @@ pub(super) struct Rounds {
     rival_heard: u32,
     /// When the present round began.
     begun: u32,
+    /// The rate of each motor's feedback, as configured.
+    pub(super) feedback_hz: u32,
     /// The length of the window that ends in this round, in units of 1.024 ms.
     window: u16,
     /// The length of the round before.
@@ -39,6 +40,7 @@ impl Rounds {
         window_from: 0,
         rival_heard: 0,
         begun: 0,
+        feedback_hz: 1_000,
         window: 0,
         elapsed: 0,
         next: 0,
@@ -69,30 +71,16 @@ impl Rounds {
     }
 }
 
-/// Checks the motor whose turn it is.
-#[inline]
-pub(super) fn check_next<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, budget: &Budget) {
-    let index = motors.rounds.next;
-    let Some(slot) = motors.slots.get_mut(usize::from(index)) else {
-        return check_without_slot(motors, outbox, budget);
-    };
-    motors.rounds.next = index + 1;
-    let word = outbox.get(slot.place);
-    if !slot.is_well(word) {
-        check(motors, budget, index, word);
-    }
-}
-
 /// Checks a motor in a round that ends a window, or begins a round.
 #[cold]
 #[inline(never)]
-fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, budget: &Budget) {
+pub(super) fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox) {
     let index = motors.rounds.next & !Rounds::CLOSING;
     match motors.slots.get(usize::from(index)) {
         Some(slot) => {
             let word = outbox.get(slot.place);
             motors.rounds.next += 1;
-            check(motors, budget, index, word);
+            check(motors, index, word);
         }
         None => motors.rounds.begin(motors.guard.now()),
     }
@@ -100,14 +88,14 @@ fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox: &Outbox, b
 
 /// Checks a motor in full.
 #[inline(never)]
-fn check<const N: usize>(motors: &mut Motors<N>, budget: &Budget, index: u8, word: i16) {
+pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16) {
     let now = motors.guard.now();
     let seen = Surroundings {
         now,
         elapsed: motors.rounds.elapsed,
         word,
         window: motors.rounds.window(),
-        feedback_hz: budget.feedback_hz,
+        feedback_hz: motors.rounds.feedback_hz,
         is_alone: now.wrapping_sub(motors.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
     };
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));

@@ -3,14 +3,14 @@
 //! What a motor needs now and then stands in the files of the folder.
 
 pub(super) mod config;
+mod duty;
 pub(super) mod gap;
-mod goal;
 pub(super) mod health;
 mod target;
 
 use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
-use super::handle::Key;
+use super::motors::Key;
 use super::range::Range;
 use super::{Facts, Feedback, State};
 use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
@@ -21,7 +21,7 @@ use crate::units::{Angle, AngularVelocity, Current};
 
 /// The refusal of a handle whose motor is gone.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
-use goal::{Action, Duty, Goal};
+use duty::{Action, Duty};
 pub(super) use health::Surroundings;
 
 /// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
@@ -62,6 +62,60 @@ pub(super) struct Slot {
     health: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
+}
+
+/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
+    turns: u32,
+    /// Raw command, bits of the rad/s or of the way, or phase of the shaft.
+    value: i32,
+}
+
+impl Goal {
+    const NONE: Self = Self::of(0);
+
+    const fn of(value: i32) -> Self {
+        Self { turns: 0, value }
+    }
+
+    const fn raw(&self) -> i32 {
+        self.value
+    }
+
+    const fn rad_per_s(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    const fn phase(&self) -> i32 {
+        self.value
+    }
+
+    const fn turns(&self) -> u32 {
+        self.turns
+    }
+
+    /// A way in rad, and the rate in rad/s that goes with it.
+    const fn measured(way: f32, rad_per_s: f32) -> Self {
+        Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
+    }
+
+    const fn way(&self) -> f32 {
+        f32::from_bits(self.value.cast_unsigned())
+    }
+
+    const fn rate(&self) -> f32 {
+        f32::from_bits(self.turns)
+    }
+}
+
+/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
+pub(super) const LONGEST_STEP_S: f32 = 0.02;
+
+/// Returns the time step of an update again, where its values are not at hand.
+fn usable(dt_s: f32) -> TimeStep {
+    TimeStep::new(dt_s, LONGEST_STEP_S)
 }
 
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
@@ -121,7 +175,7 @@ impl Slot {
     /// Tells a loop from [`NO_LOOP`], the only one without limits.
     #[inline]
     const fn has_speed_loop(&self) -> bool {
-        self.speed.core().is_limited()
+        self.speed.is_limited()
     }
 
     #[inline]
@@ -281,35 +335,35 @@ impl Slot {
             && self.monitor.follow(feedback.angle(), coarse(word))
     }
 
-    /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
-    /// stays in registers, because nobody else gets to see it.
+    /// Runs the loops of this motor and returns its raw command. `step` is that of `dt_s`: it stays in registers, as only the
+    /// usual way gets to see it.
     #[inline]
-    pub(super) fn update(&mut self, plain: &TimeStep, step: &TimeStep, sent: &Outbox) -> i16 {
+    pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
         let goal = match self.duty {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                match self.position.plain((way, velocity), way, plain) {
+                match self.position.plain((way, velocity), way, step) {
                     Ok(goal) => goal,
-                    Err(_) => return self.update_carefully(step, sent),
+                    Err(_) => return self.update_carefully(dt_s, sent),
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             // Out of line too: a zero for these would be loaded in every update of every motor.
-            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
         };
-        match self.speed.step_plain(goal, velocity, plain) {
+        match self.speed.step_plain(goal, velocity, step) {
             Ok(output) => free_to_raw(output, self.raw_per_unit),
-            Err(_) => self.follow_velocity(goal, velocity, step),
+            Err(_) => self.follow_velocity(goal, velocity, dt_s),
         }
     }
 
     // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
     #[cold]
     #[inline(never)]
-    fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
-        let output = self.speed.step(goal, velocity, step);
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
+        let output = self.speed.step(goal, velocity, &usable(dt_s));
         loop_to_raw(output, self.raw_per_unit, self.range)
     }
 }

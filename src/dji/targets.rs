@@ -1,11 +1,7 @@
 //! What an application asks of motors and reads of them: state, health, arming, targets.
 
-use super::arming;
-use super::limit;
-use super::measured;
-use super::rounds;
 use super::slot::{DETACHED, Slot, config, gap, health};
-use super::{AnyHandle, Bus, Handle, Model, State};
+use super::{AnyHandle, Bus, Handle, Model, State, arming, limit, measured, rounds};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::error::ConfigError;
@@ -332,7 +328,7 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Sets the angle that the position loop goes to by another sensor, by the shortest way.
     ///
-    /// It needs no encoder that knows its angle. The example `gimbal` is a whole one.
+    /// It needs no encoder that knows its angle; see the [module](super), and the example `gimbal`.
     ///
     /// # Errors
     /// Those of every target; also for a measurement that is too old, lies ahead by as much, or is not finite: the

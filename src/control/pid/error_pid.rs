@@ -1,6 +1,6 @@
 use super::config::{NOT_PLAIN, Parameters, PidConfig, REST_DERIVATIVE, TRACK_OUTPUT};
 use super::controller::Pid;
-use super::law::{CLOSED, UNKNOWN, gate, limit_of, passes};
+use super::law::{CLOSED, UNKNOWN, gate};
 use crate::control::number::limited;
 use crate::control::step::TimeStep;
 use crate::error::ConfigError;
@@ -91,12 +91,6 @@ impl ErrorPid {
         self.options & NOT_PLAIN == 0
     }
 
-    /// Tells whether the output has limits.
-    #[inline]
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.parameters.output_upper < f32::MAX
-    }
-
     /// Returns what the output limits leave of `value`.
     pub(super) const fn within_output_range(&self, value: f32) -> f32 {
         limited(value, self.parameters.output_lower, self.parameters.output_upper)
@@ -116,51 +110,4 @@ impl ErrorPid {
             if is_plain { (limit, upper) } else { (CLOSED, limit) };
         self.options = options;
     }
-
-    /// The plain law: gains, integral limit, one output limit.
-    ///
-    /// # Errors
-    /// If the step takes more than that (options, the first call, bad arguments, overflow), nothing changes. The value returned is
-    /// finite if `valid` and `error` are.
-    #[inline]
-    pub(crate) fn plain(
-        &mut self,
-        (error, rate): (f32, f32),
-        valid: f32,
-        step: &TimeStep,
-    ) -> Result<f32, f32> {
-        let parameters = &self.parameters;
-        let growth = parameters.ki * step.half_dt_s * (error + self.error);
-        let integral = self.integral + growth;
-        // With options, NaN and infinity nothing passes.
-        if !passes(integral, self.integral_gate) {
-            return Err(valid);
-        }
-        let output = parameters.kp * error + integral - parameters.kd * rate;
-        if passes(output, self.output_gate) {
-            self.keep(output, error, rate, integral);
-            return Ok(output);
-        }
-        if !output.is_finite() {
-            return Err(error);
-        }
-        let limit = limit_of(self.output_gate).copysign(output);
-        let integral = if are_alike(output, growth) { self.integral } else { integral };
-        self.keep(limit, error, rate, integral);
-        Ok(limit)
-    }
-
-    #[inline]
-    pub(super) const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
-        self.output = output;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
-    }
-}
-
-/// Tells whether two numbers have the same sign.
-#[inline]
-pub(super) const fn are_alike(one: f32, other: f32) -> bool {
-    (one.to_bits() ^ other.to_bits()).cast_signed() >= 0
 }

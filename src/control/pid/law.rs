@@ -11,12 +11,67 @@ use super::config::{
     PERIOD, REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, TRACKING,
 };
 use super::controller::Pid;
-use super::error_pid::are_alike;
+use super::error_pid::ErrorPid;
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 use crate::math;
 
+impl ErrorPid {
+    /// The plain law: gains, integral limit, one output limit.
+    ///
+    /// # Errors
+    /// If the step takes more than that (options, the first call, bad arguments, overflow), nothing changes. The value returned is
+    /// finite if `valid` and `error` are.
+    #[inline]
+    pub(crate) fn plain(
+        &mut self,
+        (error, rate): (f32, f32),
+        valid: f32,
+        step: &TimeStep,
+    ) -> Result<f32, f32> {
+        let parameters = &self.parameters;
+        let growth = parameters.ki * step.half_dt_s * (error + self.error);
+        let integral = self.integral + growth;
+        // With options, NaN and infinity nothing passes.
+        if !passes(integral, self.integral_gate) {
+            return Err(valid);
+        }
+        let output = parameters.kp * error + integral - parameters.kd * rate;
+        if passes(output, self.output_gate) {
+            self.keep(output, error, rate, integral);
+            return Ok(output);
+        }
+        if !output.is_finite() {
+            return Err(error);
+        }
+        let limit = limit_of(self.output_gate).copysign(output);
+        let integral = if are_alike(output, growth) { self.integral } else { integral };
+        self.keep(limit, error, rate, integral);
+        Ok(limit)
+    }
+
+    /// Tells whether the output has limits.
+    #[inline]
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
+    #[inline]
+    const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
+        self.output = output;
+        self.error = error;
+        self.rate = rate;
+        self.integral = integral;
+    }
+}
+
 impl Pid {
+    /// Tells whether the output has limits.
+    #[inline]
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.core.is_limited()
+    }
+
     /// Steps by a time that was validated before, and returns the output.
     ///
     /// # Examples
@@ -316,6 +371,12 @@ impl Pid {
             limit_of(gate).copysign(drained)
         }
     }
+}
+
+/// Tells whether two numbers have the same sign.
+#[inline]
+const fn are_alike(one: f32, other: f32) -> bool {
+    (one.to_bits() ^ other.to_bits()).cast_signed() >= 0
 }
 
 /// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].

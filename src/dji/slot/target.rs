@@ -1,8 +1,8 @@
 //! Targets: all that is not a velocity or a position that goes on.
 
-use super::goal::{Action, Duty, Goal};
-use super::{Slot, health, needs};
-use crate::control::{Pid, TimeStep};
+use super::duty::{Action, Duty};
+use super::{Goal, Slot, health, needs, usable};
+use crate::control::Pid;
 use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
 use crate::encoder::Position;
@@ -119,7 +119,7 @@ impl Slot {
     /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
-    pub(super) fn update_carefully(&mut self, step: &TimeStep, sent: &Outbox) -> i16 {
+    pub(super) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
         match self.duty {
             Duty::Rest => return 0,
             Duty::First => self.end_rest(),
@@ -131,7 +131,7 @@ impl Slot {
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {
             Action::Velocity => {
-                return self.follow_velocity(self.goal.rad_per_s(), velocity, step);
+                return self.follow_velocity(self.goal.rad_per_s(), velocity, dt_s);
             }
             Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
             Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
@@ -142,8 +142,8 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.position.advance(way, velocity, step);
-        self.follow_velocity(goal * self.opened_part(), velocity, step)
+        let goal = self.position.advance(way, velocity, &usable(dt_s));
+        self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
     }
 
     /// Returns which part of its velocity a position loop may ask for: while the output range opens, that of the range.

@@ -414,13 +414,13 @@ mod frozen_tests {
     fn a_true_standstill_is_not_frozen_however_long_and_however_hard_it_is_pushed() {
         for effort in [0.0, 0.04, -0.7, 1.0] {
             let mut frozen = Frozen::NONE;
-            assert!((0..1_000).all(|_| !look(&mut frozen, 77, 5, effort, 0.0)));
+            assert!((0..1_000).all(|_| !check(&mut frozen, 77, 5, effort, 0.0)));
         }
         // Blocked under a command that swings: the current answers.
         let mut frozen = Frozen::NONE;
         for step in 0..1_000_u16 {
             let effort = f32::from(step % 200) / 200.0;
-            assert!(!look(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
+            assert!(!check(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
         }
     }
 
@@ -428,15 +428,15 @@ mod frozen_tests {
     fn an_angle_that_rests_while_the_speed_does_not_is_frozen_and_ends() {
         let mut frozen = Frozen::NONE;
         let looks =
-            (0..20_u16).map(|step| look(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
+            (0..20_u16).map(|step| check(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
         assert_eq!(looks, Some(9), "100 ms");
-        assert!(!look(&mut frozen, 78, 0, 0.1, -0.3));
+        assert!(!check(&mut frozen, 78, 0, 0.1, -0.3));
     }
 
     #[test]
     fn feedback_that_does_not_answer_a_change_of_the_command_is_frozen() {
         let mut frozen = Frozen::NONE;
-        let mut step = |effort| look(&mut frozen, 77, 5, effort, 0.0);
+        let mut step = |effort| check(&mut frozen, 77, 5, effort, 0.0);
         assert!((0..50).all(|_| !step(0.1)));
         let looks = (0..20).map(|_| step(0.4)).position(|frozen| frozen);
         assert_eq!(looks, Some(8));
@@ -527,19 +527,19 @@ mod stall_tests {
         let config = HealthConfig::new().with_stall(0.5, 0.02, Duration::from_micros(100 << 10));
         for direction in [1.0, -1.0] {
             let (mut timer, mut latch) = (Timer::ZERO, Latch::NONE);
-            let mut look = |effort, speed| {
+            let mut check = |effort, speed| {
                 check_stall(&mut timer, &mut latch, &sample(effort, speed), &config);
                 latch.has(Condition::Stalled)
             };
-            assert!(!look(0.9 * direction, 0.5 * direction), "turns");
+            assert!(!check(0.9 * direction, 0.5 * direction), "turns");
             for _ in 0..9 {
-                assert!(!look(0.5 * direction, -0.02 * direction));
+                assert!(!check(0.5 * direction, -0.02 * direction));
             }
-            assert!(look(0.5 * direction, 0.0));
-            assert!(look(0.3 * direction, 0.039), "still pushed, still standing");
-            assert!(!look(0.3 * direction, 0.04 * direction), "turns");
+            assert!(check(0.5 * direction, 0.0));
+            assert!(check(0.3 * direction, 0.039), "still pushed, still standing");
+            assert!(!check(0.3 * direction, 0.04 * direction), "turns");
             for _ in 0..20 {
-                assert!(!look(0.49 * direction, 0.0), "pushed too little");
+                assert!(!check(0.49 * direction, 0.0), "pushed too little");
             }
         }
     }
