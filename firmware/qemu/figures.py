@@ -61,7 +61,8 @@ def measure(elf):
     roots = [name for name in measured if name.startswith("row_")]
     found["rows"]["text"] = sum(code.get(name, 0) for name in image.reachable(graph, roots))
     found["rows"]["stack_tick"] = found["stack"]["row_tick"]
-    found["rows"]["ram_bus"] = found["sizes"]["Bus"]
+    for row, kind in {"ram_bus": "Bus", "ram_bus_8": "Bus8", "ram_bus_1": "Bus1"}.items():
+        found["rows"][row] = found["sizes"][kind]
     return found
 
 

@@ -358,7 +358,7 @@ impl<B, const N: usize> Bus<B, N> {
         };
         self.motors.rounds.next = index + 1;
         let word = self.outbox.get(slot.place);
-        if !slot.is_well(word) {
+        if !slot.is_well(word, self.motors.rounds.elapsed) {
             rounds::check(&mut self.motors, index, word);
         }
     }

@@ -153,6 +153,34 @@ impl<const N: usize> Motors<N> {
         Some(outcome)
     }
 
+    /// Sets a target.
+    pub(super) fn set(
+        &mut self,
+        motor: Key,
+        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        let now = self.guard.now();
+        set(self.get_mut(motor).ok_or(TargetError::Detached)?, now)
+    }
+
+    /// Sets a target: by `renew`, which tells whether it was enough, or else by `set`.
+    #[inline(always)]
+    pub(super) fn renew(
+        &mut self,
+        motor: Key,
+        renew: impl FnOnce(&mut Slot, u32) -> bool,
+        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        let now = self.guard.now();
+        let Some(slot) = self.slots.get_mut(motor.index()) else {
+            return Err(TargetError::Detached);
+        };
+        if renew(slot, now) {
+            return Ok(());
+        }
+        if slot.matches(motor) { set(slot, now) } else { Err(TargetError::Detached) }
+    }
+
     /// [Changes](Self::change) a motor at the time of the present update.
     pub(super) fn change_present(
         &mut self,

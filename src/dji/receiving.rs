@@ -40,6 +40,9 @@ pub(super) fn ingest<const N: usize>(
         return Ingest::Malformed(Malformed::Field);
     };
     let running = motors.guard.is_running();
+    if running && has_nothing_new(motors, index, feedback, now) {
+        return Ingest::Taken;
+    }
     if !running {
         let before = motors.guard.pass_unwatched(now);
         deadlines::forget_bygones(motors, before);
@@ -58,4 +61,18 @@ pub(super) fn ingest<const N: usize>(
         motors.guard.disturb();
     }
     Ingest::Taken
+}
+
+/// Takes feedback that is in time, with an error that is known or none; `false` when it is not all of this, or was not taken.
+fn has_nothing_new<const N: usize>(
+    motors: &mut Motors<N>,
+    index: usize,
+    feedback: Feedback,
+    now: Instant,
+) -> bool {
+    let Some(slot) = motors.slots.get_mut(index) else { return false };
+    let Some(facts) = slot.facts() else { return false };
+    slot.guard.is_in_time(now.stamp())
+        && health::hear_known_error(slot, facts, feedback.error())
+        && slot.receive(feedback, now.stamp())
 }

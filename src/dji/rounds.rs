@@ -2,7 +2,7 @@
 
 use super::CommandFrame;
 use super::command::Outbox;
-use super::motors::Motors;
+use super::motors::{IDS, Motors};
 use super::slot::{Surroundings, health};
 use crate::motor::{Edge, elapsed};
 use crate::time::Instant;
@@ -27,7 +27,7 @@ pub(super) struct Rounds {
     /// The length of the window that ends in this round, in units of 1.024 ms.
     window: u16,
     /// The length of the round before.
-    elapsed: u8,
+    pub(super) elapsed: u8,
     /// Whose turn it is; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
     pub(super) next: u8,
     has_begun: bool,
@@ -82,6 +82,8 @@ pub(super) fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox:
             motors.rounds.next += 1;
             check(motors, index, word);
         }
+        // A round has a turn for each id, so that it takes the same time on every bus.
+        None if usize::from(index) < IDS => motors.rounds.next += 1,
         None => motors.rounds.begin(motors.guard.now()),
     }
 }

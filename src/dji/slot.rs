@@ -17,7 +17,7 @@ use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
 use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetError, Traffic};
-use crate::units::{Angle, AngularVelocity, Current};
+use crate::units::{AngularVelocity, Current};
 
 /// The refusal of a handle whose motor is gone.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
@@ -268,70 +268,53 @@ impl Slot {
 
     // Targets.
 
-    /// Takes rad/s of the output shaft.
+    /// Takes rad/s of the output shaft if the speed loop of this motor goes on: then the motor is armed and heard, and has a loop.
     #[inline]
-    pub(super) fn set_velocity(&mut self, rad_per_s: f32, now: u32) -> Result<(), TargetError> {
-        self.admit(rad_per_s.is_finite())?;
-        needs(self.has_speed_loop())?;
-        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
-        Ok(())
-    }
-
-    /// Takes turns and angle of the output shaft.
-    pub(super) fn set_position(&mut self, position: Position, now: u32) -> Result<(), TargetError> {
-        self.admit(position.is_finite())?;
-        needs(self.has_position_loop())?;
-        let (turns, phase) = self.shaft.locate(self.inside(position));
-        let goal = Goal { turns: self.shaft.near(turns), value: phase };
-        self.start(Action::Position, goal, now);
-        Ok(())
-    }
-
-    /// Returns the nearest position that is within the soft limits.
-    fn inside(&self, position: Position) -> Position {
-        let Some((lower, upper)) = self.health.soft_limits else { return position };
-        let radians = position.as_angle().as_radians();
-        if radians < lower {
-            Position::from_angle(Angle::from_radians(lower))
-        } else if radians > upper {
-            Position::from_angle(Angle::from_radians(upper))
-        } else {
-            position
-        }
-    }
-
-    /// Tells whether a target may be taken; where not, the one before may be over.
-    #[inline]
-    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        match self.guard.admit(is_finite) {
-            Ok(()) => Ok(()),
-            Err(error) => Err(self.refuse(error)),
-        }
-    }
-
-    #[inline]
-    fn start(&mut self, action: Action, goal: Goal, now: u32) {
-        self.goal = goal;
-        if self.asked == action {
+    pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
+        let goes_on = self.duty == Duty::Velocity
+            && self.generation == motor.generation()
+            && rad_per_s.is_finite();
+        if goes_on {
+            self.goal.value = rad_per_s.to_bits().cast_signed();
             self.guard.renew_target(now);
-        } else {
-            self.start_anew(action, now);
         }
+        goes_on
+    }
+
+    /// Takes turns and angle of the output shaft if both loops of this motor go on, and there are no soft limits.
+    #[inline]
+    pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
+        let goes_on = self.duty == Duty::Position
+            && self.generation == motor.generation()
+            && position.is_finite()
+            && self.health.soft_limits.is_none();
+        if goes_on {
+            let (turns, phase) = self.shaft.locate(position);
+            self.goal = Goal { turns: self.shaft.near(turns), value: phase };
+            self.guard.renew_target(now);
+        }
+        goes_on
     }
 
     // Update.
 
-    /// Tells at a glance whether all is well, as it is nearly always: online, cool, turning, moderately driven, nothing
-    /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
+    /// Checks a motor that is well, as it nearly always is: online, cool, turning, no condition and no error. Returns `false` if
+    /// it may be anything else, and has to be [checked](health::check) in full. `elapsed` is the time since its last check, in
+    /// units of 1.024 ms.
     #[inline]
-    pub(super) fn is_well(&mut self, word: i16) -> bool {
+    pub(super) fn is_well(&mut self, word: i16, elapsed: u8) -> bool {
         let (feedback, driven) = (self.feedback, i32::from(word));
         let Some(facts) = self.facts else { return true };
         let (calm, fastest) = (i32::from(self.calm_word), i32::from(facts.rotor_rpm));
-        feedback.error_and_temperature() < u32::from(self.cool_below)
-            && is_within(driven, calm)
-            && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
-            && is_within(feedback.rpm().into(), fastest)
+        let is_usual = feedback.error_and_temperature() < u32::from(self.cool_below)
+            && is_within(feedback.rpm().into(), fastest);
+        if !is_usual {
+            return false;
+        }
+        if !is_within(driven, calm) {
+            return health::is_driven_well(self, facts, word, elapsed);
+        }
+        (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
             && self.monitor.follow(feedback.angle(), coarse(word))
     }
 

@@ -1,6 +1,6 @@
 //! What an application asks of motors and reads of them: state, health, arming, targets.
 
-use super::slot::{DETACHED, Slot, config, gap, health};
+use super::slot::{DETACHED, config, gap, health};
 use super::{AnyHandle, Bus, Handle, Model, State, arming, limit, measured, rounds};
 use crate::control::PidConfig;
 use crate::encoder::Position;
@@ -186,7 +186,7 @@ impl<B, const N: usize> Bus<B, N> {
         motor: Handle<M, B>,
         current: Current,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_output(current.as_amperes(), now))
+        self.motors.set(motor.erase().key(), |slot, now| slot.set_output(current.as_amperes(), now))
     }
 
     /// Sets a terminal voltage, in nominal volts.
@@ -198,7 +198,7 @@ impl<B, const N: usize> Bus<B, N> {
         motor: Handle<M, B>,
         voltage: Voltage,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_output(voltage.as_volts(), now))
+        self.motors.set(motor.erase().key(), |slot, now| slot.set_output(voltage.as_volts(), now))
     }
 
     /// Sets the command on the wire's own scale.
@@ -206,7 +206,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// # Errors
     /// See above.
     pub fn set_raw(&mut self, motor: impl Into<AnyHandle<B>>, raw: i16) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_raw(raw, now))
+        self.motors.set(motor.into().key(), |slot, now| slot.set_raw(raw, now))
     }
 
     /// Sets the velocity that the speed loop follows.
@@ -219,7 +219,12 @@ impl<B, const N: usize> Bus<B, N> {
         motor: impl Into<AnyHandle<B>>,
         velocity: AngularVelocity,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_velocity(velocity.as_rad_per_s(), now))
+        let (motor, rad_per_s) = (motor.into().key(), velocity.as_rad_per_s());
+        self.motors.renew(
+            motor,
+            |slot, now| slot.renew_velocity(motor, rad_per_s, now),
+            |slot, now| slot.set_velocity(rad_per_s, now),
+        )
     }
 
     /// Sets the absolute angle that the position loop goes to, by the shortest way: 350° to 10° is +20°.
@@ -231,7 +236,8 @@ impl<B, const N: usize> Bus<B, N> {
         motor: impl Into<AnyHandle<B>>,
         angle: Angle,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
+        self.motors
+            .set(motor.into().key(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
     /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
@@ -243,7 +249,12 @@ impl<B, const N: usize> Bus<B, N> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_position(position, now))
+        let motor = motor.into().key();
+        self.motors.renew(
+            motor,
+            |slot, now| slot.renew_position(motor, position, now),
+            |slot, now| slot.set_position(position, now),
+        )
     }
 
     /// Asks a motor for nothing: zero output from the next update on, loops reset. It stays armed, and frames that wait go
@@ -385,15 +396,5 @@ impl<B, const N: usize> Bus<B, N> {
             let motor: AnyHandle<B> = motor.into();
             limit::scale_output(&mut self.motors, &mut self.outbox, motor.key(), factor);
         }
-    }
-
-    #[inline]
-    fn set(
-        &mut self,
-        motor: AnyHandle<B>,
-        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
-    ) -> Result<(), TargetError> {
-        let now = self.motors.guard.now();
-        set(self.motors.get_mut(motor.key()).ok_or(TargetError::Detached)?, now)
     }
 }

@@ -60,7 +60,7 @@ pub(super) const fn begin(slot: &mut Slot, condition: Condition) {
     require_check(slot);
 }
 
-/// Surroundingss at everything that need not be looked at in every tick.
+/// Checks everything that is not checked in every tick.
 pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     let Some(facts) = slot.facts else { return };
     let before = slot.guard.latch().active();
@@ -84,6 +84,20 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     }
 }
 
+/// [`check`] for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or
+/// frozen feedback may begin.
+#[inline(never)]
+pub(super) fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed: u8) -> bool {
+    let speed = f32::from(slot.feedback.rpm()) / f32::from(facts.rotor_no_load_rpm());
+    let effort = f32::from(word) / f32::from(slot.full_limit);
+    let angle = slot.feedback.angle();
+    if !slot.monitor.follow_driven(angle, coarse(word), (effort, speed), elapsed, slot.health) {
+        return false;
+    }
+    slot.saturated = slot.saturated.saturating_add(u16::from(slot.range.is_end(word)));
+    true
+}
+
 /// Takes the error code of a frame. One that weighs more than that before counts at once: by the motor's turn it may be
 /// over. A lesser one waits for that turn, so that codes which come and go are no flood.
 pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
@@ -91,12 +105,28 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
         return;
     }
     slot.monitor.hear_error();
-    if facts.errors.severity(code) > facts.errors.severity(slot.error_code) {
+    if is_graver(slot, facts, code) {
         let before = slot.guard.latch().active();
         take_error(slot, facts, code);
         require_check(slot);
         react(slot, before);
     }
+}
+
+/// Takes the code of a frame that was in time; `false` for one that is [graver](is_graver) than that before.
+pub(in crate::dji) fn hear_known_error(slot: &mut Slot, facts: &Facts, code: u8) -> bool {
+    if code != 0 {
+        if is_graver(slot, facts, code) {
+            return false;
+        }
+        slot.monitor.hear_error();
+    }
+    true
+}
+
+/// Tells whether an error code weighs more than that before.
+fn is_graver(slot: &Slot, facts: &Facts, code: u8) -> bool {
+    code != slot.error_code && facts.errors.severity(code) > facts.errors.severity(slot.error_code)
 }
 
 fn take_error(slot: &mut Slot, facts: &Facts, code: u8) {

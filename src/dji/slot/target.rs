@@ -1,4 +1,4 @@
-//! Targets: all that is not a velocity or a position that goes on.
+//! Targets that do not renew the one before, and the loops where they do more than go on.
 
 use super::duty::{Action, Duty};
 use super::{Goal, Slot, health, needs, usable};
@@ -7,12 +7,75 @@ use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
+use crate::units::Angle;
 
 impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
         self.apply_rules();
+    }
+
+    /// Takes rad/s of the output shaft.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::dji) fn set_velocity(
+        &mut self,
+        rad_per_s: f32,
+        now: u32,
+    ) -> Result<(), TargetError> {
+        self.admit(rad_per_s.is_finite())?;
+        needs(self.has_speed_loop())?;
+        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
+        Ok(())
+    }
+
+    /// Takes turns and angle of the output shaft.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::dji) fn set_position(
+        &mut self,
+        position: Position,
+        now: u32,
+    ) -> Result<(), TargetError> {
+        self.admit(position.is_finite())?;
+        needs(self.has_position_loop())?;
+        let (turns, phase) = self.shaft.locate(self.inside(position));
+        let goal = Goal { turns: self.shaft.near(turns), value: phase };
+        self.start(Action::Position, goal, now);
+        Ok(())
+    }
+
+    /// Returns the nearest position that is within the soft limits.
+    fn inside(&self, position: Position) -> Position {
+        let Some((lower, upper)) = self.health.soft_limits else { return position };
+        let radians = position.as_angle().as_radians();
+        if radians < lower {
+            Position::from_angle(Angle::from_radians(lower))
+        } else if radians > upper {
+            Position::from_angle(Angle::from_radians(upper))
+        } else {
+            position
+        }
+    }
+
+    /// Tells whether a target may be taken; where not, the one before may be over.
+    #[inline]
+    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        match self.guard.admit(is_finite) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.refuse(error)),
+        }
+    }
+
+    #[inline]
+    fn start(&mut self, action: Action, goal: Goal, now: u32) {
+        self.goal = goal;
+        if self.asked == action {
+            self.guard.renew_target(now);
+        } else {
+            self.start_anew(action, now);
+        }
     }
 
     /// Takes a value in the unit of the command: amperes or volts.

@@ -91,6 +91,34 @@ impl Monitor {
         moved
     }
 
+    /// As [`check`](Self::check), for a motor that is cool and driven with `effort`, so that its current tells nothing; `false` when
+    /// its angle did not move, or a stall or runaway may begin. Nothing has changed then.
+    #[inline]
+    pub(crate) fn follow_driven(
+        &mut self,
+        angle: u16,
+        word: i8,
+        (effort, speed): (f32, f32),
+        elapsed: u8,
+        config: &HealthConfig,
+    ) -> bool {
+        let stands = speed.abs() <= config.stall_speed();
+        if stands || !self.frozen.has_moved(angle) || effort.abs() < UNDRIVEN {
+            return false;
+        }
+        let mut runaway = Runaway::NONE;
+        if effort * speed < 0.0 && !config.ignores(Condition::Runaway) {
+            runaway = self.runaway;
+            if runaway.holds(speed, effort <= -0.5 || effort >= 0.5, elapsed) {
+                return false;
+            }
+        }
+        self.runaway = runaway;
+        self.stall = Timer::ZERO;
+        self.frozen.follow(angle, word);
+        true
+    }
+
     /// What ends where a motor is armed, so that it begins again, and relaxes again, if it still holds.
     pub(crate) const NOTICED_ANEW: [Condition; 3] =
         [Condition::Runaway, Condition::Stalled, Condition::Overspeed];
@@ -195,6 +223,9 @@ impl Frozen {
     }
 }
 
+/// Below this share of the full command a motor counts as not driven.
+const UNDRIVEN: f32 = 0.05;
+
 /// Speeds are kept in 64ths of the no-load speed.
 const SCALE: f32 = 64.0;
 /// 30 % of the no-load speed.
@@ -226,21 +257,25 @@ impl Runaway {
     /// * without a command, while its *current* drives it: the ESC follows somebody else, or nobody. Without the current
     ///   it is pushed from outside, which is not its fault.
     fn check(&mut self, latch: &mut Latch, sample: &Sample) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let speed = (sample.speed.abs() * SCALE) as u8;
         let effort = sample.effort * 1.0_f32.copysign(sample.speed);
         let current = sample.current * 1.0_f32.copysign(sample.speed);
-        let wrong = effort <= -0.5 || (effort.abs() < 0.05 && current >= 0.2);
+        let wrong = effort <= -0.5 || (effort.abs() < UNDRIVEN && current >= 0.2);
+        if self.holds(sample.speed, wrong, sample.elapsed) {
+            latch.set(Condition::Runaway, true);
+        }
+    }
+
+    /// Takes a speed, and whether command and current say otherwise; tells whether it runs away.
+    fn holds(&mut self, speed: f32, wrong: bool, elapsed: u8) -> bool {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let speed = (speed.abs() * SCALE) as u8;
         let falls = speed.saturating_add(FALL) < self.highest;
         if falls || self.lasted == 0 || self.lasted > LONGEST {
             *self = Self { lasted: 0, from: speed, highest: speed };
         }
-        self.lasted =
-            if wrong { self.lasted.saturating_add(sample.elapsed.div_ceil(2)) } else { 0 };
+        self.lasted = if wrong { self.lasted.saturating_add(elapsed.div_ceil(2)) } else { 0 };
         self.highest = self.highest.max(speed);
-        if self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN) {
-            latch.set(Condition::Runaway, true);
-        }
+        self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN)
     }
 }
 
@@ -689,6 +724,46 @@ mod traffic_tests {
                 gap_ms = 0;
             }
             prop_assert!(!traffic.is_double());
+        }
+    }
+}
+
+#[cfg(test)]
+mod driven_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Law: where the short check of a driven motor is enough, the full one finds nothing either, and both go on alike.
+        #[test]
+        fn the_short_check_of_a_driven_motor_is_the_full_one(
+            steps in prop::collection::vec((0_u16..8192, -2.0_f32..2.0, -1.0_f32..1.0, 0_u8..30), 1..80),
+        ) {
+            let config = HealthConfig::new();
+            let (mut short, mut full) = (Monitor::NEW, Monitor::NEW);
+            let mut latch = Latch::NONE;
+            for (angle, speed, effort, elapsed) in steps {
+                #[expect(clippy::cast_possible_truncation, reason = "at most 127")]
+                let word = (effort * 127.0) as i8;
+                let sample = Sample { angle, effort, speed, elapsed, word, ..Sample::AT_REST };
+                let before = short;
+                if !short.follow_driven(angle, word, (effort, speed), elapsed, &config) {
+                    prop_assert_eq!((short.stall, short.frozen.feedback), (before.stall, before.frozen.feedback));
+                    short.check(&mut latch.clone(), &sample, &config);
+                }
+                full.check(&mut latch, &sample, &config);
+                let found = latch.active();
+                prop_assert_eq!(short.stall, full.stall);
+                prop_assert_eq!(short.runaway.lasted, full.runaway.lasted);
+                if full.runaway.lasted > 0 {
+                    prop_assert_eq!((short.runaway.from, short.runaway.highest), (full.runaway.from, full.runaway.highest));
+                }
+                prop_assert_eq!(short.frozen.lasted, full.frozen.lasted);
+                // A motor with a condition is checked in full.
+                if !found.is_empty() {
+                    return Ok(());
+                }
+            }
         }
     }
 }
