@@ -268,10 +268,11 @@ impl Slot {
 
     // Targets.
 
-    /// Takes rad/s of the output shaft if the speed loop of this motor goes on: then the motor is armed and heard, and has a loop.
+    /// Takes rad/s of the output shaft in place of rad/s: then the motor is armed and has a loop.
     #[inline]
     pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
-        let goes_on = self.duty == Duty::Velocity
+        let goes_on = self.asked == Action::Velocity
+            && self.guard.link() == Link::Online
             && self.generation == motor.generation()
             && rad_per_s.is_finite();
         if goes_on {
@@ -281,10 +282,11 @@ impl Slot {
         goes_on
     }
 
-    /// Takes turns and angle of the output shaft if both loops of this motor go on, and there are no soft limits.
+    /// Takes turns and angle of the output shaft in place of others, without soft limits.
     #[inline]
     pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
-        let goes_on = self.duty == Duty::Position
+        let goes_on = self.asked == Action::Position
+            && self.guard.link() == Link::Online
             && self.generation == motor.generation()
             && position.is_finite()
             && self.health.soft_limits.is_none();
