@@ -396,3 +396,65 @@ fn no_family_has_a_safety_rule_of_its_own() {
     let of_core = core.iter().map(|file| own_rules(&fs::read_to_string(file).unwrap()).len());
     assert!(of_core.sum::<usize>() > 10, "the rules are somewhere");
 }
+
+/// The types whose inherent methods stand in at most this many files.
+const MOST_FILES_OF_A_TYPE: usize = 2;
+
+/// Types that still have more: `Own` and `odrive`'s `Motor`.
+const SCATTERED: [(&str, &str); 2] = [("motor", "Own"), ("odrive", "Motor")];
+
+/// The types that have an inherent `impl` in a text.
+fn inherent(text: &str) -> Vec<String> {
+    let name = |line: &str| {
+        let rest = line.strip_prefix("impl")?;
+        if line.contains(" for ") {
+            return None;
+        }
+        let rest = match rest.strip_prefix('<') {
+            // The list of parameters ends with the bracket that closes its own.
+            Some(list) => {
+                let mut depth = 1;
+                let end = list.find(|c| {
+                    depth += i32::from(c == '<') - i32::from(c == '>');
+                    depth == 0
+                })?;
+                &list[end + 1..]
+            }
+            None => rest,
+        };
+        let path = rest.trim_start().split(|c: char| !(c.is_alphanumeric() || "_:".contains(c)));
+        path.into_iter().next()?.rsplit("::").next().map(String::from)
+    };
+    code(text).filter_map(name).filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn the_inherent_methods_of_a_type_stand_in_at_most_two_files() {
+    let mut files = std::collections::BTreeMap::<(String, String), Vec<String>>::new();
+    for (module, path, text) in sources() {
+        if path.components().any(|part| part.as_os_str() == "tests") {
+            continue;
+        }
+        for name in inherent(&text) {
+            let of_type = files.entry((module.clone(), name)).or_default();
+            let file = path.display().to_string();
+            if !of_type.contains(&file) {
+                of_type.push(file);
+            }
+        }
+    }
+    assert!(files.len() > 100, "the check finds the types");
+    files.retain(|(module, name), files| {
+        let is_known = SCATTERED.contains(&(module.as_str(), name.as_str()));
+        files.len() > if is_known { 3 } else { MOST_FILES_OF_A_TYPE }
+    });
+    assert!(files.is_empty(), "{files:#?}");
+}
+
+#[test]
+fn an_inherent_impl_is_told_from_that_of_a_trait() {
+    assert_eq!(inherent("impl<B, const N: usize> Bus<B, N> {"), ["Bus"]);
+    assert_eq!(inherent("impl<M: Model<Command = Current>> Config<M> {"), ["Config"]);
+    assert_eq!(inherent("impl super::Slot {\n}\nimpl Default for Bus {"), ["Slot"]);
+    assert!(inherent("impl<D: Devices> Devices for &mut D {\nfn impl_it() {}").is_empty());
+}

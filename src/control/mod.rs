@@ -61,7 +61,7 @@ pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
 pub(crate) use number::limited;
 pub use observer::LoadObserver;
 
-pub(crate) use pid::Input;
+pub(crate) use pid::ErrorPid;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
 pub use step::TimeStep;

@@ -48,15 +48,26 @@ impl TimeStep {
     #[must_use]
     #[inline]
     pub const fn new(dt_s: f32, dt_max_s: f32) -> Self {
-        let per_dt = 1.0 / dt_s;
-        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity fail it.
-        if per_dt.to_bits().wrapping_sub(1) < f32::MAX.to_bits() {
-            if dt_s > dt_max_s {
-                return Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
-            }
-            return Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt };
+        match Self::usable(dt_s, dt_max_s) {
+            Some(step) => step,
+            None => Self { dt_s: 0.0, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY },
         }
-        Self { dt_s: 0.0, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY }
+    }
+
+    /// As [`new`](Self::new); `None` for a step that [holds](Self::is_hold).
+    #[inline]
+    pub(crate) const fn usable(dt_s: f32, dt_max_s: f32) -> Option<Self> {
+        let per_dt = 1.0 / dt_s;
+        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity are none of it.
+        if per_dt.to_bits().wrapping_sub(1) >= f32::MAX.to_bits() {
+            return None;
+        }
+        if dt_s > dt_max_s {
+            // With a longest step of zero or less every step holds.
+            let frozen = Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
+            return if dt_max_s > 0.0 { Some(frozen) } else { None };
+        }
+        Some(Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt })
     }
 
     /// Returns the seconds to count with: `dt_max_s` when frozen, 0 when on hold.

@@ -1,29 +1,29 @@
+use super::attach;
 use super::budget::Budget;
 use super::command::Outbox;
-use super::health::Rounds;
-use super::slot::Slot;
-use super::{AnyHandle, CommandFrame, Feedback, State};
+use super::counters::{Counters, Rejects};
+use super::deadlines;
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors};
+use super::receiving;
+use super::rounds;
+use super::slot::LONGEST_STEP_S;
+use super::{AnyHandle, AttachError, CommandFrame, Config, Feedback, Handle, Model};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, Devices, Ingest, Link, Malformed, Timeouts, Visitor};
+use crate::motor::{BusLoad, Ingest, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
-
-/// The lowest feedback id, and how many there are: 0x201..=0x20B.
-pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
-const SLOTS: usize = 11;
 
 /// All commands, and the feedback, lie from 0x1FE to 0x2FF.
 const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
 const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
-/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
-const LONGEST_STEP_S: f32 = 0.02;
-
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
-/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. Storage is what the protocol
-/// needs: 11 feedback ids and 5 command frames, no capacity to choose. It can stand in a `static`.
+/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. It can stand in a `static`.
+///
+/// `N` is the number of motors that it has room for: the protocol's 11 unless a [sized](Self::sized) bus saves memory. On a
+/// Cortex-M a motor takes 296 bytes, and the bus 320 beside them.
 ///
 /// # Examples
 /// ```
@@ -54,52 +54,14 @@ const LONGEST_STEP_S: f32 = 0.02;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-// The slots first: their addresses need no offset then.
-///
-/// Takes 3784 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
+// The motors first: their addresses need no offset then.
 #[repr(C)]
-pub struct Bus<B = ()> {
-    pub(super) slots: [Slot; SLOTS],
+pub struct Bus<B = (), const N: usize = IDS> {
+    pub(super) motors: Motors<N>,
     pub(super) outbox: Outbox,
-    pub(super) guard: DeviceGuard<12>,
     pub(super) budget: Budget,
-    /// The last usable time step as it was given, and as the loops take it.
-    dt_s: f32,
-    step: TimeStep,
-    pub(super) rejects: Rejects,
-    /// All slots from here on are free.
-    pub(super) used: u8,
-    pub(super) rounds: Rounds,
+    rejects: Rejects,
     brand: PhantomData<fn() -> B>,
-}
-
-#[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Slot>() <= 316 && size_of::<Bus>() <= 3784);
-
-/// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counters {
-    /// Feedback frames of another length than 8 bytes.
-    pub bad_length: u32,
-    /// Feedback frames with an angle above 8191.
-    pub bad_field: u32,
-    /// Frames with a feedback id of this family that no attached motor has: a wrong id switch shows here.
-    pub unattached: u32,
-    /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
-    pub bad_steps: u32,
-    /// Command frames that an update had ready; wraps.
-    pub packed: u32,
-    /// Command frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
-    pub superseded: u32,
-}
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rejects {
-    pub(super) bad_length: u32,
-    pub(super) bad_field: u32,
-    pub(super) unattached: u32,
 }
 
 impl Bus {
@@ -107,12 +69,6 @@ impl Bus {
     #[must_use]
     pub const fn new() -> Self {
         Self::branded()
-    }
-}
-
-impl Default for Bus {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -132,16 +88,34 @@ impl<B> Bus<B> {
     /// ```
     #[must_use]
     pub const fn branded() -> Self {
+        Self::sized()
+    }
+}
+
+impl<B, const N: usize> Bus<B, N> {
+    /// Makes a bus without motors that has room for `N` of them, 1 to 11: another number does not compile.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus: Bus<(), 2> = Bus::sized();
+    /// bus.attach_all([3, 7].map(Config::<M3508>::new))?;
+    /// let third = bus.attach(Config::<M3508>::new(1)).map_err(|error| error.to_string());
+    /// assert_eq!(third.err().as_deref(), Some("M3508 #1: the bus has room for 2 motors; Bus<_, 3> has more"));
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    /// ```compile_fail,E0080
+    /// let bus: drivetrain::dji::Bus<(), 12> = drivetrain::dji::Bus::sized();
+    /// ```
+    #[must_use]
+    pub const fn sized() -> Self {
+        const { assert!(N >= 1 && N <= IDS, "a bus has 1 to 11 motors") };
         Self {
-            slots: [Slot::FREE; SLOTS],
+            motors: Motors::NONE,
             outbox: Outbox::new(),
-            guard: DeviceGuard::NEW,
             budget: Budget::new(),
-            dt_s: 0.001,
-            step: TimeStep::new(0.001, LONGEST_STEP_S),
-            rejects: Rejects { bad_length: 0, bad_field: 0, unattached: 0 },
-            used: 0,
-            rounds: Rounds::NEW,
+            rejects: Rejects::NONE,
             brand: PhantomData,
         }
     }
@@ -149,7 +123,7 @@ impl<B> Bus<B> {
     /// Sets when feedback and commands count as lost.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
-        self.guard.set_timeouts(timeouts);
+        self.motors.guard.set_timeouts(timeouts);
         self
     }
 
@@ -160,8 +134,157 @@ impl<B> Bus<B> {
             Some(micros) if micros < 10_000_000 => micros,
             _ => 10_000_000,
         });
-        self.guard.disturb();
+        self.motors.guard.disturb();
         self
+    }
+
+    /// Says that the driver hands back the frames that it sent, so that a command frame that is received is no sign of a
+    /// second master. None is looked for then.
+    #[must_use]
+    pub const fn with_loopback(mut self) -> Self {
+        self.motors.rounds.echoes = true;
+        self
+    }
+
+    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 at first.
+    #[must_use]
+    pub const fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
+        self.budget.bit_rate = bits_per_s;
+        self
+    }
+
+    /// Sets the rate of each motor's feedback in Hz, for [`load`](Self::load); 1000 at first.
+    ///
+    /// The rate itself is set in the ESCs, with RoboMaster Assistant.
+    #[must_use]
+    pub const fn with_feedback_rate(mut self, hz: u32) -> Self {
+        self.motors.rounds.feedback_hz = hz;
+        self
+    }
+
+    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 at first.
+    #[must_use]
+    pub const fn with_tick_rate(mut self, hz: u32) -> Self {
+        self.budget.tick_hz = hz;
+        self
+    }
+
+    /// Has [`attach`](Self::attach) refuse a motor with which the worst case of the load would exceed `ceiling`, to
+    /// whole percent; 1 is a full bus. There is none at first. Set rates before, and attach after.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus = Bus::new().with_load_ceiling(0.95);
+    /// bus.attach_all([1, 2, 3, 4, 5].map(Config::<M3508>::new))?;
+    /// let refused = bus.attach(Config::<M3508>::new(6)).map_err(|error| error.to_string());
+    /// let why = "M3508 #6: the bus load of up to 108 % is above its ceiling of 95 %; \
+    ///     feedback at 839 Hz fits, or a second bus";
+    /// assert_eq!(refused.err().as_deref(), Some(why));
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub const fn with_load_ceiling(mut self, ceiling: f32) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, NaN gives 0: nothing can be attached"
+        )]
+        let percent = (ceiling * 100.0 + 0.5) as u16;
+        self.budget.ceiling_percent = Some(percent);
+        self
+    }
+
+    /// Attaches a motor.
+    ///
+    /// # Errors
+    /// When its id is out of range, another motor uses its feedback id or command slot, a parameter of the
+    /// configuration is not usable, or the bus would be loaded beyond its
+    /// [ceiling](Self::with_load_ceiling). The bus is then as it was.
+    pub const fn attach<M: Model>(
+        &mut self,
+        config: Config<M>,
+    ) -> Result<Handle<M, B>, AttachError> {
+        match attach::attach(
+            &mut self.motors,
+            &mut self.outbox,
+            &self.budget,
+            M::FACTS,
+            &config.plain,
+        ) {
+            Ok(key) => Ok(Handle::new(key)),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Attaches several motors of one model.
+    ///
+    /// # Errors
+    /// The first error; the bus is then as it was.
+    pub fn attach_all<M: Model, const K: usize>(
+        &mut self,
+        configs: [Config<M>; K],
+    ) -> Result<[Handle<M, B>; K], AttachError> {
+        let keys = configs.map(|config| config.plain);
+        let keys =
+            attach::attach_all(&mut self.motors, &mut self.outbox, &self.budget, M::FACTS, &keys)?;
+        Ok(keys.map(Handle::new))
+    }
+
+    /// Detaches a motor. Its command slot is sent as zero once more, then the frame stops when nobody else uses it.
+    pub fn detach(&mut self, motor: impl Into<AnyHandle<B>>) {
+        attach::detach(&mut self.motors, &mut self.outbox, motor.into().key());
+    }
+
+    /// Iterates over the attached motors, in the order of their feedback ids.
+    pub fn motors(&self) -> impl Iterator<Item = (AnyHandle<B>, MotorName)> + '_ {
+        self.motors.by_id().filter_map(|(_, index, slot)| {
+            let key = Key::new(index, slot.next_generation()?);
+            Some((AnyHandle::new(key), slot.name()?))
+        })
+    }
+
+    /// Returns id and mask for a hardware filter that lets all attached motors' feedback through.
+    ///
+    /// A frame passes when `frame id & mask == id & mask`. A mask cannot name any set of ids exactly, so a few
+    /// others may pass too. Without motors nothing but 0x7FF passes.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus = Bus::new();
+    /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.acceptance_filter(), (0x200, 0x7F8)); // 0x201..=0x204 need three open bits
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub fn acceptance_filter(&self) -> (u16, u16) {
+        attach::acceptance_filter(&self.motors)
+    }
+
+    /// Returns the load of the attached motors' feedback and of the command frames in use, when each of these goes out
+    /// with every update.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    ///
+    /// let mut bus = Bus::new();
+    /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.load().to_string(), "56 % to 68 %"); // four feedback frames and one command
+    /// bus.attach_all([5, 6].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.load().to_string(), "89 % to 108 %");
+    /// bus.attach_all([7, 8].map(Config::<M3508>::new))?;
+    /// assert_eq!(bus.load().to_string(), "111 % to 135 %");
+    /// assert_eq!(bus.with_feedback_rate(500).load().to_string(), "67 % to 81 %");
+    /// # Ok::<(), drivetrain::dji::AttachError>(())
+    /// ```
+    #[must_use]
+    pub const fn load(&self) -> BusLoad {
+        let (motors, commands) = (self.motors.count(), self.outbox.frames_in_use());
+        self.budget.load(motors, self.motors.rounds.feedback_hz, commands)
     }
 
     /// Takes a received frame that arrived at `now`. Constant time for one without an error code, once the updates run;
@@ -175,8 +298,8 @@ impl<B> Bus<B> {
     /// Costs 31 instructions on a Cortex-M4F, for a frame of a motor (`docs/figures.md`).
     #[inline(always)]
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let index = frame.key().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        if let Some(slot) = self.slots.get_mut(index) {
+        let index = self.motors.slot_of(frame.key().wrapping_sub(FIRST_FEEDBACK_ID) as usize);
+        if let Some(slot) = self.motors.slots.get_mut(index) {
             let feedback = Feedback::without_error(frame);
             if feedback.is_some_and(|feedback| slot.receive(feedback, now.stamp())) {
                 return Ingest::Taken;
@@ -187,46 +310,11 @@ impl<B> Bus<B> {
         self.ingest_unusual(frame, now)
     }
 
-    /// Takes any frame: also the first one of a motor, one after a gap, one with an error, and what is no feedback at all.
+    // Four words to pass: with more, the usual way would have to keep a stack ready.
     #[cold]
     #[inline(never)]
     fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        let index = frame.header().wrapping_sub(FIRST_FEEDBACK_ID) as usize;
-        let Some(slot) = self.slots.get_mut(index) else {
-            self.ingest_command(frame, now);
-            return Ingest::Unrelated;
-        };
-        #[expect(clippy::cast_possible_truncation, reason = "below 11")]
-        let motor = index as u8;
-        let Some(facts) = slot.facts() else {
-            self.rejects.unattached = self.rejects.unattached.saturating_add(1);
-            return Ingest::Unrelated;
-        };
-        if frame.length() != 8 {
-            self.rejects.bad_length = self.rejects.bad_length.saturating_add(1);
-            return Ingest::Malformed(Malformed::Length(frame.length()));
-        }
-        let Some(feedback) = Feedback::decode(frame.bytes()) else {
-            self.rejects.bad_field = self.rejects.bad_field.saturating_add(1);
-            return Ingest::Malformed(Malformed::Field);
-        };
-        let (timeouts, running) = (*self.guard.timeouts(), self.guard.is_running());
-        if !running {
-            let before = self.guard.pass_unwatched(now);
-            self.forget_bygones(before);
-        }
-        let in_time = self.change(motor, now, |slot| {
-            let in_time = slot.receive(feedback, now.stamp());
-            if !in_time {
-                slot.receive_after_gap(facts, feedback, now.stamp(), &timeouts, running);
-            }
-            slot.hear_error(facts, feedback.error());
-            in_time
-        });
-        if in_time == Some(false) {
-            self.guard.disturb();
-        }
-        Ingest::Taken
+        receiving::ingest(&mut self.motors, &self.outbox, &mut self.rejects, frame, now)
     }
 
     /// Takes a received standard data frame from a driver without an `embedded-can` frame type.
@@ -246,55 +334,36 @@ impl<B> Bus<B> {
     ///
     /// Costs 505 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
-        let before = self.guard.begin(tick.now());
-        if !self.takes_step(tick.dt_s()) {
-            let moves_on = self.guard.moves_on(before);
-            return self.update_without_step(before, moves_on);
+        let before = self.motors.guard.begin(tick.now());
+        let Some(step) = TimeStep::usable(tick.dt_s(), LONGEST_STEP_S) else {
+            let moves_on = self.motors.guard.moves_on(before);
+            return deadlines::hold(&mut self.motors, &mut self.outbox, before, moves_on);
+        };
+        let is_quiet = self.motors.guard.is_quiet(before);
+        if !is_quiet && !deadlines::apply(&mut self.motors, &mut self.outbox, before) {
+            return deadlines::hold(&mut self.motors, &mut self.outbox, before, false);
         }
-        if !self.takes_time(before) {
-            return self.update_without_step(before, false);
-        }
-        self.check_one_slot();
-        let step = self.step;
-        let mut rest = self.slots.get_mut(..usize::from(self.used)).unwrap_or_default();
+        self.check_next();
+        let mut rest = self.motors.taken_mut();
         while let [slot, others @ ..] = rest {
-            let raw = slot.update(&step, &self.step, &self.outbox);
+            let raw = slot.update(&step, tick.dt_s(), &self.outbox);
             self.outbox.put(slot.place, raw);
             rest = others;
         }
         self.outbox.finish_update();
     }
 
-    /// Sees to what the time that passed brings with it; `false` when none passed.
+    /// Checks the motor whose turn it is.
     #[inline]
-    fn takes_time(&mut self, before: Instant) -> bool {
-        self.guard.is_quiet(before) || self.look_around(before)
-    }
-
-    /// Takes over a time step, unless it is none.
-    #[inline]
-    fn takes_step(&mut self, dt_s: f32) -> bool {
-        if dt_s.to_bits() == self.dt_s.to_bits() {
-            return true;
-        }
-        let step = TimeStep::new(dt_s, LONGEST_STEP_S);
-        if !step.is_hold() {
-            (self.dt_s, self.step) = (dt_s, step);
-        }
-        !step.is_hold()
-    }
-
-    /// Looks at what need not be looked at in every tick, in one motor a tick.
-    #[inline]
-    fn check_one_slot(&mut self) {
-        let motor = self.rounds.next;
-        let Some(slot) = self.slots.get_mut(usize::from(motor)) else {
-            return self.check_without_glance();
+    fn check_next(&mut self) {
+        let index = self.motors.rounds.next;
+        let Some(slot) = self.motors.slots.get_mut(usize::from(index)) else {
+            return rounds::check_without_slot(&mut self.motors, &self.outbox);
         };
-        self.rounds.next = motor + 1;
+        self.motors.rounds.next = index + 1;
         let word = self.outbox.get(slot.place);
-        if !slot.is_well(word) {
-            self.check_closely(motor, word);
+        if !slot.is_well(word, self.motors.rounds.elapsed) {
+            rounds::check(&mut self.motors, index, word);
         }
     }
 
@@ -311,84 +380,17 @@ impl<B> Bus<B> {
         self.outbox.requeue(frame.header())
     }
 
-    /// Returns what is known of a motor; `None` before its first frame, and once it is detached.
-    ///
-    /// Inlined: a program pays for the fields that it reads.
-    ///
-    /// Costs 160 instructions on a Cortex-M4F, when every field is read (`docs/figures.md`).
-    #[must_use]
-    #[inline(always)]
-    pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {
-        self.slot(motor.into())?.state()
-    }
-
-    /// Tells whether a motor is heard; `None` once it is detached.
-    #[must_use]
-    pub fn link(&self, motor: impl Into<AnyHandle<B>>) -> Option<Link> {
-        Some(self.slot(motor.into())?.guard.link())
-    }
-
-    /// Tells whether a motor takes targets: armed, and not relaxed by a fault.
-    #[must_use]
-    pub fn is_motor_armed(&self, motor: impl Into<AnyHandle<B>>) -> bool {
-        self.slot(motor.into()).is_some_and(|slot| slot.guard.is_armed())
-    }
-
     /// Returns what the bus has counted.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        let Rejects { bad_length, bad_field, unattached } = self.rejects;
-        let bad_steps = self.guard.bad_steps();
-        let (packed, superseded) = (self.outbox.packed, self.outbox.superseded);
-        Counters { bad_length, bad_field, unattached, bad_steps, packed, superseded }
-    }
-
-    /// Changes a slot, and sees to what follows.
-    pub(super) fn change<T>(
-        &mut self,
-        motor: u8,
-        now: Instant,
-        change: impl FnOnce(&mut Slot) -> T,
-    ) -> Option<T> {
-        let slot = self.slots.get_mut(usize::from(motor))?;
-        let before = slot.guard.known();
-        let outcome = change(slot);
-        slot.settle();
-        self.guard.note(motor, before, &slot.guard, now);
-        Some(outcome)
-    }
-
-    #[inline]
-    pub(super) fn slot(&self, motor: AnyHandle<B>) -> Option<&Slot> {
-        self.slots.get(motor.key().index()).filter(|slot| slot.matches(motor.key()))
-    }
-
-    #[inline]
-    pub(super) fn slot_mut(&mut self, motor: AnyHandle<B>) -> Option<&mut Slot> {
-        self.slots.get_mut(motor.key().index()).filter(|slot| slot.matches(motor.key()))
-    }
-}
-
-/// One device needs no search among several: each goes straight to the bus.
-impl<B> Devices for Bus<B> {
-    #[inline]
-    fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(self);
-    }
-
-    #[inline]
-    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        Self::ingest(self, frame, now)
-    }
-
-    #[inline]
-    fn update(&mut self, tick: Tick) {
-        Self::update(self, tick);
-    }
-
-    #[inline]
-    fn next_frame(&mut self, _: u32) -> Option<CanFrame> {
-        Self::next_frame(self)
+        Counters {
+            bad_length: self.rejects.bad_length,
+            bad_field: self.rejects.bad_field,
+            unattached: self.rejects.unattached,
+            bad_steps: self.motors.guard.bad_steps(),
+            packed: self.outbox.packed,
+            superseded: self.outbox.superseded,
+        }
     }
 }
 

@@ -54,6 +54,13 @@ pub enum AttachError {
         /// The highest feedback rate of all motors that stays below it, in Hz; 0 when the commands alone do not.
         feedback_hz: u32,
     },
+    /// The bus has no free slot: make it with a larger capacity, `Bus<B, N>`.
+    Full {
+        /// The motor that was to be attached.
+        motor: MotorName,
+        /// The number of motors that the bus has room for.
+        capacity: u8,
+    },
     /// This place was attached and detached 16 times; a further handle could be confused with an old one.
     WornOut {
         /// The motor that was to be attached.
@@ -115,6 +122,13 @@ impl AttachError {
                     }
                 }
             }
+            Self::Full { motor, capacity } => message
+                .name(*motor)
+                .text(": the bus has room for ")
+                .number(*capacity as u32)
+                .text(if *capacity == 1 { " motor; Bus<_, " } else { " motors; Bus<_, " })
+                .number(*capacity as u32 + 1)
+                .text("> has more"),
             Self::WornOut { motor } => {
                 message.name(*motor).text(": attached and detached too often on this bus")
             }

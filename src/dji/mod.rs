@@ -79,25 +79,113 @@
 //! assert_eq!(BUS.motors().count(), 2);
 //! ```
 //!
+//! # Targets that another sensor measures
+//! For example a gimbal's yaw that an IMU tells, whatever the chassis under it does.
+//!
+//! **Both loops** run on the measurement: the position loop on its angle, the speed loop on its rate. The rate of the
+//! encoder is that against the base; a speed loop on it would hold the gimbal against the chassis, not in the
+//! world, and the angle would be off for as long as the chassis turns.
+//!
+//! The measurement counts from its own time: older than [`Timeouts::measured`](crate::motor::Timeouts::measured) it is an
+//! error when it is set, and one that becomes so is zero output within a tick, as if the application had stopped. The
+//! feedback of the motor has to be fresh as well. Set it in each tick; between two measurements, the last one again.
+//!
+//! ```
+//! use drivetrain::control::PidConfig;
+//! use drivetrain::dji::{Bus, Config, Gm6020Voltage};
+//! use drivetrain::frame::CanFrame;
+//! use drivetrain::motor::{Measured, TargetError};
+//! use drivetrain::time::{Duration, Instant, Tick};
+//! use drivetrain::units::{Angle, AngularVelocity};
+//!
+//! let angle = PidConfig::new(10.0, 0.0, 0.0); // rad/s per rad
+//! let rate = PidConfig::new(2.0, 0.0, 0.0); // V per rad/s
+//! let mut bus = Bus::new();
+//! let config = Config::<Gm6020Voltage>::new(1).position_loop(angle, rate);
+//! let yaw = bus.attach(config.with_opening(Duration::ZERO))?; // for one update
+//! let now = Instant::from_micros(1_000);
+//! bus.ingest(&CanFrame::standard(0x205, [0; 8]).ok_or("not an 11-bit id")?, now);
+//! bus.arm(now)?;
+//!
+//! // 0.1 rad to go, and the gimbal already turns there at 0.5 rad/s in the world.
+//! let imu = Measured {
+//!     angle: Angle::from_radians(0.2),
+//!     velocity: AngularVelocity::from_rad_per_s(0.5),
+//!     at: now,
+//! };
+//! bus.set_angle_measured(yaw, Angle::from_radians(0.3), imu)?;
+//! bus.update(Tick::new(now, 0.001));
+//! let frame = bus.next_frame().ok_or("nothing to send")?;
+//! assert_eq!(format!("{frame:?}"), "1FF [8] 04 12 00 00 00 00 00 00"); // 2 * (10 * 0.1 - 0.5) = 1 V: 1042
+//!
+//! let late = Instant::from_micros(30_000);
+//! bus.ingest(&CanFrame::standard(0x205, [0; 8]).ok_or("not an 11-bit id")?, late);
+//! bus.update(Tick::new(late, 0.001));
+//! let refused = bus.set_angle_measured(yaw, Angle::from_radians(0.3), imu);
+//! assert_eq!(refused, Err(TargetError::StaleMeasurement)); // 29 ms old
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # A limit over several motors
+//! [`Bus::scale_outputs`] cuts the commands of an update by one factor, for instance to keep a power limit:
+//!
+//! ```
+//! use drivetrain::chassis::{PowerModel, WheelLoad};
+//! use drivetrain::dji::{Bus, Config, M3508};
+//! use drivetrain::frame::CanFrame;
+//! use drivetrain::time::{Duration, Instant, Tick};
+//! use drivetrain::units::Current;
+//!
+//! let mut bus = Bus::new();
+//! let at_once = |id| Config::<M3508>::new(id).with_opening(Duration::ZERO); // for one update
+//! let wheels = bus.attach_all([1, 2].map(at_once))?;
+//! let now = Instant::from_micros(1_000);
+//! for id in [0x201, 0x202] {
+//!     let at_100_rpm = [0, 0, 0x07, 0x80, 0, 0, 30, 0]; // 1920 rpm of the rotor, behind 19.2 to 1
+//!     bus.ingest(&CanFrame::standard(id, at_100_rpm).ok_or("id")?, now);
+//! }
+//! bus.arm(now)?;
+//! for wheel in wheels {
+//!     bus.set_current(wheel, Current::from_amperes(10.0))?;
+//! }
+//! bus.update(Tick::new(now, 0.001));
+//!
+//! let model = PowerModel::new(0.0, 0.475, 0.065, 0.0)?; // of current and speed
+//! let loads = wheels.map(|wheel| WheelLoad {
+//!     torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
+//!     speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
+//! });
+//! let cut = model.cut(loads, 60.0); // both together would take 112 W
+//! bus.scale_outputs(wheels, cut.scale);
+//! let left = bus.commanded_current(wheels[0]).ok_or("detached")?;
+//! assert!((left.as_amperes() - 5.62).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Sources
 //! DJI C610 user guide V1.0 (2019.03) pages 8 and 9 for layout, ids, scale and rate of C610; for C620 and GM6020,
 //! whose manuals were not at hand, what independent public drivers agree on (taproot, librm, HNU's framework, IFR). They differ on the GM6020 voltage limit: 25000 is today's, 30000 that of old motors
 //! ([`Config::with_legacy_full_scale`]). The volts behind it are nominal: sources say 24 V or 25.2 V.
 
+mod arming;
 mod attach;
 mod budget;
 mod bus;
 mod command;
 mod config;
+mod counters;
 mod deadlines;
 mod device;
+mod drive;
 mod error;
 mod feedback;
-mod handle;
-mod health;
 mod limit;
+mod measured;
 mod model;
+mod motors;
 mod range;
+mod receiving;
+mod rounds;
 mod slot;
 mod state;
 mod targets;
@@ -105,12 +193,13 @@ mod targets;
 mod tests;
 mod word_gains;
 
-pub use bus::{Bus, Counters};
+pub use bus::Bus;
 pub use command::CommandFrame;
 pub use config::Config;
+pub use counters::Counters;
 pub use error::{AttachError, Message};
 pub use feedback::{ErrorCode, Feedback};
-pub use handle::{AnyHandle, Handle};
 pub use model::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
+pub use motors::{AnyHandle, Handle};
 pub use state::State;
 pub use word_gains::WordGains;

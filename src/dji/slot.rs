@@ -2,25 +2,27 @@
 //!
 //! What a motor needs now and then stands in the files of the folder.
 
-mod config;
-mod gap;
-mod health;
+pub(super) mod config;
+mod duty;
+pub(super) mod gap;
+pub(super) mod health;
 mod target;
 
 use super::command::{Outbox, Place, free_to_raw, loop_to_raw, saturate};
 use super::config::USUAL;
-use super::handle::Key;
+use super::motors::Key;
 use super::range::Range;
-use super::{Facts, Feedback};
-use crate::control::{Input, Pid, PidConfig, TimeStep};
+use super::{Facts, Feedback, State};
+use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
-use crate::motor::{HealthConfig, Monitor, MotorGuard, TargetError, Traffic};
-use crate::units::{Angle, AngularVelocity};
+use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetError, Traffic};
+use crate::units::{AngularVelocity, Current};
 
 /// The refusal of a handle whose motor is gone.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
-pub(super) use health::Look;
+use duty::{Action, Duty};
+pub(super) use health::Surroundings;
 
 /// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
 const CALM_CURRENT: i32 = 2_000;
@@ -45,7 +47,7 @@ pub(super) struct Slot {
     raw_per_unit: f32,
     goal: Goal,
     speed: Pid,
-    position: Pid,
+    position: ErrorPid,
     facts: Option<&'static Facts>,
     nm_per_a: f32,
     ambiguous_gaps: u16,
@@ -60,43 +62,6 @@ pub(super) struct Slot {
     health: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
-}
-
-/// What a motor is asked to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-enum Action {
-    Rest,
-    Raw,
-    Velocity,
-    /// The shortest way.
-    Angle,
-    Position,
-    /// The way that another sensor leaves.
-    Measured,
-}
-
-impl Action {
-    /// Tells whether it goes to a place of the shaft.
-    const fn is_way(self) -> bool {
-        matches!(self, Self::Angle | Self::Position)
-    }
-}
-
-/// What an update does: the action, where that is as simple as it nearly always is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-enum Duty {
-    Rest,
-    /// Whatever is asked for, for the first time since a rest.
-    First,
-    Raw,
-    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
-    Velocity,
-    /// Both loops, as above.
-    Position,
-    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
-    Other,
 }
 
 /// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
@@ -145,6 +110,14 @@ impl Goal {
     }
 }
 
+/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
+pub(super) const LONGEST_STEP_S: f32 = 0.02;
+
+/// Returns the time step of an update again, where its values are not at hand.
+fn usable(dt_s: f32) -> TimeStep {
+    TimeStep::new(dt_s, LONGEST_STEP_S)
+}
+
 /// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
 const NO_GAINS: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
 
@@ -170,7 +143,7 @@ impl Slot {
         full_limit: 0,
         ambiguous_gaps: 0,
         speed: NO_LOOP,
-        position: NO_LOOP,
+        position: *NO_LOOP.core(),
         generation: 0,
         place: Place::Nowhere,
         homing: Homing::Relative,
@@ -199,6 +172,85 @@ impl Slot {
         AngularVelocity::from_rad_per_s(f32::from(self.feedback.rpm()) * self.rad_per_s_per_rpm)
     }
 
+    /// Tells a loop from [`NO_LOOP`], the only one without limits.
+    #[inline]
+    const fn has_speed_loop(&self) -> bool {
+        self.speed.is_limited()
+    }
+
+    #[inline]
+    const fn has_position_loop(&self) -> bool {
+        self.position.is_limited()
+    }
+
+    /// Frees the slot; handles of the motor find nothing from now on.
+    pub(super) const fn free(&mut self) {
+        *self = Self { generation: self.generation + 1, ..Self::FREE };
+    }
+
+    /// Frees a slot whose handle nobody was given.
+    pub(super) const fn withdraw(&mut self) {
+        *self = Self { generation: self.generation, ..Self::FREE };
+    }
+
+    /// Returns the generation of the next motor here, or `None` when there is none left.
+    pub(super) const fn next_generation(&self) -> Option<u8> {
+        if self.generation < Key::GENERATIONS { Some(self.generation) } else { None }
+    }
+
+    pub(super) const fn name(&self) -> Option<MotorName> {
+        match self.facts {
+            Some(facts) => Some(MotorName::new(facts.name, self.id(facts))),
+            None => None,
+        }
+    }
+
+    /// Returns the id on the ESC, which the place of the command word tells.
+    const fn id(&self, facts: &Facts) -> u8 {
+        let [lower, _] = facts.command;
+        let before = if self.place.frame() as u8 == lower as u8 { 0 } else { 4 };
+        before + self.place.slot() + 1
+    }
+
+    /// Returns what is known; `None` before the first frame.
+    // The compiler leaves out what nobody reads, in line only.
+    #[inline(always)]
+    pub(super) fn state(&self) -> Option<State> {
+        let facts = self.facts?;
+        if self.guard.link() == Link::Unheard {
+            return None;
+        }
+        let amperes =
+            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
+                / f32::from(facts.current_raw);
+        Some(State {
+            motor: MotorName::new(facts.name, self.id(facts)),
+            position: self.shaft.position(),
+            homing: self.homing,
+            velocity: self.velocity(),
+            current: Current::from_amperes(amperes),
+            torque_nm: amperes * self.nm_per_a,
+            temperature_c: facts
+                .has_temperature
+                .then_some(health::celsius(self.feedback.temperature())),
+            error: facts.errors.read(self.feedback.error()),
+            rotor_counts: self.shaft.rotor_counts(),
+            ambiguous_gaps: self.ambiguous_gaps,
+            refused_targets: self.guard.refused_targets(),
+            forgotten_targets: self.guard.forgotten_targets(),
+            conditions: self.guard.latch().active(),
+            link: self.guard.link(),
+            feedback: self.feedback,
+        })
+    }
+
+    /// Time did not move on. A free slot loses nothing.
+    pub(super) fn lose_time(&mut self) {
+        if self.facts.is_some() {
+            self.guard.lose_time();
+        }
+    }
+
     // Feedback.
 
     /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
@@ -216,116 +268,93 @@ impl Slot {
 
     // Targets.
 
-    /// Takes rad/s of the output shaft.
+    /// Takes rad/s of the output shaft in place of rad/s: then the motor is armed and has a loop.
     #[inline]
-    pub(super) fn set_velocity(&mut self, rad_per_s: f32, now: u32) -> Result<(), TargetError> {
-        self.admit(rad_per_s.is_finite())?;
-        needs(&self.speed)?;
-        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
-        Ok(())
-    }
-
-    /// Takes turns and angle of the output shaft.
-    pub(super) fn set_position(&mut self, position: Position, now: u32) -> Result<(), TargetError> {
-        self.admit(position.is_finite())?;
-        needs(&self.position)?;
-        let (turns, phase) = self.shaft.locate(self.inside(position));
-        let goal = Goal { turns: self.shaft.near(turns), value: phase };
-        self.start(Action::Position, goal, now);
-        Ok(())
-    }
-
-    /// Returns the nearest position that is within the soft limits.
-    fn inside(&self, position: Position) -> Position {
-        let Some((lower, upper)) = self.health.soft_limits else { return position };
-        let radians = position.as_angle().as_radians();
-        if radians < lower {
-            Position::from_angle(Angle::from_radians(lower))
-        } else if radians > upper {
-            Position::from_angle(Angle::from_radians(upper))
-        } else {
-            position
-        }
-    }
-
-    /// Tells whether a target may be taken; where not, the one before may be over.
-    #[inline]
-    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
-        match self.guard.admit(is_finite) {
-            Ok(()) => Ok(()),
-            Err(error) => Err(self.refuse(error)),
-        }
-    }
-
-    #[inline]
-    fn start(&mut self, action: Action, goal: Goal, now: u32) {
-        self.goal = goal;
-        if self.asked == action {
+    pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
+        let goes_on = self.asked == Action::Velocity
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && rad_per_s.is_finite();
+        if goes_on {
+            self.goal.value = rad_per_s.to_bits().cast_signed();
             self.guard.renew_target(now);
-        } else {
-            self.start_anew(action, now);
         }
+        goes_on
+    }
+
+    /// Takes turns and angle of the output shaft in place of others, without soft limits.
+    #[inline]
+    pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
+        let goes_on = self.asked == Action::Position
+            && self.guard.link() == Link::Online
+            && self.generation == motor.generation()
+            && position.is_finite()
+            && self.health.soft_limits.is_none();
+        if goes_on {
+            let (turns, phase) = self.shaft.locate(position);
+            self.goal = Goal { turns: self.shaft.near(turns), value: phase };
+            self.guard.renew_target(now);
+        }
+        goes_on
     }
 
     // Update.
 
-    /// Tells at a glance whether all is well, as it is nearly always: online, cool, turning, moderately driven, nothing
-    /// wrong with it and no error. Otherwise it has to be looked at [closely](Self::check).
+    /// Checks a motor that is well, as it nearly always is: online, cool, turning, no condition and no error. Returns `false` if
+    /// it may be anything else, and has to be [checked](health::check) in full. `elapsed` is the time since its last check, in
+    /// units of 1.024 ms.
     #[inline]
-    pub(super) fn is_well(&mut self, word: i16) -> bool {
+    pub(super) fn is_well(&mut self, word: i16, elapsed: u8) -> bool {
         let (feedback, driven) = (self.feedback, i32::from(word));
         let Some(facts) = self.facts else { return true };
         let (calm, fastest) = (i32::from(self.calm_word), i32::from(facts.rotor_rpm));
-        feedback.error_and_temperature() < u32::from(self.cool_below)
-            && is_within(driven, calm)
-            && (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
-            && is_within(feedback.rpm().into(), fastest)
-            && self.monitor.glance(feedback.angle(), coarse(word))
+        let is_usual = feedback.error_and_temperature() < u32::from(self.cool_below)
+            && is_within(feedback.rpm().into(), fastest);
+        if !is_usual {
+            return false;
+        }
+        if !is_within(driven, calm) {
+            return health::is_driven_well(self, facts, word, elapsed);
+        }
+        (is_within(feedback.current().into(), CALM_CURRENT) || !is_within(driven, calm / 4))
+            && self.monitor.follow(feedback.angle(), coarse(word))
     }
 
-    /// Runs the loops of this motor and returns its raw command. Both steps are the same one: `plain` is a copy that
-    /// stays in registers, because nobody else gets to see it.
+    /// Runs the loops of this motor and returns its raw command. `step` is that of `dt_s`: it stays in registers, as only the
+    /// usual way gets to see it.
     #[inline]
-    pub(super) fn update(&mut self, plain: &TimeStep, step: &TimeStep, sent: &Outbox) -> i16 {
+    pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
         let goal = match self.duty {
             Duty::Velocity => self.goal.rad_per_s(),
             Duty::Position => {
                 let way = self.shaft.way_to(self.goal.turns(), self.goal.phase());
-                let input = Input::Given { error: way, rate: velocity };
-                match self.position.step_plain(input, plain) {
+                match self.position.plain((way, velocity), way, step) {
                     Ok(goal) => goal,
-                    Err(_) => return self.update_carefully(step, sent),
+                    Err(_) => return self.update_carefully(dt_s, sent),
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
             // Out of line too: a zero for these would be loaded in every update of every motor.
-            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(step, sent),
+            Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
         };
-        let input = Input::Measured { setpoint: goal, measurement: velocity };
-        match self.speed.step_plain(input, plain) {
+        match self.speed.step_plain(goal, velocity, step) {
             Ok(output) => free_to_raw(output, self.raw_per_unit),
-            Err(_) => self.follow_velocity(goal, velocity, step),
+            Err(_) => self.follow_velocity(goal, velocity, dt_s),
         }
     }
 
     // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
     #[cold]
     #[inline(never)]
-    fn follow_velocity(&mut self, goal: f32, velocity: f32, step: &TimeStep) -> i16 {
-        let output = self.speed.step(goal, velocity, step);
+    fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
+        let output = self.speed.step(goal, velocity, &usable(dt_s));
         loop_to_raw(output, self.raw_per_unit, self.range)
     }
 }
 
-/// Tells a loop from [`NO_LOOP`], the only one without limits.
-#[inline]
-const fn is_loop(pid: &Pid) -> bool {
-    pid.is_limited()
-}
-
-fn needs(pid: &Pid) -> Result<(), TargetError> {
-    if is_loop(pid) { Ok(()) } else { Err(TargetError::NoLoop) }
+fn needs(is_there: bool) -> Result<(), TargetError> {
+    if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
 /// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.

@@ -1,14 +1,172 @@
-//! What the application asks of the motors.
+//! What an application asks of motors and reads of them: state, health, arming, targets.
 
-use super::slot::DETACHED;
-use super::slot::Slot;
-use super::{AnyHandle, Bus, Handle, Model};
+use super::slot::{DETACHED, config, gap, health};
+use super::{AnyHandle, Bus, Handle, Model, State, arming, limit, measured, rounds};
 use crate::control::PidConfig;
 use crate::encoder::Position;
 use crate::error::ConfigError;
-use crate::motor::{AngleDrive, Capabilities, LONGEST_PAUSE, Measured, TargetError, VelocityDrive};
+use crate::motor::{
+    ArmError, Capabilities, Conditions, Devices, Edge, Health, Link, Measured, TargetError,
+};
 use crate::time::Instant;
 use crate::units::{Angle, AngularVelocity, Current, Voltage};
+
+/// State, health and arming.
+impl<B, const N: usize> Bus<B, N> {
+    /// Returns what is known of a motor; `None` before its first frame, and once it is detached.
+    ///
+    /// Inlined: a program pays for the fields that it reads.
+    #[must_use]
+    #[inline(always)]
+    pub fn state(&self, motor: impl Into<AnyHandle<B>>) -> Option<State> {
+        self.motors.get(motor.into().key())?.state()
+    }
+
+    /// Tells whether a motor is heard; `None` once it is detached.
+    #[must_use]
+    pub fn link(&self, motor: impl Into<AnyHandle<B>>) -> Option<Link> {
+        Some(self.motors.get(motor.into().key())?.guard.link())
+    }
+
+    /// Tells whether a motor takes targets: armed, and not relaxed by a fault.
+    #[must_use]
+    pub fn is_motor_armed(&self, motor: impl Into<AnyHandle<B>>) -> bool {
+        self.motors.get(motor.into().key()).is_some_and(|slot| slot.guard.is_armed())
+    }
+
+    /// Returns how a motor is; `None` once it is detached.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::time::Instant;
+    ///
+    /// let mut bus = Bus::new();
+    /// let wheel = bus.attach(Config::<M3508>::new(2))?;
+    /// bus.ingest_raw(0x202, &[0, 0, 0, 0, 0, 0, 131, 8], Instant::from_micros(1_000));
+    /// let health = bus.health(wheel).ok_or("detached")?;
+    /// assert_eq!(
+    ///     health.to_string(),
+    ///     "M3508 #2: online, disarmed, ESC warning; 0 Hz, gap 0 us, 131 C, error 8; saturated 0, refused 0, forgotten 0, ambiguous 0",
+    /// );
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn health(&self, motor: impl Into<AnyHandle<B>>) -> Option<Health> {
+        health::report(self.motors.get(motor.into().key())?)
+    }
+
+    /// Returns what is wrong with a motor; nothing once it is detached.
+    #[must_use]
+    pub fn conditions(&self, motor: impl Into<AnyHandle<B>>) -> Conditions {
+        self.motors
+            .get(motor.into().key())
+            .map_or(Conditions::NONE, |slot| slot.guard.latch().active())
+    }
+
+    /// Returns the oldest change of a motor's condition that was not read yet.
+    ///
+    /// None is lost, however late it is read; while it waits, the same change is not noted again. Beyond 12 that wait,
+    /// the order of the later ones is that of the motors.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::motor::Condition;
+    /// use drivetrain::time::{Instant, Tick};
+    ///
+    /// let mut bus = Bus::new();
+    /// let wheel = bus.attach(Config::<M3508>::new(2))?;
+    /// bus.ingest_raw(0x202, &[0; 8], Instant::from_micros(1_000));
+    /// for millis in 1..20 {
+    ///     bus.update(Tick::new(Instant::from_micros(millis * 1_000), 0.001));
+    /// }
+    /// let edge = bus.next_edge().ok_or("nothing happened")?;
+    /// assert_eq!((edge.motor.id(), edge.condition, edge.began), (2, Condition::Late, true));
+    /// assert_eq!(edge.at.as_micros() / 1_024, 12_000 / 1_024); // the first update after 10 ms
+    /// assert_eq!(bus.next_edge(), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[inline]
+    pub fn next_edge(&mut self) -> Option<Edge> {
+        if self.motors.guard.journal().is_empty() {
+            None
+        } else {
+            rounds::take_edge(&mut self.motors)
+        }
+    }
+
+    /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms of updates.
+    ///
+    /// `now` is the time of the present tick: an update before it counts as a clock that went back.
+    ///
+    /// # Errors
+    /// As [`Devices::arm`].
+    pub fn arm(&mut self, now: Instant) -> Result<(), ArmError> {
+        Devices::arm(self, now)
+    }
+
+    /// Relaxes every motor and refuses targets until armed again.
+    pub fn disarm(&mut self) {
+        for slot in &mut self.motors.slots {
+            slot.guard.disarm();
+            slot.apply_rules();
+        }
+        self.outbox.clear();
+    }
+
+    /// Tells whether every motor takes targets: false as long as one of them waits to be armed.
+    #[must_use]
+    pub fn is_armed(&self) -> bool {
+        arming::is_armed(&self.motors.slots)
+    }
+
+    /// Relaxes every motor at once, until the stop is cleared and the bus armed.
+    pub fn emergency_stop(&mut self) {
+        if self.motors.guard.stop() {
+            Self::disarm(self);
+        }
+    }
+
+    /// Clears the emergency stop. The bus stays disarmed, and arming needs a new request.
+    pub const fn clear_emergency_stop(&mut self) {
+        self.motors.guard.clear_stop();
+    }
+
+    /// Tells whether the emergency stop is set.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        self.motors.guard.is_stopped()
+    }
+
+    /// Arms these motors only, whatever the others do.
+    ///
+    /// It knows this bus alone: where it is a part of a device of several families, look at
+    /// [`clash`](Devices::clash) of the whole first.
+    ///
+    /// # Errors
+    /// As [`Devices::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::dji::{Bus, Config, M3508};
+    /// use drivetrain::frame::CanFrame;
+    /// use drivetrain::time::Instant;
+    ///
+    /// let mut bus = Bus::new();
+    /// let [left, right] = bus.attach_all([1, 2].map(Config::<M3508>::new))?;
+    /// let now = Instant::from_micros(1_000);
+    /// bus.ingest(&CanFrame::standard(0x201, [0; 8]).ok_or("not an 11-bit id")?, now);
+    /// bus.arm_only(&[left.erase()], now)?;
+    /// assert!(bus.is_motor_armed(left) && !bus.is_motor_armed(right));
+    /// assert!(!bus.is_armed()); // not all of them
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn arm_only(&mut self, motors: &[AnyHandle<B>], now: Instant) -> Result<(), ArmError> {
+        let chosen = motors.iter().map(|motor| motor.key());
+        arming::arm_only(&mut self.motors, chosen, now)
+    }
+}
 
 /// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
 /// ([`Timeouts::command`](crate::motor::Timeouts::command)): an application that stops setting targets stops the motor.
@@ -18,7 +176,7 @@ use crate::units::{Angle, AngularVelocity, Current, Voltage};
 /// # Errors
 /// Each fails, and the value is not kept for later, when the motor is detached, not armed, relaxed by a fault or
 /// not heard, when it has not the loop that it needs, and for NaN or infinity, which takes the present target away.
-impl<B> Bus<B> {
+impl<B, const N: usize> Bus<B, N> {
     /// Sets a torque current.
     ///
     /// # Errors
@@ -28,7 +186,7 @@ impl<B> Bus<B> {
         motor: Handle<M, B>,
         current: Current,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_output(current.as_amperes(), now))
+        self.motors.set(motor.erase().key(), |slot, now| slot.set_output(current.as_amperes(), now))
     }
 
     /// Sets a terminal voltage, in nominal volts.
@@ -40,7 +198,7 @@ impl<B> Bus<B> {
         motor: Handle<M, B>,
         voltage: Voltage,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_output(voltage.as_volts(), now))
+        self.motors.set(motor.erase().key(), |slot, now| slot.set_output(voltage.as_volts(), now))
     }
 
     /// Sets the command on the wire's own scale.
@@ -48,7 +206,7 @@ impl<B> Bus<B> {
     /// # Errors
     /// See above.
     pub fn set_raw(&mut self, motor: impl Into<AnyHandle<B>>, raw: i16) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_raw(raw, now))
+        self.motors.set(motor.into().key(), |slot, now| slot.set_raw(raw, now))
     }
 
     /// Sets the velocity that the speed loop follows.
@@ -63,7 +221,12 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         velocity: AngularVelocity,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_velocity(velocity.as_rad_per_s(), now))
+        let (motor, rad_per_s) = (motor.into().key(), velocity.as_rad_per_s());
+        self.motors.renew(
+            motor,
+            |slot, now| slot.renew_velocity(motor, rad_per_s, now),
+            |slot, now| slot.set_velocity(rad_per_s, now),
+        )
     }
 
     /// Sets the absolute angle that the position loop goes to, by the shortest way: 350° to 10° is +20°.
@@ -75,7 +238,8 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         angle: Angle,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
+        self.motors
+            .set(motor.into().key(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
     /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
@@ -89,13 +253,18 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.set(motor.into(), |slot, now| slot.set_position(position, now))
+        let motor = motor.into().key();
+        self.motors.renew(
+            motor,
+            |slot, now| slot.renew_position(motor, position, now),
+            |slot, now| slot.set_position(position, now),
+        )
     }
 
     /// Asks a motor for nothing: zero output from the next update on, loops reset. It stays armed, and frames that wait go
     /// out as they are.
     pub fn relax(&mut self, motor: impl Into<AnyHandle<B>>) {
-        if let Some(slot) = self.slot_mut(motor.into()) {
+        if let Some(slot) = self.motors.get_mut(motor.into().key()) {
             slot.relax();
         }
     }
@@ -119,7 +288,8 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         position: Position,
     ) -> Result<(), TargetError> {
-        self.change_at(motor.into(), |slot| slot.set_present_position(position))
+        self.motors
+            .change_present(motor.into().key(), |slot| gap::set_present_position(slot, position))
     }
 
     /// Changes the speed loop of a motor while it runs, without a jump of its output.
@@ -132,8 +302,8 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         config: PidConfig,
     ) -> Result<(), ConfigError> {
-        let slot = self.slot_mut(motor.into()).ok_or(DETACHED)?;
-        slot.set_speed_loop(config)
+        let slot = self.motors.get_mut(motor.into().key()).ok_or(DETACHED)?;
+        config::set_speed_loop(slot, config)
     }
 
     /// Changes the position loop of a motor while it runs, without a jump of its output.
@@ -146,8 +316,8 @@ impl<B> Bus<B> {
         motor: impl Into<AnyHandle<B>>,
         config: PidConfig,
     ) -> Result<(), ConfigError> {
-        let slot = self.slot_mut(motor.into()).ok_or(DETACHED)?;
-        slot.set_position_loop(config)
+        let slot = self.motors.get_mut(motor.into().key()).ok_or(DETACHED)?;
+        config::set_position_loop(slot, config)
     }
 
     /// Returns what a motor offers with the loops that it was attached with; nothing once it is detached.
@@ -168,85 +338,16 @@ impl<B> Bus<B> {
     /// ```
     #[must_use]
     pub fn capabilities(&self, motor: impl Into<AnyHandle<B>>) -> Capabilities {
-        self.slot(motor.into()).map_or(Capabilities::NONE, Slot::capabilities)
+        self.motors.get(motor.into().key()).map_or(Capabilities::NONE, config::capabilities)
     }
 
-    /// Changes a motor now, and sees to what follows.
-    pub(super) fn change_at(
-        &mut self,
-        motor: AnyHandle<B>,
-        change: impl FnOnce(&mut Slot) -> Result<(), TargetError>,
-    ) -> Result<(), TargetError> {
-        self.slot(motor).ok_or(TargetError::Detached)?;
-        let changed = self.change(motor.key().place(), self.guard.updated(), change);
-        changed.unwrap_or(Err(TargetError::Detached))
-    }
-
-    #[inline]
-    fn set(
-        &mut self,
-        motor: AnyHandle<B>,
-        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
-    ) -> Result<(), TargetError> {
-        let now = self.guard.now();
-        set(self.slot_mut(motor).ok_or(TargetError::Detached)?, now)
-    }
-}
-
-/// Targets that another sensor measures: a gimbal's yaw that an IMU tells, whatever the chassis under it does.
-///
-/// **Both loops** run on the measurement: the position loop on its angle, the speed loop on its rate. The rate of the
-/// encoder is that against the base; a speed loop on it would hold the gimbal against the chassis, not in the
-/// world, and the angle would be off for as long as the chassis turns.
-///
-/// The measurement counts from its own time: older than [`Timeouts::measured`](crate::motor::Timeouts::measured) it is an
-/// error when it is set, and one that becomes so is zero output within a tick, as if the application had stopped. The
-/// feedback of the motor has to be fresh as well. Set it in each tick; between two measurements, the last one again.
-impl<B> Bus<B> {
     /// Sets the angle that the position loop goes to by another sensor, by the shortest way.
     ///
-    /// It needs no encoder that knows its angle. The example `gimbal` is a whole one.
+    /// It needs no encoder that knows its angle; see the [module](super), and the example `gimbal`.
     ///
     /// # Errors
     /// Those of every target; also for a measurement that is too old, lies ahead by as much, or is not finite: the
     /// motor then goes to its safe output at once.
-    ///
-    /// # Examples
-    /// ```
-    /// use drivetrain::control::PidConfig;
-    /// use drivetrain::dji::{Bus, Config, Gm6020Voltage};
-    /// use drivetrain::frame::CanFrame;
-    /// use drivetrain::motor::{Measured, TargetError};
-    /// use drivetrain::time::{Duration, Instant, Tick};
-    /// use drivetrain::units::{Angle, AngularVelocity};
-    ///
-    /// let angle = PidConfig::new(10.0, 0.0, 0.0); // rad/s per rad
-    /// let rate = PidConfig::new(2.0, 0.0, 0.0); // V per rad/s
-    /// let mut bus = Bus::new();
-    /// let config = Config::<Gm6020Voltage>::new(1).position_loop(angle, rate);
-    /// let yaw = bus.attach(config.with_opening(Duration::ZERO))?; // for one update
-    /// let now = Instant::from_micros(1_000);
-    /// bus.ingest(&CanFrame::standard(0x205, [0; 8]).ok_or("not an 11-bit id")?, now);
-    /// bus.arm(now)?;
-    ///
-    /// // 0.1 rad to go, and the gimbal already turns there at 0.5 rad/s in the world.
-    /// let imu = Measured {
-    ///     angle: Angle::from_radians(0.2),
-    ///     velocity: AngularVelocity::from_rad_per_s(0.5),
-    ///     at: now,
-    /// };
-    /// bus.set_angle_measured(yaw, Angle::from_radians(0.3), imu)?;
-    /// bus.update(Tick::new(now, 0.001));
-    /// let frame = bus.next_frame().ok_or("nothing to send")?;
-    /// assert_eq!(format!("{frame:?}"), "1FF [8] 04 12 00 00 00 00 00 00"); // 2 * (10 * 0.1 - 0.5) = 1 V: 1042
-    ///
-    /// let late = Instant::from_micros(30_000);
-    /// bus.ingest(&CanFrame::standard(0x205, [0; 8]).ok_or("not an 11-bit id")?, late);
-    /// bus.update(Tick::new(late, 0.001));
-    /// let refused = bus.set_angle_measured(yaw, Angle::from_radians(0.3), imu);
-    /// assert_eq!(refused, Err(TargetError::StaleMeasurement)); // 29 ms old
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn set_angle_measured(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -254,7 +355,7 @@ impl<B> Bus<B> {
         measured: Measured<Angle>,
     ) -> Result<(), TargetError> {
         let way = measured.way_to(target);
-        self.set_measured(motor.into(), way, measured.velocity, measured.at)
+        measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
     }
 
     /// Sets the multi-turn position that the position loop goes to by another sensor.
@@ -268,83 +369,36 @@ impl<B> Bus<B> {
         measured: Measured<Position>,
     ) -> Result<(), TargetError> {
         let way = measured.way_to(target);
-        self.set_measured(motor.into(), way, measured.velocity, measured.at)
+        measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
     }
 
-    fn set_measured(
-        &mut self,
-        motor: AnyHandle<B>,
-        way: Angle,
-        velocity: AngularVelocity,
-        at: Instant,
-    ) -> Result<(), TargetError> {
-        let (now, updated, timeouts) =
-            (self.guard.now(), self.guard.updated(), *self.guard.timeouts());
-        // A stamp of 32 bits alone would be fresh again every 71 minutes.
-        let is_ahead = self.guard.is_running() && at.since(updated) > LONGEST_PAUSE;
-        let is_far = is_ahead || updated.since(at) > timeouts.measured();
-        let at = (!is_far).then(|| at.stamp());
-        self.change_at(motor, |slot| {
-            slot.set_measured(way.as_radians(), velocity.as_rad_per_s(), at, now, &timeouts)
-        })?;
-        // It lasts for a shorter time than other targets.
-        self.guard.disturb();
-        Ok(())
-    }
-}
-
-impl<M: Model, B> VelocityDrive<Handle<M, B>> for Bus<B> {
-    fn velocity(&self, motor: Handle<M, B>) -> Option<AngularVelocity> {
-        self.fresh_velocity(motor.into())
-    }
-
-    fn capabilities(&self, motor: Handle<M, B>) -> Capabilities {
-        Self::capabilities(self, motor)
-    }
-
-    fn set_velocity(
-        &mut self,
+    /// Returns the current that the last update asks of a motor, as it goes on the wire; `None` once it is detached.
+    ///
+    /// The direction is that of the shaft. What the motor does about it is in [`State::current`](super::State::current).
+    #[must_use]
+    pub fn commanded_current<M: Model<Command = Current>>(
+        &self,
         motor: Handle<M, B>,
-        target: AngularVelocity,
-    ) -> Result<(), TargetError> {
-        Self::set_velocity(self, motor, target)
-    }
-}
-
-impl<B> VelocityDrive<AnyHandle<B>> for Bus<B> {
-    fn velocity(&self, motor: AnyHandle<B>) -> Option<AngularVelocity> {
-        self.fresh_velocity(motor)
+    ) -> Option<Current> {
+        let slot = self.motors.get(motor.erase().key())?;
+        Some(Current::from_amperes(slot.in_units(self.outbox.get(slot.place))))
     }
 
-    fn capabilities(&self, motor: AnyHandle<B>) -> Capabilities {
-        Self::capabilities(self, motor)
-    }
-
-    fn set_velocity(
+    /// Cuts what the last update asks of some motors, all by one factor: for a limit on several together, of power say.
+    ///
+    /// Call it after [`update`](Self::update) and before [`next_frame`](Self::next_frame); with a runner, in
+    /// [`tick_limited`](crate::runner::Runner::tick_limited). It can only take away: a factor of 1 or more changes
+    /// nothing, one that is zero, negative or NaN gives zero, and what is left is rounded towards zero. It works on the
+    /// frames alone, so stops and limits stay as they are, and each update starts anew. The integral of a speed loop that
+    /// is cut is held within what is left of its output: it does not wind up meanwhile.
+    pub fn scale_outputs(
         &mut self,
-        motor: AnyHandle<B>,
-        target: AngularVelocity,
-    ) -> Result<(), TargetError> {
-        Self::set_velocity(self, motor, target)
-    }
-}
-
-impl<M: Model, B> AngleDrive<Handle<M, B>> for Bus<B> {
-    fn angle(&self, motor: Handle<M, B>) -> Option<Angle> {
-        self.fresh_angle(motor.into())
-    }
-
-    fn set_angle(&mut self, motor: Handle<M, B>, target: Angle) -> Result<(), TargetError> {
-        Self::set_angle(self, motor, target)
-    }
-}
-
-impl<B> AngleDrive<AnyHandle<B>> for Bus<B> {
-    fn angle(&self, motor: AnyHandle<B>) -> Option<Angle> {
-        self.fresh_angle(motor)
-    }
-
-    fn set_angle(&mut self, motor: AnyHandle<B>, target: Angle) -> Result<(), TargetError> {
-        Self::set_angle(self, motor, target)
+        motors: impl IntoIterator<Item = impl Into<AnyHandle<B>>>,
+        factor: f32,
+    ) {
+        for motor in motors {
+            let motor: AnyHandle<B> = motor.into();
+            limit::scale_output(&mut self.motors, &mut self.outbox, motor.key(), factor);
+        }
     }
 }

@@ -216,6 +216,12 @@ impl Shaft {
     pub(crate) const fn near(&self, turns: Turns) -> u32 {
         const FAR: i64 = 1 << 30;
         let here = self.turns.get();
+        let (way, is_alike) = (turns.get().wrapping_sub(here), (turns.get() ^ here) >= 0);
+        // Of one sign: the difference did not overflow.
+        if is_alike && way.wrapping_add(FAR).cast_unsigned() <= 2 * FAR.cast_unsigned() {
+            return turns.low();
+        }
+        seldom();
         let way = turns.get().saturating_sub(here);
         if way > FAR {
             self.turns.add(FAR).low()

@@ -150,7 +150,7 @@ impl Watch {
         let saturated = guard.is_armed() && vitals.effort.abs() >= 1.0;
         self.saturated = self.saturated.saturating_add(u16::from(saturated));
         let (monitor, config) = (&mut self.monitor, self.config);
-        guard.look(now, |latch| monitor.look(latch, &sample, config))
+        guard.look(now, |latch| monitor.check(latch, &sample, config))
     }
 
     fn read_error(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) {

@@ -1,7 +1,8 @@
 //! Who owes an answer: by id, as an answer may come after its joint was detached.
 
-use super::bus::{SLOTS, count};
-use super::{Joint, Joints, Register};
+use super::bus::SLOTS;
+use super::counters::count;
+use super::{Joints, Register};
 use crate::time::{Duration, Instant};
 
 /// What each joint was asked for and has not answered.
@@ -55,25 +56,17 @@ impl Answers {
     }
 }
 
-impl Joints {
-    /// Returns the register that a joint was asked for and has not answered yet.
-    #[must_use]
-    pub fn awaited(&self, joint: Joint) -> Option<Register> {
-        self.slot(joint).and_then(|_| self.answers.of(joint.index()))
-    }
-
-    /// Waits no longer for what is overdue. Without a time-out all is.
-    pub(super) fn give_up(&mut self, reply_timeout: Option<Duration>) {
-        let now = self.now;
-        for (owed, slot) in self.answers.0.iter_mut().zip(&mut self.slots) {
-            let Some((register, since)) = owed.due else { continue };
-            // A clock that was set back would have it wait for long.
-            let passed = now.since(since).max(since.since(now));
-            if reply_timeout.is_none_or(|timeout| passed > timeout) {
-                *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
-                count(&mut slot.unanswered);
-                count(&mut self.counters.unanswered);
-            }
+/// Waits no longer for what is overdue. Without a time-out all is.
+pub(super) fn give_up(joints: &mut Joints, reply_timeout: Option<Duration>) {
+    let now = joints.now;
+    for (owed, slot) in joints.answers.0.iter_mut().zip(&mut joints.slots) {
+        let Some((register, since)) = owed.due else { continue };
+        // A clock that was set back would have it wait for long.
+        let passed = now.since(since).max(since.since(now));
+        if reply_timeout.is_none_or(|timeout| passed > timeout) {
+            *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
+            count(&mut slot.unanswered);
+            count(&mut joints.counters.unanswered);
         }
     }
 }

@@ -1,11 +1,13 @@
-use super::answers::Answers;
-use super::budget::Budget;
+use super::answers::{self, Answers};
+use super::budget::{Budget, limited};
+use super::counters::{Counters, count};
 use super::model::IDS;
-use super::slot::{Slot, name};
+use super::schedule;
+use super::slot::{Slot, health, name};
 use super::{AttachError, Command, Config, Joint, Reply, State};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
 use crate::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
 
@@ -78,33 +80,6 @@ pub struct Joints {
     pub(super) counters: Counters,
 }
 
-/// What was counted; saturates, but for the frames, which wrap at 2^32.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counters {
-    /// Replies that were taken.
-    pub replies: u32,
-    /// Frames with a joint's id and another length than 6.
-    pub bad_length: u32,
-    /// Frames with a joint's id that are no reply, or of a register that is not known.
-    pub bad_field: u32,
-    /// Frames with a joint's id that only a controller sends: there is a second one on the bus.
-    pub foreign_commands: u32,
-    /// Frames with the id of a joint that is not attached.
-    pub unattached: u32,
-    /// Requests that were sent, and not given back.
-    pub requests: u32,
-    /// Requests that were not answered in time, those too that were given back after that.
-    pub unanswered: u32,
-    /// Updates whose time step was zero, negative, infinite or NaN, or whose time stood still.
-    pub bad_steps: u32,
-    /// Frames that were ready: chosen by an update, or one that disables, whenever that is due; wraps.
-    pub packed: u32,
-    /// Frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
-    pub superseded: u32,
-}
-
 impl Joints {
     /// Makes a bus without joints. Feedback is late after 40 ms, as a joint of twelve is asked for its position each 12 or
     /// 24 ms; a joint is offline after 100 ms, and its target counts for 100 ms.
@@ -128,18 +103,7 @@ impl Joints {
             asked: IDS - 1,
             guard: DeviceGuard::with(Timeouts::POLLED),
             echoes: false,
-            counters: Counters {
-                replies: 0,
-                bad_length: 0,
-                bad_field: 0,
-                foreign_commands: 0,
-                unattached: 0,
-                requests: 0,
-                unanswered: 0,
-                bad_steps: 0,
-                packed: 0,
-                superseded: 0,
-            },
+            counters: Counters::NONE,
         }
     }
 
@@ -157,6 +121,48 @@ impl Joints {
         let is_long = timeout.as_micros() > LONGEST_REPLY.as_micros();
         self.reply_timeout = if is_long { LONGEST_REPLY } else { timeout };
         self
+    }
+
+    /// Sets how many joints are asked, and how many are written to, in an update; one each at first, 1 to 12.
+    ///
+    /// The fewer frames, the longer until a joint has its next turn: choose
+    /// [`Timeouts::late`](crate::motor::Timeouts::late) above three turns. More than the driver has room for only wait, and
+    /// take turns; where it has room for fewer than it is given, it must not choose by the lowest id.
+    ///
+    /// # Examples
+    /// ```
+    /// use drivetrain::snake::Joints;
+    ///
+    /// let fast = Joints::new().with_frames_per_update(2, 2);
+    /// assert_eq!(fast.load().to_string(), "51 % to 61 %"); // a bus without other motors
+    /// ```
+    #[must_use]
+    pub const fn with_frames_per_update(mut self, reads: u8, writes: u8) -> Self {
+        self.budget.reads = limited(reads);
+        self.budget.writes = limited(writes);
+        self
+    }
+
+    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 at first.
+    #[must_use]
+    pub const fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
+        self.budget.bit_rate = bits_per_s;
+        self
+    }
+
+    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 at first.
+    #[must_use]
+    pub const fn with_tick_rate(mut self, hz: u32) -> Self {
+        self.budget.tick_hz = hz;
+        self
+    }
+
+    /// Returns the load of requests, their replies, and writes, while all joints move.
+    ///
+    /// Relaxed joints take less. A stop of all joints takes 12 frames more, once. [`BusLoad::and`] adds other families.
+    #[must_use]
+    pub const fn load(&self) -> BusLoad {
+        self.budget.load()
     }
 
     /// Attaches a joint. It is disabled with the next update, or as soon as one that was there before owes no answer.
@@ -180,8 +186,8 @@ impl Joints {
     pub fn detach(&mut self, joint: Joint) {
         let Some(slot) = self.slot_mut(joint) else { return };
         slot.free();
-        self.stop(joint.index());
-        self.drop_read(joint.index());
+        schedule::stop(self, joint.index());
+        schedule::drop_read(self, joint.index());
     }
 
     /// Takes a received frame that arrived at `now`. Constant time.
@@ -209,7 +215,7 @@ impl Joints {
                     return Ingest::Unrelated;
                 }
                 count(&mut counters.foreign_commands);
-                slot.hear_rival(now);
+                health::hear_rival(slot, now);
             }
             None => count(match frame.length() {
                 6 => &mut counters.bad_field,
@@ -236,15 +242,15 @@ impl Joints {
         }
         self.guard.run();
         self.now = tick.now();
-        self.give_up(Some(self.reply_timeout));
+        answers::give_up(self, Some(self.reply_timeout));
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index) else { continue };
             if slot.id.is_some() && slot.update(tick.now()) {
-                self.stop(index);
+                schedule::stop(self, index);
             }
         }
         self.remind();
-        self.plan();
+        schedule::plan(self);
     }
 
     /// Relaxes every joint until it is armed again: where time did not move on, no age is known.
@@ -272,16 +278,16 @@ impl Joints {
         // A clock that stands or went back does not tell when an answer is overdue: then an update counts for a millisecond.
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
-        self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
+        answers::give_up(self, (!(stands && is_long)).then_some(self.reply_timeout));
         self.remind();
-        self.stop_again();
+        schedule::stop_again(self);
     }
 
     fn remind(&mut self) {
         for index in 0..SLOTS {
             let slot = self.slots.get(index).filter(|slot| slot.id.is_some());
             if slot.is_some_and(|slot| slot.wants_reminder(self.now)) {
-                self.stop(index);
+                schedule::stop(self, index);
             }
         }
     }
@@ -298,8 +304,18 @@ impl Joints {
     /// which would see nothing then.
     pub(super) fn let_go(&mut self, index: usize) {
         if self.slots.get_mut(index).is_some_and(Slot::let_go) {
-            self.stop(index);
+            schedule::stop(self, index);
         }
+    }
+
+    /// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
+    pub fn next_frame(&mut self) -> Option<CanFrame> {
+        schedule::next_frame(self)
+    }
+
+    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+    pub fn requeue(&mut self, frame: &CanFrame) -> bool {
+        schedule::requeue(self, frame)
     }
 
     /// Returns what is known of a joint; `None` before its first position, and once it is detached.
@@ -340,14 +356,4 @@ impl Joints {
     pub(super) fn slot_mut(&mut self, joint: Joint) -> Option<&mut Slot> {
         self.slots.get_mut(joint.index()).filter(|slot| slot.matches(joint))
     }
-}
-
-impl Default for Joints {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-pub(super) const fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
 }

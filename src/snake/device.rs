@@ -1,6 +1,7 @@
 //! The joints as a device of the runner.
 
-use super::{Joints, slot::Slot};
+use super::slot::{Slot, health};
+use super::{Joints, schedule};
 use crate::frame::CanFrame;
 use crate::motor::{
     CanDevice, Claim, Devices, Edge, Guard, Ingest, MotorName, Role, Visitor, WrongSetting,
@@ -54,7 +55,7 @@ impl CanDevice for Joints {
     }
 
     fn second_master(&self) -> Option<Claim> {
-        let slot = self.slots.iter().find(|slot| slot.has_rival())?;
+        let slot = self.slots.iter().find(|slot| health::has_rival(slot))?;
         let id = StandardId::new(u16::from(slot.id?))?;
         Some(Claim::new(id, Role::Command, slot.name()?))
     }
@@ -81,11 +82,11 @@ impl CanDevice for Joints {
     }
 
     fn disarm(&mut self) {
-        self.rest_all(Guard::disarm);
+        rest_all(self, Guard::disarm);
     }
 
     fn trip(&mut self) {
-        self.rest_all(Guard::trip);
+        rest_all(self, Guard::trip);
     }
 
     fn is_armed(&self) -> bool {
@@ -95,8 +96,8 @@ impl CanDevice for Joints {
 
     fn emergency_stop(&mut self) {
         if self.guard.stop() {
-            self.rest_all(Guard::emergency_stop);
-            self.stop_all();
+            rest_all(self, Guard::emergency_stop);
+            schedule::stop_all(self);
         }
     }
 
@@ -117,20 +118,24 @@ impl Devices for Joints {
     }
 }
 
-impl Joints {
-    /// Relaxes every joint.
-    fn rest_all(&mut self, rest: impl Fn(&mut Guard)) {
-        for index in 0..self.slots.len() {
-            let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
-                continue;
-            };
-            let was_armed = slot.guard.is_armed();
-            rest(&mut slot.guard);
-            _ = slot.let_go();
-            // A program may disarm in each tick: a joint that knows of it already is only reminded.
-            if was_armed || !slot.is_told() {
-                self.stop(index);
-            }
+/// Relaxes every joint.
+fn rest_all(joints: &mut Joints, rest: impl Fn(&mut Guard)) {
+    for index in 0..joints.slots.len() {
+        let Some(slot) = joints.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
+            continue;
+        };
+        let was_armed = slot.guard.is_armed();
+        rest(&mut slot.guard);
+        _ = slot.let_go();
+        // A program may disarm in each tick: a joint that knows of it already is only reminded.
+        if was_armed || !slot.is_told() {
+            schedule::stop(joints, index);
         }
+    }
+}
+
+impl Default for Joints {
+    fn default() -> Self {
+        Self::new()
     }
 }

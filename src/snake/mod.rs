@@ -86,11 +86,11 @@ mod budget;
 mod bus;
 mod command;
 mod config;
+mod counters;
 mod device;
 mod error;
 mod feedback;
 mod handle;
-mod health;
 mod model;
 mod offset;
 mod schedule;
@@ -100,9 +100,10 @@ mod targets;
 #[cfg(test)]
 mod tests;
 
-pub use bus::{Counters, Joints};
+pub use bus::Joints;
 pub use command::Command;
 pub use config::Config;
+pub use counters::Counters;
 pub use error::AttachError;
 pub use feedback::Reply;
 pub use handle::Joint;

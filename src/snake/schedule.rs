@@ -1,181 +1,179 @@
-//! Who is written to and asked next.
+//! Which joint is disabled, written to and asked next.
 
-use super::bus::count;
+use super::counters::count;
 use super::model::IDS;
 use super::{Command, Joints};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
 
-impl Joints {
-    /// Chooses the frames of this update: what was left or given back, then those whose turn it is.
-    pub(super) fn plan(&mut self) {
-        self.stop_again();
-        let (_, writes, reads) = core::mem::take(&mut self.returned);
-        self.drop_frames(self.writes.count_ones() + self.reads.count_ones());
-        self.writes |= writes;
-        self.reads |= reads;
-        // What had no room goes first, and where both had none, they take turns: neither starves the other.
-        self.reads_first = self.reads != 0 && !(self.writes != 0 && self.reads_first);
-        // Whoever owes an answer is in nobody's way.
-        let quiet = self.answers.owing();
-        // Who has news goes before who only hears the old again.
-        for news in [true, false] {
-            for index in turns(self.last_write) {
-                if (self.writes & !quiet).count_ones() >= u32::from(self.budget.writes) {
-                    break;
-                }
-                let Some(slot) = self.slots.get(usize::from(index)) else { continue };
-                let free = self.is_free(index) && self.writes & 1 << index == 0;
-                let wants = if news { slot.has_news() } else { slot.is_driven() };
-                if free && wants {
-                    self.writes |= 1 << index;
-                    self.last_write = index;
-                }
-            }
-        }
-        for index in turns(self.last_read) {
-            if (self.reads & !quiet).count_ones() >= u32::from(self.budget.reads) {
+/// Chooses the frames of this update: what was left or given back, then those whose turn it is.
+pub(super) fn plan(joints: &mut Joints) {
+    stop_again(joints);
+    let (_, writes, reads) = core::mem::take(&mut joints.returned);
+    drop_frames(joints, joints.writes.count_ones() + joints.reads.count_ones());
+    joints.writes |= writes;
+    joints.reads |= reads;
+    // What had no room goes first, and where both had none, they take turns: neither starves the other.
+    joints.reads_first = joints.reads != 0 && !(joints.writes != 0 && joints.reads_first);
+    // Whoever owes an answer is in nobody's way.
+    let quiet = joints.answers.owing();
+    // Who has news goes before who only hears the old again.
+    for news in [true, false] {
+        for index in turns(joints.last_write) {
+            if (joints.writes & !quiet).count_ones() >= u32::from(joints.budget.writes) {
                 break;
             }
-            if self.is_free(index) && self.reads & 1 << index == 0 {
-                self.reads |= 1 << index;
-                self.last_read = index;
-            }
-        }
-        self.pack(self.writes.count_ones() + self.reads.count_ones());
-    }
-
-    /// Has the joints whose disable was given back disabled now.
-    pub(super) fn stop_again(&mut self) {
-        let stops = core::mem::take(&mut self.returned.0);
-        self.pack((stops & !self.stops).count_ones());
-        self.stops |= stops;
-    }
-
-    const fn pack(&mut self, frames: u32) {
-        self.counters.packed = self.counters.packed.wrapping_add(frames);
-    }
-
-    const fn drop_frames(&mut self, frames: u32) {
-        self.counters.superseded = self.counters.superseded.wrapping_add(frames);
-    }
-
-    /// Tells whether a joint is there and owes no answer.
-    fn is_free(&self, index: u8) -> bool {
-        let slot = self.slots.get(usize::from(index));
-        slot.is_some_and(|slot| slot.id.is_some()) && self.answers.of(index.into()).is_none()
-    }
-
-    /// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
-    pub fn next_frame(&mut self) -> Option<CanFrame> {
-        let now = self.now;
-        let quiet = self.answers.owing();
-        if let Some(index) = next_after(self.told, self.stops & !quiet) {
-            self.stops &= !(1 << index);
-            self.told = index;
-            if let Some(slot) = self.slots.get_mut(usize::from(index)) {
-                slot.told_to_relax(now);
-            }
-            return Command::DISABLE.frame(index + 1);
-        }
-        let write = next_after(self.written, self.writes & !quiet);
-        // An update without a step does not know how long an answer is waited for.
-        let reads = if self.guard.held_steps() == 0 { self.reads & !quiet } else { 0 };
-        let read = next_after(self.asked, reads);
-        match (write, read) {
-            (Some(index), None) => self.write(index),
-            (Some(index), Some(_)) if !self.reads_first => self.write(index),
-            (_, Some(index)) => {
-                self.reads &= !(1 << index);
-                self.asked = index;
-                count(&mut self.counters.requests);
-                let register = self.slots.get_mut(usize::from(index))?.next_read();
-                self.answers.expect(index.into(), register, now);
-                Command::Read(register).frame(index + 1)
-            }
-            (None, None) => None,
-        }
-    }
-
-    fn write(&mut self, index: u8) -> Option<CanFrame> {
-        self.writes &= !(1 << index);
-        self.written = index;
-        self.slots.get_mut(usize::from(index))?.next_write(self.now).frame(index + 1)
-    }
-
-    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
-    pub fn requeue(&mut self, frame: &CanFrame) -> bool {
-        let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
-        let Some(slot) = self.slots.get_mut(usize::from(index)) else { return false };
-        let Some(command) = Command::decode(frame.data()) else { return false };
-        if !slot.was_ever_attached() {
-            return false;
-        }
-        let (bit, attached) = (1 << index, slot.id.is_some());
-        if let Command::Read(register) = command {
-            self.counters.requests = self.counters.requests.saturating_sub(1);
-            if self.answers.take_back(index.into(), register) {
-                slot.take_back_question();
-            }
-        }
-        let (stops, writes, reads) = &mut self.returned;
-        // The first that comes back is the next of its kind.
-        let (returned, last) = match command {
-            Command::DISABLE => {
-                slot.told_to_relax(self.now);
-                (stops, &mut self.told)
-            }
-            _ if !attached => {
-                self.drop_frames(1);
-                return true;
-            }
-            Command::Write(register, _) => {
-                slot.take_back(register);
-                (writes, &mut self.written)
-            }
-            Command::Read(_) => (reads, &mut self.asked),
-        };
-        if *returned == 0 {
-            *last = (index + IDS - 1) % IDS;
-        }
-        *returned |= bit;
-        if command == Command::DISABLE {
-            self.drop_write(bit);
-        }
-        self.drop_frames(1);
-        true
-    }
-
-    /// Has a joint disabled before all else.
-    pub(super) const fn stop(&mut self, index: usize) {
-        let bit = 1 << index;
-        self.pack((bit & !self.stops).count_ones());
-        self.stops |= bit;
-        self.drop_write(bit);
-    }
-
-    pub(super) fn stop_all(&mut self) {
-        for index in 0..self.slots.len() {
-            if self.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
-                self.stop(index);
+            let Some(slot) = joints.slots.get(usize::from(index)) else { continue };
+            let free = is_free(joints, index) && joints.writes & 1 << index == 0;
+            let wants = if news { slot.has_news() } else { slot.is_driven() };
+            if free && wants {
+                joints.writes |= 1 << index;
+                joints.last_write = index;
             }
         }
     }
-
-    /// What is to be disabled is written nothing else before.
-    const fn drop_write(&mut self, bit: u16) {
-        self.drop_frames((self.writes & bit).count_ones());
-        self.writes &= !bit;
-        self.returned.1 &= !bit;
+    for index in turns(joints.last_read) {
+        if (joints.reads & !quiet).count_ones() >= u32::from(joints.budget.reads) {
+            break;
+        }
+        if is_free(joints, index) && joints.reads & 1 << index == 0 {
+            joints.reads |= 1 << index;
+            joints.last_read = index;
+        }
     }
+    pack(joints, joints.writes.count_ones() + joints.reads.count_ones());
+}
 
-    /// Asks a joint that is detached nothing more.
-    pub(super) const fn drop_read(&mut self, index: usize) {
-        let bit = 1 << index;
-        self.drop_frames((self.reads & bit).count_ones());
-        self.reads &= !bit;
-        self.returned.2 &= !bit;
+/// Has the joints whose disable was given back disabled now.
+pub(super) fn stop_again(joints: &mut Joints) {
+    let stops = core::mem::take(&mut joints.returned.0);
+    pack(joints, (stops & !joints.stops).count_ones());
+    joints.stops |= stops;
+}
+
+const fn pack(joints: &mut Joints, frames: u32) {
+    joints.counters.packed = joints.counters.packed.wrapping_add(frames);
+}
+
+const fn drop_frames(joints: &mut Joints, frames: u32) {
+    joints.counters.superseded = joints.counters.superseded.wrapping_add(frames);
+}
+
+/// Tells whether a joint is there and owes no answer.
+fn is_free(joints: &Joints, index: u8) -> bool {
+    let slot = joints.slots.get(usize::from(index));
+    slot.is_some_and(|slot| slot.id.is_some()) && joints.answers.of(index.into()).is_none()
+}
+
+/// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
+pub(super) fn next_frame(joints: &mut Joints) -> Option<CanFrame> {
+    let now = joints.now;
+    let quiet = joints.answers.owing();
+    if let Some(index) = next_after(joints.told, joints.stops & !quiet) {
+        joints.stops &= !(1 << index);
+        joints.told = index;
+        if let Some(slot) = joints.slots.get_mut(usize::from(index)) {
+            slot.told_to_relax(now);
+        }
+        return Command::DISABLE.frame(index + 1);
     }
+    let write = next_after(joints.written, joints.writes & !quiet);
+    // An update without a step does not know how long an answer is waited for.
+    let reads = if joints.guard.held_steps() == 0 { joints.reads & !quiet } else { 0 };
+    let read = next_after(joints.asked, reads);
+    match (write, read) {
+        (Some(index), None) => write_next(joints, index),
+        (Some(index), Some(_)) if !joints.reads_first => write_next(joints, index),
+        (_, Some(index)) => {
+            joints.reads &= !(1 << index);
+            joints.asked = index;
+            count(&mut joints.counters.requests);
+            let register = joints.slots.get_mut(usize::from(index))?.next_read();
+            joints.answers.expect(index.into(), register, now);
+            Command::Read(register).frame(index + 1)
+        }
+        (None, None) => None,
+    }
+}
+
+fn write_next(joints: &mut Joints, index: u8) -> Option<CanFrame> {
+    joints.writes &= !(1 << index);
+    joints.written = index;
+    joints.slots.get_mut(usize::from(index))?.next_write(joints.now).frame(index + 1)
+}
+
+/// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+pub(super) fn requeue(joints: &mut Joints, frame: &CanFrame) -> bool {
+    let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
+    let Some(slot) = joints.slots.get_mut(usize::from(index)) else { return false };
+    let Some(command) = Command::decode(frame.data()) else { return false };
+    if !slot.was_ever_attached() {
+        return false;
+    }
+    let (bit, attached) = (1 << index, slot.id.is_some());
+    if let Command::Read(register) = command {
+        joints.counters.requests = joints.counters.requests.saturating_sub(1);
+        if joints.answers.take_back(index.into(), register) {
+            slot.take_back_question();
+        }
+    }
+    let (stops, writes, reads) = &mut joints.returned;
+    // The first that comes back is the next of its kind.
+    let (returned, last) = match command {
+        Command::DISABLE => {
+            slot.told_to_relax(joints.now);
+            (stops, &mut joints.told)
+        }
+        _ if !attached => {
+            drop_frames(joints, 1);
+            return true;
+        }
+        Command::Write(register, _) => {
+            slot.take_back(register);
+            (writes, &mut joints.written)
+        }
+        Command::Read(_) => (reads, &mut joints.asked),
+    };
+    if *returned == 0 {
+        *last = (index + IDS - 1) % IDS;
+    }
+    *returned |= bit;
+    if command == Command::DISABLE {
+        drop_write(joints, bit);
+    }
+    drop_frames(joints, 1);
+    true
+}
+
+/// Has a joint disabled before all else.
+pub(super) const fn stop(joints: &mut Joints, index: usize) {
+    let bit = 1 << index;
+    pack(joints, (bit & !joints.stops).count_ones());
+    joints.stops |= bit;
+    drop_write(joints, bit);
+}
+
+pub(super) fn stop_all(joints: &mut Joints) {
+    for index in 0..joints.slots.len() {
+        if joints.slots.get(index).is_some_and(|slot| slot.id.is_some()) {
+            stop(joints, index);
+        }
+    }
+}
+
+/// What is to be disabled is written nothing else before.
+const fn drop_write(joints: &mut Joints, bit: u16) {
+    drop_frames(joints, (joints.writes & bit).count_ones());
+    joints.writes &= !bit;
+    joints.returned.1 &= !bit;
+}
+
+/// Asks a joint that is detached nothing more.
+pub(super) const fn drop_read(joints: &mut Joints, index: usize) {
+    let bit = 1 << index;
+    drop_frames(joints, (joints.reads & bit).count_ones());
+    joints.reads &= !bit;
+    joints.returned.2 &= !bit;
 }
 
 /// All joints, beginning with the one after `last`.

@@ -1,6 +1,6 @@
 //! One joint: replies in, the next frame for it out.
 
-mod health;
+pub(super) mod health;
 mod writing;
 
 use super::config::Settings;
@@ -153,7 +153,7 @@ impl Slot {
         match reply.register() {
             Register::ActualPosition => self.receive_position(reply.value(), now),
             Register::ActualSpeed => self.raw_speed = reply.value(),
-            Register::Enable if self.is_up() && reply.value() == 0 => {
+            Register::Enable if health::is_up(self) && reply.value() == 0 => {
                 self.resets = self.resets.saturating_add(1);
                 self.distrust(now);
             }
@@ -175,7 +175,7 @@ impl Slot {
                 self.distrust(now);
             }
         }
-        self.count_position(now);
+        health::count_position(self, now);
         self.raw = Some(raw);
         self.heard = now;
         self.guard.hear(now);
@@ -208,7 +208,7 @@ impl Slot {
         if self.guard.link() == Link::Offline {
             self.lose_zero(now);
         }
-        self.look(now);
+        health::check(self, now);
         // What was seen may have relaxed it.
         let drives = drives && self.guard.is_armed();
         let stops = self.driven && !drives;

@@ -26,8 +26,8 @@ pub fn call_all() {
     Guard::next_edge.call();
     Guard::relax_until_armed.call();
     Config::<M3508>::with_health.call();
-    Bus::<()>::with_loopback.call();
-    Bus::<()>::next_edge.call();
+    Bus::<(), 2>::with_loopback.call();
+    Bus::<(), 2>::next_edge.call();
     (|bus: &Bus, motor: AnyHandle| Bus::health(bus, motor)).call();
     (|bus: &Bus, motor: AnyHandle| Bus::conditions(bus, motor)).call();
 }

@@ -357,7 +357,7 @@ pub fn sizes() {
         };
     }
     sizes!(
-        "Bus" Bus, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
+        "Bus" Bus, "Bus8" Bus<(), 8>, "Bus1" Bus<(), 1>, "Config" Config<M3508>, "Handle" Handle<M3508>, "State" State, "Feedback" Feedback,
         "Pid" Pid, "PidConfig" PidConfig,
         "Shaft" Shaft, "Mecanum" Mecanum, "Transform2" Place2, "Transform3" Place3, "Position" Position, "CanFrame" CanFrame, "Instant" Instant, "Tick" Tick,
     );

@@ -40,8 +40,6 @@ pub(super) struct Parameters {
     /// Equal to the former for an integral separation.
     pub(super) no_rate_above: f32,
     pub(super) dead_band: f32,
-    pub(super) static_gain: f32,
-    pub(super) velocity_gain: f32,
     pub(super) slew_per_s: f32,
     pub(super) derivative_time_s: f32,
     /// Of back-calculation. Zero for conditional integration, [`PidConfig::OFF`] without anti-windup: nothing is drained.
@@ -81,7 +79,9 @@ pub(super) struct Parameters {
 pub struct PidConfig {
     pub(super) parameters: Parameters,
     pub(super) integral_limit: f32,
-    /// Zero without a limit.
+    pub(super) static_gain: f32,
+    pub(super) velocity_gain: f32,
+    /// Zero without one.
     pub(super) period: f32,
     /// Zero without tracking.
     pub(super) tracking_r: f32,
@@ -107,8 +107,6 @@ impl PidConfig {
             full_rate_below: Self::OFF,
             no_rate_above: Self::OFF,
             dead_band: 0.0,
-            static_gain: 0.0,
-            velocity_gain: 0.0,
             slew_per_s: Self::OFF,
             derivative_time_s: 0.0,
             drain_time_s: 0.0,
@@ -116,6 +114,8 @@ impl PidConfig {
         Self {
             parameters,
             integral_limit: Self::OFF,
+            static_gain: 0.0,
+            velocity_gain: 0.0,
             period: 0.0,
             tracking_r: 0.0,
             derivative_on_error: false,
@@ -200,8 +200,8 @@ impl PidConfig {
     /// removed from the error by rounding counts as zero. A step with a given error has no feed-forward.
     #[must_use]
     pub const fn with_feed_forward(mut self, static_gain: f32, velocity_gain: f32) -> Self {
-        self.parameters.static_gain = static_gain;
-        self.parameters.velocity_gain = velocity_gain;
+        self.static_gain = static_gain;
+        self.velocity_gain = velocity_gain;
         self
     }
 
@@ -335,8 +335,8 @@ impl PidConfig {
             check!(ordered("variable_integral", p.full_rate_below, p.no_rate_above));
         }
         check!(not_negative("dead_band", p.dead_band));
-        check!(not_negative("static_gain", p.static_gain));
-        check!(not_negative("velocity_gain", p.velocity_gain));
+        check!(not_negative("static_gain", self.static_gain));
+        check!(not_negative("velocity_gain", self.velocity_gain));
         check!(positive("slew_limit", p.slew_per_s));
         check!(off_or_positive("period", self.period));
         check!(off_or_positive("derivative_filter", p.derivative_time_s));
@@ -357,7 +357,7 @@ impl PidConfig {
         set(ASYMMETRIC, p.output_lower + p.output_upper != 0.0)
             | set(INTEGRAL_WEIGHT, p.no_rate_above < OFF)
             | set(DEAD_BAND, p.dead_band > 0.0)
-            | set(FEED_FORWARD, p.static_gain > 0.0 || p.velocity_gain > 0.0)
+            | set(FEED_FORWARD, self.static_gain > 0.0 || self.velocity_gain > 0.0)
             | set(SLEW_LIMIT, p.slew_per_s < OFF)
             | set(PERIOD, self.period > 0.0)
             | set(DERIVATIVE_FILTER, p.derivative_time_s > 0.0)

@@ -1,7 +1,7 @@
 use super::config::{
-    DERIVATIVE_ON_ERROR, INCREMENTAL, NOT_PLAIN, Parameters, PidConfig, REST_DERIVATIVE,
-    TRACK_OUTPUT, TRACKING,
+    DERIVATIVE_ON_ERROR, INCREMENTAL, PidConfig, REST_DERIVATIVE, TRACK_OUTPUT, TRACKING,
 };
+use super::error_pid::ErrorPid;
 use super::law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 use crate::control::error::{check, gains};
 use crate::control::number::{finite, limited};
@@ -72,29 +72,20 @@ use crate::error::ConfigError;
 /// Takes 92 bytes on a Cortex-M4F (`docs/figures.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-// The values written by each step stand first, next to the values that it reads.
 #[repr(C)]
 pub struct Pid {
-    pub(super) output: f32,
+    pub(super) core: ErrorPid,
     pub(super) measurement: f32,
-    pub(super) error: f32,
-    pub(super) rate: f32,
-    pub(super) integral: f32,
-    /// Of the integral; closed unless the controller is plain.
-    pub(super) integral_gate: u32,
-    /// Of the output; of the integral too unless the controller is plain.
-    pub(super) output_gate: u32,
     /// Of half the period; or the bits of the speed of tracking.
     pub(super) way_gate: u32,
-    pub(super) parameters: Parameters,
-    /// Of the tracked setpoint.
+    /// Of the setpoint that is followed.
     pub(super) tracking_rate: f32,
-    pub(super) options: u16,
-    pub(super) rejected: u16,
+    static_gain: f32,
+    velocity_gain: f32,
 }
 
 #[cfg(target_pointer_width = "32")]
-const _: () = assert!(size_of::<Pid>() <= 92, "two for each motor of a bus");
+const _: () = assert!(size_of::<Pid>() <= 92, "one for each motor of a bus");
 
 /// The parts of the last output, in its unit.
 ///
@@ -121,30 +112,32 @@ impl Pid {
     /// Names the parameter that is NaN, infinite, negative, zero where zero is invalid, or reversed.
     pub const fn new(config: PidConfig) -> Result<Self, ConfigError> {
         check!(config.validate());
-        let mut pid = Self {
-            output: 0.0,
-            measurement: UNKNOWN,
-            error: UNKNOWN,
-            rate: 0.0,
-            integral: 0.0,
-            integral_gate: CLOSED,
-            output_gate: CLOSED,
-            way_gate: CLOSED,
-            parameters: config.parameters,
-            tracking_rate: 0.0,
-            options: 0,
-            rejected: 0,
-        };
+        let mut pid = Self::of_error(ErrorPid::new(config.parameters));
         pid.store(&config);
         Ok(pid)
     }
 
+    /// Adds what a controller knows of its setpoint: nothing yet.
+    pub(super) const fn of_error(core: ErrorPid) -> Self {
+        Self {
+            core,
+            measurement: UNKNOWN,
+            way_gate: CLOSED,
+            tracking_rate: 0.0,
+            static_gain: 0.0,
+            velocity_gain: 0.0,
+        }
+    }
+
+    /// Returns the part for errors that are formed elsewhere.
+    pub(crate) const fn core(&self) -> &ErrorPid {
+        &self.core
+    }
+
     /// Forgets everything but the configuration and the count of rejected steps: the next call is a first call.
     pub const fn reset(&mut self) {
-        self.interrupt();
-        self.integral = 0.0;
-        self.output = 0.0;
-        self.options &= !TRACK_OUTPUT;
+        self.forget_setpoint();
+        self.core.reset();
     }
 
     /// Keeps the integral, and forgets the values from which the next step would integrate, differentiate and track: for
@@ -164,11 +157,13 @@ impl Pid {
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     pub const fn interrupt(&mut self) {
-        self.error = UNKNOWN;
+        self.forget_setpoint();
+        self.core.interrupt();
+    }
+
+    const fn forget_setpoint(&mut self) {
         self.measurement = UNKNOWN;
-        self.rate = 0.0;
         self.tracking_rate = 0.0;
-        self.set_options(self.options & !REST_DERIVATIVE);
     }
 
     /// Resets, and lets the first call return `output`, within the limits, for any error: to take over from another
@@ -177,9 +172,8 @@ impl Pid {
     /// The memory carries the difference to P, as far as its limit reaches. In the positional form with `ki` zero there is no
     /// memory, and `output` is only the start of a slew limit. NaN and infinity count as zero.
     pub const fn reset_to(&mut self, output: f32) {
-        self.reset();
-        self.output = self.within_output_range(if output.is_finite() { output } else { 0.0 });
-        self.options |= TRACK_OUTPUT;
+        self.forget_setpoint();
+        self.core.reset_to(output);
     }
 
     /// Changes the gains without a jump of P: the memory takes up the difference.
@@ -210,16 +204,16 @@ impl Pid {
     /// Returns the parts of the last output.
     #[must_use]
     pub fn terms(&self) -> Terms {
-        let parameters = &self.parameters;
-        let is_known = self.error != UNKNOWN;
+        let parameters = &self.core.parameters;
+        let is_known = self.core.error != UNKNOWN;
         let is_measured = is_known && self.measurement != UNKNOWN;
-        let counts = is_known && self.error.abs() >= parameters.dead_band;
+        let counts = is_known && self.core.error.abs() >= parameters.dead_band;
         Terms {
-            p: parameters.kp * if counts { self.error } else { 0.0 },
-            i: self.integral,
-            d: -(parameters.kd * self.rate),
+            p: parameters.kp * if counts { self.core.error } else { 0.0 },
+            i: self.core.integral,
+            d: -(parameters.kd * self.core.rate),
             feed_forward: if is_measured {
-                self.feed_forward(self.measurement, self.error)
+                self.feed_forward(self.measurement, self.core.error)
             } else {
                 0.0
             },
@@ -229,20 +223,22 @@ impl Pid {
     /// Returns the last output; before the first call zero, or the value given to [`reset_to`](Self::reset_to).
     #[must_use]
     pub const fn output(&self) -> f32 {
-        self.output
+        self.core.output
     }
 
     /// Returns the configuration.
     #[must_use]
     pub const fn config(&self) -> PidConfig {
-        let tracks = self.options & TRACKING != 0;
+        let tracks = self.core.options & TRACKING != 0;
         PidConfig {
-            parameters: self.parameters,
-            integral_limit: limit_of(self.integral_limit_gate()),
+            parameters: self.core.parameters,
+            integral_limit: limit_of(self.core.integral_limit_gate()),
+            static_gain: self.static_gain,
+            velocity_gain: self.velocity_gain,
             period: if tracks { 0.0 } else { self.period() },
             tracking_r: if tracks { self.tracking_r() } else { 0.0 },
-            derivative_on_error: self.options & DERIVATIVE_ON_ERROR != 0,
-            incremental: self.options & INCREMENTAL != 0,
+            derivative_on_error: self.core.options & DERIVATIVE_ON_ERROR != 0,
+            incremental: self.core.options & INCREMENTAL != 0,
         }
     }
 
@@ -250,12 +246,12 @@ impl Pid {
     /// integrated; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.core.rejected
     }
 
     /// Returns whether the plain step knows all options in use: gains, integral limit, one output limit.
     pub(crate) const fn is_plain(&self) -> bool {
-        self.options & NOT_PLAIN == 0
+        self.core.is_plain()
     }
 
     /// Takes the part of the last output passed by a limit beyond this loop, and keeps the integral within its size: a
@@ -267,22 +263,17 @@ impl Pid {
 
     /// Keeps the integral within a range of the output around zero.
     pub(crate) const fn keep_integral_between(&mut self, lowest: f32, highest: f32) {
-        self.integral = limited(self.integral, lowest, highest);
+        self.core.integral = limited(self.core.integral, lowest, highest);
     }
 
     /// Returns `value` within the output limits.
     pub(in crate::control) const fn within_output_range(&self, value: f32) -> f32 {
-        limited(value, self.parameters.output_lower, self.parameters.output_upper)
+        self.core.within_output_range(value)
     }
 
     /// Returns whether the memory may hold a value.
     pub(super) const fn has_memory(&self) -> bool {
-        self.parameters.ki > 0.0 || self.options & INCREMENTAL != 0
-    }
-
-    #[inline]
-    pub(super) const fn integral_limit_gate(&self) -> u32 {
-        if self.integral_gate != CLOSED { self.integral_gate } else { self.output_gate }
+        self.core.parameters.ki > 0.0 || self.core.options & INCREMENTAL != 0
     }
 
     /// Returns the period of a controller without tracking.
@@ -300,11 +291,11 @@ impl Pid {
     #[inline]
     pub(super) const fn feed_forward(&self, measurement: f32, error: f32) -> f32 {
         let setpoint = measurement + error;
-        let moving = self.parameters.velocity_gain * setpoint;
+        let moving = self.velocity_gain * setpoint;
         if setpoint > 0.0 {
-            moving + self.parameters.static_gain
+            moving + self.static_gain
         } else if setpoint < 0.0 {
-            moving - self.parameters.static_gain
+            moving - self.static_gain
         } else {
             moving
         }
@@ -313,45 +304,36 @@ impl Pid {
     /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel
     /// spans more than one step.
     pub(in crate::control) const fn refuse(&mut self, rests: bool) -> f32 {
-        self.rejected = self.rejected.saturating_add(1);
+        self.core.rejected = self.core.rejected.saturating_add(1);
         if rests {
             self.rest_derivative();
         }
-        self.output
+        self.core.output
     }
 
     pub(in crate::control) const fn rest_derivative(&mut self) {
-        self.set_options(self.options | REST_DERIVATIVE);
+        self.core.set_options(self.core.options | REST_DERIVATIVE);
     }
 
     /// Stores a validated configuration.
     const fn store(&mut self, config: &PidConfig) {
-        self.parameters = config.parameters;
+        self.core.parameters = config.parameters;
+        (self.static_gain, self.velocity_gain) = (config.static_gain, config.velocity_gain);
         let tracks = config.tracking_r > 0.0;
         let half_period = open_gate(0.5 * config.period);
         self.way_gate = if tracks { config.tracking_r.to_bits() } else { half_period };
-        (self.integral_gate, self.output_gate) = (CLOSED, gate(config.integral_limit));
-        let state = self.options & (REST_DERIVATIVE | TRACK_OUTPUT);
-        self.set_options(config.options() | state);
-    }
-
-    /// Opens or closes the plain step.
-    pub(super) const fn set_options(&mut self, options: u16) {
-        let limit = self.integral_limit_gate();
-        let is_plain = options & (NOT_PLAIN | REST_DERIVATIVE) == 0;
-        let upper = gate(self.parameters.output_upper);
-        (self.integral_gate, self.output_gate) =
-            if is_plain { (limit, upper) } else { (CLOSED, limit) };
-        self.options = options;
+        (self.core.integral_gate, self.core.output_gate) = (CLOSED, gate(config.integral_limit));
+        let state = self.core.options & (REST_DERIVATIVE | TRACK_OUTPUT);
+        self.core.set_options(config.options() | state);
     }
 
     fn change(&mut self, config: &PidConfig) {
-        let (lower, upper) = (self.parameters.output_lower, self.parameters.output_upper);
+        let (lower, upper) = (self.core.parameters.output_lower, self.core.parameters.output_upper);
         let before = self.terms();
         self.store(config);
         let after = self.terms();
         if !self.has_memory() {
-            self.integral = 0.0;
+            self.core.integral = 0.0;
             return;
         }
         let mut change = before.p - after.p + (before.feed_forward - after.feed_forward);
@@ -366,7 +348,7 @@ impl Pid {
             change = (lower - follows).min(0.0);
         }
         let limit = config.integral_limit;
-        self.integral = limited(finite(self.integral + change), -limit, limit);
+        self.core.integral = limited(finite(self.core.integral + change), -limit, limit);
     }
 }
 
@@ -383,6 +365,11 @@ mod tests {
 
     fn pid(config: PidConfig) -> Pid {
         Pid::new(config).unwrap()
+    }
+
+    fn with_core(mut pid: Pid, change: impl FnOnce(&mut ErrorPid)) -> Pid {
+        change(&mut pid.core);
+        pid
     }
 
     fn every_option() -> PidConfig {
@@ -420,7 +407,7 @@ mod tests {
             {
                 assert_eq!(pid.step(9.0, 2.0, &TimeStep::of(dt_s)), before.output());
                 assert_eq!(usize::from(pid.rejected()), refused + 1);
-                assert_eq!(Pid { rejected: 0, ..pid }, before);
+                assert_eq!(with_core(pid, |core| core.rejected = 0), before);
             }
         }
     }
@@ -491,7 +478,10 @@ mod tests {
                     assert_eq!(hit.step(1.0, measurement, &TimeStep::of(DT_S)), expected);
                 }
                 assert_eq!(hit.rejected(), 40);
-                assert_eq!(Pid { rejected: 0, rate: clean.rate, ..hit }, clean);
+                assert_eq!(
+                    with_core(hit, |core| (core.rejected, core.rate) = (0, clean.core.rate)),
+                    clean
+                );
             }
         }
     }
@@ -521,8 +511,8 @@ mod tests {
             assert_eq!(pid.config(), config);
             let fresh = Pid::new(config).unwrap();
             assert_eq!(
-                (pid.integral_gate, pid.output_gate),
-                (fresh.integral_gate, fresh.output_gate)
+                (pid.core.integral_gate, pid.core.output_gate),
+                (fresh.core.integral_gate, fresh.core.output_gate)
             ); // back on the plain path
         }
     }
@@ -538,7 +528,7 @@ mod tests {
             assert_eq!(pid.step_error(1.0, bad, &step), before.output());
         }
         assert_eq!(pid.step_error(1.0, 0.5, &TimeStep::new(0.0, 0.1)), before.output());
-        assert_eq!((pid.rejected(), Pid { rejected: 0, ..pid }), (7, before));
+        assert_eq!((pid.rejected(), with_core(pid, |core| core.rejected = 0)), (7, before));
     }
 
     #[test]
@@ -620,9 +610,10 @@ mod tests {
                 for setpoint in [1.0, f32::MAX, f32::MIN] {
                     let output = pid.step(setpoint, measurement, &TimeStep::of(1e-6));
                     assert!(
-                        output.abs() <= config.parameters.output_upper && pid.integral.is_finite()
+                        output.abs() <= config.parameters.output_upper
+                            && pid.core.integral.is_finite()
                     );
-                    assert!(pid.rate.is_finite() && pid.error.is_finite());
+                    assert!(pid.core.rate.is_finite() && pid.core.error.is_finite());
                 }
             }
             assert_eq!(pid.rejected(), 0);
@@ -1216,6 +1207,11 @@ mod incremental {
         Pid::new(config).unwrap()
     }
 
+    fn with_core(mut pid: Pid, change: impl FnOnce(&mut ErrorPid)) -> Pid {
+        change(&mut pid.core);
+        pid
+    }
+
     fn incremental(kp: f32, ki: f32, kd: f32) -> PidConfig {
         PidConfig::new(kp, ki, kd).with_incremental_form()
     }
@@ -1248,7 +1244,7 @@ mod incremental {
             assert_eq!(hit.step(1.0, measurement, &TimeStep::of(DT_S)), expected);
         }
         assert_eq!(hit.rejected(), 220);
-        assert_eq!(Pid { rejected: 0, rate: clean.rate, ..hit }, clean);
+        assert_eq!(with_core(hit, |core| (core.rejected, core.rate) = (0, clean.core.rate)), clean);
     }
 
     #[test]

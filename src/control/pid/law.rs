@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! step, step_error        from setpoint and measurement, or from an error and a rate
-//!   └─ step_plain         gains, integral limit, one output limit; an error for all else
+//!   └─ ErrorPid::plain    gains, integral limit, one output limit; an error for all else
 //!        └─ step_in_full  every option, unguarded; if a value is not finite, once more with guards
 //! ```
 
@@ -11,28 +11,68 @@ use super::config::{
     PERIOD, REST_DERIVATIVE, SLEW_LIMIT, TRACK_OUTPUT, TRACKING,
 };
 use super::controller::Pid;
+use super::error_pid::ErrorPid;
 use crate::control::number::{finite, limited};
 use crate::control::step::TimeStep;
 use crate::math;
 
-/// The values of one step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Input {
-    Measured {
-        setpoint: f32,
-        measurement: f32,
-    },
-    /// A given error, and a measured rate of change.
-    Given {
-        error: f32,
-        rate: f32,
-    },
+impl ErrorPid {
+    /// The plain law: gains, integral limit, one output limit.
+    ///
+    /// # Errors
+    /// If the step takes more than that (options, the first call, bad arguments, overflow), nothing changes. The value returned is
+    /// finite if `valid` and `error` are.
+    #[inline]
+    pub(crate) fn plain(
+        &mut self,
+        (error, rate): (f32, f32),
+        valid: f32,
+        step: &TimeStep,
+    ) -> Result<f32, f32> {
+        let parameters = &self.parameters;
+        let growth = parameters.ki * step.half_dt_s * (error + self.error);
+        let integral = self.integral + growth;
+        // With options, NaN and infinity nothing passes.
+        if !passes(integral, self.integral_gate) {
+            return Err(valid);
+        }
+        let output = parameters.kp * error + integral - parameters.kd * rate;
+        if passes(output, self.output_gate) {
+            self.keep(output, error, rate, integral);
+            return Ok(output);
+        }
+        if !output.is_finite() {
+            return Err(error);
+        }
+        let limit = limit_of(self.output_gate).copysign(output);
+        let integral = if are_alike(output, growth) { self.integral } else { integral };
+        self.keep(limit, error, rate, integral);
+        Ok(limit)
+    }
+
+    /// Tells whether the output has limits.
+    #[inline]
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.parameters.output_upper < f32::MAX
+    }
+
+    #[inline]
+    const fn keep(&mut self, output: f32, error: f32, rate: f32, integral: f32) {
+        self.output = output;
+        self.error = error;
+        self.rate = rate;
+        self.integral = integral;
+    }
 }
 
 impl Pid {
-    /// Steps by a validated time step, and returns the output.
-    ///
-    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
+    /// Tells whether the output has limits.
+    #[inline]
+    pub(crate) const fn is_limited(&self) -> bool {
+        self.core.is_limited()
+    }
+
+    /// Steps by a time that was validated before, and returns the output.
     ///
     /// # Examples
     /// ```
@@ -48,14 +88,14 @@ impl Pid {
     pub fn step(&mut self, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
         let (error, travel) = (setpoint - measurement, measurement - self.measurement);
         let rate = travel * step.per_dt;
-        match self.step_plain(Input::Measured { setpoint, measurement }, step) {
+        match self.step_plain(setpoint, measurement, step) {
             Ok(output) => output,
             Err(valid) => self.step_in_full::<false>(
                 (valid, measurement),
                 (error, rate),
                 travel,
                 step,
-                self.options,
+                self.core.options,
             ),
         }
     }
@@ -75,10 +115,13 @@ impl Pid {
     /// ```
     #[inline]
     pub fn step_error(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        match self.step_plain(Input::Given { error, rate }, step) {
-            Ok(output) => output,
+        match self.core.plain((error, rate), error, step) {
+            Ok(output) => {
+                self.measurement = UNKNOWN;
+                output
+            }
             Err(valid) => {
-                let options = self.options & !OF_SETPOINT | GIVEN;
+                let options = self.core.options & !OF_SETPOINT | GIVEN;
                 self.step_in_full::<false>((valid, UNKNOWN), (error, rate), 0.0, step, options)
             }
         }
@@ -87,36 +130,18 @@ impl Pid {
     /// The step of a [plain](Self::is_plain) controller.
     ///
     /// # Errors
-    /// If the step needs more than the plain step (options, the first call, bad arguments, overflow), nothing changes. The
-    /// returned value is finite if setpoint and measurement, or the given error, are.
+    /// As [`ErrorPid::plain`]. The value returned is finite if setpoint and measurement are.
     #[inline]
-    pub(crate) fn step_plain(&mut self, input: Input, step: &TimeStep) -> Result<f32, f32> {
-        let (setpoint, measurement, error, rate) = match input {
-            Input::Given { error, rate } => (error, UNKNOWN, error, rate),
-            Input::Measured { setpoint, measurement } => {
-                let travel = measurement - self.measurement;
-                (setpoint, measurement, setpoint - measurement, travel * step.per_dt)
-            }
-        };
-        let parameters = &self.parameters;
-        let integral = self.integral + self.growth(error, step);
-        // With options, NaN and infinity nothing passes.
-        if !passes(integral, self.integral_gate) {
-            return Err(setpoint);
-        }
-        let output = parameters.kp * error + integral - parameters.kd * rate;
-        if passes(output, self.output_gate) {
-            self.keep(output, measurement, error, rate, integral);
-            return Ok(output);
-        }
-        if !output.is_finite() {
-            return Err(error);
-        }
-        let limit = limit_of(self.output_gate).copysign(output);
-        let is_outward = (output - limit) * (integral - self.integral) > 0.0;
-        let integral = if is_outward { self.integral } else { integral };
-        self.keep(limit, measurement, error, rate, integral);
-        Ok(limit)
+    pub(crate) fn step_plain(
+        &mut self,
+        setpoint: f32,
+        measurement: f32,
+        step: &TimeStep,
+    ) -> Result<f32, f32> {
+        let (error, travel) = (setpoint - measurement, measurement - self.measurement);
+        let output = self.core.plain((error, travel * step.per_dt), setpoint, step)?;
+        self.measurement = measurement;
+        Ok(output)
     }
 
     /// The step of any controller, with error and rate as the plain step takes them.
@@ -145,16 +170,16 @@ impl Pid {
             let (error, rate, tracking_rate) =
                 self.differences::<GUARDED>(differences, step, options);
             let (proportional, growth) = self.proportional_and_growth::<GUARDED>(error, step);
-            let mut others = finite(proportional - finite(self.parameters.kd * rate));
+            let mut others = finite(proportional - finite(self.core.parameters.kd * rate));
             if on(FEED_FORWARD) {
                 others = finite(others + self.feed_forward(measurement, error));
             }
-            let mut memory = self.integral;
+            let mut memory = self.core.integral;
             if GUARDED && on(TRACK_OUTPUT) && self.has_memory() {
-                memory = finite(self.output - others);
+                memory = finite(self.core.output - others);
             }
             let mut integral = finite(memory + growth);
-            let gate = self.integral_limit_gate();
+            let gate = self.core.integral_limit_gate();
             if !passes(integral, gate) {
                 if !integral.is_finite() {
                     break 'finite;
@@ -164,19 +189,20 @@ impl Pid {
             let wanted = finite(others + integral);
             let (mut bounded, mut is_free) = (wanted, true);
             if on(SLEW_LIMIT) {
-                let way = wanted - self.output;
-                let reach = self.parameters.slew_per_s * step.dt_s;
+                let way = wanted - self.core.output;
+                let reach = self.core.parameters.slew_per_s * step.dt_s;
                 if way.abs() > reach {
-                    (bounded, is_free) = (self.output + reach.copysign(way), false);
+                    (bounded, is_free) = (self.core.output + reach.copysign(way), false);
                 }
             }
             if GUARDED {
-                if step.is_frozen() && self.error != UNKNOWN {
-                    self.rejected = self.rejected.saturating_add(1);
+                if step.is_frozen() && self.core.error != UNKNOWN {
+                    self.core.rejected = self.core.rejected.saturating_add(1);
                 }
-                self.set_options(self.options & !(REST_DERIVATIVE | TRACK_OUTPUT));
+                self.core.set_options(self.core.options & !(REST_DERIVATIVE | TRACK_OUTPUT));
             }
-            let (lower, upper) = (self.parameters.output_lower, self.parameters.output_upper);
+            let (lower, upper) =
+                (self.core.parameters.output_lower, self.core.parameters.output_upper);
             if is_free && wanted <= upper && wanted >= lower {
                 self.tracking_rate = tracking_rate;
                 self.keep(wanted, measurement, error, rate, integral);
@@ -192,7 +218,7 @@ impl Pid {
             return output;
         }
         if GUARDED {
-            return self.output; // never: all of it is finite
+            return self.core.output; // never: all of it is finite
         }
         self.step_in_full::<true>((valid, measurement), (error, rate), travel, step, options)
     }
@@ -221,7 +247,7 @@ impl Pid {
                 (error, tracking_rate) = self.follow::<GUARDED>(error, travel, step);
             }
             if on(DERIVATIVE_ON_ERROR) {
-                let travel = self.error - error;
+                let travel = self.core.error - error;
                 let travel = if on(PERIOD) { self.shortest::<GUARDED>(travel) } else { travel };
                 rate = finite(finite(travel) * step.per_dt);
             }
@@ -230,16 +256,16 @@ impl Pid {
             }
         }
         if GUARDED {
-            let of_error = on(DERIVATIVE_ON_ERROR) && self.error != UNKNOWN;
+            let of_error = on(DERIVATIVE_ON_ERROR) && self.core.error != UNKNOWN;
             if step.is_frozen() || on(REST_DERIVATIVE) && !on(GIVEN) {
-                rate = self.rate;
+                rate = self.core.rate;
             } else if self.measurement == UNKNOWN && !of_error && !on(GIVEN) {
                 rate = 0.0;
             }
         }
         if on(DERIVATIVE_FILTER) {
-            let gain = step.dt_s / (step.dt_s + self.parameters.derivative_time_s);
-            rate = finite(self.rate + gain * (rate - self.rate));
+            let gain = step.dt_s / (step.dt_s + self.core.parameters.derivative_time_s);
+            rate = finite(self.core.rate + gain * (rate - self.core.rate));
         }
         (error, rate, tracking_rate)
     }
@@ -252,8 +278,8 @@ impl Pid {
         step: &TimeStep,
     ) -> (f32, f32) {
         let finite = |value| if GUARDED { finite(value) } else { value };
-        let parameters = &self.parameters;
-        let (mut before, mut half_dt_s) = (self.error, step.half_dt_s);
+        let parameters = &self.core.parameters;
+        let (mut before, mut half_dt_s) = (self.core.error, step.half_dt_s);
         if GUARDED && before == UNKNOWN {
             before = -error; // no interval yet: a mean of zero
         }
@@ -268,7 +294,7 @@ impl Pid {
         }
         if error.abs() < parameters.dead_band {
             proportional = 0.0;
-            let shrinks = growth * self.integral < 0.0;
+            let shrinks = growth * self.core.integral < 0.0;
             if !shrinks {
                 growth *= 0.0; // and not simply zero: what is not finite must show
             }
@@ -276,24 +302,10 @@ impl Pid {
         (proportional, growth)
     }
 
-    /// Returns whether the output has limits.
-    #[inline]
-    pub(crate) const fn is_limited(&self) -> bool {
-        self.parameters.output_upper < f32::MAX
-    }
-
     #[inline]
     const fn keep(&mut self, output: f32, measurement: f32, error: f32, rate: f32, integral: f32) {
-        self.output = output;
         self.measurement = measurement;
-        self.error = error;
-        self.rate = rate;
-        self.integral = integral;
-    }
-
-    #[inline]
-    fn growth(&self, error: f32, step: &TimeStep) -> f32 {
-        self.parameters.ki * step.half_dt_s * (error + self.error)
+        self.core.keep(output, error, rate, integral);
     }
 
     /// Returns whether a way is less than half a turn. Half a turn itself, and overflow, need another look.
@@ -322,7 +334,7 @@ impl Pid {
     fn follow<const GUARDED: bool>(&self, error: f32, travel: f32, step: &TimeStep) -> (f32, f32) {
         let finite = |value| if GUARDED { finite(value) } else { value };
         let is_first = GUARDED && self.measurement == UNKNOWN;
-        let before = if is_first { 0.0 } else { finite(self.error - travel) };
+        let before = if is_first { 0.0 } else { finite(self.core.error - travel) };
         let rate = if is_first { 0.0 } else { self.tracking_rate };
         let (r, longest_s) = (self.tracking_r(), 1.0 / self.tracking_r());
         let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
@@ -333,20 +345,24 @@ impl Pid {
     /// Returns the share of its rate at which the integral works at an error beyond the full rate.
     #[inline]
     fn weight(&self, error: f32) -> f32 {
-        let (size, none) = (error.abs(), self.parameters.no_rate_above);
-        if size >= none { 0.0 } else { (none - size) / (none - self.parameters.full_rate_below) }
+        let (size, none) = (error.abs(), self.core.parameters.no_rate_above);
+        if size >= none {
+            0.0
+        } else {
+            (none - size) / (none - self.core.parameters.full_rate_below)
+        }
     }
 
     /// Returns the integral after anti-windup, for an `excess` cut off the output by the limits.
     #[inline]
     fn without_windup(&self, excess: f32, before: f32, integral: f32, step: &TimeStep) -> f32 {
-        if self.options & BACK_CALCULATION == 0 {
-            let is_outward = excess * (integral - before) > 0.0;
+        if self.core.options & BACK_CALCULATION == 0 {
+            let is_outward = are_alike(excess, integral - before);
             return if is_outward { before } else { integral };
         }
-        let part = step.dt_s / self.parameters.drain_time_s;
+        let part = step.dt_s / self.core.parameters.drain_time_s;
         let drained = integral - excess * if part < 1.0 { part } else { 1.0 };
-        let gate = self.integral_limit_gate();
+        let gate = self.core.integral_limit_gate();
         if passes(drained, gate) {
             drained
         } else if drained.is_nan() {
@@ -357,7 +373,13 @@ impl Pid {
     }
 }
 
-/// Marks a stored error or measurement as unknown: arithmetic with NaN never passes a [`gate`].
+/// Tells whether two numbers have the same sign.
+#[inline]
+const fn are_alike(one: f32, other: f32) -> bool {
+    (one.to_bits() ^ other.to_bits()).cast_signed() >= 0
+}
+
+/// Marks a stored error or measurement as unknown: arithmetic with it never passes a [`gate`].
 pub(super) const UNKNOWN: f32 = f32::INFINITY;
 
 /// A gate passed by no value.
@@ -398,21 +420,18 @@ mod tests {
     use proptest::prelude::*;
 
     fn stepped(pid: &mut Pid, setpoint: f32, measurement: f32, step: &TimeStep) -> f32 {
-        let plain = if pid.is_plain() {
-            pid.step_plain(Input::Measured { setpoint, measurement }, step).ok()
-        } else {
-            None
-        };
+        let plain =
+            if pid.is_plain() { pid.step_plain(setpoint, measurement, step).ok() } else { None };
         plain.unwrap_or_else(|| pid.step(setpoint, measurement, step))
     }
 
     fn stepped_by(pid: &mut Pid, error: f32, rate: f32, step: &TimeStep) -> f32 {
-        let plain = if pid.is_plain() {
-            pid.step_plain(Input::Given { error, rate }, step).ok()
-        } else {
-            None
-        };
-        plain.unwrap_or_else(|| pid.step_error(error, rate, step))
+        let mut part = *pid.core();
+        let plain = part.plain((error, rate), error, step);
+        let output = plain.unwrap_or_else(|_| part.advance(error, rate, step));
+        let whole = pid.step_error(error, rate, step);
+        assert_eq!((output, &part), (whole, pid.core()));
+        whole
     }
 
     proptest! {

@@ -1,12 +1,11 @@
 //! What a motor is configured with: at the start, and while it runs.
 
-use super::{NO_GAINS, Slot, is_loop};
+use super::{NO_GAINS, Slot};
 use crate::control::{Pid, PidConfig};
 use crate::dji::command::{Place, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
 use crate::dji::feedback::ErrorTable;
-use crate::dji::handle::Key;
 use crate::dji::range::Range;
 use crate::dji::{AttachError, Facts};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Shaft};
@@ -14,158 +13,132 @@ use crate::error::ConfigError;
 use crate::motor::{Capabilities, Capability, HealthConfig, MotorGuard, MotorName};
 use core::f32::consts::TAU;
 
-impl Slot {
-    /// Makes the slot of a motor, validating its configuration.
-    pub(in crate::dji) const fn new(
-        facts: &'static Facts,
-        config: &PlainConfig,
-        place: Place,
-        generation: u8,
-    ) -> Result<Self, AttachError> {
-        let motor = MotorName::new(facts.name, config.id);
-        macro_rules! parameter {
-            ($name:expr) => {
-                AttachError::Parameter { motor, parameter: $name }
-            };
-        }
-        let full_scale = config.command_full_scale;
-        if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(parameter!("nominal voltage"));
-        }
-        let limit = match config.limit {
-            Some(limit) => limit,
-            None => full_scale,
+/// Makes the slot of a motor, validating its configuration.
+pub(in crate::dji) const fn configured(
+    facts: &'static Facts,
+    config: &PlainConfig,
+    place: Place,
+    generation: u8,
+) -> Result<Slot, AttachError> {
+    let motor = MotorName::new(facts.name, config.id);
+    macro_rules! parameter {
+        ($name:expr) => {
+            AttachError::Parameter { motor, parameter: $name }
         };
-        if !(limit > 0.0 && limit <= full_scale) {
-            return Err(parameter!("command limit"));
-        }
-        let nm_per_a = match config.torque_constant_nm_per_a {
-            Some(nm_per_a) => nm_per_a,
-            None => facts.torque_constant_nm_per_a * config.gear.as_f32() / facts.gear.as_f32(),
-        };
-        if !(nm_per_a.is_finite() && nm_per_a > 0.0) {
-            return Err(parameter!("torque constant"));
-        }
-        let sign = if config.reversed { -1.0 } else { 1.0 };
-        let raw_per_unit = config.command_raw as f32 / full_scale;
-        let limit_raw = to_raw(limit, raw_per_unit, config.command_raw);
-        let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
-        let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
-        let position = within(config.position, fastest);
-        let speed = within(config.speed, limit);
-        let (position_loop, speed_loop) = match (Pid::new(position), Pid::new(speed)) {
-            (Ok(position), Ok(speed)) => (position, speed),
-            (Err(error), _) | (_, Err(error)) => return Err(parameter!(error.parameter())),
-        };
-        if let Some(gain) = steep_position(&position, facts) {
-            let SteepGain { parameter, value, highest } = gain;
-            return Err(AttachError::Gain { motor, parameter, value, highest });
-        }
-        if let Some(gain) = steep_speed(&speed, facts, rad_per_s_per_rpm) {
-            let SteepGain { parameter, value, highest } = gain;
-            return Err(AttachError::Gain { motor, parameter, value, highest });
-        }
-        if let Err(name) = config.health.validate() {
-            return Err(parameter!(name));
-        }
-        let direct = config.gear.rotor() == config.gear.output();
-        Ok(Self {
-            facts: Some(facts),
-            shaft: Shaft::new(config.gear, config.reversed),
-            rad_per_s_per_rpm,
-            raw_per_unit: sign * raw_per_unit,
-            nm_per_a,
-            range: Range::within(limit_raw),
-            full_limit: limit_raw,
-            guard: MotorGuard::NEW.with(config.opening, config.resumes),
-            speed: speed_loop,
-            position: position_loop,
-            generation,
-            place,
-            health: config.health,
-            calm_word: Self::calm_word(config.health, limit_raw),
-            homing: if direct { Homing::Absolute } else { Homing::Relative },
-            ..Self::FREE
-        })
     }
+    let full_scale = config.command_full_scale;
+    if !(full_scale.is_finite() && full_scale > 0.0) {
+        return Err(parameter!("nominal voltage"));
+    }
+    let limit = match config.limit {
+        Some(limit) => limit,
+        None => full_scale,
+    };
+    if !(limit > 0.0 && limit <= full_scale) {
+        return Err(parameter!("command limit"));
+    }
+    let nm_per_a = match config.torque_constant_nm_per_a {
+        Some(nm_per_a) => nm_per_a,
+        None => facts.torque_constant_nm_per_a * config.gear.as_f32() / facts.gear.as_f32(),
+    };
+    if !(nm_per_a.is_finite() && nm_per_a > 0.0) {
+        return Err(parameter!("torque constant"));
+    }
+    let sign = if config.reversed { -1.0 } else { 1.0 };
+    let raw_per_unit = config.command_raw as f32 / full_scale;
+    let limit_raw = to_raw(limit, raw_per_unit, config.command_raw);
+    let rad_per_s_per_rpm = sign * (TAU / 60.0) / config.gear.as_f32();
+    let fastest = no_load_velocity(facts, rad_per_s_per_rpm);
+    let position = within(config.position, fastest);
+    let speed = within(config.speed, limit);
+    let (position_loop, speed_loop) = match (Pid::new(position), Pid::new(speed)) {
+        (Ok(position), Ok(speed)) => (position, speed),
+        (Err(error), _) | (_, Err(error)) => return Err(parameter!(error.parameter())),
+    };
+    if let Some(gain) = steep_position(&position, facts) {
+        let SteepGain { parameter, value, highest } = gain;
+        return Err(AttachError::Gain { motor, parameter, value, highest });
+    }
+    if let Some(gain) = steep_speed(&speed, facts, rad_per_s_per_rpm) {
+        let SteepGain { parameter, value, highest } = gain;
+        return Err(AttachError::Gain { motor, parameter, value, highest });
+    }
+    if let Err(name) = config.health.validate() {
+        return Err(parameter!(name));
+    }
+    let direct = config.gear.rotor() == config.gear.output();
+    Ok(Slot {
+        facts: Some(facts),
+        shaft: Shaft::new(config.gear, config.reversed),
+        rad_per_s_per_rpm,
+        raw_per_unit: sign * raw_per_unit,
+        nm_per_a,
+        range: Range::within(limit_raw),
+        full_limit: limit_raw,
+        guard: MotorGuard::NEW.with(config.opening, config.resumes),
+        speed: speed_loop,
+        position: *position_loop.core(),
+        generation,
+        place,
+        health: config.health,
+        calm_word: calm_word(config.health, limit_raw),
+        homing: if direct { Homing::Absolute } else { Homing::Relative },
+        ..Slot::FREE
+    })
+}
 
-    /// Returns below which command a motor need not be looked at closely.
-    const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
-        // A stall, and half of the command for a runaway.
-        let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
-        to_raw(effort, full_limit as f32, full_limit).unsigned_abs()
-    }
+/// Returns below which command a motor need not be looked at closely.
+const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
+    // A stall, and half of the command for a runaway.
+    let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
+    to_raw(effort, full_limit as f32, full_limit).unsigned_abs()
+}
 
-    /// Frees the slot; handles of the motor find nothing from now on.
-    pub(in crate::dji) const fn free(&mut self) {
-        *self = Self { generation: self.generation + 1, ..Self::FREE };
-    }
+/// Returns what the motor offers with the loops that it has.
+pub(in crate::dji) fn capabilities(slot: &Slot) -> Capabilities {
+    let Some(facts) = slot.facts else { return Capabilities::NONE };
+    let set = Capabilities::of(&[Capability::Raw, facts.control, Capability::Feedback]);
+    [
+        (Capability::Velocity, slot.has_speed_loop()),
+        (Capability::Angle, slot.has_position_loop()),
+        (Capability::Position, slot.has_position_loop()),
+        (Capability::Temperature, facts.has_temperature),
+        (Capability::ErrorCodes, facts.errors != ErrorTable::None),
+        (Capability::AbsoluteAngle, slot.shaft.is_direct()),
+    ]
+    .into_iter()
+    .filter(|(_, offered)| *offered)
+    .fold(set, |set, (capability, _)| set.with(capability))
+}
 
-    /// Frees a slot whose handle nobody was given.
-    pub(in crate::dji) const fn withdraw(&mut self) {
-        *self = Self { generation: self.generation, ..Self::FREE };
-    }
+/// Changes the gains of the speed loop without a jump of its output.
+pub(in crate::dji) fn set_speed_loop(
+    slot: &mut Slot,
+    config: PidConfig,
+) -> Result<(), ConfigError> {
+    let facts = slot.facts.ok_or(super::DETACHED)?;
+    let limit = f32::from(slot.full_limit) / slot.raw_per_unit.abs();
+    let steep = steep_speed(&config, facts, slot.rad_per_s_per_rpm);
+    slot.rest_loops();
+    let replaced = checked(slot.has_speed_loop(), config, limit, steep)
+        .and_then(|config| slot.speed.set_config(config));
+    slot.apply_rules();
+    replaced
+}
 
-    /// Returns the generation of the next motor here, or `None` when there is none left.
-    pub(in crate::dji) const fn next_generation(&self) -> Option<u8> {
-        if self.generation < Key::GENERATIONS { Some(self.generation) } else { None }
-    }
-
-    pub(in crate::dji) const fn name(&self) -> Option<MotorName> {
-        match self.facts {
-            Some(facts) => Some(MotorName::new(facts.name, self.id(facts))),
-            None => None,
-        }
-    }
-
-    /// Returns the id on the ESC, which the place of the command word tells.
-    pub(super) const fn id(&self, facts: &Facts) -> u8 {
-        let [lower, _] = facts.command;
-        let before = if self.place.frame() as u8 == lower as u8 { 0 } else { 4 };
-        before + self.place.slot() + 1
-    }
-
-    /// Returns what the motor offers with the loops that it has.
-    pub(in crate::dji) fn capabilities(&self) -> Capabilities {
-        let Some(facts) = self.facts else { return Capabilities::NONE };
-        let set = Capabilities::of(&[Capability::Raw, facts.control, Capability::Feedback]);
-        [
-            (Capability::Velocity, is_loop(&self.speed)),
-            (Capability::Angle, is_loop(&self.position)),
-            (Capability::Position, is_loop(&self.position)),
-            (Capability::Temperature, facts.has_temperature),
-            (Capability::ErrorCodes, facts.errors != ErrorTable::None),
-            (Capability::AbsoluteAngle, self.shaft.is_direct()),
-        ]
-        .into_iter()
-        .filter(|(_, offered)| *offered)
-        .fold(set, |set, (capability, _)| set.with(capability))
-    }
-
-    /// Changes the gains of the speed loop without a jump of its output.
-    pub(in crate::dji) fn set_speed_loop(&mut self, config: PidConfig) -> Result<(), ConfigError> {
-        let facts = self.facts.ok_or(super::DETACHED)?;
-        let limit = f32::from(self.full_limit) / self.raw_per_unit.abs();
-        let steep = steep_speed(&config, facts, self.rad_per_s_per_rpm);
-        self.rest_loops();
-        let replaced = replace(&mut self.speed, config, limit, steep);
-        self.settle();
-        replaced
-    }
-
-    /// Changes the gains of the position loop without a jump of its output.
-    pub(in crate::dji) fn set_position_loop(
-        &mut self,
-        config: PidConfig,
-    ) -> Result<(), ConfigError> {
-        let facts = self.facts.ok_or(super::DETACHED)?;
-        let limit = no_load_velocity(facts, self.rad_per_s_per_rpm);
-        let steep = steep_position(&config, facts);
-        self.rest_loops();
-        let replaced = replace(&mut self.position, config, limit, steep);
-        self.settle();
-        replaced
-    }
+/// Changes the gains of the position loop without a jump of its output.
+pub(in crate::dji) fn set_position_loop(
+    slot: &mut Slot,
+    config: PidConfig,
+) -> Result<(), ConfigError> {
+    let facts = slot.facts.ok_or(super::DETACHED)?;
+    let limit = no_load_velocity(facts, slot.rad_per_s_per_rpm);
+    let steep = steep_position(&config, facts);
+    slot.rest_loops();
+    let replaced = checked(slot.has_position_loop(), config, limit, steep)
+        .and_then(|config| slot.position.set_config(config));
+    slot.apply_rules();
+    replaced
 }
 
 /// The velocity of the output shaft without load: what a position loop may ask for.
@@ -182,20 +155,21 @@ const fn within(config: Option<PidConfig>, limit: f32) -> PidConfig {
     config.with_output_range(lower, upper)
 }
 
-fn replace(
-    pid: &mut Pid,
+/// Returns the configuration for a loop that is there, narrowed to ±`limit`.
+fn checked(
+    is_there: bool,
     config: PidConfig,
     limit: f32,
     steep: Option<SteepGain>,
-) -> Result<(), ConfigError> {
-    if !is_loop(pid) {
+) -> Result<PidConfig, ConfigError> {
+    if !is_there {
         return Err(ConfigError::Unusable("handle of a motor without this loop"));
     }
     if let Some(SteepGain { parameter, value, highest }) = steep {
         let (value, most) = (value as f32, highest as f32);
         return Err(ConfigError::Range { parameter, value, least: 0.0, most });
     }
-    pid.set_config(within(Some(config), limit))
+    Ok(within(Some(config), limit))
 }
 
 /// Returns the proportional gain of a speed loop with which an error of one rpm of the rotor, the finest that feedback tells, asks

@@ -1,15 +1,12 @@
 //! Checks of one motor a tick, and its health.
 
 use super::{Slot, coarse};
+use crate::dji::Facts;
 use crate::dji::command::to_raw;
 use crate::dji::range::Range;
-use crate::dji::{Facts, State};
 use crate::encoder::Homing;
-use crate::motor::{
-    Condition, Conditions, Health, HealthConfig, Link, Monitor, MotorName, Sample, age,
-};
+use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};
 use crate::time::Duration;
-use crate::units::Current;
 
 /// Inside of a soft limit by this much the motor is no longer at it.
 const CLEAR_RAD: f32 = 0.01;
@@ -22,7 +19,7 @@ const OBSTACLES: Conditions = Conditions::NONE.with(Condition::Fault).with(Condi
 
 /// What a look at a motor has to know of its bus.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::dji) struct Look {
+pub(in crate::dji) struct Surroundings {
     pub(in crate::dji) now: u32,
     /// Time since the look before, in units of 1.024 ms.
     pub(in crate::dji) elapsed: u8,
@@ -35,283 +32,274 @@ pub(in crate::dji) struct Look {
     pub(in crate::dji) is_alone: bool,
 }
 
-impl Slot {
-    /// Something began: the motor is looked at closely until all is [well](Self::relent) again.
-    pub(super) const fn attend(&mut self) {
-        self.cool_below = 0;
-    }
+/// Something began: the motor is looked at closely until all is [well](relent) again.
+pub(super) const fn require_check(slot: &mut Slot) {
+    slot.cool_below = 0;
+}
 
-    /// From now on a glance is enough, if all is well.
-    #[inline(never)]
-    pub(super) fn relent(&mut self, facts: &Facts) {
-        let is_well = self.guard.latch().active().is_empty()
-            && self.guard.link() == Link::Online
-            && !self.guard.is_opening()
-            && self.error_code == 0
-            && self.range == Range::within(self.full_limit)
-            && self.health.soft_limits.is_none();
-        if is_well {
-            let (warning, _) = temperatures(facts, self.health);
-            let known = u8::try_from(warning.max(0)).unwrap_or(FIRST_BELOW_ZERO);
-            self.cool_below =
-                if facts.has_temperature { known.min(FIRST_BELOW_ZERO) } else { FIRST_BELOW_ZERO };
-        }
+/// From now on a glance is enough, if all is well.
+#[inline(never)]
+pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
+    let is_well = slot.guard.latch().active().is_empty()
+        && slot.guard.link() == Link::Online
+        && !slot.guard.is_opening()
+        && slot.error_code == 0
+        && slot.range == Range::within(slot.full_limit)
+        && slot.health.soft_limits.is_none();
+    if is_well {
+        let (warning, _) = temperatures(facts, slot.health);
+        let known = u8::try_from(warning.max(0)).unwrap_or(FIRST_BELOW_ZERO);
+        slot.cool_below =
+            if facts.has_temperature { known.min(FIRST_BELOW_ZERO) } else { FIRST_BELOW_ZERO };
     }
+}
 
-    /// A condition began that a look at the motor has to end, or is to see.
-    pub(super) const fn begin(&mut self, condition: Condition) {
-        self.guard.latch_mut().set(condition, true);
-        self.attend();
-    }
+/// A condition began that a look at the motor has to end, or is to see.
+pub(super) const fn begin(slot: &mut Slot, condition: Condition) {
+    slot.guard.latch_mut().set(condition, true);
+    require_check(slot);
+}
 
-    /// Looks at everything that need not be looked at in every tick.
-    pub(in crate::dji) fn check(&mut self, look: &Look) {
-        let Some(facts) = self.facts else { return };
-        let before = self.guard.latch().active();
-        if let Some(window) = look.window {
-            self.close_window(window, look.feedback_hz);
-        }
-        if !before.is_empty() {
-            self.end_what_is_over(look);
-        }
-        if self.guard.link() == Link::Online {
-            let share = self.examine(facts, look);
-            self.narrow(share, look.elapsed, look.now);
-        } else {
-            self.monitor = Monitor::NEW;
-        }
-        if !self.guard.latch().active().is_empty() || self.error_code != 0 {
-            self.attend();
-            self.react(before);
-        } else if self.cool_below == 0 {
-            self.relent(facts);
-        }
+/// Checks everything that is not checked in every tick.
+pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
+    let Some(facts) = slot.facts else { return };
+    let before = slot.guard.latch().active();
+    if let Some(window) = seen.window {
+        close_window(slot, window, seen.feedback_hz);
     }
+    if !before.is_empty() {
+        end_what_is_over(slot, seen);
+    }
+    if slot.guard.link() == Link::Online {
+        let share = run_checks(slot, facts, seen);
+        narrow(slot, share, seen.elapsed, seen.now);
+    } else {
+        slot.monitor = Monitor::NEW;
+    }
+    if !slot.guard.latch().active().is_empty() || slot.error_code != 0 {
+        require_check(slot);
+        react(slot, before);
+    } else if slot.cool_below == 0 {
+        waive_check(slot, facts);
+    }
+}
 
-    /// Takes the error code of a frame. One that weighs more than that before counts at once: by the motor's turn it may be
-    /// over. A lesser one waits for that turn, so that codes which come and go are no flood.
-    pub(in crate::dji) fn hear_error(&mut self, facts: &Facts, code: u8) {
-        if code == 0 {
-            return;
-        }
-        self.monitor.hear_error();
-        if facts.errors.severity(code) > facts.errors.severity(self.error_code) {
-            let before = self.guard.latch().active();
-            self.take_error(facts, code);
-            self.attend();
-            self.react(before);
-        }
+/// [`check`] for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or
+/// frozen feedback may begin.
+#[inline(never)]
+pub(super) fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed: u8) -> bool {
+    let speed = f32::from(slot.feedback.rpm()) / f32::from(facts.rotor_no_load_rpm());
+    let effort = f32::from(word) / f32::from(slot.full_limit);
+    let angle = slot.feedback.angle();
+    if !slot.monitor.follow_driven(angle, coarse(word), (effort, speed), elapsed, slot.health) {
+        return false;
     }
+    slot.saturated = slot.saturated.saturating_add(u16::from(slot.range.is_end(word)));
+    true
+}
 
-    fn take_error(&mut self, facts: &Facts, code: u8) {
-        if code != self.error_code {
-            self.error_code = code;
-            self.guard.latch_mut().report(facts.errors.severity(code), true, self.health);
+/// Takes the error code of a frame. One that weighs more than that before counts at once: by the motor's turn it may be
+/// over. A lesser one waits for that turn, so that codes which come and go are no flood.
+pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
+    if code == 0 {
+        return;
+    }
+    slot.monitor.hear_error();
+    if is_graver(slot, facts, code) {
+        let before = slot.guard.latch().active();
+        take_error(slot, facts, code);
+        require_check(slot);
+        react(slot, before);
+    }
+}
+
+/// Takes the code of a frame that was in time; `false` for one that is [graver](is_graver) than that before.
+pub(in crate::dji) fn hear_known_error(slot: &mut Slot, facts: &Facts, code: u8) -> bool {
+    if code != 0 {
+        if is_graver(slot, facts, code) {
+            return false;
         }
+        slot.monitor.hear_error();
     }
+    true
+}
 
-    fn examine(&mut self, facts: &Facts, look: &Look) -> f32 {
-        let feedback = self.feedback;
-        let came = self.monitor.take_error();
-        // What came and went since the look before is not over yet: it may come and go.
-        if !came || feedback.error() != 0 {
-            self.take_error(facts, feedback.error());
-        }
-        let at_limit = self.range.is_end(look.word);
-        self.saturated = self.saturated.saturating_add(u16::from(at_limit));
-        let sample = Sample {
-            elapsed: look.elapsed,
-            fresh: age(look.now, self.guard.heard()) <= u32::from(look.elapsed) << 10,
-            effort: f32::from(look.word) / f32::from(self.full_limit),
-            speed: f32::from(feedback.rpm()) / f32::from(facts.rotor_no_load_rpm()),
-            current: f32::from(feedback.current()) / f32::from(facts.current_raw),
-            word: coarse(look.word),
-            // A fifth of the motor's limit.
-            word_change: (coarse(self.full_limit) / 5).max(1).unsigned_abs(),
-            angle: feedback.angle(),
-            rest: mixed(feedback.current().cast_unsigned(), feedback.rpm().cast_unsigned()),
-            temperature: facts
-                .has_temperature
-                .then(|| (celsius(feedback.temperature()), temperatures(facts, self.health))),
-        };
-        self.monitor.look(self.guard.latch_mut(), &sample, self.health)
-    }
+/// Tells whether an error code weighs more than that before.
+fn is_graver(slot: &Slot, facts: &Facts, code: u8) -> bool {
+    code != slot.error_code && facts.errors.severity(code) > facts.errors.severity(slot.error_code)
+}
 
-    /// Narrows the output to the share that is left, in the directions that are left.
-    fn narrow(&mut self, share: f32, elapsed: u8, now: u32) {
-        let share = share.min(self.guard.share(now));
-        let limit = to_raw(share, f32::from(self.full_limit), self.full_limit);
-        self.range = Range::within(limit);
-        self.keep_inside(elapsed);
-        if self.range != Range::within(self.full_limit) {
-            self.hold_back();
-        }
+fn take_error(slot: &mut Slot, facts: &Facts, code: u8) {
+    if code != slot.error_code {
+        slot.error_code = code;
+        slot.guard.latch_mut().report(facts.errors.severity(code), true, slot.health);
     }
+}
 
-    /// Keeps the integral of the speed loop within what is left of the output: the loop knows only the full limit, and would
-    /// wind up.
-    fn hold_back(&mut self) {
-        let end = |raw: i16| f32::from(self.range.nearest(raw.into())) / self.raw_per_unit;
-        let (one, other) = (end(i16::MIN), end(i16::MAX));
-        self.speed.keep_integral_between(one.min(other), one.max(other));
+fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
+    let feedback = slot.feedback;
+    let came = slot.monitor.take_error();
+    // What came and went since the look before is not over yet: it may come and go.
+    if !came || feedback.error() != 0 {
+        take_error(slot, facts, feedback.error());
     }
+    let at_limit = slot.range.is_end(seen.word);
+    slot.saturated = slot.saturated.saturating_add(u16::from(at_limit));
+    let sample = Sample {
+        elapsed: seen.elapsed,
+        fresh: age(seen.now, slot.guard.heard()) <= u32::from(seen.elapsed) << 10,
+        effort: f32::from(seen.word) / f32::from(slot.full_limit),
+        speed: f32::from(feedback.rpm()) / f32::from(facts.rotor_no_load_rpm()),
+        current: f32::from(feedback.current()) / f32::from(facts.current_raw),
+        word: coarse(seen.word),
+        // A fifth of the motor's limit.
+        word_change: (coarse(slot.full_limit) / 5).max(1).unsigned_abs(),
+        angle: feedback.angle(),
+        rest: mixed(feedback.current().cast_unsigned(), feedback.rpm().cast_unsigned()),
+        temperature: facts
+            .has_temperature
+            .then(|| (celsius(feedback.temperature()), temperatures(facts, slot.health))),
+    };
+    slot.monitor.check(slot.guard.latch_mut(), &sample, slot.health)
+}
 
-    /// Tells whether there is a motor, and nothing that keeps it from being armed.
-    pub(in crate::dji) fn is_fit(&self) -> bool {
-        self.facts.is_some() && !self.is_faulty()
+/// Narrows the output to the share that is left, in the directions that are left.
+fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
+    let share = share.min(slot.guard.share(now));
+    let limit = to_raw(share, f32::from(slot.full_limit), slot.full_limit);
+    slot.range = Range::within(limit);
+    keep_inside(slot, elapsed);
+    if slot.range != Range::within(slot.full_limit) {
+        hold_back(slot);
     }
+}
 
-    /// Takes targets from now on, starting from rest; what relaxed the motor before is noticed anew.
-    pub(in crate::dji) fn engage(&mut self, now: u32) {
-        self.guard.engage(now);
-        for condition in Monitor::NOTICED_ANEW {
-            self.guard.latch_mut().set(condition, false);
-        }
-        self.monitor = Monitor::NEW;
-        self.begin_opening();
-        self.keep_inside(0);
-    }
+/// Keeps the integral of the speed loop within what is left of the output: the loop knows only the full limit, and would
+/// wind up.
+fn hold_back(slot: &mut Slot) {
+    let end = |raw: i16| f32::from(slot.range.nearest(raw.into())) / slot.raw_per_unit;
+    let (one, other) = (end(i16::MIN), end(i16::MAX));
+    slot.speed.keep_integral_between(one.min(other), one.max(other));
+}
 
-    /// The output range opens from zero, where it does not open at once.
-    pub(super) fn begin_opening(&mut self) {
-        if self.guard.is_opening() {
-            self.range = Range::ZERO;
-        }
-    }
+/// Tells whether there is a motor, and nothing that keeps it from being armed.
+pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
+    slot.facts.is_some() && !is_faulty(slot)
+}
 
-    /// Takes the outward direction away at a soft limit. `ahead` is how far to look, in units of 1.024 ms.
-    pub(super) fn keep_inside(&mut self, ahead: u8) {
-        let (up_only, down_only) = self.soft_limits(ahead);
-        let upward = self.raw_per_unit > 0.0;
-        let (positive_only, negative_only) =
-            if upward { (up_only, down_only) } else { (down_only, up_only) };
-        if positive_only {
-            self.range = self.range.without_negative();
-        }
-        if negative_only {
-            self.range = self.range.without_positive();
-        }
-        self.settle();
+/// Takes targets from now on, starting from rest; what relaxed the motor before is noticed anew.
+pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
+    slot.guard.engage(now);
+    for condition in Monitor::NOTICED_ANEW {
+        slot.guard.latch_mut().set(condition, false);
     }
+    slot.monitor = Monitor::NEW;
+    begin_opening(slot);
+    keep_inside(slot, 0);
+}
 
-    /// Returns whether the shaft may turn up only, and whether down only.
-    fn soft_limits(&mut self, ahead: u8) -> (bool, bool) {
-        let Some((lower, upper)) = self.health.soft_limits else { return (false, false) };
-        if self.homing == Homing::Relative {
-            self.guard.latch_mut().set(Condition::SoftLimit, false);
-            return (false, false);
-        }
-        let here = self.shaft.position().as_angle().as_radians();
-        // Where it is when it is looked at next.
-        let there = here + self.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
-        let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
-        let lingers = self.guard.latch().has(Condition::SoftLimit)
-            && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
-        self.guard.latch_mut().set(Condition::SoftLimit, below || above || lingers);
-        (below, above)
+/// The output range opens from zero, where it does not open at once.
+pub(super) fn begin_opening(slot: &mut Slot) {
+    if slot.guard.is_opening() {
+        slot.range = Range::ZERO;
     }
+}
 
-    fn end_what_is_over(&mut self, look: &Look) {
-        self.guard.end_what_is_over();
-        if look.is_alone {
-            self.guard.latch_mut().set(Condition::SecondMaster, false);
-        }
+/// Takes the outward direction away at a soft limit. `ahead` is how far to look, in units of 1.024 ms.
+pub(super) fn keep_inside(slot: &mut Slot, ahead: u8) {
+    let (up_only, down_only) = soft_limits(slot, ahead);
+    let upward = slot.raw_per_unit > 0.0;
+    let (positive_only, negative_only) =
+        if upward { (up_only, down_only) } else { (down_only, up_only) };
+    if positive_only {
+        slot.range = slot.range.without_negative();
     }
+    if negative_only {
+        slot.range = slot.range.without_positive();
+    }
+    slot.apply_rules();
+}
 
-    fn close_window(&mut self, window: u16, feedback_hz: u32) {
-        let was_crowded = self.traffic.is_crowded();
-        let double = self.traffic.is_double();
-        self.traffic.add(self.guard.take_in_time());
-        self.traffic.close(window, feedback_hz);
-        if self.traffic.is_crowded() {
-            // Every frame is compared from now on.
-            self.guard.trust(0);
-        }
-        if was_crowded && !double {
-            self.guard.latch_mut().set(Condition::DuplicateId, false);
-        }
+/// Returns whether the shaft may turn up only, and whether down only.
+fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
+    let Some((lower, upper)) = slot.health.soft_limits else { return (false, false) };
+    if slot.homing == Homing::Relative {
+        slot.guard.latch_mut().set(Condition::SoftLimit, false);
+        return (false, false);
     }
+    let here = slot.shaft.position().as_angle().as_radians();
+    // Where it is when it is looked at next.
+    let there = here + slot.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
+    let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
+    let lingers = slot.guard.latch().has(Condition::SoftLimit)
+        && !(here > lower + CLEAR_RAD && here < upper - CLEAR_RAD);
+    slot.guard.latch_mut().set(Condition::SoftLimit, below || above || lingers);
+    (below, above)
+}
 
-    /// Relaxes the motor when something began, or still holds, for which it has to be.
-    pub(super) fn react(&mut self, before: Conditions) {
-        let active = self.guard.latch().active();
-        let begun = active.minus(before).and(self.health.relaxing());
-        if !begun.is_empty() || self.is_faulty() {
-            self.guard.trip();
-        }
+fn end_what_is_over(slot: &mut Slot, seen: &Surroundings) {
+    slot.guard.end_what_is_over();
+    if seen.is_alone {
+        slot.guard.latch_mut().set(Condition::SecondMaster, false);
     }
+}
 
-    /// Another node has sent the motor's command frame.
-    pub(in crate::dji) fn hear_rival(&mut self) {
-        if !self.health.ignores(Condition::SecondMaster) {
-            let before = self.guard.latch().active();
-            self.begin(Condition::SecondMaster);
-            self.react(before);
-        }
+fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
+    let was_crowded = slot.traffic.is_crowded();
+    let double = slot.traffic.is_double();
+    slot.traffic.add(slot.guard.take_in_time());
+    slot.traffic.close(window, feedback_hz);
+    if slot.traffic.is_crowded() {
+        // Every frame is compared from now on.
+        slot.guard.trust(0);
     }
+    if was_crowded && !double {
+        slot.guard.latch_mut().set(Condition::DuplicateId, false);
+    }
+}
 
-    /// Returns how the motor is.
-    pub(in crate::dji) fn health(&self) -> Option<Health> {
-        let facts = self.facts?;
-        let heard = self.guard.link() != Link::Unheard;
-        let celsius = celsius(self.feedback.temperature());
-        Some(Health {
-            motor: self.name()?,
-            link: self.guard.link(),
-            armed: self.guard.is_armed(),
-            conditions: self.guard.latch().active(),
-            feedback_hz: self.traffic.rate_hz(),
-            longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
-            temperature_c: (heard && facts.has_temperature).then_some(celsius),
-            error_code: self.error_code,
-            saturated: self.saturated,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
-            ambiguous_gaps: self.ambiguous_gaps,
-        })
+/// Relaxes the motor when something began, or still holds, for which it has to be.
+pub(super) fn react(slot: &mut Slot, before: Conditions) {
+    let active = slot.guard.latch().active();
+    let begun = active.minus(before).and(slot.health.relaxing());
+    if !begun.is_empty() || is_faulty(slot) {
+        slot.guard.trip();
     }
+}
 
-    /// Tells whether the motor must not be armed.
-    pub(in crate::dji) fn is_faulty(&self) -> bool {
-        !self.guard.latch().active().and(OBSTACLES).and(self.health.relaxing()).is_empty()
+/// Another node has sent the motor's command frame.
+pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
+    if !slot.health.ignores(Condition::SecondMaster) {
+        let before = slot.guard.latch().active();
+        begin(slot, Condition::SecondMaster);
+        react(slot, before);
     }
+}
 
-    /// Returns what is known; `None` before the first frame.
-    // The compiler leaves out what nobody reads, in line only.
-    #[inline(always)]
-    pub(in crate::dji) fn state(&self) -> Option<State> {
-        let facts = self.facts?;
-        if self.guard.link() == Link::Unheard {
-            return None;
-        }
-        let amperes =
-            self.direction() * f32::from(self.feedback.current()) * facts.current_full_scale_a
-                / f32::from(facts.current_raw);
-        Some(State {
-            motor: MotorName::new(facts.name, self.id(facts)),
-            position: self.shaft.position(),
-            homing: self.homing,
-            velocity: self.velocity(),
-            current: Current::from_amperes(amperes),
-            torque_nm: amperes * self.nm_per_a,
-            temperature_c: facts.has_temperature.then_some(celsius(self.feedback.temperature())),
-            error: facts.errors.read(self.feedback.error()),
-            rotor_counts: self.shaft.rotor_counts(),
-            ambiguous_gaps: self.ambiguous_gaps,
-            refused_targets: self.guard.refused_targets(),
-            forgotten_targets: self.guard.forgotten_targets(),
-            conditions: self.guard.latch().active(),
-            link: self.guard.link(),
-            feedback: self.feedback,
-        })
-    }
+/// Returns how the motor is.
+pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
+    let facts = slot.facts?;
+    let heard = slot.guard.link() != Link::Unheard;
+    let celsius = celsius(slot.feedback.temperature());
+    Some(Health {
+        motor: slot.name()?,
+        link: slot.guard.link(),
+        armed: slot.guard.is_armed(),
+        conditions: slot.guard.latch().active(),
+        feedback_hz: slot.traffic.rate_hz(),
+        longest_gap: Duration::from_micros(slot.traffic.longest_gap_us().into()),
+        temperature_c: (heard && facts.has_temperature).then_some(celsius),
+        error_code: slot.error_code,
+        saturated: slot.saturated,
+        refused_targets: slot.guard.refused_targets(),
+        forgotten_targets: slot.guard.forgotten_targets(),
+        ambiguous_gaps: slot.ambiguous_gaps,
+    })
+}
 
-    /// Time did not move on. A free slot loses nothing.
-    pub(in crate::dji) fn lose_time(&mut self) {
-        if self.facts.is_some() {
-            self.guard.lose_time();
-        }
-    }
+/// Tells whether the motor must not be armed.
+pub(in crate::dji) fn is_faulty(slot: &Slot) -> bool {
+    !slot.guard.latch().active().and(OBSTACLES).and(slot.health.relaxing()).is_empty()
 }
 
 /// Mixes two numbers so that the upper bits change with each (Knuth's multiplicative hash).
@@ -328,7 +316,7 @@ const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
 }
 
 /// The byte is signed in some drivers and unsigned in others: -40 to -1 is meant rather than 216 to 255.
-fn celsius(byte: u8) -> i16 {
+pub(super) fn celsius(byte: u8) -> i16 {
     if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
 }
 

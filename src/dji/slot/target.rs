@@ -1,17 +1,81 @@
-//! Targets: all that is not a velocity or a position that goes on.
+//! Targets that do not renew the one before, and the loops where they do more than go on.
 
-use super::{Action, Duty, Goal, Slot, needs};
-use crate::control::{Pid, TimeStep};
+use super::duty::{Action, Duty};
+use super::{Goal, Slot, health, needs, usable};
+use crate::control::Pid;
 use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
+use crate::units::Angle;
 
 impl Slot {
     /// Asks for nothing: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
-        self.settle();
+        self.apply_rules();
+    }
+
+    /// Takes rad/s of the output shaft.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::dji) fn set_velocity(
+        &mut self,
+        rad_per_s: f32,
+        now: u32,
+    ) -> Result<(), TargetError> {
+        self.admit(rad_per_s.is_finite())?;
+        needs(self.has_speed_loop())?;
+        self.start(Action::Velocity, Goal::of(rad_per_s.to_bits().cast_signed()), now);
+        Ok(())
+    }
+
+    /// Takes turns and angle of the output shaft.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::dji) fn set_position(
+        &mut self,
+        position: Position,
+        now: u32,
+    ) -> Result<(), TargetError> {
+        self.admit(position.is_finite())?;
+        needs(self.has_position_loop())?;
+        let (turns, phase) = self.shaft.locate(self.inside(position));
+        let goal = Goal { turns: self.shaft.near(turns), value: phase };
+        self.start(Action::Position, goal, now);
+        Ok(())
+    }
+
+    /// Returns the nearest position that is within the soft limits.
+    fn inside(&self, position: Position) -> Position {
+        let Some((lower, upper)) = self.health.soft_limits else { return position };
+        let radians = position.as_angle().as_radians();
+        if radians < lower {
+            Position::from_angle(Angle::from_radians(lower))
+        } else if radians > upper {
+            Position::from_angle(Angle::from_radians(upper))
+        } else {
+            position
+        }
+    }
+
+    /// Tells whether a target may be taken; where not, the one before may be over.
+    #[inline]
+    fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
+        match self.guard.admit(is_finite) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.refuse(error)),
+        }
+    }
+
+    #[inline]
+    fn start(&mut self, action: Action, goal: Goal, now: u32) {
+        self.goal = goal;
+        if self.asked == action {
+            self.guard.renew_target(now);
+        } else {
+            self.start_anew(action, now);
+        }
     }
 
     /// Takes a value in the unit of the command: amperes or volts.
@@ -37,7 +101,7 @@ impl Slot {
         now: u32,
     ) -> Result<(), TargetError> {
         self.admit(angle.is_finite())?;
-        needs(&self.position)?;
+        needs(self.has_position_loop())?;
         if !self.homing.is_known() {
             return Err(TargetError::NotHomed);
         }
@@ -57,12 +121,12 @@ impl Slot {
         timeouts: &Timeouts,
     ) -> Result<(), TargetError> {
         self.admit(way.is_finite() && rad_per_s.is_finite())?;
-        needs(&self.position)?;
+        needs(self.has_position_loop())?;
         let Some(stamp) = at.and_then(|at| MotorGuard::stamp_of_measurement(at, now, timeouts))
         else {
             if self.guard.has_target() {
                 self.guard.forget_target();
-                self.settle();
+                self.apply_rules();
             }
             return Err(TargetError::StaleMeasurement);
         };
@@ -73,7 +137,7 @@ impl Slot {
     #[cold]
     #[inline(never)]
     pub(super) fn refuse(&mut self, error: TargetError) -> TargetError {
-        self.settle();
+        self.apply_rules();
         error
     }
 
@@ -82,7 +146,7 @@ impl Slot {
     pub(super) fn start_anew(&mut self, action: Action, now: u32) {
         self.asked = action;
         self.guard.take_target(now);
-        self.settle();
+        self.apply_rules();
     }
 
     /// Tells whether the motor was at rest, not asked or not heard, at any time since the last usable update: its command
@@ -92,13 +156,13 @@ impl Slot {
     }
 
     /// Finds out what an update has to do. To be called wherever the guard, the range, a loop or what is asked for changes.
-    pub(in crate::dji) fn settle(&mut self) {
+    pub(in crate::dji) fn apply_rules(&mut self) {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
         }
         let is_online = self.guard.link() == Link::Online;
         if !self.guard.latch().active().is_empty() || self.guard.is_opening() {
-            self.attend();
+            health::require_check(self);
         }
         let is_free = self.range == Range::within(self.full_limit) && self.speed.is_plain();
         self.duty = match self.asked {
@@ -118,7 +182,7 @@ impl Slot {
     /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
-    pub(super) fn update_carefully(&mut self, step: &TimeStep, sent: &Outbox) -> i16 {
+    pub(super) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
         match self.duty {
             Duty::Rest => return 0,
             Duty::First => self.end_rest(),
@@ -130,7 +194,7 @@ impl Slot {
         let mut velocity = self.velocity().as_rad_per_s();
         let way = match self.asked {
             Action::Velocity => {
-                return self.follow_velocity(self.goal.rad_per_s(), velocity, step);
+                return self.follow_velocity(self.goal.rad_per_s(), velocity, dt_s);
             }
             Action::Position => self.shaft.way_to(self.goal.turns(), self.goal.phase()),
             Action::Angle => self.shaft.shortest_way_to(self.goal.phase()),
@@ -141,8 +205,8 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.position.step_error(way, velocity, step);
-        self.follow_velocity(goal * self.opened_part(), velocity, step)
+        let goal = self.position.advance(way, velocity, &usable(dt_s));
+        self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
     }
 
     /// Returns which part of its velocity a position loop may ask for: while the output range opens, that of the range.
@@ -160,7 +224,7 @@ impl Slot {
         self.rest_loops();
         self.acted = Action::Rest;
         self.duty = Duty::Other;
-        self.settle();
+        self.apply_rules();
     }
 
     /// Has the loops rest as the motor did.
@@ -203,7 +267,7 @@ impl Slot {
             }
             _ => {}
         }
-        self.settle();
+        self.apply_rules();
     }
 
     const fn reset_loops(&mut self) {
@@ -256,7 +320,7 @@ mod tests {
             let now = Instant::from_micros(1_000);
             _ = bus.ingest(&CanFrame::standard(0x201, [0; 8]).unwrap(), now);
             bus.arm(now).unwrap();
-            let duty = |bus: &Bus| bus.slot(motor.erase()).unwrap().duty;
+            let duty = |bus: &Bus| bus.motors.get(motor.erase().key()).unwrap().duty;
             bus.set_velocity(motor, AngularVelocity::ZERO).unwrap();
             assert_eq!(duty(&bus), Duty::First);
             bus.update(Tick::new(now, 0.001));
@@ -270,12 +334,12 @@ mod tests {
             assert_eq!(duty(&bus), Duty::Raw, "it has no loop");
             bus.set_position(motor, Position::ZERO).unwrap();
             bus.update(Tick::new(Instant::from_micros(4_000), 0.001));
-            let slot = bus.slot_mut(motor.erase()).unwrap();
+            let slot = bus.motors.get_mut(motor.erase().key()).unwrap();
             slot.range = Range::within(1_000);
-            slot.settle();
+            slot.apply_rules();
             assert_eq!(slot.duty, Duty::Other, "less than the full output");
             slot.guard.age(500_000, &Timeouts::new());
-            slot.settle();
+            slot.apply_rules();
             assert_eq!(slot.duty, Duty::Rest, "not heard");
         }
     }

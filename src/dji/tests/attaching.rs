@@ -1,4 +1,5 @@
 use super::*;
+use crate::motor::VelocityDrive;
 
 #[test]
 fn ids_outside_of_the_model_are_rejected() {
@@ -163,16 +164,16 @@ fn a_place_that_was_taken_before_is_armed_and_measured_as_a_new_one() {
         bus.detach(wheel);
         wheel = bus.attach(Config::<M3508>::at_once(3)).unwrap();
     }
-    assert_eq!(bus.fresh_velocity(wheel.erase()), None);
+    assert_eq!(VelocityDrive::velocity(&bus, wheel), None);
     for id in [0x201, 0x203] {
         assert_eq!(bus.ingest(&feedback(id, 0, 1_920), at_ms(1)), Ingest::Taken);
     }
     bus.arm_only(&[wheel.erase()], at_ms(1)).unwrap();
     assert!(bus.is_motor_armed(wheel) && !bus.is_motor_armed(other));
-    let rpm = bus.fresh_velocity(wheel.erase()).unwrap().as_rpm();
+    let rpm = VelocityDrive::velocity(&bus, wheel).unwrap().as_rpm();
     assert!((rpm - 1_920.0 * 187.0 / 3591.0).abs() < 0.01, "{rpm}");
     bus.update(Tick::new(at_ms(500), 0.001));
-    assert_eq!(bus.fresh_velocity(wheel.erase()), None, "lost");
+    assert_eq!(VelocityDrive::velocity(&bus, wheel), None, "lost");
 }
 
 /// The place of one that is refused with others was taken before, and its old handle is still somewhere.

@@ -14,6 +14,7 @@ mod limiting;
 mod measured;
 mod receiving;
 mod safety;
+mod sized;
 mod soft_limits;
 mod takeover;
 mod timing;

@@ -166,7 +166,8 @@ fn a_position_loop_does_not_go_on_from_a_velocity_before_a_rest() {
         let nowhere = AngularVelocity::from_rpm(f32::NAN);
         assert_eq!(bus.set_velocity(yaw, nowhere), Err(TargetError::NotFinite));
     });
-    let integral = bench.bus.slot_mut(bench.motor.into()).unwrap().speed_loop_mut().terms().i;
+    let integral =
+        bench.bus.motors.get_mut(bench.motor.erase().key()).unwrap().speed_loop_mut().terms().i;
     let first = volts(&mut bench, STILL, here);
     assert!((first - integral).abs() < 0.05, "{first} V: it is where it is to be");
 }

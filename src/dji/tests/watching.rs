@@ -167,10 +167,10 @@ fn feedback_that_does_not_answer_a_command_is_frozen_and_one_whose_current_answe
     }
 }
 
-/// What costs a close look costs each update: it is kept for what needs one.
+/// The full check costs each update: it is kept for a motor that needs it.
 #[test]
-fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
-    // Of full scale a half is calm; and from an eighth on a current of its own is no wonder.
+fn the_short_check_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
+    // Up to half of full scale is calm, and from an eighth on a current of its own is no wonder; above, the motor hardly turns.
     let cases: [(i16, i16, bool); 9] = [
         (0, 0, true),
         (0, 1_999, true),
@@ -187,7 +187,9 @@ fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
         bench.run(40, CALM, 500);
         bench.hear(Told { current, ..CALM });
         let motor = bench.motor.erase();
-        let glance = |bench: &mut Bench<M3508>| bench.bus.slot_mut(motor).unwrap().is_well(raw);
+        let glance = |bench: &mut Bench<M3508>| {
+            bench.bus.motors.get_mut(motor.key()).unwrap().is_well(raw, 12)
+        };
         assert_eq!(glance(&mut bench), expected, "{raw} and {current}");
         // After something was wrong, and is over, a glance is enough again.
         bench.run(24, Told { celsius: 130, ..CALM }, 500);
@@ -196,6 +198,18 @@ fn a_glance_is_enough_for_a_motor_that_turns_and_with_which_nothing_is_wrong() {
         bench.run(24, CALM, 500);
         bench.hear(Told { current, ..CALM });
         assert_eq!(glance(&mut bench), expected, "{raw} and {current}, cool again");
+    }
+}
+
+/// A motor that is driven and hardly turns may stall: the short check leaves it to the full one.
+#[test]
+fn the_short_check_is_not_enough_for_a_motor_that_is_driven_and_stands() {
+    for (rpm, expected) in [(0, false), (185, false), (186, true), (-185, false), (-186, true)] {
+        let mut bench = Bench::new(Config::<M3508>::at_once(1));
+        bench.run(40, CALM, 500);
+        bench.hear(Told { rpm, ..CALM });
+        let slot = bench.bus.motors.get_mut(bench.motor.erase().key()).unwrap();
+        assert_eq!(slot.is_well(16_384, 12), expected, "{rpm}");
     }
 }
 

@@ -158,12 +158,23 @@ impl Conditions {
 
     /// Iterates over them, in the order of [`Condition::ALL`].
     pub fn iter(self) -> impl Iterator<Item = Condition> {
-        Condition::ALL.into_iter().filter(move |condition| self.contains(*condition))
+        let mut left = self.0;
+        core::iter::from_fn(move || {
+            // Behind the last bit there is no condition.
+            let first = Condition::ALL.get(left.trailing_zeros() as usize)?;
+            left &= left.wrapping_sub(1);
+            Some(*first)
+        })
     }
 
     /// Returns those that are in both.
     pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
+    }
+
+    /// Returns those that are in one of them.
+    pub(crate) const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 
     /// Returns those that are in this set and not in the other.

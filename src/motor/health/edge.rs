@@ -96,13 +96,7 @@ impl Latch {
 
     /// Returns a change that waits. Of a condition that began and ended, the earlier one comes first.
     pub(crate) fn next(&self) -> Option<(Condition, bool)> {
-        if self.began.is_empty() && self.ended.is_empty() {
-            return None;
-        }
-        let waits = |condition: &Condition| {
-            self.began.contains(*condition) || self.ended.contains(*condition)
-        };
-        let condition = Condition::ALL.into_iter().find(waits)?;
+        let condition = self.began.or(self.ended).iter().next()?;
         let both = self.began.contains(condition) && self.ended.contains(condition);
         let began = if both { !self.has(condition) } else { self.began.contains(condition) };
         Some((condition, began))

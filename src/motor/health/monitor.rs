@@ -81,7 +81,7 @@ impl Monitor {
     /// As [`look`](Self::look), for a motor that is moderately driven and cool; `false` when its angle did not move, and
     /// has to be looked at.
     #[inline]
-    pub(crate) const fn glance(&mut self, angle: u16, word: i8) -> bool {
+    pub(crate) const fn follow(&mut self, angle: u16, word: i8) -> bool {
         let moved = self.frozen.has_moved(angle);
         if moved {
             self.stall = Timer::ZERO;
@@ -89,6 +89,34 @@ impl Monitor {
             self.frozen.follow(angle, word);
         }
         moved
+    }
+
+    /// As [`check`](Self::check), for a motor that is cool and driven with `effort`, so that its current tells nothing; `false` when
+    /// its angle did not move, or a stall or runaway may begin. Nothing has changed then.
+    #[inline]
+    pub(crate) fn follow_driven(
+        &mut self,
+        angle: u16,
+        word: i8,
+        (effort, speed): (f32, f32),
+        elapsed: u8,
+        config: &HealthConfig,
+    ) -> bool {
+        let stands = speed.abs() <= config.stall_speed();
+        if stands || !self.frozen.has_moved(angle) || effort.abs() < UNDRIVEN {
+            return false;
+        }
+        let mut runaway = Runaway::NONE;
+        if effort * speed < 0.0 && !config.ignores(Condition::Runaway) {
+            runaway = self.runaway;
+            if runaway.holds(speed, effort <= -0.5 || effort >= 0.5, elapsed) {
+                return false;
+            }
+        }
+        self.runaway = runaway;
+        self.stall = Timer::ZERO;
+        self.frozen.follow(angle, word);
+        true
     }
 
     /// What ends where a motor is armed, so that it begins again, and relaxes again, if it still holds.
@@ -106,7 +134,7 @@ impl Monitor {
     }
 
     /// Looks at the motor and returns the share of the output that it is left with.
-    pub(crate) fn look(
+    pub(crate) fn check(
         &mut self,
         latch: &mut Latch,
         sample: &Sample,
@@ -195,6 +223,9 @@ impl Frozen {
     }
 }
 
+/// Below this share of the full command a motor counts as not driven.
+const UNDRIVEN: f32 = 0.05;
+
 /// Speeds are kept in 64ths of the no-load speed.
 const SCALE: f32 = 64.0;
 /// 30 % of the no-load speed.
@@ -226,21 +257,25 @@ impl Runaway {
     /// * without a command, while its *current* drives it: the ESC follows somebody else, or nobody. Without the current
     ///   it is pushed from outside, which is not its fault.
     fn check(&mut self, latch: &mut Latch, sample: &Sample) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let speed = (sample.speed.abs() * SCALE) as u8;
         let effort = sample.effort * 1.0_f32.copysign(sample.speed);
         let current = sample.current * 1.0_f32.copysign(sample.speed);
-        let wrong = effort <= -0.5 || (effort.abs() < 0.05 && current >= 0.2);
+        let wrong = effort <= -0.5 || (effort.abs() < UNDRIVEN && current >= 0.2);
+        if self.holds(sample.speed, wrong, sample.elapsed) {
+            latch.set(Condition::Runaway, true);
+        }
+    }
+
+    /// Takes a speed, and whether command and current say otherwise; tells whether it runs away.
+    fn holds(&mut self, speed: f32, wrong: bool, elapsed: u8) -> bool {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let speed = (speed.abs() * SCALE) as u8;
         let falls = speed.saturating_add(FALL) < self.highest;
         if falls || self.lasted == 0 || self.lasted > LONGEST {
             *self = Self { lasted: 0, from: speed, highest: speed };
         }
-        self.lasted =
-            if wrong { self.lasted.saturating_add(sample.elapsed.div_ceil(2)) } else { 0 };
+        self.lasted = if wrong { self.lasted.saturating_add(elapsed.div_ceil(2)) } else { 0 };
         self.highest = self.highest.max(speed);
-        if self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN) {
-            latch.set(Condition::Runaway, true);
-        }
+        self.lasted >= SHORTEST && self.highest >= self.from.saturating_add(GAIN)
     }
 }
 
@@ -401,7 +436,7 @@ const fn saturated(value: u32) -> u16 {
 mod frozen_tests {
     use super::*;
 
-    fn look(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
+    fn check(frozen: &mut Frozen, angle: u16, rest: u16, effort: f32, speed: f32) -> bool {
         let mut latch = Latch::NONE;
         #[expect(clippy::cast_possible_truncation, reason = "at most 100")]
         let word = (effort * 100.0) as i8;
@@ -414,13 +449,13 @@ mod frozen_tests {
     fn a_true_standstill_is_not_frozen_however_long_and_however_hard_it_is_pushed() {
         for effort in [0.0, 0.04, -0.7, 1.0] {
             let mut frozen = Frozen::NONE;
-            assert!((0..1_000).all(|_| !look(&mut frozen, 77, 5, effort, 0.0)));
+            assert!((0..1_000).all(|_| !check(&mut frozen, 77, 5, effort, 0.0)));
         }
         // Blocked under a command that swings: the current answers.
         let mut frozen = Frozen::NONE;
         for step in 0..1_000_u16 {
             let effort = f32::from(step % 200) / 200.0;
-            assert!(!look(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
+            assert!(!check(&mut frozen, 77, step.wrapping_mul(0x9E37), effort, 0.0));
         }
     }
 
@@ -428,15 +463,15 @@ mod frozen_tests {
     fn an_angle_that_rests_while_the_speed_does_not_is_frozen_and_ends() {
         let mut frozen = Frozen::NONE;
         let looks =
-            (0..20_u16).map(|step| look(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
+            (0..20_u16).map(|step| check(&mut frozen, 77, step << 13, 0.1, -0.3)).position(|f| f);
         assert_eq!(looks, Some(9), "100 ms");
-        assert!(!look(&mut frozen, 78, 0, 0.1, -0.3));
+        assert!(!check(&mut frozen, 78, 0, 0.1, -0.3));
     }
 
     #[test]
     fn feedback_that_does_not_answer_a_change_of_the_command_is_frozen() {
         let mut frozen = Frozen::NONE;
-        let mut step = |effort| look(&mut frozen, 77, 5, effort, 0.0);
+        let mut step = |effort| check(&mut frozen, 77, 5, effort, 0.0);
         assert!((0..50).all(|_| !step(0.1)));
         let looks = (0..20).map(|_| step(0.4)).position(|frozen| frozen);
         assert_eq!(looks, Some(8));
@@ -527,19 +562,19 @@ mod stall_tests {
         let config = HealthConfig::new().with_stall(0.5, 0.02, Duration::from_micros(100 << 10));
         for direction in [1.0, -1.0] {
             let (mut timer, mut latch) = (Timer::ZERO, Latch::NONE);
-            let mut look = |effort, speed| {
+            let mut check = |effort, speed| {
                 check_stall(&mut timer, &mut latch, &sample(effort, speed), &config);
                 latch.has(Condition::Stalled)
             };
-            assert!(!look(0.9 * direction, 0.5 * direction), "turns");
+            assert!(!check(0.9 * direction, 0.5 * direction), "turns");
             for _ in 0..9 {
-                assert!(!look(0.5 * direction, -0.02 * direction));
+                assert!(!check(0.5 * direction, -0.02 * direction));
             }
-            assert!(look(0.5 * direction, 0.0));
-            assert!(look(0.3 * direction, 0.039), "still pushed, still standing");
-            assert!(!look(0.3 * direction, 0.04 * direction), "turns");
+            assert!(check(0.5 * direction, 0.0));
+            assert!(check(0.3 * direction, 0.039), "still pushed, still standing");
+            assert!(!check(0.3 * direction, 0.04 * direction), "turns");
             for _ in 0..20 {
-                assert!(!look(0.49 * direction, 0.0), "pushed too little");
+                assert!(!check(0.49 * direction, 0.0), "pushed too little");
             }
         }
     }
@@ -689,6 +724,46 @@ mod traffic_tests {
                 gap_ms = 0;
             }
             prop_assert!(!traffic.is_double());
+        }
+    }
+}
+
+#[cfg(test)]
+mod driven_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Law: where the short check of a driven motor is enough, the full one finds nothing either, and both go on alike.
+        #[test]
+        fn the_short_check_of_a_driven_motor_is_the_full_one(
+            steps in prop::collection::vec((0_u16..8192, -2.0_f32..2.0, -1.0_f32..1.0, 0_u8..30), 1..80),
+        ) {
+            let config = HealthConfig::new();
+            let (mut short, mut full) = (Monitor::NEW, Monitor::NEW);
+            let mut latch = Latch::NONE;
+            for (angle, speed, effort, elapsed) in steps {
+                #[expect(clippy::cast_possible_truncation, reason = "at most 127")]
+                let word = (effort * 127.0) as i8;
+                let sample = Sample { angle, effort, speed, elapsed, word, ..Sample::AT_REST };
+                let before = short;
+                if !short.follow_driven(angle, word, (effort, speed), elapsed, &config) {
+                    prop_assert_eq!((short.stall, short.frozen.feedback), (before.stall, before.frozen.feedback));
+                    short.check(&mut latch.clone(), &sample, &config);
+                }
+                full.check(&mut latch, &sample, &config);
+                let found = latch.active();
+                prop_assert_eq!(short.stall, full.stall);
+                prop_assert_eq!(short.runaway.lasted, full.runaway.lasted);
+                if full.runaway.lasted > 0 {
+                    prop_assert_eq!((short.runaway.from, short.runaway.highest), (full.runaway.from, full.runaway.highest));
+                }
+                prop_assert_eq!(short.frozen.lasted, full.frozen.lasted);
+                // A motor with a condition is checked in full.
+                if !found.is_empty() {
+                    return Ok(());
+                }
+            }
         }
     }
 }

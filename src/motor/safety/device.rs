@@ -21,7 +21,7 @@ pub(crate) struct DeviceGuard<const N: usize> {
     /// The time of the last arming: no update lies before it.
     armed_at: Instant,
     gesture: Gesture,
-    /// Whether each motor has to be seen to with the next update.
+    /// Whether the next update has to compare the ages of each motor.
     is_disturbed: bool,
     /// Whether there was an update.
     is_running: bool,
@@ -137,7 +137,7 @@ impl<const N: usize> DeviceGuard<N> {
         self.held_steps = 0;
     }
 
-    /// Returns the ages of no motor, or `None` where each motor has to be seen to; that is over then.
+    /// Returns the ages of no motor, or `None` where each motor has to be compared by itself; that is over then.
     pub(crate) fn ages(&mut self) -> Option<Ages> {
         let is_disturbed = core::mem::replace(&mut self.is_disturbed, false);
         (!is_disturbed).then(|| Ages::none(self.now, &self.timeouts))
@@ -150,8 +150,8 @@ impl<const N: usize> DeviceGuard<N> {
         self.quiet_until = self.updated + Duration::from_micros(micros.into());
     }
 
-    /// Has the next update see to each motor. To be called wherever an age may become greater than by the time that
-    /// passes, or another limit hold for it.
+    /// Makes the next update compare the ages of each motor. To be called wherever an age may become greater than by the time
+    /// that passes, or another limit hold for it.
     pub(crate) const fn disturb(&mut self) {
         self.quiet_until = Instant::START;
         self.is_disturbed = true;

@@ -136,14 +136,13 @@ impl Guard {
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
         let before = self.device.begin(now);
-        (self.device.is_quiet(before) || self.look_around(before, now)) && self.motor.drives()
+        (self.device.is_quiet(before) || self.compare_ages(before, now)) && self.motor.drives()
     }
 
-    /// Sees to all that the time that passed brings with it, and finds out until when there is nothing of it; `false` when
-    /// none passed.
+    /// Applies all time-outs that are due, and computes until when none can be; `false` if time did not move on.
     #[cold]
     #[inline(never)]
-    fn look_around(&mut self, before: Instant, now: Instant) -> bool {
+    fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
         if !self.device.moves_on(before) {
             self.end_without_time(before, now);
             return false;

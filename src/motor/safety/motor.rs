@@ -195,7 +195,7 @@ impl MotorGuard {
         }
     }
 
-    /// Sees to what grew old; `false` when there may be more to see to at the next update, whatever comes or does not come
+    /// Applies expired time-outs. Returns `false` if the motor has to be checked again with the next update, whatever is received
     /// until then.
     pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
         let is_settled = match self.link {
@@ -247,8 +247,7 @@ impl MotorGuard {
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 
-    /// Gives up what nobody knows any more how old it is: after a pause everything, otherwise what is so old that nobody
-    /// will know.
+    /// Discards each stamp whose age 32 bits can no longer tell; after a pause, discards all stamps.
     pub(crate) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
         let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
         if self.listens && self.link != Link::Unheard && is_bygone(self.heard) {

@@ -24,92 +24,90 @@ pub(super) struct Standing {
     pub(super) since: Instant,
 }
 
-impl Slot {
-    /// Counts a position that arrived at `now`, before its time replaces that of the one before.
-    pub(super) fn count_position(&mut self, now: Instant) {
-        if self.raw.is_some() {
-            let gap = now.since(self.heard).micros_u32();
-            self.traffic.gap(gap.unwrap_or(u32::MAX));
-        } else {
-            self.window_from = now;
-        }
-        self.traffic.count();
+/// Counts a position that arrived at `now`, before its time replaces that of the one before.
+pub(super) fn count_position(slot: &mut Slot, now: Instant) {
+    if slot.raw.is_some() {
+        let gap = now.since(slot.heard).micros_u32();
+        slot.traffic.gap(gap.unwrap_or(u32::MAX));
+    } else {
+        slot.window_from = now;
     }
+    slot.traffic.count();
+}
 
-    /// Another node wrote to the joint, or asked it.
-    pub(in crate::snake) fn hear_rival(&mut self, now: Instant) {
-        self.rival_heard = Some(now);
-        self.guard.note(Condition::SecondMaster, true, now);
-    }
+/// Another node wrote to the joint, or asked it.
+pub(in crate::snake) fn hear_rival(slot: &mut Slot, now: Instant) {
+    slot.rival_heard = Some(now);
+    slot.guard.note(Condition::SecondMaster, true, now);
+}
 
-    pub(in crate::snake) const fn has_rival(&self) -> bool {
-        self.rival_heard.is_some()
-    }
+pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
+    slot.rival_heard.is_some()
+}
 
-    /// Ends what is over, and the window in which positions are counted.
-    pub(super) fn look(&mut self, now: Instant) {
-        if self.rival_heard.is_some_and(|heard| now.since(heard) > RIVAL_FORGOTTEN) {
-            self.rival_heard = None;
-            self.guard.note(Condition::SecondMaster, false, now);
-        }
-        self.look_for_stall(now);
-        let window = now.since(self.window_from);
-        if self.raw.is_some() && window >= WINDOW {
-            let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
-            // How often a joint is asked is the application's affair.
-            self.traffic.close(units, u32::MAX);
-            self.window_from = now;
-        }
+/// Ends what is over, and the window in which positions are counted.
+pub(super) fn check(slot: &mut Slot, now: Instant) {
+    if slot.rival_heard.is_some_and(|heard| now.since(heard) > RIVAL_FORGOTTEN) {
+        slot.rival_heard = None;
+        slot.guard.note(Condition::SecondMaster, false, now);
     }
+    check_stall(slot, now);
+    let window = now.since(slot.window_from);
+    if slot.raw.is_some() && window >= WINDOW {
+        let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
+        // How often a joint is asked is the application's affair.
+        slot.traffic.close(units, u32::MAX);
+        slot.window_from = now;
+    }
+}
 
-    /// A joint that has a way to go and does not move is blocked, or its drive does not do what it is told.
-    fn look_for_stall(&mut self, now: Instant) {
-        let Some(raw) = self.raw else { return };
-        let (window, reaction) = (self.stall.window, self.stall.reaction);
-        let way = self.target.wrapping_sub(raw).unsigned_abs();
-        let moved = raw.wrapping_sub(self.stands.at).unsigned_abs() > STANDS;
-        let asked = self.is_up() && way > THERE;
-        let looks = reaction != Reaction::Ignore && self.guard.link() == Link::Online;
-        if moved || !(asked && looks && self.is_fast_enough()) {
-            self.stands = Standing { at: raw, since: now };
-        }
-        let begins = now.since(self.stands.since) >= window;
-        if begins && reaction == Reaction::Relax {
-            self.guard.relax_until_armed();
-        }
-        self.guard.note(Condition::Stalled, begins, now);
+/// A joint that has a way to go and does not move is blocked, or its drive does not do what it is told.
+fn check_stall(slot: &mut Slot, now: Instant) {
+    let Some(raw) = slot.raw else { return };
+    let (window, reaction) = (slot.stall.window, slot.stall.reaction);
+    let way = slot.target.wrapping_sub(raw).unsigned_abs();
+    let moved = raw.wrapping_sub(slot.stands.at).unsigned_abs() > STANDS;
+    let asked = is_up(slot) && way > THERE;
+    let looks = reaction != Reaction::Ignore && slot.guard.link() == Link::Online;
+    if moved || !(asked && looks && is_fast_enough(slot)) {
+        slot.stands = Standing { at: raw, since: now };
     }
+    let begins = now.since(slot.stands.since) >= window;
+    if begins && reaction == Reaction::Relax {
+        slot.guard.relax_until_armed();
+    }
+    slot.guard.note(Condition::Stalled, begins, now);
+}
 
-    /// Tells whether the joint was enabled. Before that it says of itself that it is not; afterwards it may have news all
-    /// the time, from an application that leads it along.
-    pub(super) const fn is_up(&self) -> bool {
-        self.driven && self.pending & LAST == 0
-    }
+/// Tells whether the joint was enabled. Before that it says of itself that it is not; afterwards it may have news all
+/// the time, from an application that leads it along.
+pub(super) const fn is_up(slot: &Slot) -> bool {
+    slot.driven && slot.pending & LAST == 0
+}
 
-    /// Tells whether the joint would move visibly within the window, from rest.
-    fn is_fast_enough(&self) -> bool {
-        let time_s = self.stall.window.as_secs_f32();
-        let sped_up = 0.5 * self.settings.acceleration as f32 * time_s * time_s;
-        sped_up.min(self.speed as f32 * time_s) > 4.0 * STANDS as f32
-    }
+/// Tells whether the joint would move visibly within the window, from rest.
+fn is_fast_enough(slot: &Slot) -> bool {
+    let time_s = slot.stall.window.as_secs_f32();
+    let sped_up = 0.5 * slot.settings.acceleration as f32 * time_s * time_s;
+    sped_up.min(slot.speed as f32 * time_s) > 4.0 * STANDS as f32
+}
 
-    /// Returns when the change was noted that is next to be read.
-    pub(in crate::snake) fn next_edge_at(&self) -> Option<Instant> {
-        self.id.and_then(|_| self.guard.next_edge_at())
-    }
+/// Returns when the change was noted that is next to be read.
+pub(in crate::snake) fn next_edge_at(slot: &Slot) -> Option<Instant> {
+    slot.id.and_then(|_| slot.guard.next_edge_at())
+}
 
-    pub(in crate::snake) fn next_edge(&mut self) -> Option<Edge> {
-        let motor = self.name()?;
-        self.guard.next_edge(motor)
-    }
+pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge> {
+    let motor = slot.name()?;
+    slot.guard.next_edge(motor)
+}
 
-    /// Returns how the joint is.
-    pub(in crate::snake) fn health(&self) -> Option<Health> {
-        Some(Health {
-            feedback_hz: self.traffic.rate_hz(),
-            longest_gap: Duration::from_micros(self.traffic.longest_gap_us().into()),
-            ambiguous_gaps: self.position_jumps,
-            ..self.guard.health(self.name()?)
-        })
-    }
+/// Returns how the joint is.
+pub(in crate::snake) fn report(slot: &Slot) -> Option<Health> {
+    Some(Health {
+        feedback_hz: slot.traffic.rate_hz(),
+        longest_gap: Duration::from_micros(slot.traffic.longest_gap_us().into()),
+        ambiguous_gaps: slot.position_jumps,
+        ..slot.guard.health(slot.name()?)
+    })
 }

@@ -1,0 +1,313 @@
+//! The motors of a bus in their slots, and the handles that name them.
+
+use super::Model;
+use super::rounds::Rounds;
+use super::slot::Slot;
+use crate::motor::{DeviceGuard, TargetError};
+use crate::time::Instant;
+use core::marker::PhantomData;
+
+/// The lowest feedback id, and how many there are: 0x201..=0x20B.
+pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
+pub(super) const IDS: usize = 11;
+
+/// The motors of a bus in their slots, and the rules that hold for all of them.
+#[derive(Debug)]
+// The slots first: their addresses need no offset then.
+#[repr(C)]
+pub(super) struct Motors<const N: usize> {
+    pub(super) slots: [Slot; N],
+    pub(super) guard: DeviceGuard<12>,
+    pub(super) rounds: Rounds,
+    /// The slot of each feedback id, from the lowest on; [`NOBODY`](Self::NOBODY) without a motor.
+    ///
+    /// Not looked at where there are as many slots as ids: each id has the slot of its number then.
+    places: [u8; IDS],
+    /// All slots from here on are free.
+    pub(super) used: u8,
+}
+
+impl<const N: usize> Motors<N> {
+    pub(super) const NOBODY: u8 = u8::MAX;
+
+    pub(super) const NONE: Self = Self {
+        slots: [Slot::FREE; N],
+        guard: DeviceGuard::NEW,
+        rounds: Rounds::NEW,
+        places: [Self::NOBODY; IDS],
+        used: 0,
+    };
+
+    /// Returns the slot for a feedback id, counted from the lowest; beyond all slots where there is none.
+    #[inline(always)]
+    pub(super) const fn slot_of(&self, id_index: usize) -> usize {
+        if N == IDS {
+            return id_index;
+        }
+        match self.places.as_slice().split_at_checked(id_index) {
+            Some((_, [place, ..])) => *place as usize,
+            _ => Self::NOBODY as usize,
+        }
+    }
+
+    /// Returns the slot where a motor with this feedback id is, or would be attached; `None` when all are taken.
+    pub(super) const fn place_for(&self, id_index: usize) -> Option<u8> {
+        let own = self.slot_of(id_index);
+        if own < N {
+            #[expect(clippy::cast_possible_truncation, reason = "below 11")]
+            return Some(own as u8);
+        }
+        let (mut index, mut worn_out) = (0, None);
+        let mut slots = self.slots.as_slice();
+        while let [slot, rest @ ..] = slots {
+            if slot.facts().is_none() {
+                if slot.next_generation().is_some() {
+                    return Some(index);
+                }
+                worn_out = Some(index);
+            }
+            (index, slots) = (index + 1, rest);
+        }
+        worn_out
+    }
+
+    /// Puts a motor into a slot.
+    pub(super) const fn put(&mut self, id_index: usize, index: u8, motor: Slot) {
+        if let Some((_, [here, ..])) = self.slots.split_at_mut_checked(index as usize) {
+            *here = motor;
+        }
+        if let Some((_, [place, ..])) = self.places.split_at_mut_checked(id_index) {
+            *place = index;
+        }
+        if self.used <= index {
+            self.used = index + 1;
+        }
+    }
+
+    /// Takes the motor of a slot off the list of ids.
+    pub(super) fn forget(&mut self, index: u8) {
+        self.guard.journal_mut().forget(index);
+        for place in &mut self.places {
+            if *place == index {
+                *place = Self::NOBODY;
+            }
+        }
+    }
+
+    #[inline]
+    pub(super) fn get(&self, motor: Key) -> Option<&Slot> {
+        self.slots.get(motor.index()).filter(|slot| slot.matches(motor))
+    }
+
+    #[inline]
+    pub(super) fn get_mut(&mut self, motor: Key) -> Option<&mut Slot> {
+        self.slots.get_mut(motor.index()).filter(|slot| slot.matches(motor))
+    }
+
+    /// Returns the slots up to the last that is taken.
+    #[inline]
+    pub(super) fn taken(&self) -> &[Slot] {
+        self.slots.get(..usize::from(self.used)).unwrap_or_default()
+    }
+
+    /// As [`taken`](Self::taken), to be changed.
+    #[inline]
+    pub(super) fn taken_mut(&mut self) -> &mut [Slot] {
+        self.slots.get_mut(..usize::from(self.used)).unwrap_or_default()
+    }
+
+    /// Iterates over the attached motors in the order of their feedback ids, with id and index of the slot.
+    pub(super) fn by_id(&self) -> impl Iterator<Item = (u16, u8, &Slot)> {
+        (0x201_u16..).zip(0..IDS).filter_map(|(id, id_index)| {
+            let index = self.slot_of(id_index);
+            let slot = self.slots.get(index).filter(|slot| slot.facts().is_some())?;
+            Some((id, u8::try_from(index).ok()?, slot))
+        })
+    }
+
+    /// Returns how many motors are attached.
+    pub(super) const fn count(&self) -> u32 {
+        let mut slots = self.slots.as_slice();
+        let mut count = 0;
+        while let [slot, rest @ ..] = slots {
+            if slot.facts().is_some() {
+                count += 1;
+            }
+            slots = rest;
+        }
+        count
+    }
+
+    /// Changes a slot; applies the rules to the result and notes edges and trips.
+    pub(super) fn change<T>(
+        &mut self,
+        index: u8,
+        now: Instant,
+        change: impl FnOnce(&mut Slot) -> T,
+    ) -> Option<T> {
+        let slot = self.slots.get_mut(usize::from(index))?;
+        let before = slot.guard.known();
+        let outcome = change(slot);
+        slot.apply_rules();
+        self.guard.note(index, before, &slot.guard, now);
+        Some(outcome)
+    }
+
+    /// Sets a target.
+    pub(super) fn set(
+        &mut self,
+        motor: Key,
+        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        let now = self.guard.now();
+        set(self.get_mut(motor).ok_or(TargetError::Detached)?, now)
+    }
+
+    /// Sets a target: by `renew`, which tells whether it was enough, or else by `set`.
+    #[inline(always)]
+    pub(super) fn renew(
+        &mut self,
+        motor: Key,
+        renew: impl FnOnce(&mut Slot, u32) -> bool,
+        set: impl FnOnce(&mut Slot, u32) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        let now = self.guard.now();
+        let Some(slot) = self.slots.get_mut(motor.index()) else {
+            return Err(TargetError::Detached);
+        };
+        if renew(slot, now) {
+            return Ok(());
+        }
+        if slot.matches(motor) { set(slot, now) } else { Err(TargetError::Detached) }
+    }
+
+    /// [Changes](Self::change) a motor at the time of the present update.
+    pub(super) fn change_present(
+        &mut self,
+        motor: Key,
+        change: impl FnOnce(&mut Slot) -> Result<(), TargetError>,
+    ) -> Result<(), TargetError> {
+        self.get(motor).ok_or(TargetError::Detached)?;
+        let changed = self.change(motor.place(), self.guard.updated(), change);
+        changed.unwrap_or(Err(TargetError::Detached))
+    }
+
+    /// [Changes](Self::change) each slot that may be taken.
+    pub(super) fn change_all(&mut self, now: Instant, change: impl Fn(&mut Slot)) {
+        for index in 0..self.used {
+            self.change(index, now, &change);
+        }
+    }
+}
+
+#[cfg(target_pointer_width = "32")]
+const _: () = {
+    assert!(size_of::<Slot>() <= 296 && size_of::<super::Bus>() <= 3600);
+    assert!(size_of::<super::Bus<(), 8>>() <= 2800 && size_of::<super::Bus<(), 1>>() <= 640);
+};
+
+/// Names a motor of a bus: one byte, `Copy`, with the model as a type.
+///
+/// `B` is the brand of the bus ([`Bus::branded`](super::Bus::branded)); handles of differently branded buses do
+/// not mix. A handle of a motor that was detached finds nothing, even when another motor took its place.
+pub struct Handle<M: Model, B = ()> {
+    key: Key,
+    brand: PhantomData<fn() -> (M, B)>,
+}
+
+/// Names a motor of a bus whatever its model: for logging, tuning and everything that all models can do.
+pub struct AnyHandle<B = ()> {
+    key: Key,
+    brand: PhantomData<fn() -> B>,
+}
+
+/// Slot index in the low half, generation in the high half.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Key(u8);
+
+impl Key {
+    pub(super) const GENERATIONS: u8 = 16;
+    /// Names no slot: there are 11.
+    pub(super) const NONE: Self = Self(0xFF);
+
+    pub(super) const fn new(index: u8, generation: u8) -> Self {
+        Self(generation << 4 | (index & 15))
+    }
+
+    pub(super) const fn index(self) -> usize {
+        (self.0 & 15) as usize
+    }
+
+    /// Returns the index as it is kept in small places.
+    pub(super) const fn place(self) -> u8 {
+        self.0 & 15
+    }
+
+    pub(super) const fn generation(self) -> u8 {
+        self.0 >> 4
+    }
+}
+
+impl<M: Model, B> Handle<M, B> {
+    pub(super) const fn new(key: Key) -> Self {
+        Self { key, brand: PhantomData }
+    }
+
+    /// Forgets the model.
+    #[must_use]
+    pub const fn erase(self) -> AnyHandle<B> {
+        AnyHandle::new(self.key)
+    }
+}
+
+impl<B> AnyHandle<B> {
+    pub(super) const fn new(key: Key) -> Self {
+        Self { key, brand: PhantomData }
+    }
+
+    pub(super) const fn key(self) -> Key {
+        self.key
+    }
+}
+
+impl<M: Model, B> From<Handle<M, B>> for AnyHandle<B> {
+    fn from(handle: Handle<M, B>) -> Self {
+        handle.erase()
+    }
+}
+
+impl<M: Model, B> Clone for Handle<M, B> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Model, B> Copy for Handle<M, B> {}
+impl<M: Model, B> PartialEq for Handle<M, B> {
+    fn eq(&self, other: &Self) -> bool {
+        self.key == other.key
+    }
+}
+impl<M: Model, B> Eq for Handle<M, B> {}
+impl<M: Model, B> core::fmt::Debug for Handle<M, B> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "Handle({} in slot {})", M::FACTS.name, self.key.index())
+    }
+}
+
+impl<B> Clone for AnyHandle<B> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<B> Copy for AnyHandle<B> {}
+impl<B> PartialEq for AnyHandle<B> {
+    fn eq(&self, other: &Self) -> bool {
+        self.key == other.key
+    }
+}
+impl<B> Eq for AnyHandle<B> {}
+impl<B> core::fmt::Debug for AnyHandle<B> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "AnyHandle(slot {})", self.key.index())
+    }
+}
