@@ -416,9 +416,9 @@ class Trial:
     def registers(self):
         """The table of the source, that of the program, and that of the judge."""
         source = pathlib.Path(__file__).parent.parent / "src/damiao/register.rs"
-        rows = re.findall(r"^    \w+ (\d+) (Float|Integer)(Fact)? \"", source.read_text(), re.MULTILINE)
-        kinds = {"Float": "float", "Integer": "uint32"}
-        source = {int(n): (kinds[kind], "RO" if fact else "RW") for n, kind, fact in rows}
+        rows = re.findall(r"^    \w+ (\d+) ([FU]32) (R[wo]) \"", source.read_text(), re.MULTILINE)
+        kinds = {"F32": "float", "U32": "uint32"}
+        source = {int(n): (kinds[kind], access.upper()) for n, kind, access in rows}
         ours = {int(n): (kind, access) for n, kind, access in self.program.lines("registers")}
         require(ours == source, f"judges/src/main.rs does not have {set(source) ^ set(ours)}")
         for number in self.judge.table or {}:

@@ -8,17 +8,11 @@ use crate::error::ConfigError;
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, Severity, Vitals, WrongSetting, register_questions,
+    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit;
-
-/// A unit of the register TIMEOUT.
-const TIMEOUT_UNIT_US: u32 = 50;
-
-/// The time-out of the drive unless configured otherwise: 100 ms.
-const TIMEOUT_UNITS: u32 = 100_000 / TIMEOUT_UNIT_US;
 
 /// The largest share by which a range may differ from that of the model: rounding of the drive's display.
 const RANGE_TOLERANCE: f32 = 1e-4;
@@ -55,7 +49,7 @@ pub struct Motor {
     model: Model,
     id: u8,
     master_id: u16,
-    timeout_units: u32,
+    timeout: TimeoutUnits,
     mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
@@ -79,7 +73,7 @@ impl Motor {
             model,
             id,
             master_id: u16::from(id) + 0x10,
-            timeout_units: TIMEOUT_UNITS,
+            timeout: TimeoutUnits::USUAL,
             mode,
             drive: None,
             settings: Settings::new(CHECKED),
@@ -104,9 +98,7 @@ impl Motor {
     /// # Errors
     /// [`ConfigError::Range`] for another time.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
-        let micros =
-            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 60_000_000)?;
-        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
+        Ok(Self { timeout: TimeoutUnits::new(timeout, 60_000_000)?, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -210,7 +202,7 @@ impl OwnMotor for Motor {
     /// First what is not known of the settings, then the time-out, written and read back, then the frame that enables: each of
     /// them needs all of that anew, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        let timeout = Preparation::exact(Register::Timeout, self.timeout_units as f32);
+        let timeout = Preparation::exact(Register::Timeout, self.timeout.value());
         let asked = self.settings.prepare([timeout]);
         Some(match asked {
             Some(asked) => inquiry(self.id, asked),

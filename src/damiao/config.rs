@@ -81,7 +81,7 @@ impl Mode {
         model: &Model,
     ) -> Option<Command> {
         let shaft = (drive.angle(), drive.velocity());
-        let goal = self.0.impedance_goal(order, shaft, &model.most(), &model.count())?;
+        let goal = self.0.impedance_goal(order, shaft, model.ranges(), 4_095)?;
         let limit = self.0.most_velocity();
         let way = match goal {
             Goal::Impedance(command) => return Some(Command::Mit(command)),

@@ -53,6 +53,13 @@ pub trait Devices {
         offer.outcome
     }
 
+    /// Returns header and mask of this device's usual feedback; `None`, unless said otherwise, if it has none.
+    ///
+    /// An array of devices finds the first one to ask by it, if their headers are as far apart from each other as the first two.
+    fn usual_feedback(&self) -> Option<(u32, u32)> {
+        None
+    }
+
     /// Takes a received frame of any driver's own type. A frame of more than 8 bytes is unrelated.
     fn ingest_any(&mut self, frame: &impl embedded_can::Frame, now: Instant) -> Ingest {
         CanFrame::copy_of(frame).map_or(Ingest::Unrelated, |frame| self.ingest(&frame, now))
@@ -220,13 +227,63 @@ impl<D: Devices> Devices for &mut D {
     fn visit(&mut self, visitor: &mut impl Visitor) {
         (**self).visit(visitor);
     }
+
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        (**self).ingest(frame, now)
+    }
+
+    #[inline]
+    fn usual_feedback(&self) -> Option<(u32, u32)> {
+        (**self).usual_feedback()
+    }
+
+    #[inline]
+    fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
+        (**self).next_frame(turn)
+    }
 }
 
+/// An array of motors with ids at one distance takes a frame by one look at its id.
 impl<D: Devices, const N: usize> Devices for [D; N] {
     #[inline]
     fn visit(&mut self, visitor: &mut impl Visitor) {
         self.iter_mut().for_each(|device| device.visit(visitor));
     }
+
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        let first = place_of(self, frame.header()).unwrap_or(0);
+        // The one that it is for is the first; where a frame is for none, or ids are shared, each is asked once.
+        let mut place = first;
+        for _ in 0..N {
+            let Some(device) = self.get_mut(place) else { break };
+            let outcome = device.ingest(frame, now);
+            if outcome != Ingest::Unrelated {
+                return outcome;
+            }
+            place = if place + 1 < N { place + 1 } else { 0 };
+        }
+        Ingest::Unrelated
+    }
+
+    #[inline]
+    fn next_frame(&mut self, turn: u32) -> Option<CanFrame> {
+        let first = turn.checked_rem(u32::try_from(N).ok()?)?;
+        let (before, after) = self.split_at_mut_checked(usize::try_from(first).ok()?)?;
+        after.iter_mut().chain(before).find_map(|device| device.next_frame(turn))
+    }
+}
+
+/// Returns the place of the device whose usual feedback has a header.
+#[inline]
+fn place_of<D: Devices>(devices: &[D], header: u32) -> Option<usize> {
+    let [one, two, ..] = devices else { return None };
+    let ((first, mask), (second, _)) = (one.usual_feedback()?, two.usual_feedback()?);
+    let way = (header & mask).wrapping_sub(first);
+    let place = usize::try_from(way.checked_div(second.wrapping_sub(first))?).ok()?;
+    let (usual, mask) = devices.get(place)?.usual_feedback()?;
+    (header & mask == usual).then_some(place)
 }
 
 macro_rules! tuple {

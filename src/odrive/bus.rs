@@ -114,7 +114,7 @@ impl OwnMotor for Motor {
             return request(self.node, ESTIMATES);
         }
         let is_torque = self.mode.control.number == TORQUE;
-        let parts = if is_torque { PARTS } else { (order.share * PARTS).floor().min(PARTS) };
+        let parts = if is_torque { PARTS } else { parts_of(order.share).min(PARTS) };
         if self.state.limits.is_due(parts, LIMITS_EACH) {
             return self.limits_of(parts);
         }
@@ -290,4 +290,10 @@ impl Motor {
             .find(|code| *code > 0)
             .unwrap_or(0)
     }
+}
+
+/// Returns the whole parts of a share.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn parts_of(share: f32) -> f32 {
+    f32::from((share * PARTS) as u8)
 }

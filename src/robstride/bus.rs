@@ -8,16 +8,10 @@ use crate::error::{ConfigError, check};
 use crate::frame::CanFrame;
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Laps, Malformed, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, Severity, Vitals, WrongSetting, register_questions,
+    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
-
-/// A unit of the parameter canTimeout.
-const TIMEOUT_UNIT_US: u32 = 50;
-
-/// The time-out of the drive unless configured otherwise: 100 ms.
-const TIMEOUT_UNITS: u32 = 100_000 / TIMEOUT_UNIT_US;
 
 /// The code of a drive that calibrates itself.
 const CALIBRATION_CODE: u8 = 1;
@@ -50,7 +44,7 @@ pub struct Motor {
     model: Model,
     id: u8,
     host: u8,
-    timeout_units: u32,
+    timeout: TimeoutUnits,
     mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
@@ -85,7 +79,7 @@ impl Motor {
             model,
             id,
             host: 0xFD,
-            timeout_units: TIMEOUT_UNITS,
+            timeout: TimeoutUnits::USUAL,
             mode,
             drive: None,
             laps: Laps::default(),
@@ -117,9 +111,7 @@ impl Motor {
         if !self.model.has_timeout() {
             return Err(ConfigError::Unsupported("time-out"));
         }
-        let micros =
-            ConfigError::check_micros("time-out in us", timeout.micros_u32(), 1_000, 5_000_000)?;
-        Ok(Self { timeout_units: micros / TIMEOUT_UNIT_US, ..self })
+        Ok(Self { timeout: TimeoutUnits::new(timeout, 5_000_000)?, ..self })
     }
 
     /// Returns the last feedback of the drive; `None` before the first.
@@ -175,7 +167,7 @@ impl Motor {
     fn expected(&self, register: Register) -> (&'static str, f32) {
         match register {
             Register::RunMode => ("run_mode", self.mode.number(&self.model).into()),
-            Register::Timeout => ("canTimeout", self.timeout_units as f32),
+            Register::Timeout => ("canTimeout", self.timeout.value()),
             _ => ("mechPos", self.model.pmax_rad()),
         }
     }
@@ -230,10 +222,8 @@ impl OwnMotor for Motor {
         let Some(feedback) = Feedback::decode(frame, &self.model) else {
             return Ingest::Malformed(Malformed::Field);
         };
-        let pmax = self.model.pmax_rad();
         let before = self.drive.map(|drive| drive.measured.position_rad);
-        let way = before.map_or(0.0, |before| feedback.measured.position_rad - before);
-        self.laps.advance(way, pmax);
+        self.laps.advance(before, feedback.measured.position_rad, self.model.pmax_rad());
         if self.has_cleared && feedback.faults == 0 {
             (self.reported, self.has_cleared) = (0, false);
         }
@@ -258,7 +248,8 @@ impl OwnMotor for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         let shaft = (self.angle(), self.velocity());
         let command = self.drive.and_then(|_| self.mode.command(order, shaft, &self.model));
-        command.map(|command| self.frame_of(command)).unwrap_or_else(|| self.rest())
+        let Some(command) = command else { return self.rest() };
+        self.frame_of(command)
     }
 
     fn reset(&mut self) {
@@ -268,7 +259,7 @@ impl OwnMotor for Motor {
     /// First what is not known of the settings, then the preparations, each written and read back, then the frame that enables:
     /// all of that anew each time, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        let (timeout, mode) = (self.timeout_units as f32, self.mode.preparations());
+        let (timeout, mode) = (self.timeout.value(), self.mode.preparations());
         let timeout = Preparation::exact(Register::Timeout, timeout);
         let timeout = Some(timeout).filter(|_| self.model.has_timeout());
         let asked = self.settings.prepare(timeout.into_iter().chain(mode.into_iter().flatten()));
@@ -301,7 +292,8 @@ impl OwnMotor for Motor {
         }
         self.questions = self.questions.wrapping_add(1);
         let (_, mode) = self.expected(Register::RunMode);
-        let is_other = self.settings.found(Register::RunMode).is_some_and(|found| found != mode);
+        let is_other =
+            self.settings.found(Register::RunMode).is_some_and(|it| it.to_bits() != mode.to_bits());
         if is_other && self.questions.is_multiple_of(4) {
             return Some(self.frame_of(Command::Write(Register::RunMode, mode)));
         }

@@ -97,9 +97,3 @@ pub(super) fn extended(raw: u32) -> Id {
 pub(super) fn raw_of(frame: &CanFrame) -> Option<u32> {
     frame.has_extended_id().then_some(frame.header() & ExtendedId::MAX.as_raw())
 }
-
-/// Returns the type of a frame, bits 28 to 24 of its id.
-pub(super) const fn kind_of(raw: u32) -> u8 {
-    let [kind, ..] = raw.to_be_bytes();
-    kind
-}

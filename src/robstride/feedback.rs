@@ -1,6 +1,6 @@
 //! The codec of what a drive sends: its feedback, parameters and reports of faults.
 
-use super::command::{kind_of, raw_of};
+use super::command::raw_of;
 use super::{Model, Register};
 use crate::frame::CanFrame;
 use crate::motor::lowest_bit;
@@ -53,8 +53,8 @@ impl Feedback {
     #[must_use]
     pub fn decode(frame: &CanFrame, model: &Model) -> Option<Self> {
         let raw = raw_of(frame)?;
-        let [_, state, id, _] = raw.to_be_bytes();
-        if kind_of(raw) != 2 || frame.length() != 8 {
+        let [kind, state, id, _] = raw.to_be_bytes();
+        if kind != FEEDBACK || frame.length() != 8 {
             return None;
         }
         let status = Status::of(state >> 6)?;
@@ -110,8 +110,9 @@ impl Status {
     }
 }
 
-/// The types of what a drive says beside its feedback: a parameter, its faults as the manual counts their bits, and its firmware, which
+/// The types of what a drive says: feedback, a parameter, its faults as the manual counts their bits, and its firmware, which
 /// another node has asked for, with the type of feedback.
+const FEEDBACK: u8 = 2;
 pub(super) const VALUE: u8 = 17;
 pub(super) const FAULTS: u8 = 21;
 const VERSION: [u8; 3] = [0x00, 0xC4, 0x56];
@@ -119,8 +120,8 @@ const VERSION: [u8; 3] = [0x00, 0xC4, 0x56];
 /// Reads a frame that is no feedback: its type, whether the drive knows what it was asked for, and the data.
 pub(super) fn answer(frame: &CanFrame) -> Option<(u8, bool, [u8; 8])> {
     let (raw, data) = (raw_of(frame)?, *frame.bytes());
-    let ([_, status, ..], kind) = (raw.to_be_bytes(), kind_of(raw));
-    let is_version = kind == 2 && data.starts_with(&VERSION);
+    let [kind, status, ..] = raw.to_be_bytes();
+    let is_version = kind == FEEDBACK && data.starts_with(&VERSION);
     let is_answer = frame.length() == 8 && (is_version || matches!(kind, VALUE | FAULTS));
     is_answer.then_some((kind, status == 0, data))
 }

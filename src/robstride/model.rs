@@ -85,15 +85,10 @@ impl Model {
         }
     }
 
-    const fn known(
-        name: &'static str,
-        ranges: [f32; 4],
-        current_a: f32,
-        is_cybergear: bool,
-    ) -> Self {
+    const fn known(name: &'static str, ranges: [f32; 4], current: f32, is_cybergear: bool) -> Self {
         let [vmax, tmax, kp, kd] = ranges;
         let ranges = Ranges::of([FOUR_PI, vmax, tmax], [kp, kd]);
-        Self { name, ranges, current_a, is_cybergear }
+        Self { name, ranges, current_a: current, is_cybergear }
     }
 
     /// Sets another range of the position, in rad, and keeps all others: that of another firmware.

@@ -1,6 +1,6 @@
 #!/bin/busybox sh
-# The first program of the emulated machine: brings up the CAN interfaces, runs the test and powers off. MODULES comes with the
-# kernel's command line. The kernel writes to the first serial port, the test to the second.
+# The first program of the emulated machine: brings up the CAN interfaces, runs the test and powers off. MODULES and
+# ONLY come with the kernel's command line. The kernel writes to the first serial port, the test to the second.
 export PATH=/bin
 bb=/bin/busybox
 $bb mount -t devtmpfs none /dev
@@ -19,6 +19,7 @@ $bb stty -F /dev/ttyS1 -opost
     for interface in can0 can1; do
         /bin/ip link set $interface up type can bitrate 1000000 || echo "no $interface"
     done
-    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 </dev/null
+    PYTHONHOME=$($bb cat /python-home) PYTHONPATH=/ MOTORBRIDGE_TX_GAP_US=0 MOTORBRIDGE_BULK_OP_GAP_MS=0 \
+    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
 } >/dev/ttyS1 2>&1
 $bb poweroff -f

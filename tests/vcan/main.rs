@@ -6,13 +6,15 @@
 //! frames. Afterwards every frame has to be accounted for: I6 of `docs/faults.md`, by three counts that are not ours.
 //! And a chassis has to move as the bench is asked to.
 //!
-//! Two CAN controllers with drivers carry the same bench in [`controllers`].
+//! Two CAN controllers with drivers carry the same bench in [`controllers`]. In [`foreign`] a master that others wrote drives simulated
+//! drives.
 
 #![cfg(test)]
 #![cfg(target_os = "linux")]
 
 mod controllers;
 mod ends;
+mod foreign;
 mod judge;
 
 use drivetrain::frame::CanFrame;

@@ -358,6 +358,7 @@ pub fn family<D: CanDevice + 'static>() {
 pub fn device<D: Devices + 'static>() {
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest_any(frame, now)).call();
+    (|device: &D| device.usual_feedback()).call();
     (|device: &mut D, tick: Tick| device.update(tick)).call();
     (|device: &mut D, turn: u32| device.next_frame(turn)).call();
     (|device: &mut D, frame: &CanFrame| device.requeue(frame)).call();

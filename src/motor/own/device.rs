@@ -27,28 +27,19 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         }
     }
 
+    #[inline]
     fn update(&mut self, tick: Tick) {
         let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
         let left = self.look(tick.now());
         let drives = self.guard.drives(tick.now());
-        let may_drive = drives && !(step.is_hold() && self.held.is_none());
-        // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
-        self.switched.take_if(|_| self.power.is_confirmed());
-        self.rested.take_if(|_| self.command.is_some());
-        self.withdraw(|own| &mut own.command);
-        self.has_posted = false;
-        let was_on = self.power.is_on();
-        self.switch(may_drive, tick.now());
-        // Before the drive was on for certain, it was polled where rest would have disabled it.
-        self.rested.take_if(|_| was_on && !self.power.is_on());
-        let inquiry = self.inquire(tick.now());
-        let is_at_rest = !may_drive || !self.power.is_ready();
-        let command = self.act(may_drive, step, left);
-        // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
-        let has_other = self.has_posted || inquiry.is_some();
-        let gives_way = is_at_rest && self.rested.is_some() && has_other;
-        self.offer(if gives_way { inquiry } else { command });
-        self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
+        if drives && !step.is_hold() && self.is_steady() {
+            self.power.pass(tick.now());
+            self.withdraw(|own| &mut own.command);
+            self.has_posted = false;
+            self.command = Some(self.follow(step, left));
+            return;
+        }
+        self.update_anyhow(drives, step, left, tick.now());
     }
 
     #[inline]
@@ -158,6 +149,36 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
 /// The update, step by step.
 impl<M: OwnMotor> Own<M> {
+    /// Tells whether the drive is enabled, and no frame but a command is due: that is so in almost each cycle of a motor that is driven.
+    #[inline]
+    fn is_steady(&self) -> bool {
+        let waits = self.switched.is_some() || self.switching.is_some() || self.rested.is_some();
+        self.power.is_steady() && self.was_online && !waits
+    }
+
+    /// Enables, disables, asks, commands and rests, as the motor may be driven or not.
+    #[inline(never)]
+    fn update_anyhow(&mut self, drives: bool, step: TimeStep, left: f32, now: Instant) {
+        let may_drive = drives && !(step.is_hold() && self.held.is_none());
+        // A question that is given back from now on did not enable the drive, and rest that nobody took was not sent.
+        self.switched.take_if(|_| self.power.is_confirmed());
+        self.rested.take_if(|_| self.command.is_some());
+        self.withdraw(|own| &mut own.command);
+        self.has_posted = false;
+        let was_on = self.power.is_on();
+        self.switch(may_drive, now);
+        // Before the drive was on for certain, it was polled where rest would have disabled it.
+        self.rested.take_if(|_| was_on && !self.power.is_on());
+        let inquiry = self.inquire(now);
+        let is_at_rest = !may_drive || !self.power.is_ready();
+        let command = self.act(may_drive, step, left);
+        // Between two frames of rest, another frame takes the place of one: the bus never has two of them at once to carry.
+        let has_other = self.has_posted || inquiry.is_some();
+        let gives_way = is_at_rest && self.rested.is_some() && has_other;
+        self.offer(if gives_way { inquiry } else { command });
+        self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
+    }
+
     /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
     fn look(&mut self, now: Instant) -> f32 {
         let share = self.watch.look(&mut self.guard, || self.motor.vitals(), now);
@@ -272,11 +293,18 @@ impl<M: OwnMotor> Own<M> {
         if step.is_hold() {
             return self.held.take();
         }
+        Some(self.follow(step, left))
+    }
+
+    /// Returns the command of this step.
+    #[inline]
+    fn follow(&mut self, step: TimeStep, left: f32) -> CanFrame {
         self.is_resting = false;
         let opened = self.guard.share();
-        let order = Order { target: self.goal(opened), share: left.min(opened), step };
-        self.held = Some(self.motor.control(order));
-        self.held
+        let target = if opened < 1.0 { self.goal(opened) } else { self.target };
+        let command = self.motor.control(Order { target, share: left.min(opened), step });
+        self.held = Some(command);
+        command
     }
 
     /// Returns the target; an angle on its way from where the shaft was, as far as the output range is open.

@@ -192,22 +192,50 @@ impl ImpedanceControl {
     /// exact. Gains are whole counts and a quarter, for a drive that truncates.
     pub fn step(
         &mut self,
-        Order { target, share, step }: Order,
+        order: Order,
         angle: Option<Angle>,
         velocity: AngularVelocity,
         most: &Impedance,
         count: &Impedance,
     ) -> Option<Impedance> {
+        let gains = (count.stiffness, count.damping);
+        self.step_within(order, (angle, velocity), gains, || (*most, *count))
+    }
+
+    /// As [`step`](Self::step), with the counts of the two gains, and all ends and counts, which a torque alone does not need.
+    #[inline]
+    pub(crate) fn step_within(
+        &mut self,
+        order: Order,
+        shaft: Shaft,
+        counts: (f32, f32),
+        fields: impl FnOnce() -> (Impedance, Impedance),
+    ) -> Option<Impedance> {
         self.effort = 0.0;
-        let limit = self.torque_limit_nm * share;
-        let wanted = self.wanted(Order { target, share, step }, (angle, velocity))?;
+        let limit = self.torque_limit_nm * order.share;
+        let wanted = self.wanted(order, shaft)?;
         let torque_nm = limited(wanted.torque_nm, -limit, limit);
         if wanted.stiffness <= 0.0 && wanted.damping <= 0.0 {
             self.effort = torque_nm / self.torque_limit_nm;
-            let (stiffness, damping) = (0.25 * count.stiffness, 0.25 * count.damping);
-            let angle = angle.unwrap_or(Angle::ZERO);
+            let (stiffness, damping) = (0.25 * counts.0, 0.25 * counts.1);
+            let (angle, velocity) = (shaft.0.unwrap_or(Angle::ZERO), shaft.1);
             return Some(Impedance { angle, velocity, stiffness, damping, torque_nm });
         }
+        let (most, count) = fields();
+        self.spring(&Impedance { torque_nm, ..wanted }, shaft, order.share, &most, &count)
+    }
+
+    /// Limits a spring and a damper beside a torque, which is limited.
+    #[inline(never)]
+    fn spring(
+        &mut self,
+        wanted: &Impedance,
+        (angle, velocity): Shaft,
+        share: f32,
+        most: &Impedance,
+        count: &Impedance,
+    ) -> Option<Impedance> {
+        let (limit, torque_nm) = (self.torque_limit_nm * share, wanted.torque_nm);
         let (per_count, per_count_s) = (count.angle.as_radians(), count.velocity.as_rad_per_s());
         let end = most.velocity.as_rad_per_s();
         // A velocity at the end of its range is there or beyond.
@@ -248,8 +276,7 @@ impl ImpedanceControl {
             damping: UNLIMITED,
             torque_nm: self.torque_limit_nm,
         };
-        let (angle, velocity) = shaft;
-        self.step(order, angle, velocity, &most, &Impedance::FREE)?;
+        self.step_within(order, shaft, (0.0, 0.0), || (most, Impedance::FREE))?;
         let limit = self.torque_limit_nm * order.share;
         Some(limited(self.effort * self.torque_limit_nm, -limit, limit))
     }

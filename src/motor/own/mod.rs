@@ -23,14 +23,14 @@ pub use settings::{Inquiry, Settings};
 pub(crate) use mode::{ControlMode, Goal, Shaft, inside};
 pub(crate) use questions::Questions;
 pub(crate) use registers::{Form, lowest_bit, mit_model, models, register_questions, registers};
-pub(crate) use settings::Preparation;
+pub(crate) use settings::{Preparation, TimeoutUnits};
 pub(crate) use told::Told;
 pub(crate) use torque_loops::TorqueLoops;
 pub(crate) use turns::{Laps, Tachometer};
 
 use super::{
-    AngleDrive, Capabilities, Capability, Claim, Devices, Guard, Health, HealthConfig, Link,
-    TargetError, Timeouts, VelocityDrive, Visitor, Watch,
+    AngleDrive, CanDevice, Capabilities, Capability, Claim, Devices, Guard, Health, HealthConfig,
+    Link, TargetError, Timeouts, VelocityDrive, Visitor, Watch,
 };
 use crate::frame::CanFrame;
 use crate::time::{Duration, Instant};
@@ -253,6 +253,16 @@ impl<M: OwnMotor> Devices for Own<M> {
     #[inline]
     fn visit(&mut self, visitor: &mut impl Visitor) {
         visitor.visit(self);
+    }
+
+    #[inline]
+    fn usual_feedback(&self) -> Option<(u32, u32)> {
+        self.route.usual()
+    }
+
+    #[inline]
+    fn next_frame(&mut self, _turn: u32) -> Option<CanFrame> {
+        CanDevice::next_frame(self)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::error::ConfigError;
 use crate::math::wrap_pi;
 use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
-use crate::wire::mit;
+use crate::wire::mit::{self, Ranges};
 
 /// Angle and velocity of the output shaft; no angle where it is not known.
 pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
@@ -135,21 +135,25 @@ impl ControlMode {
         }
     }
 
-    /// Returns the goal of a drive that follows an impedance, whose fields have these ends and counts; `None` to rest.
+    /// Returns the goal of a drive that follows an impedance in fields of these ranges, which go to `top`, the position to 65535; `None`
+    /// to rest.
     #[inline]
     pub(crate) fn impedance_goal(
         &mut self,
         order: Order,
-        (angle, velocity): Shaft,
-        most: &Impedance,
-        count: &Impedance,
+        shaft: Shaft,
+        ranges: &Ranges,
+        top: u16,
     ) -> Option<Goal> {
         match &mut self.follows {
             Follows::Impedance(control) => {
-                let sent = control.step(order, angle, velocity, most, count)?;
+                let (stiffness, damping) = ranges.gains();
+                let counts = (stiffness / f32::from(top), damping / f32::from(top));
+                let fields = || (Impedance::most(ranges), Impedance::count(ranges, top));
+                let sent = control.step_within(order, shaft, counts, fields)?;
                 Some(Goal::Impedance(sent.into()))
             }
-            _ => self.own_goal(order, (angle, velocity)),
+            _ => self.own_goal(order, shaft),
         }
     }
 

@@ -114,6 +114,16 @@ impl Power {
         self.on && self.seen != Some(false)
     }
 
+    /// Tells whether the drive is enabled, as far as it says, and nothing is due.
+    pub(super) fn is_steady(&self) -> bool {
+        self.is_ready() && !self.is_due
+    }
+
+    /// Moves on to an update in which nothing is due.
+    pub(super) const fn pass(&mut self, now: Instant) {
+        self.now = now;
+    }
+
     /// Tells whether the drive says that it is enabled, as it is to be.
     pub(super) fn is_confirmed(&self) -> bool {
         self.on && self.seen == Some(true)

@@ -7,15 +7,26 @@ use crate::motor::{Claim, Role};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Route {
     feedback: Pattern,
+    /// Feedback with an id that other motors have too, which need not resemble the ids of this one.
+    shared: Pattern,
     command: Pattern,
-    /// The first claim of feedback; fits nothing where a command may have such an id too.
+    /// The first claim of feedback.
     usual: Pattern,
+    /// The same; fits nothing where a command may have such an id too.
+    certain: Pattern,
 }
 
 impl Route {
     /// Before the claims are known, only they tell.
-    pub(super) const UNKNOWN: Self =
-        Self { feedback: Pattern::ANY, command: Pattern::ANY, usual: Pattern::NONE };
+    pub(super) const UNKNOWN: Self = Self { feedback: Pattern::ANY, ..Self::NONE };
+
+    const NONE: Self = Self {
+        feedback: Pattern::NONE,
+        shared: Pattern::NONE,
+        command: Pattern::NONE,
+        usual: Pattern::NONE,
+        certain: Pattern::NONE,
+    };
 
     pub(super) const fn is_unknown(&self) -> bool {
         self.feedback.mask == 0
@@ -23,14 +34,13 @@ impl Route {
 
     /// Takes the claims of the motor. A command with a shared id tells nothing: it may be for another drive.
     pub(super) fn of<I: IntoIterator<Item = Claim>>(claims: impl Fn() -> I) -> Self {
-        let mut route =
-            Self { feedback: Pattern::NONE, command: Pattern::NONE, usual: Pattern::NONE };
+        let mut route = Self::NONE;
         for claim in claims() {
+            if claim.role() == Role::Feedback && route.usual.is_none() {
+                route.usual = Pattern::of(&claim);
+            }
             match claim.role() {
-                Role::Feedback if route.usual.is_none() => {
-                    route.usual = Pattern::of(&claim);
-                    route.feedback.add(&claim);
-                }
+                Role::Feedback if claim.is_shared() => route.shared.add(&claim),
                 Role::Feedback => route.feedback.add(&claim),
                 Role::Command if claim.is_shared() => {}
                 Role::Command => route.command.add(&claim),
@@ -39,8 +49,8 @@ impl Route {
         let mut commands = claims()
             .into_iter()
             .filter(|claim| claim.role() == Role::Command && !claim.is_shared());
-        if commands.any(|claim| Pattern::of(&claim).meets(&route.usual)) {
-            route.usual = Pattern::NONE;
+        if !commands.any(|claim| Pattern::of(&claim).meets(&route.usual)) {
+            route.certain = route.usual;
         }
         route
     }
@@ -48,13 +58,19 @@ impl Route {
     /// Tells whether a frame may concern the motor; false for most frames of others, and for every remote frame.
     #[inline]
     pub(super) const fn fits(&self, frame: &CanFrame) -> bool {
-        self.feedback.fits(frame) || self.command.fits(frame)
+        self.feedback.fits(frame) || self.command.fits(frame) || self.shared.fits(frame)
+    }
+
+    /// Returns header and mask of the usual feedback, if there is one.
+    #[inline]
+    pub(super) const fn usual(&self) -> Option<(u32, u32)> {
+        if self.usual.is_none() { None } else { Some((self.usual.header, self.usual.mask)) }
     }
 
     /// Tells whether a frame is the motor's usual feedback for certain, and no command of another node.
     #[inline]
     pub(super) const fn is_feedback(&self, frame: &CanFrame) -> bool {
-        self.usual.fits(frame)
+        self.certain.fits(frame)
     }
 }
 

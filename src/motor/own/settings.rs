@@ -1,6 +1,8 @@
 //! The dialogue with a drive about its settings.
 
+use crate::error::ConfigError;
 use crate::motor::{MotorName, WrongSetting};
+use crate::time::Duration;
 
 /// A question to a drive about a setting, `R` by the protocol's own name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -224,5 +226,27 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         settings
             .into_iter()
             .find(|(setting, found)| found.is_none_or(|found| !is_right(*setting, found)))
+    }
+}
+
+/// The time without a command after which a drive stops by itself, in units of 50 µs: 100 ms at first.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TimeoutUnits(u32);
+
+impl TimeoutUnits {
+    const UNIT_US: u32 = 50;
+
+    pub(crate) const USUAL: Self = Self(100_000 / Self::UNIT_US);
+
+    /// # Errors
+    /// [`ConfigError::Range`] for less than 1 ms, and for more than so many µs.
+    pub(crate) fn new(timeout: Duration, most_us: u32) -> Result<Self, ConfigError> {
+        let micros = timeout.micros_u32();
+        let micros = ConfigError::check_micros("time-out in us", micros, 1_000, most_us)?;
+        Ok(Self(micros / Self::UNIT_US))
+    }
+
+    pub(crate) const fn value(self) -> f32 {
+        self.0 as f32
     }
 }

@@ -18,8 +18,9 @@ impl Laps {
         Self(if position > 0.0 { laps } else { -laps })
     }
 
-    /// Takes the way from one reported position to the next: one of more than the range leads across its end.
-    pub(crate) fn advance(&mut self, way: f32, range: f32) {
+    /// Takes a reported position and the one before: a way of more than the range leads across its end.
+    pub(crate) fn advance(&mut self, before: Option<f32>, position: f32, range: f32) {
+        let way = before.map_or(0.0, |before| position - before);
         self.0 = self.0.saturating_add(i32::from(way < -range) - i32::from(way > range));
     }
 
