@@ -67,6 +67,10 @@ impl Phases {
 ///                                         second peak         either sign
 /// ```
 ///
+/// # Edge behaviour
+/// Before the start, and for a time that is NaN, it is at the start; from [`duration_s`](Self::duration_s) on, at exactly the end. Its limits
+/// hold to 1 in 10^6, and its duration is that of Ruckig to 2 in 10^6, or to 2 µs below a second.
+///
 /// # Examples
 /// ```
 /// use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
@@ -102,8 +106,8 @@ impl Motion {
     /// Plans the fastest motion.
     ///
     /// # Errors
-    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or what is NaN or infinite of `position`, `velocity`,
-    /// `acceleration`, `target` and `target_velocity`.
+    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or a `position`, `start_velocity`,
+    /// `start_acceleration`, `target` or `target_velocity` that is NaN or infinite.
     pub fn plan(
         from: &ProfileState,
         to: &MotionTarget,
