@@ -8,6 +8,9 @@ use crate::control::shaping::{MotionLimits, ProfileState};
 /// Each update with another target or other limits plans anew from the state that the last one returned, so position, velocity and
 /// acceleration never jump, whatever the targets do.
 ///
+/// A target with a velocity is met where it was told to be, so a target that moves on is pursued: tell the follower where it will be
+/// after [`left_s`](Self::left_s) to meet it.
+///
 /// # Edge behaviour
 /// A `dt_s` that is zero, negative, NaN or infinite, a target that is NaN or infinite, and limits that [`Motion::plan`] would refuse change
 /// nothing: the last states are returned, and [`rejected`](Self::rejected) grows. A long step is one along the plan. Steps of
@@ -23,7 +26,7 @@ use crate::control::shaping::{MotionLimits, ProfileState};
 ///     yaw.update(&[MotionTarget::at_rest(1.0)], &limits, 0.001);
 /// }
 /// let [turning] = yaw.states();
-/// assert!((turning.velocity - 1.6).abs() < 1e-4); // 0.1 s of jerk, 0.2 s at 8 rad/s²: 0.4 + 1.2 and still rising
+/// assert!((turning.velocity - 1.9).abs() < 1e-4); // full speed in 0.05 s: 2 - 80 / 2 * 0.05²
 /// let [turned_round] = yaw.update(&[MotionTarget::at_rest(-1.0)], &limits, 0.001);
 /// assert!((turned_round.velocity - turning.velocity).abs() <= 0.008);
 /// # Ok::<(), drivetrain::error::ConfigError>(())

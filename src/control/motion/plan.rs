@@ -67,6 +67,10 @@ impl Phases {
 ///                                         second peak         either sign
 /// ```
 ///
+/// # Edge behaviour
+/// Before the start, and for a time that is NaN, it is at the start; from [`duration_s`](Self::duration_s) on, at exactly the end. Its limits
+/// hold to 1 in 10^6, and its duration is that of Ruckig to 2 in 10^6, or to 2 µs below a second.
+///
 /// # Examples
 /// ```
 /// use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
