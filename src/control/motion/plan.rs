@@ -106,8 +106,8 @@ impl Motion {
     /// Plans the fastest motion.
     ///
     /// # Errors
-    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or the value that is NaN or infinite: `position`, `velocity`,
-    /// `acceleration`, `target` or `target_velocity`.
+    /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or the value that is NaN or infinite: `position`,
+    /// `start_velocity`, `start_acceleration`, `target` or `target_velocity`.
     pub fn plan(
         from: &ProfileState,
         to: &MotionTarget,

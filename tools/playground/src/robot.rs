@@ -82,6 +82,9 @@ pub(crate) trait Robot {
     fn next_bus_edge(&mut self) -> Option<(Instant, String)>;
 }
 
+/// A robot, and the motors of the world that turn its wheels.
+pub(crate) type Built = (Box<dyn Robot>, Vec<MotorKey>);
+
 /// Puts a robot into a world; also the motors that turn its wheels, front left first.
 pub(crate) fn build(
     layout: Layout,
@@ -89,7 +92,7 @@ pub(crate) fn build(
     can: Delayed,
     mass_kg: f32,
     speed: PidConfig,
-) -> Result<(Box<dyn Robot>, Vec<MotorKey>), Box<dyn Error>> {
+) -> Result<Built, Box<dyn Error>> {
     let mut parts = Parts { world, bus: Bus::new(), floor: Vec::new(), keys: Vec::new(), speed };
     let robot: Box<dyn Robot> = match layout {
         Layout::Mecanum => {
