@@ -39,7 +39,7 @@ fn ripple(gains: PidConfig, by_stamp: bool, seed: u64) -> Ripple {
     let (mut stamp, mut before) = (Instant::START, Instant::START);
     let (mut received, mut was_armed) = (0, false);
     let (mut speeds, mut currents) = (Vec::new(), Vec::new());
-    for ms in 0..2_500 {
+    for ms in 0..4_000 {
         let tick = loop {
             // The interrupt: a stamp is exact to 10 µs.
             for _ in 0..10 {
@@ -64,7 +64,7 @@ fn ripple(gains: PidConfig, by_stamp: bool, seed: u64) -> Ripple {
         let output = pid.step(target, measured, &TimeStep::of(dt_s));
         _ = runner.device_mut().set_current(motor, Current::from_amperes(output));
         runner.tick(tick);
-        if ms >= 500 {
+        if ms >= 1_000 {
             let truth = world.motor(key).unwrap();
             speeds.push(truth.velocity.as_rad_per_s() - target);
             currents.push(output);
@@ -75,7 +75,7 @@ fn ripple(gains: PidConfig, by_stamp: bool, seed: u64) -> Ripple {
 
 /// The mean over some phases of tick and feedback.
 fn mean(gains: PidConfig, by_stamp: bool) -> Ripple {
-    let all: Vec<Ripple> = (1..=3).map(|seed| ripple(gains, by_stamp, seed)).collect();
+    let all: Vec<Ripple> = (1..=6).map(|seed| ripple(gains, by_stamp, seed)).collect();
     let mean = |value: fn(&Ripple) -> f32| all.iter().map(value).sum::<f32>() / all.len() as f32;
     Ripple { speed: mean(|ripple| ripple.speed), current: mean(|ripple| ripple.current) }
 }
