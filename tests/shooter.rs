@@ -261,6 +261,10 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
         let fault = if fault_of_wheel { ShooterFault::WheelLost } else { ShooterFault::LoaderLost };
         assert_eq!(range.shooter.state(), ShooterState::Fault(fault));
         assert_eq!(range.targets, ShooterTargets::REST);
+        // A loader that is silent is not braked: it coasts, and a ball may drop.
+        let balls = range.balls;
+        range.run(Order::Fire(50), 100, true);
+        assert!(range.balls <= balls + 1);
         let balls = range.balls;
         range.run(Order::Fire(50), 1_000, true); // it is heard again since long
         assert_eq!((range.balls, range.targets), (balls, ShooterTargets::REST));
@@ -268,8 +272,13 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
         range.run(Order::Rest, 100, true);
         range.run(Order::Spin, 2_000, true);
         assert_eq!(range.shooter.state(), ShooterState::Ready);
+        let shots = range.shooter.shots();
         range.run(Order::Fire(1), 400, true);
-        assert_eq!(range.balls, balls + 1);
+        assert_eq!(range.shooter.shots(), shots + 1);
+        // A gap of 80 ms leaves the rotor turns of a coasting loader in doubt, and with them the place of its chambers.
+        if fault_of_wheel {
+            assert_eq!(range.balls, balls + 1);
+        }
     }
 }
 
