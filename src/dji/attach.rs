@@ -23,8 +23,9 @@ pub(super) const fn attach<const N: usize>(
     let feedback_id = facts.feedback_base + config.id as u16;
     let id_index = feedback_id as usize - FIRST_FEEDBACK_ID as usize;
     let Some(index) = motors.place_for(id_index) else {
-        #[expect(clippy::cast_possible_truncation, reason = "11 at most")]
-        return Err(AttachError::Full { motor, capacity: N as u8 });
+        #[expect(clippy::cast_possible_truncation, reason = "at most 11")]
+        let capacity = N as u8;
+        return Err(AttachError::Full { motor, capacity });
     };
     let Some((_, [here, ..])) = motors.slots.split_at_checked(index as usize) else {
         return Err(AttachError::Id { motor, highest: facts.ids });

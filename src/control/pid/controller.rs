@@ -5,6 +5,7 @@ use super::error_pid::ErrorPid;
 use super::law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 use crate::control::error::{check, gains};
 use crate::control::number::{finite, limited};
+use crate::control::step::TimeStep;
 use crate::error::ConfigError;
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
@@ -299,6 +300,26 @@ impl Pid {
         } else {
             moving
         }
+    }
+
+    /// Returns the error of the tracked setpoint, and its rate: the linear tracking differentiator by Euler's rule.
+    ///
+    /// The setpoint of the last step is `measurement + error`, so only its rate has to be stored.
+    #[inline(always)]
+    pub(super) fn follow<const GUARDED: bool>(
+        &self,
+        error: f32,
+        travel: f32,
+        step: &TimeStep,
+    ) -> (f32, f32) {
+        let finite = |value| if GUARDED { finite(value) } else { value };
+        let is_first = GUARDED && self.measurement == UNKNOWN;
+        let before = if is_first { 0.0 } else { finite(self.core.error - travel) };
+        let rate = if is_first { 0.0 } else { self.tracking_rate };
+        let (r, longest_s) = (self.tracking_r(), 1.0 / self.tracking_r());
+        let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
+        let pull = finite(-r * finite(r * finite(before - error) + 2.0 * rate));
+        (finite(before + dt_s * rate), finite(rate + dt_s * pull))
     }
 
     /// Holds the output and counts the step. If time passed without a measurement, D rests in the next good step: the travel

@@ -327,21 +327,6 @@ impl Pid {
         if self.is_short(rest) { rest } else { f32::NAN }
     }
 
-    /// Returns the error of the tracked setpoint, and its rate: the linear tracking differentiator by Euler's rule.
-    ///
-    /// The setpoint of the step before is `measurement + error`, so only its rate has to be stored.
-    #[inline(always)]
-    fn follow<const GUARDED: bool>(&self, error: f32, travel: f32, step: &TimeStep) -> (f32, f32) {
-        let finite = |value| if GUARDED { finite(value) } else { value };
-        let is_first = GUARDED && self.measurement == UNKNOWN;
-        let before = if is_first { 0.0 } else { finite(self.core.error - travel) };
-        let rate = if is_first { 0.0 } else { self.tracking_rate };
-        let (r, longest_s) = (self.tracking_r(), 1.0 / self.tracking_r());
-        let dt_s = if step.dt_s > longest_s { longest_s } else { step.dt_s };
-        let pull = finite(-r * finite(r * finite(before - error) + 2.0 * rate));
-        (finite(before + dt_s * rate), finite(rate + dt_s * pull))
-    }
-
     /// Returns the share of its rate at which the integral works at an error beyond the full rate.
     #[inline]
     fn weight(&self, error: f32) -> f32 {

@@ -27,10 +27,12 @@ mod config;
 mod edge;
 mod monitor;
 mod report;
+mod traffic;
 
 pub use condition::{Condition, Conditions};
 pub use config::{HealthConfig, Reaction};
 pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
-pub(crate) use monitor::{Monitor, Sample, Traffic, elapsed};
+pub(crate) use monitor::{Monitor, Sample, elapsed};
 pub use report::Health;
+pub(crate) use traffic::Traffic;
