@@ -18,12 +18,12 @@ const INQUIRY: Duration = Duration::from_millis(10);
 impl<M: OwnMotor> CanDevice for Own<M> {
     #[inline]
     fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        if !self.route.fits(frame) {
-            Ingest::Unrelated
-        } else if self.route.is_feedback(frame) {
+        if self.route.is_feedback(frame) {
             self.take(frame, now)
-        } else {
+        } else if self.route.fits(frame) {
             self.take_by_claims(frame, now)
+        } else {
+            Ingest::Unrelated
         }
     }
 

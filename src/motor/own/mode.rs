@@ -36,10 +36,7 @@ pub(crate) struct ControlMode {
 }
 
 #[derive(Debug, Clone, Copy)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is no heap, and an array holds motors of all modes"
-)]
+#[expect(clippy::large_enum_variant, reason = "a motor has one, and there is no heap")]
 enum Follows {
     Impedance(ImpedanceControl),
     /// With the share of the limit that the last goal was.
