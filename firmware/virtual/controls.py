@@ -1,10 +1,10 @@
 """Defects that the rows have to find: each is planted into one row, which then has to fail. `run --controls` plants them."""
 import struct
 
-import scenarios
+from rows import Wrong, board, line, motors, operator, sentry, snake
 from board.bxcan import TSR, BxCan
 from board.fdcan import TXBCR
-from robots import FAULT_AT_US, PROGRAMS, Robot
+from robots import FAULT_AT_US, PROGRAMS
 
 FEEDBACK_LOST_US, LATE_US = struct.pack("<I", 10_000), struct.pack("<I", 60_000)
 
@@ -61,27 +61,50 @@ def starts_with_a_current(robot):
     can.candidate = spoilt
 
 
+def deaf_dma(robot):
+    """The DMA controllers move nothing from 350 ms on."""
+    def stop():
+        for dma in robot.chip.dmas:
+            dma.serve = lambda request: None
+
+    robot.at(350_000, stop)
+
+
+def holds_disables(robot):
+    """The line shows questions in the place of frames that disable a joint."""
+    can, candidate = robot.chip.can, robot.chip.can.candidate
+
+    def held():
+        frame = candidate()
+        return frame and (frame[0], b"\x03\x07", *frame[2:]) if frame and frame[1] == snake.DISABLE else frame
+
+    can.candidate = held
+
+
 PLANTS = (
-    ("one-motor", scenarios.silent_motor, late_deadline),
-    ("one-motor", scenarios.pulled_plug, deaf_to_abort),
-    ("one-motor", scenarios.short_pull, deaf_to_abort),
-    ("dm-mc02-embassy", scenarios.pulled_plug, deaf_to_abort),
-    ("one-motor", scenarios.silent_motor, holds_commands),
-    ("c-board-embassy", scenarios.remote_cut, holds_commands),
-    ("c-board-rtic", scenarios.dead_loop, no_watchdog),
-    ("one-motor", scenarios.brown_out, arms_by_itself),
-    ("c-board-embassy", scenarios.start, starts_with_a_current),
+    ("one-motor", motors.silent_motor, late_deadline),
+    ("one-motor", line.pulled_plug, deaf_to_abort),
+    ("one-motor", line.short_pull, deaf_to_abort),
+    ("dm-mc02-embassy", line.pulled_plug, deaf_to_abort),
+    ("one-motor", motors.silent_motor, holds_commands),
+    ("c-board-embassy", operator.remote_cut, holds_commands),
+    ("c-board-rtic", board.dead_loop, no_watchdog),
+    ("one-motor", board.brown_out, arms_by_itself),
+    ("c-board-embassy", board.start, starts_with_a_current),
+    ("sentry", sentry.closed_loop, deaf_dma),
+    ("sentry", sentry.sentry_dead_loop, no_watchdog),
+    ("snake", snake.host_cut, holds_disables),
 )
 
 
 def plant(task):
     """Returns what the row said of the defect; `None` if it said nothing."""
     place, builds, world = task
-    name, scenario, defect = PLANTS[place]
-    with Robot(PROGRAMS[name], builds, world) as robot:
+    name, row, defect = PLANTS[place]
+    with PROGRAMS[name].robot(builds, world, row) as robot:
         defect(robot)
         try:
-            scenario(robot)
-        except scenarios.Wrong as error:
+            row(robot)
+        except Wrong as error:
             return str(error)
     return None

@@ -3,6 +3,7 @@ from board.board import Board
 from board.chips import Stm32f407, Stm32h723
 from board.imu import Imu
 from board.remote import MIDDLE, UP, Remote
+import machines
 
 COMMAND = 0x200
 CYCLE_US = 1000.0
@@ -12,20 +13,38 @@ ARM_AT_US, DRIVE_AT_US, FAULT_AT_US = 60_000, 110_000, 250_000
 
 
 class Program:
-    def __init__(self, name, package, chip, motors, remote=None, key=None, held=0, control=None):
+    def __init__(self, name, package, chip, things, remote=None, key=None, held=0, control=None, transmit_irq=None):
         self.name, self.package, self.chip, self.remote, self.key = name, package, chip, remote, key
         # Frames that may still leave when the line is back, and the interrupt in which the control loop runs.
         self.held, self.control = held, control
-        self.motors = [f"m3508 {place + 1}" for place in range(motors)]
+        self.things = things
+        # The interrupts of its CAN controller; embassy's driver has a queue that the one for sending empties.
+        self.receive_irqs = (19, 21) if chip is Stm32h723 else (20, 21)
+        self.transmit_irq = transmit_irq
+        self.has = {"loop", "remote" if remote else "key"} | ({"transmit irq"} if transmit_irq else set())
+        self.fault_at_us = FAULT_AT_US
+
+    def robot(self, builds, world, row):
+        """From power-on, with what the row has beside it."""
+        return Robot(self, builds, world, row.things, row.setup == "imu")
+
+
+def wheels(count):
+    return [f"motor m3508 {place + 1} can1" for place in range(count)]
 
 
 PROGRAMS = {
     program.name: program
     for program in (
-        Program("one-motor", "c-board-embassy", Stm32f407, 1, key=("A", 0)),
-        Program("c-board-embassy", "c-board-embassy", Stm32f407, 4, remote=3),
-        Program("c-board-rtic", "c-board-rtic", Stm32f407, 4, remote=3, control=7),
-        Program("dm-mc02-embassy", "dm-mc02-embassy", Stm32h723, 4, remote=5),
+        Program("one-motor", "c-board-embassy", Stm32f407, wheels(1), key=("A", 0), transmit_irq=19),
+        Program("c-board-embassy", "c-board-embassy", Stm32f407, wheels(4), remote=3, transmit_irq=19),
+        Program("c-board-rtic", "c-board-rtic", Stm32f407, wheels(4), remote=3, control=7),
+        Program("dm-mc02-embassy", "dm-mc02-embassy", Stm32h723, wheels(4), remote=5),
+        machines.Sentry,
+        machines.Snake,
+        machines.CheckEmbassy,
+        machines.CheckHal,
+        machines.CheckH7,
     )
 }
 
@@ -33,12 +52,13 @@ PROGRAMS = {
 class Robot(Board):
     """A board with its program, that is armed at 60 ms and asked to drive."""
 
-    def __init__(self, program, builds, world):
+    def __init__(self, program, builds, world, things=(), has_imu=False):
         self.program = program
         self.held = program.held
-        super().__init__(program.chip, f"{builds}/{program.name}", world, program.motors)
+        super().__init__(program.chip, f"{builds}/{program.name}", world, [*program.things, *things])
         self.remote = Remote(self, program.remote) if program.remote else None
-        self.imu = None
+        # All boards have the IMU on USART1.
+        self.imu = Imu(self, 1) if has_imu else None
         self.at(ARM_AT_US, lambda: self.ask_to_arm(True))
         if self.remote:
             self.at(DRIVE_AT_US, lambda: self.stick(0.5))
@@ -56,10 +76,6 @@ class Robot(Board):
             self.at(at_us, lambda: self.stick(0.0))
             self.at(at_us + 200_000, lambda: self.stick(0.5))
         self.at(at_us + 150_000, lambda: self.ask_to_arm(True))
-
-    def with_imu(self):
-        """All boards have the IMU on USART1."""
-        self.imu = Imu(self, 1)
 
     def hang_control(self):
         self.core.hang(self.program.control)

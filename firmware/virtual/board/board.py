@@ -1,4 +1,6 @@
 """A board: chip, wire, motors; what happens to them, and what is measured."""
+from collections import defaultdict
+
 from .clock import Clock
 from .core import Core
 from .image import Image
@@ -12,12 +14,15 @@ class Board:
     def __init__(self, chip, image, world, motors):
         self.chip_type, self.image = chip, Image(image)
         self.clock = Clock(chip.HZ)
-        self.wire = Wire(self.clock)
+        self.wires = [Wire(self.clock, "can1"), Wire(self.clock, "can2")]
+        self.wire = self.wires[0]
         self.pins = []
+        self.serial = defaultdict(list)
+        """Who hears what the USART of that number sends."""
         self.resets = []
         self.nvic = self.registers = self.chip = self.core = None
         self._power_on()
-        self.world = World(world, motors, self.clock, self.wire)
+        self.world = World(world, motors, self.clock, self.wires)
 
     def __enter__(self):
         return self
@@ -57,5 +62,5 @@ class Board:
         inputs = self.chip.ports[port].inputs
         self.chip.ports[port].inputs = inputs | 1 << pin if level else inputs & ~(1 << pin)
 
-    def sent(self, since=0.0, until=1e12, sender="board"):
-        return [frame for frame in self.wire.record if frame.sender == sender and since <= frame.us < until]
+    def sent(self, since=0.0, until=1e12, sender="board", wire=0):
+        return [frame for frame in self.wires[wire].record if frame.sender == sender and since <= frame.us < until]

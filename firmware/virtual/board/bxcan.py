@@ -27,9 +27,11 @@ class Mailbox:
 
 
 class BxCan(Device):
-    def __init__(self, clock, nvic, wire, irqs):
+    def __init__(self, clock, nvic, wire, irqs, master=None):
         super().__init__()
         self.clock, self.nvic, self.wire = clock, nvic, wire
+        self.master = master
+        """CAN1, which has the filters of both."""
         self.tx_irq, self.rx0_irq, self.rx1_irq, self.sce_irq = irqs
         wire.controller = self
         self.overruns = 0
@@ -44,9 +46,15 @@ class BxCan(Device):
         self.code = 0
         self.recovering = None
         self.orders = 0
-        self.values = {FMR: 0x2A1C_0E01, BTR: 0x0123_0000}
+        self.values = {BTR: 0x0123_0000} if self.master else {FMR: 0x2A1C_0E01, BTR: 0x0123_0000}
 
     # The side of the wire.
+
+    def loops_back(self):
+        return bool(self.values[BTR] & 1 << 30)
+
+    def is_silent(self):
+        return bool(self.values[BTR] & 1 << 31)
 
     def _is_running(self):
         return not self.msr & (INAK | SLAK) and not self.counters.is_bus_off
@@ -118,13 +126,15 @@ class BxCan(Device):
 
     def _filter(self, identifier):
         """The FIFO for a standard data frame, or none: banks of 32 bits by mask or list, of 16 bits by mask or list."""
-        if self.values[FMR] & 1:
+        values = (self.master or self).values
+        if values[FMR] & 1:
             return None
-        lists, wide, fifos, active = (self.values.get(at, 0) for at in (0x204, 0x20C, 0x214, 0x21C))
-        for bank in range(28):
+        lists, wide, fifos, active = (values.get(at, 0) for at in (0x204, 0x20C, 0x214, 0x21C))
+        first_of_second = values[FMR] >> 8 & 0x3F
+        for bank in range(first_of_second, 28) if self.master else range(first_of_second):
             if not active >> bank & 1:
                 continue
-            words = self.values.get(0x240 + 8 * bank, 0), self.values.get(0x244 + 8 * bank, 0)
+            words = values.get(0x240 + 8 * bank, 0), values.get(0x244 + 8 * bank, 0)
             if wide >> bank & 1:
                 word, halves = identifier << 21, words
             else:

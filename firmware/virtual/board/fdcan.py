@@ -53,6 +53,12 @@ class FdCan(Device):
 
     # The side of the wire.
 
+    def loops_back(self):
+        return bool(self.values[CCCR] & 1 << 7 and self.values.get(TEST, 0) & 1 << 4)
+
+    def is_silent(self):
+        return bool(self.values[CCCR] & 1 << 5)
+
     def _is_running(self):
         return not self.values[CCCR] & INIT and not self.counters.is_bus_off
 

@@ -19,6 +19,8 @@ class Nvic:
         self.reset_requested = False
         self.event = False
         """The event register, which WFE waits for."""
+        self.masked = ()
+        """Interrupts that are not served, as if others took all the time."""
         self.best = None
         """The most urgent interrupt that is pending and enabled, with its priority first."""
 
@@ -38,10 +40,16 @@ class Nvic:
         while waiting:
             irq = (waiting & -waiting).bit_length() - 1
             waiting &= waiting - 1
+            if irq in self.masked:
+                continue
             candidate = (self.priorities.get(irq, 0), irq)
             if best is None or candidate < best:
                 best = candidate
         self.best = best
+
+    def mask(self, irqs=()):
+        self.masked = irqs
+        self._judge()
 
     def priority(self):
         """The priority at which the core runs now."""

@@ -31,18 +31,22 @@ def bits_of(identifier, data):
 
 
 class Wire:
-    """One controller, and all other nodes as queues by name: each queue offers its oldest frame."""
+    """The line `can1` or `can2`: one controller, and all other nodes as queues by name: each queue offers its oldest frame."""
 
-    def __init__(self, clock):
-        self.clock = clock
+    def __init__(self, clock, name):
+        self.clock, self.name = clock, name
         self.bit = clock.hz // 1_000_000
         self.controller = None
         self.others = {}
         self.busy = None
         self.is_plugged, self.is_shorted = True, False
+        self.is_disturbed = False
+        """Whether the line was held at one level since the present frame began."""
         self.record = []
         self.listeners = []
         self.attempts = 0
+        self.collisions = 0
+        """How often two nodes began the same id in the same bit: on a real line both frames are lost."""
 
     def offer(self, sender, identifier, data):
         """A node other than the controller has a frame to send. Without a line to the controller nobody sees it."""
@@ -60,6 +64,7 @@ class Wire:
     def short(self, is_shorted):
         """Holds the line at one level: each attempt of the controller ends at its first bit."""
         self.is_shorted = is_shorted
+        self.is_disturbed |= is_shorted
         self.others.clear()
 
     def kick(self):
@@ -72,6 +77,8 @@ class Wire:
                 key = (queue[0][0], 1, sender)
                 best = key if best is None else min(best, key)
         mine = self.controller.candidate() if self.controller else None
+        if mine is not None and best is not None and mine[0] == best[0]:
+            self.collisions += 1
         if mine is not None and (best is None or mine[0] <= best[0]):
             self._attempt(*mine)
         elif best is not None:
@@ -80,6 +87,8 @@ class Wire:
             self._occupy(bits_of(identifier, data), done)
 
     def _occupy(self, bits, done, pause=INTERMISSION_BITS):
+        self.is_disturbed = self.is_shorted
+
         def over():
             done()
             self.busy = self.clock.after(pause * self.bit, free)
@@ -94,18 +103,27 @@ class Wire:
         self.attempts += 1
         controller, length = self.controller, bits_of(identifier, data)
         controller.begins(token)
-        if self.is_shorted:
+        if controller.loops_back():
+            # It hears itself, and needs no acknowledge; the line shows its frames unless it is silent too.
+            def heard():
+                if controller.holds(token):
+                    controller.succeeded(token)
+                    controller.hear(identifier, data)
+                    self._show(Sent(self.clock.us(), "silent" if controller.is_silent() else "board", identifier, data, born))
+
+            self._occupy(length, heard)
+        elif self.is_shorted:
             self._occupy(1 + ERROR_BITS, lambda: controller.holds(token) and controller.failed(token, "bit"), self._pause(controller))
         else:
             def over():
                 # The slot of the acknowledge is past the middle of it all: whoever is there then gives it.
                 if not controller.holds(token):
                     return  # the chip was reset in the middle of it
-                if self.is_plugged:
+                if self.is_disturbed:
+                    controller.failed(token, "bit")
+                elif self.is_plugged:
                     controller.succeeded(token)
-                    self.record.append(Sent(self.clock.us(), "board", identifier, data, born))
-                    for listener in self.listeners:
-                        listener(self.record[-1])
+                    self._show(Sent(self.clock.us(), "board", identifier, data, born))
                 else:
                     controller.failed(token, "acknowledge")
 
@@ -114,14 +132,17 @@ class Wire:
             else:
                 self._occupy(length - AFTER_ACK_BITS + ERROR_BITS, over, self._pause(controller))
 
+    def _show(self, sent):
+        self.record.append(sent)
+        for listener in self.listeners:
+            listener(sent)
+
     @staticmethod
     def _pause(controller):
         return INTERMISSION_BITS + (SUSPEND_BITS if controller.is_error_passive() else 0)
 
     def _delivered(self, sender, identifier, data, born):
-        if self.is_plugged and not self.is_shorted:
-            self.record.append(Sent(self.clock.us(), sender, identifier, data, born))
-            for listener in self.listeners:
-                listener(self.record[-1])
+        if self.is_plugged and not self.is_disturbed:
+            self._show(Sent(self.clock.us(), sender, identifier, data, born))
             if self.controller:
                 self.controller.hear(identifier, data)

@@ -1,0 +1,167 @@
+"""What goes wrong with the one who drives: remote control, key, IMU."""
+import random
+
+from board.imu import frame
+from robots import ARM_AT_US, CYCLE_US, FAULT_AT_US
+from rows.judge import REMOTE_LOST_US, drives_again, driving, goes_on, must, rested, rests, row
+
+
+@row("F41")
+def let_go(robot):
+    """The switch is turned away, or the key let go: it rests within a frame of the remote control."""
+    driving(robot)
+    robot.ask_to_arm(False)
+    robot.run(FAULT_AT_US + 50_000)
+    result = rested(robot, FAULT_AT_US, 14_000 + 18 * 120 + 11 * CYCLE_US, "at rest")
+    rests(robot, FAULT_AT_US + 30_000, FAULT_AT_US + 50_000)
+    return result
+
+
+@row("F68", "fresh")
+def on_at_power_on(robot):
+    """The switch is at the top, or the key down, before the supply is on: nothing moves."""
+    robot.at(0, lambda: robot.ask_to_arm(True))
+    robot.run(120_000)
+    must(robot.commands() and not robot.driven(), "it drives, though nobody turned the switch")
+    return {"zero_us": robot.commands()[0].us, "stale": 0, "note": "at rest"}
+
+
+@row("F58", needs="remote")
+def remote_cut(robot):
+    """The line of the remote control is cut in the middle of a frame."""
+    driving(robot)
+    robot.remote.cut_after = 7
+    robot.run(FAULT_AT_US + 130_000)
+    zero = robot.zero_after(FAULT_AT_US)
+    must(zero is not None and zero < REMOTE_LOST_US, f"no zeros after {zero} us")
+    rests(robot, FAULT_AT_US + zero + 1, FAULT_AT_US + 130_000)
+    # Heard again with the switch still at the top: nothing moves before it is turned anew.
+    robot.remote.cut_after, robot.remote.is_heard = None, True
+    robot.run(FAULT_AT_US + 180_000)
+    rests(robot, FAULT_AT_US + 140_000, FAULT_AT_US + 180_000)
+    drives_again(robot, FAULT_AT_US + 180_000)
+    return {"zero_us": zero, "stale": len(robot.stale()), "note": "rests when heard again; drives again when armed again"}
+
+
+@row("F59", needs="remote")
+def remote_noise(robot):
+    """Two bits of each byte of the remote control are inverted: no frame is plausible."""
+    driving(robot)
+    robot.remote.spoil = lambda place, byte: byte ^ 0x5A if place < 6 else byte
+    robot.run(FAULT_AT_US + 140_000)
+    zero = robot.zero_after(FAULT_AT_US)
+    must(zero is not None and zero < REMOTE_LOST_US, f"no zeros after {zero} us")
+    rests(robot, FAULT_AT_US + zero + 1, FAULT_AT_US + 140_000)
+    return {"zero_us": zero, "stale": len(robot.stale()), "note": "at rest"}
+
+
+@row("F59", needs="remote")
+def remote_flips(robot):
+    """A bit of one byte of each third frame of the remote control is inverted, in a channel that is at rest."""
+    driving(robot)
+    count = [0]
+
+    def spoil(place, byte):
+        count[0] += place == 0
+        return byte ^ 0x10 if place == 9 and count[0] % 3 == 0 else byte
+
+    robot.remote.spoil = spoil
+    return goes_on(robot, FAULT_AT_US, FAULT_AT_US + 70_000, "goes on")
+
+
+@row("F57", needs="remote")
+def remote_drops(robot):
+    """A byte of each second frame of the remote control is lost: those frames are thrown away, the next counts."""
+    driving(robot)
+    count = [0]
+
+    def drop(place, byte):
+        count[0] += place == 0
+        return None if place == 5 and count[0] % 2 else byte
+
+    robot.remote.spoil = drop
+    return goes_on(robot, FAULT_AT_US, FAULT_AT_US + 110_000, "half of its frames count; goes on")
+
+
+@row("F58", needs="remote")
+def remote_away(robot):
+    """The remote control is silent for 60 ms: shorter than its deadline."""
+    driving(robot)
+    robot.remote.is_heard = False
+    robot.run(FAULT_AT_US + 60_000)
+    robot.remote.is_heard = True
+    return goes_on(robot, FAULT_AT_US, FAULT_AT_US + 90_000, "goes on")
+
+
+@row("F59", needs="remote")
+def remote_storm(robot):
+    """The line of the remote control carries noise without a pause, for 130 ms."""
+    driving(robot)
+    robot.remote.is_heard = False
+    drawn = random.Random(7)
+
+    def noise():
+        robot.remote.byte(drawn.randrange(256))
+        if robot.clock.us() < FAULT_AT_US + 130_000:
+            robot.clock.after(robot.clock.cycles(120), noise)
+
+    noise()
+    robot.run(FAULT_AT_US + 140_000)
+    result = rested(robot, FAULT_AT_US, REMOTE_LOST_US, "at rest")
+    rests(robot, FAULT_AT_US + REMOTE_LOST_US, FAULT_AT_US + 140_000)
+    return result
+
+
+@row("F41", "fresh", needs="remote")
+def armed_with_a_stick(robot):
+    """The switch is turned to the top while a stick is held: it does not arm."""
+    robot.stick(0.5)
+    robot.run(120_000)
+    must(robot.commands() and not robot.driven(), "it was armed with a stick that is held")
+    return {"zero_us": robot.commands()[0].us, "stale": 0, "note": "arming needs sticks at rest"}
+
+
+@row("F58", "imu", needs="remote")
+def imu_cut(robot):
+    """The line of the IMU is cut in the middle of a frame while a stick is held: the robot stops until the sticks are let go."""
+    driving(robot)
+    robot.imu.cut_after = 40
+    robot.run(FAULT_AT_US + 450_000)
+    speeds = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(speeds) < 5, f"the wheels turn with {speeds} rpm, though the IMU is lost")
+    # Heard again while the stick is still held: nothing moves before it is let go.
+    robot.imu.cut_after = None
+    robot.run(FAULT_AT_US + 520_000)
+    speeds = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(speeds) < 5, f"the wheels turn with {speeds} rpm before the stick is let go")
+    robot.stick(0.0)
+    robot.run(FAULT_AT_US + 560_000)
+    robot.stick(0.5)
+    robot.run(FAULT_AT_US + 760_000)
+    must(abs(robot.world.state(0)[0]) > 20, "it does not drive after the stick was let go and pushed again")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": None, "stale": len(robot.stale()), "note": "stands; drives when the stick is let go and pushed again"}
+
+
+def _without_imu(robot, since, until):
+    robot.run(until)
+    speeds = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(speeds) < 5, f"the wheels turn with {speeds} rpm, though the IMU is lost")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": None, "stale": len(robot.stale(since)), "note": "stands until the stick is let go"}
+
+
+@row("F59", "imu", needs="remote")
+def imu_garbage(robot):
+    """A byte of each frame of the IMU is inverted: no checksum holds."""
+    driving(robot)
+    robot.imu.spoil = lambda place, byte: byte ^ 0xFF if place == 40 else byte
+    return _without_imu(robot, FAULT_AT_US, FAULT_AT_US + 450_000)
+
+
+@row("F63", "imu", needs="remote")
+def imu_frozen(robot):
+    """The IMU repeats one frame: its time stands."""
+    driving(robot)
+    robot.imu.frozen = frame(200)
+    return _without_imu(robot, FAULT_AT_US, FAULT_AT_US + 450_000)
