@@ -21,7 +21,6 @@ const MOTOR_RPM: f32 = 6_000.0;
 
 /// A motor of each family that [`Own`] makes a device of.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "a dozen of them, and each is stored in place")]
 enum Kind {
     Damiao(Own<damiao::Motor>),
     Lk(Own<lk::Motor>),

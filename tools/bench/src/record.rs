@@ -1,4 +1,4 @@
-//! Recordings: the text of candump, and MCAP, which Foxglove, PlotJuggler and Rerun open.
+//! Recordings: the text of candump, and MCAP, which Foxglove and Rerun open.
 
 use crate::outlet::{Outlet, Sink};
 use crate::text;

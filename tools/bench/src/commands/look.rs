@@ -35,10 +35,9 @@ fn questions() -> Vec<CanFrame> {
 impl Task for Scan {
     fn ticked(&mut self, session: &mut Session, ticks: u64, out: &mut Out) -> bool {
         // Four milliseconds for each: a question and its answer are 1 % of the bus.
-        if ticks.is_multiple_of(4) {
-            if let Some(question) = self.questions.next() {
-                _ = session.tap().transmit(&question);
-            }
+        let question = if ticks.is_multiple_of(4) { self.questions.next() } else { None };
+        if let Some(question) = question {
+            _ = session.tap().transmit(&question);
         }
         if !out.is_json && ticks.is_multiple_of(1_000) {
             out.say(format!("{:>3} s\n", ticks / 1_000));

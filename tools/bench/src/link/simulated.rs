@@ -21,7 +21,6 @@ const STEP: Duration = Duration::from_micros(250);
 
 /// A drive that hears each frame of the bus.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "a dozen of them")]
 enum Kind {
     Damiao(DamiaoDrive),
     Lk(LkDrive),
@@ -34,7 +33,7 @@ enum Kind {
 #[derive(Debug)]
 enum Place {
     Dji(MotorKey),
-    Own(Kind),
+    Own(Box<Kind>),
 }
 
 #[derive(Debug)]
@@ -62,7 +61,7 @@ impl Simulated {
                 Some(config) => {
                     Place::Dji(world.attach(config).map_err(|error| error.to_string())?)
                 }
-                None => Place::Own(kind(*spec).ok_or("a motor that is not simulated")?),
+                None => Place::Own(Box::new(kind(*spec).ok_or("a motor that is not simulated")?)),
             };
             Ok(Motor { place, silent_until: Instant::START })
         });

@@ -197,7 +197,10 @@ mod tests {
 
     /// Gives a byte at a time, and takes nothing in every second call.
     #[derive(Clone, Default)]
-    struct Slow(Arc<Mutex<(Vec<u8>, Vec<u8>, bool)>>);
+    struct Slow(Arc<Mutex<Wire>>);
+
+    /// What is to be read, what was written, and whether it takes a byte now.
+    type Wire = (Vec<u8>, Vec<u8>, bool);
 
     impl Read for Slow {
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {

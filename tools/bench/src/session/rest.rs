@@ -60,11 +60,8 @@ impl Session {
         let is_asked = self.armed_once && !self.pace.is_lock_step();
         let robot = self.runner.device();
         let is_heard = |motor| robot.reading(motor).is_some_and(|reading| reading.is_heard());
-        let (_, name) = robot
-            .names()
-            .enumerate()
-            .find(|(motor, _)| is_asked && !is_heard(*motor))
-            .map(|(motor, name)| (motor, name))?;
+        let (_, name) =
+            robot.names().enumerate().find(|(motor, _)| is_asked && !is_heard(*motor))?;
         Some(format!("{name} is not heard"))
     }
 }
