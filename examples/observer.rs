@@ -54,7 +54,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn drive() -> Result<Vec<Sample>, Box<dyn Error>> {
     let world = Simulation::new(24);
     let key = world.attach(MotorConfig::m3508(1).with_speed_noise_rpm(NOISE_RPM))?;
-    let at = |time_s: f32| Instant::START + Duration::from_micros((time_s * 1e6) as u64);
+    let at =
+        |time_s: f32| Instant::START + Duration::from_secs_f32(time_s).unwrap_or(Duration::ZERO);
     world.fault(Fault::BlockedShaft(key), at(BLOCKED_S)..)?;
     let mut bus = Bus::new();
     let motor = bus.attach(Config::<M3508>::new(1).speed_loop(SPEED))?;

@@ -135,7 +135,8 @@ fn shoot() -> Result<(Vec<Sample>, f32), Box<dyn Error>> {
     let world = Simulation::new(17);
     let keys = [world.attach(MotorConfig::m3508(1))?, world.attach(MotorConfig::m3508(2))?];
     let loader_key = world.attach(MotorConfig::m2006(3).with_load_friction_nm(0.1))?;
-    let at = |time_s: f32| Instant::START + Duration::from_micros((time_s * 1e6) as u64);
+    let at =
+        |time_s: f32| Instant::START + Duration::from_secs_f32(time_s).unwrap_or(Duration::ZERO);
     world.fault(Fault::BlockedShaft(loader_key), at(JAM_S.0)..at(JAM_S.1))?;
     let mut barrel = Barrel {
         world: &world,
@@ -232,6 +233,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     picture::draw(&path, &samples, |sample| sample.time_s, &charts)?;
     console::line(format_args!("{path}"));
+    #[expect(clippy::float_cmp, reason = "whole numbers")]
     let is_right = single == 1.0 && burst == 6.0 && last.shots == last.balls;
     if is_right && slow < 1.5 && hottest <= f32::from(HEAT_LIMIT) {
         Ok(())

@@ -115,6 +115,7 @@ impl<'w> Range<'w> {
         let Some(barrel) = self.barrel else { return };
         let [limit, cooling] = [barrel.limit, barrel.cooling_per_s].map(u16::to_le_bytes);
         let state = [3, 1, 200, 0, 200, 0, cooling[0], cooling[1], limit[0], limit[1], 80, 0, 7];
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 600")]
         let heat = (self.heat as u16).to_le_bytes();
         let power = [0, 0, 0, 0, 0, 0, 0, 0, 60, 0, heat[0], heat[1], 0, 0];
         for (command, data) in [(0x0201, &state[..]), (0x0202, &power)] {

@@ -39,6 +39,7 @@ mod plan;
 mod planner;
 mod scale;
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests;
 mod wide;
 
