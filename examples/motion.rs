@@ -12,7 +12,7 @@ mod console;
 use drivetrain::control::{MotionFollower, MotionLimits, MotionTarget, Motions, ProfileState};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::math;
-use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own, OwnMotor};
+use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
@@ -199,7 +199,9 @@ fn plot(path: &str, samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     root.fill(&WHITE)?;
     let areas = root.split_evenly((3, 1));
     type Values = fn(&Sample) -> f32;
-    let charts: [(&str, f32, &[(RGBColor, Values)]); 3] = [
+    /// Name, upper end of the axis, and the curves of a chart.
+    type Chart<'a> = (&'a str, f32, &'a [(RGBColor, Values)]);
+    let charts: [Chart<'_>; 3] = [
         (
             "angle in rad (grey: target, red: plan, blue: joint)",
             3.0,

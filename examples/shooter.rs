@@ -14,7 +14,7 @@ use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
 use drivetrain::motor::VelocityDrive;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::shooter::{
-    LoaderFeedback, Order, Shooter, ShooterConfig, ShooterFeedback, ShooterState,
+    LoaderFeedback, Shooter, ShooterConfig, ShooterFeedback, ShooterOrder, ShooterState,
 };
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
@@ -39,16 +39,16 @@ const END_S: f32 = 12.0;
 const JAM_S: (f32, f32) = (3.25, 3.55);
 
 /// The trigger, as a pilot would hold it.
-fn order(time_s: f32) -> Order {
+fn order(time_s: f32) -> ShooterOrder {
     match time_s {
-        time if time < 0.5 => Order::Rest,
-        time if time < 2.0 => Order::Spin,
-        time if time < 2.5 => Order::Fire(1),
-        time if time < 3.0 => Order::Spin,
-        time if time < 5.0 => Order::Fire(5),
-        time if time < 5.5 => Order::Spin,
-        time if time < 11.0 => Order::Fire(255),
-        _ => Order::Rest,
+        time if time < 0.5 => ShooterOrder::Rest,
+        time if time < 2.0 => ShooterOrder::Spin,
+        time if time < 2.5 => ShooterOrder::Fire(1),
+        time if time < 3.0 => ShooterOrder::Spin,
+        time if time < 5.0 => ShooterOrder::Fire(5),
+        time if time < 5.5 => ShooterOrder::Spin,
+        time if time < 11.0 => ShooterOrder::Fire(255),
+        _ => ShooterOrder::Rest,
     }
 }
 

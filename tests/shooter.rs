@@ -6,8 +6,8 @@ use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M2006, M3508};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::shooter::{
-    LoaderFeedback, Order, Shooter, ShooterConfig, ShooterFault, ShooterFeedback, ShooterState,
-    ShooterTargets,
+    LoaderFeedback, Shooter, ShooterConfig, ShooterFault, ShooterFeedback, ShooterOrder,
+    ShooterState, ShooterTargets,
 };
 use drivetrain::sim::{Controller, Fault, Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
@@ -126,7 +126,7 @@ impl<'w> Range<'w> {
     }
 
     /// Runs for so long under one order; arms when `arms` says so.
-    fn run(&mut self, order: Order, millis: u64, arms: bool) {
+    fn run(&mut self, order: ShooterOrder, millis: u64, arms: bool) {
         let end = self.ms + millis;
         while self.ms < end {
             self.world.advance(Duration::from_micros(100));
@@ -179,26 +179,26 @@ const COOL: Option<Barrel> = Some(Barrel { limit: 400, cooling_per_s: 80 });
 fn single_shots_and_a_burst_are_counted_and_each_leaves_at_the_speed_within_1_percent() {
     let world = Simulation::new(3);
     let mut range = Range::new(&world, COOL);
-    range.run(Order::Rest, 300, true);
+    range.run(ShooterOrder::Rest, 300, true);
     assert_eq!((range.shooter.state(), range.wheel_rpm()), (ShooterState::Rest, 0.0));
-    range.run(Order::Spin, 1_500, true);
+    range.run(ShooterOrder::Spin, 1_500, true);
     assert_eq!((range.shooter.state(), range.balls), (ShooterState::Ready, 0));
     for single in 1..=3 {
-        range.run(Order::Fire(1), 400, true); // held, and one shot all the same
+        range.run(ShooterOrder::Fire(1), 400, true); // held, and one shot all the same
         assert_eq!((range.shooter.shots(), range.balls), (single, i64::from(single)));
-        range.run(Order::Spin, 20, true);
+        range.run(ShooterOrder::Spin, 20, true);
     }
-    range.run(Order::Fire(5), 1_000, true);
+    range.run(ShooterOrder::Fire(5), 1_000, true);
     assert_eq!((range.shooter.shots(), range.balls), (8, 8));
     assert!(range.slowest_rpm.get() > 0.985 * WHEEL_RPM, "{} rpm", range.slowest_rpm.get());
     // Released in the middle of a burst: what is on its way leaves, the rest is dropped.
-    range.run(Order::Spin, 20, true);
-    range.run(Order::Fire(20), 350, true);
+    range.run(ShooterOrder::Spin, 20, true);
+    range.run(ShooterOrder::Fire(20), 350, true);
     let until = range.balls;
-    range.run(Order::Spin, 500, true);
+    range.run(ShooterOrder::Spin, 500, true);
     assert!((until..=until + 2).contains(&range.balls) && range.balls < 14, "{}", range.balls);
     assert_eq!(i64::from(range.shooter.shots()), range.balls);
-    range.run(Order::Rest, 2_000, true);
+    range.run(ShooterOrder::Rest, 2_000, true);
     assert!(range.wheel_rpm() < 1.0 && range.loader_rpm() == 0.0);
 }
 
@@ -206,25 +206,25 @@ fn single_shots_and_a_burst_are_counted_and_each_leaves_at_the_speed_within_1_pe
 fn a_jam_that_gives_way_is_cleared_and_one_that_does_not_stops_the_shooter() {
     let world = Simulation::new(4);
     let mut range = Range::new(&world, COOL);
-    range.run(Order::Spin, 1_500, true);
+    range.run(ShooterOrder::Spin, 1_500, true);
     // It blocks for 250 ms in the middle of the first shot.
     let from = range.ms + 40;
     world.fault(Fault::BlockedShaft(range.keys[2]), at_ms(from)..at_ms(from + 250)).unwrap();
-    range.run(Order::Fire(3), 200, true);
+    range.run(ShooterOrder::Fire(3), 200, true);
     assert_eq!((range.shooter.state(), range.shooter.tries()), (ShooterState::Clearing, 1));
-    range.run(Order::Fire(3), 1_300, true);
+    range.run(ShooterOrder::Fire(3), 1_300, true);
     assert_eq!((range.shooter.shots(), range.balls, range.shooter.tries()), (3, 3, 0));
 
     world.fault(Fault::BlockedShaft(range.keys[2]), at_ms(range.ms)..).unwrap();
-    range.run(Order::Spin, 20, true);
-    range.run(Order::Fire(3), 2_000, true);
+    range.run(ShooterOrder::Spin, 20, true);
+    range.run(ShooterOrder::Fire(3), 2_000, true);
     assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::Jammed));
     assert_eq!((range.targets, range.balls), (ShooterTargets::REST, 3));
     // Neither a new trigger nor a spin clears it: rest does.
-    range.run(Order::Spin, 50, true);
-    range.run(Order::Fire(1), 50, true);
+    range.run(ShooterOrder::Spin, 50, true);
+    range.run(ShooterOrder::Fire(1), 50, true);
     assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::Jammed));
-    range.run(Order::Rest, 5, true);
+    range.run(ShooterOrder::Rest, 5, true);
     assert_eq!(range.shooter.state(), ShooterState::Rest);
 }
 
@@ -232,8 +232,8 @@ fn a_jam_that_gives_way_is_cleared_and_one_that_does_not_stops_the_shooter() {
 fn the_true_heat_never_exceeds_the_limit_and_the_rate_is_that_of_the_cooling() {
     let world = Simulation::new(5);
     let mut range = Range::new(&world, Some(Barrel { limit: 100, cooling_per_s: 40 }));
-    range.run(Order::Spin, 1_500, true);
-    range.run(Order::Fire(255), 5_000, true);
+    range.run(ShooterOrder::Spin, 1_500, true);
+    range.run(ShooterOrder::Fire(255), 5_000, true);
     assert!(range.hottest <= 100.0, "{}", range.hottest);
     assert!(range.hottest > 75.0, "the limit is not used: {}", range.hottest);
     // 8 to 9 shots at once, then 4 in 1 s.
@@ -242,9 +242,9 @@ fn the_true_heat_never_exceeds_the_limit_and_the_rate_is_that_of_the_cooling() {
 
     // The referee system falls silent: nothing is shot, and the wheels go on.
     range.barrel = None;
-    range.run(Order::Fire(255), 1_000, true);
+    range.run(ShooterOrder::Fire(255), 1_000, true);
     let balls = range.balls;
-    range.run(Order::Fire(255), 1_000, true);
+    range.run(ShooterOrder::Fire(255), 1_000, true);
     assert_eq!((range.balls, range.shooter.state()), (balls, ShooterState::Cooling));
     assert!(range.wheel_rpm() > 390.0);
 }
@@ -254,27 +254,27 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
     for fault_of_wheel in [true, false] {
         let world = Simulation::new(6);
         let mut range = Range::new(&world, COOL);
-        range.run(Order::Spin, 1_500, true);
+        range.run(ShooterOrder::Spin, 1_500, true);
         let lost = range.keys[if fault_of_wheel { 1 } else { 2 }];
         let (from, until) = (range.ms + 250, range.ms + 330);
         world.fault(Fault::Silent(lost), at_ms(from)..at_ms(until)).unwrap();
-        range.run(Order::Fire(50), 300, true);
+        range.run(ShooterOrder::Fire(50), 300, true);
         let fault = if fault_of_wheel { ShooterFault::WheelLost } else { ShooterFault::LoaderLost };
         assert_eq!(range.shooter.state(), ShooterState::Fault(fault));
         assert_eq!(range.targets, ShooterTargets::REST);
         // A loader that is silent is not braked: it coasts, and a ball may drop.
         let balls = range.balls;
-        range.run(Order::Fire(50), 100, true);
+        range.run(ShooterOrder::Fire(50), 100, true);
         assert!(range.balls <= balls + 1);
         let balls = range.balls;
-        range.run(Order::Fire(50), 1_000, true); // it is heard again since long
+        range.run(ShooterOrder::Fire(50), 1_000, true); // it is heard again since long
         assert_eq!((range.balls, range.targets), (balls, ShooterTargets::REST));
         assert!(range.wheel_rpm() < 40.0 && range.loader_rpm() == 0.0);
-        range.run(Order::Rest, 100, true);
-        range.run(Order::Spin, 2_000, true);
+        range.run(ShooterOrder::Rest, 100, true);
+        range.run(ShooterOrder::Spin, 2_000, true);
         assert_eq!(range.shooter.state(), ShooterState::Ready);
         let shots = range.shooter.shots();
-        range.run(Order::Fire(1), 400, true);
+        range.run(ShooterOrder::Fire(1), 400, true);
         assert_eq!(range.shooter.shots(), shots + 1);
         // A gap of 80 ms leaves the rotor turns of a coasting loader in doubt, and with them the place of its chambers.
         if fault_of_wheel {
@@ -287,15 +287,15 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
 fn disarmed_everything_is_at_rest_and_a_held_trigger_shoots_nothing_when_armed_again() {
     let world = Simulation::new(7);
     let mut range = Range::new(&world, COOL);
-    range.run(Order::Fire(5), 500, false);
+    range.run(ShooterOrder::Fire(5), 500, false);
     assert_eq!((range.shooter.state(), range.balls), (ShooterState::Rest, 0));
-    range.run(Order::Fire(5), 2_000, true); // held since before
+    range.run(ShooterOrder::Fire(5), 2_000, true); // held since before
     assert_eq!((range.shooter.state(), range.balls), (ShooterState::Ready, 0));
-    range.run(Order::Spin, 10, true);
-    range.run(Order::Fire(50), 250, true);
+    range.run(ShooterOrder::Spin, 10, true);
+    range.run(ShooterOrder::Fire(50), 250, true);
     let balls = range.balls;
     assert!(balls > 0);
-    range.run(Order::Fire(50), 200, false);
+    range.run(ShooterOrder::Fire(50), 200, false);
     assert_eq!((range.shooter.state(), range.targets), (ShooterState::Rest, ShooterTargets::REST));
     assert!(range.balls <= balls + 1, "the loader stops by its friction");
     let balls = range.balls;
@@ -304,7 +304,7 @@ fn disarmed_everything_is_at_rest_and_a_held_trigger_shoots_nothing_when_armed_a
     for key in range.keys {
         assert_eq!(world.motor(key).unwrap().command, 0);
     }
-    range.run(Order::Fire(50), 2_000, true);
+    range.run(ShooterOrder::Fire(50), 2_000, true);
     assert_eq!(range.balls, balls);
 }
 
@@ -313,9 +313,9 @@ fn a_wheel_that_does_not_reach_its_speed_is_a_fault_after_3_s() {
     let world = Simulation::new(8);
     let mut range = Range::new(&world, COOL);
     world.fault(Fault::BlockedShaft(range.keys[0]), ..).unwrap();
-    range.run(Order::Fire(1), 2_900, true);
+    range.run(ShooterOrder::Fire(1), 2_900, true);
     assert_eq!((range.shooter.state(), range.balls), (ShooterState::SpinningUp, 0));
-    range.run(Order::Fire(1), 400, true);
+    range.run(ShooterOrder::Fire(1), 400, true);
     assert_eq!(range.shooter.state(), ShooterState::Fault(ShooterFault::WheelSlow));
 }
 
@@ -326,8 +326,8 @@ fn for_practice_a_heat_limit_without_the_referee_system_holds() {
     let config = ShooterConfig::new(AngularVelocity::from_rpm(WHEEL_RPM), CHAMBERS, 10.0)
         .with_heat_without_referee(BarrelHeat { heat: 0, limit: 50, cooling_per_s: 10 });
     let mut range = Range::with(&world, None, config);
-    range.run(Order::Spin, 1_500, true);
-    range.run(Order::Fire(255), 3_000, true);
+    range.run(ShooterOrder::Spin, 1_500, true);
+    range.run(ShooterOrder::Fire(255), 3_000, true);
     // 4 at once, then 1 in 1 s.
     assert!((6..=8).contains(&range.balls), "{}", range.balls);
 }

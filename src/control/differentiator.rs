@@ -237,7 +237,9 @@ mod tests {
         for width in [1.0, 1.2, 1.249_99] {
             let narrow = Differentiator::optimal(1.0, width * DT_S, DT_S).unwrap_err();
             assert_eq!(narrow, ConfigError::Unstable("h0"));
-            assert!(narrow.to_string().starts_with("h0: below 1.25 times the longest step"));
+            assert!(
+                narrow.to_string().starts_with("h0: a value below 1.25 times the longest step")
+            );
         }
     }
 

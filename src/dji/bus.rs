@@ -1,13 +1,12 @@
-use super::attach;
 use super::budget::Budget;
 use super::command::Outbox;
 use super::counters::{Counters, Rejects};
-use super::deadlines;
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors};
-use super::receiving;
-use super::rounds;
 use super::slot::LONGEST_STEP_S;
-use super::{AnyHandle, AttachError, CommandFrame, Config, Feedback, Handle, Model};
+use super::{
+    AnyHandle, AttachError, CommandFrame, Config, Feedback, Handle, Model, attach, deadlines,
+    receiving, rounds,
+};
 use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, Ingest, MotorName, Timeouts};

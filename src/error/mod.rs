@@ -34,7 +34,7 @@ use core::fmt;
 /// let error = Pid::new(reversed).unwrap_err();
 /// assert_eq!(error, ConfigError::Reversed("output_range"));
 /// assert_eq!(error.parameter(), "output_range");
-/// assert_eq!(error.to_string(), "output_range: the lower end must lie below the upper one");
+/// assert_eq!(error.to_string(), "output_range: the lower end must lie below the upper end");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

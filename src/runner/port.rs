@@ -226,8 +226,7 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     ) -> usize {
         self.watch.receive_ran();
         self.note_lost(queue.take_dropped());
-        let mut tally = Tally::default();
-        let mut frames = 0;
+        let (mut tally, mut frames) = (Tally::default(), 0);
         while frames < budget {
             let Some((frame, arrived)) = queue.pop() else { break };
             frames += 1;

@@ -2,7 +2,7 @@ use super::config::ShooterConfig;
 use super::heat::Heat;
 use super::loader::{Feed, Loader};
 use super::state::{
-    LoaderFeedback, Order, ShooterFault, ShooterFeedback, ShooterState, ShooterTargets,
+    LoaderFeedback, ShooterFault, ShooterFeedback, ShooterOrder, ShooterState, ShooterTargets,
 };
 use crate::error::ConfigError;
 use crate::time::Tick;
@@ -21,7 +21,7 @@ const LONGEST_STEP_S: f32 = 0.1;
 /// One shot, with motors that follow at once:
 /// ```
 /// use drivetrain::encoder::Position;
-/// use drivetrain::shooter::{LoaderFeedback, Order, Shooter, ShooterConfig, ShooterFeedback};
+/// use drivetrain::shooter::{LoaderFeedback, ShooterOrder, Shooter, ShooterConfig, ShooterFeedback};
 /// use drivetrain::time::{Instant, Tick};
 /// use drivetrain::units::{Angle, AngularVelocity};
 /// use drivetrain::wire::referee::BarrelHeat;
@@ -37,7 +37,7 @@ const LONGEST_STEP_S: f32 = 0.1;
 ///         loader: Some(LoaderFeedback { position, velocity }),
 ///         heat: Some(BarrelHeat { heat: 0, limit: 200, cooling_per_s: 10 }), // `Referee::heat_17mm`
 ///     };
-///     let order = if ms < 100 { Order::Spin } else { Order::Fire(1) };
+///     let order = if ms < 100 { ShooterOrder::Spin } else { ShooterOrder::Fire(1) };
 ///     let targets = shooter.update(order, &feedback, Tick::new(Instant::from_micros(1_000 * ms), 0.001));
 ///     (wheels, velocity) = (targets.wheels, targets.loader);
 ///     angle_rad += 0.001 * velocity.as_rad_per_s();
@@ -90,7 +90,7 @@ impl Shooter {
     /// everything stands for that tick, and nothing else changes.
     pub fn update(
         &mut self,
-        order: Order,
+        order: ShooterOrder,
         feedback: &ShooterFeedback,
         tick: Tick,
     ) -> ShooterTargets {
@@ -103,9 +103,9 @@ impl Shooter {
             self.is_released = false;
             return self.rest();
         }
-        let fires = matches!(order, Order::Fire(1..));
+        let fires = matches!(order, ShooterOrder::Fire(1..));
         self.is_released |= !fires;
-        if order == Order::Rest {
+        if order == ShooterOrder::Rest {
             return self.rest();
         }
         if let ShooterState::Fault(_) = self.state {
@@ -121,10 +121,10 @@ impl Shooter {
             (self.settled_s, self.spinning_up_s) = (0.0, 0.0);
         }
         match order {
-            Order::Fire(shots @ 1..) if self.is_released => {
+            ShooterOrder::Fire(shots @ 1..) if self.is_released => {
                 (self.ordered, self.is_released) = (shots, false);
             }
-            Order::Fire(1..) => {}
+            ShooterOrder::Fire(1..) => {}
             _ => self.ordered = 0,
         }
         let is_settled = match self.settle(wheels, dt_s) {

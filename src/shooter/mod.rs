@@ -1,7 +1,7 @@
 //! A shooter for balls: two friction wheels and a loader that counts, clears a jam, and keeps the heat limit of the barrel.
 //!
 //! ```text
-//!  pilot ── Order ──┐                                     ┌── speed of both wheels
+//!  pilot ── order ──┐                                     ┌── speed of both wheels
 //!  motors ─ feedback ┼──> Shooter::update (each tick) ────┤
 //!  referee ── heat ─┘                                     └── speed of the loader
 //! ```
@@ -23,7 +23,7 @@
 //! before the referee system reports it: a burst then does not exceed the limit during the 100 ms between two reports.
 //!
 //! ```
-//! use drivetrain::shooter::{Order, Shooter, ShooterConfig, ShooterFeedback, ShooterState};
+//! use drivetrain::shooter::{ShooterOrder, Shooter, ShooterConfig, ShooterFeedback, ShooterState};
 //! use drivetrain::time::{Instant, Tick};
 //! use drivetrain::units::AngularVelocity;
 //!
@@ -32,7 +32,7 @@
 //! let tick = Tick::new(Instant::from_micros(1_000), 0.001);
 //!
 //! let disarmed = ShooterFeedback::default();
-//! let targets = shooter.update(Order::Fire(1), &disarmed, tick);
+//! let targets = shooter.update(ShooterOrder::Fire(1), &disarmed, tick);
 //! assert_eq!((targets.wheels.as_rpm(), targets.loader.as_rpm()), (0.0, 0.0));
 //! assert_eq!(shooter.state(), ShooterState::Rest);
 //! # Ok::<(), drivetrain::error::ConfigError>(())
@@ -50,5 +50,5 @@ mod state;
 pub use config::ShooterConfig;
 pub use machine::Shooter;
 pub use state::{
-    LoaderFeedback, Order, ShooterFault, ShooterFeedback, ShooterState, ShooterTargets,
+    LoaderFeedback, ShooterFault, ShooterFeedback, ShooterOrder, ShooterState, ShooterTargets,
 };

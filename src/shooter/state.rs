@@ -6,7 +6,7 @@ use crate::wire::referee::BarrelHeat;
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Order {
+pub enum ShooterOrder {
     /// Wheels and loader stand. Clears a fault.
     #[default]
     Rest,
@@ -37,7 +37,7 @@ pub enum ShooterState {
     Clearing,
     /// A shot waits until the barrel is cool enough, or until its heat is known.
     Cooling,
-    /// Everything stands until the order is [`Order::Rest`], or the robot is disarmed.
+    /// Everything stands until the order is [`ShooterOrder::Rest`], or the robot is disarmed.
     Fault(ShooterFault),
 }
 

@@ -1,13 +1,11 @@
 //! The rows of motions from any state: planning one axis, its mean and its most over states of each kind, and sampling.
 
-use crate::meter::{CALLS, instructions};
-use crate::row;
+use crate::meter::{CALLS, instructions, row};
 use core::hint::black_box;
 use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
 use drivetrain::error::ConfigError;
 
-type Plan =
-    fn(&ProfileState, &MotionTarget, &MotionLimits) -> Result<Motion, ConfigError>;
+type Plan = fn(&ProfileState, &MotionTarget, &MotionLimits) -> Result<Motion, ConfigError>;
 
 #[unsafe(no_mangle)]
 #[inline(never)]

@@ -1,9 +1,8 @@
+use crate::control::motion::roots::{lesser, root, root_of};
+use crate::control::motion::task::Task;
 use crate::control::motion::wide::Wide;
 use crate::control::number::limited;
 use crate::math;
-
-/// A step of this share is the last but one: the next one would be of its square.
-const CLOSE: f32 = 3e-5;
 
 /// In `f32`, where rounding may keep the steps from becoming close; then with the value in twice its precision, which takes one step,
 /// and more where the way hardly depends on the roots. The bracket halves where a step would leave it.
@@ -93,62 +92,19 @@ pub(super) enum Beginning {
     Up(f32),
 }
 
-/// A state, a target and the largest velocity, in units where acceleration and jerk end at 1.
-#[derive(Debug, Default, Clone, Copy, PartialEq)]
-pub(super) struct Task {
-    pub(super) distance: Wide,
-    pub(super) velocity: Wide,
-    pub(super) acceleration: Wide,
-    /// Half of the square of the acceleration.
-    pub(super) square: Wide,
-    pub(super) exit: Wide,
-    pub(super) top: f32,
-}
-
-impl Task {
-    /// Returns the task in the mirror.
-    pub(super) fn mirrored(self) -> Self {
-        Self {
-            distance: -self.distance,
-            velocity: -self.velocity,
-            acceleration: -self.acceleration,
-            exit: -self.exit,
-            ..self
-        }
-    }
-
-    /// Whether the direct change of velocity goes down.
-    pub(super) fn falls(&self) -> bool {
-        let is_rising = self.acceleration.narrow() > 0.0;
-        let rest =
-            if is_rising { self.velocity + self.square } else { self.velocity - self.square };
-        (rest - self.exit).narrow() >= 0.0
-    }
-
-    /// Returns how far the target lies beyond the end of the direct change of velocity, which has to go down.
-    pub(super) fn beyond(&self) -> Wide {
-        let crest = self.velocity + self.square;
-        let change = crest - self.exit;
-        let duration =
-            if change.narrow() >= 1.0 { change + 1.0 } else { change.root().scaled(2.0) };
-        let slope = (crest + self.exit).scaled(0.5) * duration;
-        self.distance - slope - self.acceleration * (crest - self.square * Wide::THIRD)
-    }
-
-    pub(super) fn ascent(&self) -> Ascent {
-        let entry = self.velocity - self.square;
-        Ascent {
-            acceleration: self.acceleration.narrow(),
-            entry,
-            exit: self.exit,
-            top: self.top,
-            way: self.distance + self.acceleration * (entry + self.square * Wide::THIRD),
-            rise: (self.exit - entry).narrow(),
-        }
-    }
-}
-
 impl Ascent {
+    pub(super) fn of(task: &Task) -> Self {
+        let entry = task.velocity - task.square;
+        Self {
+            acceleration: task.acceleration.narrow(),
+            entry,
+            exit: task.exit,
+            top: task.top,
+            way: task.distance + task.acceleration * (entry + task.square * Wide::THIRD),
+            rise: (task.exit - entry).narrow(),
+        }
+    }
+
     /// Returns the direct motion, if it ends within rounding of the target and longer ones at first fall behind.
     ///
     /// They would then have to come back from afar. A target that is followed at its velocity is such a one.
@@ -411,38 +367,4 @@ impl Ascent {
         }
         high
     }
-}
-
-/// Returns the square root, and zero of a negative number.
-fn root_of(x: f32) -> f32 {
-    if x > 0.0 { math::sqrt(x) } else { 0.0 }
-}
-
-const fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// Finds where a function passes zero upward, which it does once between `low` and `high`.
-fn root<const STEPS: u32>(
-    low: f32,
-    high: f32,
-    guess: f32,
-    function: impl Fn(f32) -> (f32, f32),
-) -> f32 {
-    let (mut low, mut high, mut x) = (low, high, guess);
-    for _ in 0..STEPS {
-        let (value, slope) = function(x);
-        if value > 0.0 {
-            high = x;
-        } else {
-            low = x;
-        }
-        let step = value / slope;
-        let next = x - step;
-        if step.abs() <= CLOSE * x.abs() {
-            return limited(next, low, high);
-        }
-        x = if next >= low && next <= high { next } else { 0.5 * (low + high) };
-    }
-    x
 }

@@ -1,4 +1,4 @@
-use crate::control::motion::ascent::Task;
+use crate::control::motion::task::Task;
 use crate::control::motion::wide::Wide;
 
 /// Brings a state that is outside of the limits, or will be whatever is done, back inside: with full jerk, then without.

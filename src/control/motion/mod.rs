@@ -37,7 +37,9 @@ mod follower;
 mod in_step;
 mod plan;
 mod planner;
+mod roots;
 mod scale;
+mod task;
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests;

@@ -1,8 +1,9 @@
 use crate::control::error::{finite, positive};
-use crate::control::motion::ascent::{Beginning, Curve, Task};
+use crate::control::motion::ascent::{Ascent, Beginning, Curve};
 use crate::control::motion::brake::Brake;
 use crate::control::motion::plan::{Motion, MotionTarget, Phases};
 use crate::control::motion::scale::{self, Limits};
+use crate::control::motion::task::Task;
 use crate::control::motion::wide::Wide;
 use crate::control::number::{self, limited};
 use crate::control::shaping::{MotionLimits, ProfileState};
@@ -77,7 +78,7 @@ impl Planner {
         let goes_on = beyond >= 0.0;
         let task = if goes_on { direct } else { direct.mirrored() };
         let beginning = if goes_on { Beginning::Down(beyond) } else { Beginning::Up(-beyond) };
-        let ascent = task.ascent();
+        let ascent = Ascent::of(&task);
         let direct = if beyond.abs() <= self.rounding { ascent.direct(beginning) } else { None };
         let curve = direct.unwrap_or_else(|| ascent.fastest(beginning));
         self.motion(falls == goes_on, &curve)
@@ -89,7 +90,7 @@ impl Planner {
     pub(super) fn duration_from(&self, duration_s: f32) -> f32 {
         let time = self.time_of(duration_s);
         for task in [self.task, self.task.mirrored()] {
-            let ascent = task.ascent();
+            let ascent = Ascent::of(&task);
             let (_, beyond) = ascent.lasting(time);
             let rounding = ROUNDING * task.distance.narrow().abs();
             if beyond < -rounding {
@@ -103,8 +104,8 @@ impl Planner {
     /// Returns two motions of this duration, the one too long and the other too short, and the share of the first that is right.
     pub(super) fn lasting(&self, duration_s: f32) -> (Motion, Motion, f32) {
         let time = self.time_of(duration_s);
-        let (high, above) = self.task.ascent().lasting(time);
-        let (low, below) = self.task.mirrored().ascent().lasting(time);
+        let (high, above) = Ascent::of(&self.task).lasting(time);
+        let (low, below) = Ascent::of(&self.task.mirrored()).lasting(time);
         let share = below / (above + below);
         let share = if share.is_nan() { 1.0 } else { limited(share, 0.0, 1.0) };
         let unit = self.limits.acceleration * self.unit_s * self.unit_s;

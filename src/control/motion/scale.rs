@@ -1,5 +1,5 @@
-use crate::control::motion::ascent::Task;
 use crate::control::motion::plan::MotionTarget;
+use crate::control::motion::task::Task;
 use crate::control::motion::wide::Wide;
 use crate::control::shaping::ProfileState;
 

@@ -112,8 +112,8 @@ fn a_speed_loop_in_words_per_rpm_and_its_conversion_send_the_same_words() {
         let word =
             bus.next_frame().map(|frame| i16::from_be_bytes([frame.bytes()[0], frame.bytes()[1]]));
         let error = target_rpm * 3591.0 / 187.0 - f64::from(rpm);
-        // By the trapezoid, as the controller of this crate.
-        sum += 0.001 * (error + before.unwrap_or(error)) / 2.0;
+        // By the trapezoid, as the controller of this crate, whose first step has no interval yet.
+        sum += 0.001 * (error + before.unwrap_or(-error)) / 2.0;
         before = Some(error);
         let raw = (kp * error + ki * sum).round();
         worst = worst.max((f64::from(word.unwrap()) - raw).abs());

@@ -85,8 +85,7 @@ impl Pilot {
         let (wheels, chassis) = (wheels_of(bus)?, chassis_of()?);
         let imu = Receiver::new(IMU_DEADLINE);
         let (gesture, forward) = (Gesture::default(), Forward::Chassis);
-        let parameters =
-            Parameters::new(PARAMETERS).map_err(|_| "a parameter that cannot work")?;
+        let parameters = Parameters::new(PARAMETERS).map_err(|_| "a parameter that cannot work")?;
         Ok(Self { wheels, chassis, dbus: Dbus::new(), imu, parameters, gesture, forward })
     }
 

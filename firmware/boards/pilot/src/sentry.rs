@@ -14,7 +14,7 @@
 use crate::gesture::{Gesture, Wish};
 use crate::loader::Loader;
 use crate::{CURRENT_LIMIT, chassis_of, wheels_of};
-use drivetrain::chassis::{Chassis, Mecanum, MecanumWheels, Mode, ModeConfig, Modes};
+use drivetrain::chassis::{Chassis, ChassisMode, Mecanum, MecanumWheels, ModeConfig, Modes};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M2006, M3508};
 use drivetrain::encoder::GearRatio;
@@ -122,7 +122,7 @@ impl Steering {
     /// Returns how the chassis is to move. `yaw` is that of the gimbal in the chassis; `None` when it is not known.
     pub fn update(&mut self, remote: &Remote, yaw: Option<Angle>, dt_s: f32) -> Twist<Body> {
         let is_rotor = remote.left_switch == Switch::Down;
-        self.0.set_mode(if is_rotor { Mode::Rotor } else { Mode::FollowGimbal });
+        self.0.set_mode(if is_rotor { ChassisMode::Rotor } else { ChassisMode::FollowGimbal });
         let (vx, vy) = (remote.right_y * FASTEST_M_S, -remote.right_x * FASTEST_M_S);
         self.0.update(Twist::new(vx, vy, 0.0), yaw, dt_s).unwrap_or(Twist::ZERO)
     }

@@ -1,0 +1,40 @@
+use crate::control::number::limited;
+use crate::math;
+
+/// A step of this share is the last but one: the next one would be of its square.
+const CLOSE: f32 = 3e-5;
+
+/// Returns the square root, and zero of a negative number.
+pub(super) fn root_of(x: f32) -> f32 {
+    if x > 0.0 { math::sqrt(x) } else { 0.0 }
+}
+
+/// Returns the lesser one of two, and the second if the first is NaN.
+pub(super) const fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// Finds where a function passes zero upward, which it does once between `low` and `high`.
+pub(super) fn root<const STEPS: u32>(
+    low: f32,
+    high: f32,
+    guess: f32,
+    function: impl Fn(f32) -> (f32, f32),
+) -> f32 {
+    let (mut low, mut high, mut x) = (low, high, guess);
+    for _ in 0..STEPS {
+        let (value, slope) = function(x);
+        if value > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let step = value / slope;
+        let next = x - step;
+        if step.abs() <= CLOSE * x.abs() {
+            return limited(next, low, high);
+        }
+        x = if next >= low && next <= high { next } else { 0.5 * (low + high) };
+    }
+    x
+}
