@@ -30,7 +30,7 @@ impl Mode {
     }
 
     /// Velocity mode with a limit of the torque in Nm too, on drives that read the limit: protocol V2.35 of `lk` has no field for it, and
-    /// such a drive keeps to its own setting. Motors of `rmd` refuse it. The [share](Order::share) of an order lowers it.
+    /// such a drive keeps to its own setting. Motors of `rmd` refuse it. The [share](crate::motor::Order::share) of an order lowers it.
     #[must_use]
     pub const fn velocity_with_torque_limit(
         velocity_limit: AngularVelocity,

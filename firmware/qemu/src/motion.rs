@@ -38,7 +38,7 @@ impl Random {
     /// States inside and outside of the limits, short and long ways, targets at rest and moving.
     fn case(&mut self, call: u32) -> Case {
         let [position, velocity, acceleration] = [self.number(), self.number(), self.number()];
-        let way = self.number() * if call % 2 == 0 { 0.1 } else { 3.0 };
+        let way = self.number() * if call.is_multiple_of(2) { 0.1 } else { 3.0 };
         let moving = if call % 4 < 2 { 0.0 } else { self.number() };
         let (top, steep, jerk) = (1.2 + self.number(), 3.0 + 2.5 * self.number(), 15.0);
         let from = ProfileState { position, velocity, acceleration: 4.0 * acceleration };

@@ -14,7 +14,7 @@ mod meter;
 mod wiring;
 
 use core::panic::PanicInfo;
-use cortex_m_semihosting::{debug, hprint, hprintln, nr, syscall};
+use cortex_m_semihosting::{debug, hprint, hprintln, nr, syscall1};
 use dearest::{CYCLE, CYCLES, MOTORS, Script, dearest, exact, found};
 
 /// Lines of descent, so that one that is stuck does not end the search.
@@ -73,7 +73,7 @@ fn arguments() -> (u32, u32) {
     let mut line = [0_u8; 128];
     let mut block = [line.as_mut_ptr() as usize, line.len()];
     // SAFETY: the block is an address and its length, as the call asks for.
-    unsafe { syscall(nr::GET_CMDLINE, &mut block) };
+    unsafe { syscall1(nr::GET_CMDLINE, (&raw mut block) as usize) };
     let text = core::str::from_utf8(&line).unwrap_or("");
     let mut numbers = text.split([' ', '\0']).filter_map(|word| word.parse().ok());
     (numbers.next().unwrap_or(1_000), numbers.next().unwrap_or(1))

@@ -80,7 +80,7 @@ fn a_moving_target_is_pursued_without_a_detour() {
         for step in 0..5_000_u16 {
             let position = velocity * (0.2 + 0.001 * f32::from(step));
             let [now] = follower.update(&[MotionTarget { position, velocity }], &[LIMITS], 0.001);
-            if step > 1_500 {
+            if step > 2_500 {
                 let behind = (position - now.position) * velocity.signum();
                 assert!((-0.001..0.6).contains(&behind), "{now:?} for {position}");
                 assert!((1.4..2.001).contains(&(now.velocity * velocity.signum())), "{now:?}");
@@ -183,7 +183,7 @@ fn bad_targets_limits_and_times_change_nothing_and_are_counted() {
 /// A number of any size: the exponents are uniform.
 fn any_size() -> impl Strategy<Value = f32> {
     prop_oneof![
-        4 => (-126_i32..127, 1.0_f32..2.0, any::<bool>()).prop_map(|(exponent, part, negative)| {
+        4 => (-126_i32..127, between(1.0, 1.999_999), any::<bool>()).prop_map(|(exponent, part, negative)| {
             let x = part * 2.0_f32.powi(exponent);
             if negative { -x } else { x }
         }),
@@ -193,18 +193,25 @@ fn any_size() -> impl Strategy<Value = f32> {
     ]
 }
 
+/// A number of a range, by whole steps: ranges of `f32` fail an assertion of proptest 1.11 now and then.
+fn between(low: f32, high: f32) -> impl Strategy<Value = f32> {
+    (0..=1_u32 << 20)
+        .prop_map(move |part| low + (high - low) * (part as f32 / (1_u32 << 20) as f32))
+}
+
 fn limits() -> impl Strategy<Value = MotionLimits> {
-    (0.1_f32..10.0, 0.1_f32..20.0, 0.1_f32..200.0)
+    (between(0.1, 10.0), between(0.1, 20.0), between(0.1, 200.0))
         .prop_map(|(top, steep, jerk)| MotionLimits::new(top, steep).with_jerk(jerk))
 }
 
 fn target() -> impl Strategy<Value = MotionTarget> {
-    (-5.0_f32..5.0, prop_oneof![Just(0.0_f32), -2.0_f32..2.0])
+    (between(-5.0, 5.0), prop_oneof![Just(0.0_f32), between(-2.0, 2.0)])
         .prop_map(|(position, velocity)| MotionTarget { position, velocity })
 }
 
 fn any_state() -> impl Strategy<Value = ProfileState> {
-    (-5.0_f32..5.0, -3.0_f32..3.0, -5.0_f32..5.0).prop_map(|(p, v, a)| state(p, v, a))
+    (between(-5.0, 5.0), between(-3.0, 3.0), between(-5.0, 5.0))
+        .prop_map(|(p, v, a)| state(p, v, a))
 }
 
 /// Fails if `now` cannot follow on `last` after `dt_s` with an acceleration and a jerk within the limits.
@@ -234,7 +241,7 @@ proptest! {
     #[test]
     fn there_is_always_a_plan(
         p in any_size(), v in any_size(), a in any_size(), to in any_size(), to_velocity in any_size(),
-        top in any_size(), steep in any_size(), jerk in any_size(), part in 0.0_f32..1.0,
+        top in any_size(), steep in any_size(), jerk in any_size(), part in between(0.0, 1.0),
     ) {
         let limit = |x: f32| if x == 0.0 { 1.0 } else { x.abs() };
         let limits = MotionLimits::new(limit(top), limit(steep)).with_jerk(limit(jerk));
@@ -269,7 +276,7 @@ proptest! {
     /// Law: from a moment of a motion, the motion takes what is left of its time.
     #[test]
     fn planning_anew_on_the_way_takes_no_longer(
-        from in any_state(), target in -5.0_f32..5.0, limits in limits(), part in 0.0_f32..1.0,
+        from in any_state(), target in between(-5.0, 5.0), limits in limits(), part in between(0.0, 1.0),
     ) {
         let to = MotionTarget::at_rest(target);
         let motion = Motion::plan(&from, &to, &limits).unwrap();

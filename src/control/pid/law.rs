@@ -72,7 +72,9 @@ impl Pid {
         self.core.is_limited()
     }
 
-    /// Steps by a time that was validated before, and returns the output.
+    /// Steps by a validated time step, and returns the output.
+    ///
+    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
     ///
     /// # Examples
     /// ```
@@ -102,8 +104,8 @@ impl Pid {
 
     /// Steps with a given error (from integers, on a circle) and the measured rate of change.
     ///
-    /// D is `-kd * rate`, on the first call too, so a positive `kd` damps. Period, tracking, feed-forward and the derivative of the
-    /// error do not apply. Everything else is as for [`step`](Self::step); both may be mixed.
+    /// D is `-kd * rate`, on the first call too. Period, tracking, feed-forward and the derivative of the error do not apply.
+    /// Everything else is as for [`step`](Self::step).
     ///
     /// # Examples
     /// ```

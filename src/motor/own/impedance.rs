@@ -158,7 +158,7 @@ impl ImpedanceControl {
     /// do not apply then.
     ///
     /// # Errors
-    /// As [`Cascade::new`].
+    /// As [`Cascade::new`](crate::control::Cascade::new).
     pub fn with_loops(self, position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
         let limit = self.torque_limit_nm;
         let loops = TorqueLoops::new(position, speed.with_output_limit(limit))?;
