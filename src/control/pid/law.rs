@@ -20,8 +20,7 @@ impl ErrorPid {
     /// The plain law: gains, integral limit, one output limit.
     ///
     /// # Errors
-    /// If the step takes more than that (options, the first call, bad arguments, overflow), nothing changes. The value returned is
-    /// finite if `valid` and `error` are.
+    /// If the step needs more, nothing changes. The returned value is finite if `valid` and `error` are.
     #[inline]
     pub(crate) fn plain(
         &mut self,
