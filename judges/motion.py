@@ -47,7 +47,11 @@ def states(random, count):
 
 
 def theirs(rows, axes=1):
-    """The durations of Ruckig, in `f64` from the same `f32`; of so many rows together."""
+    """The durations of Ruckig, in `f64` from the same `f32`; of so many rows together. NaN where Ruckig itself finds no plan.
+
+    Ruckig 0.19.4 ends some calculations of axes in step with -101 (a duration beyond its numerical limits), which its Python
+    package does not know as a result.
+    """
     planner, task, motion = ruckig.Ruckig(axes), ruckig.InputParameter(axes), ruckig.Trajectory(axes)
     found = np.empty(len(rows) // axes)
     for place, row in enumerate(rows.astype(float).reshape(-1, axes, 8).transpose(0, 2, 1).tolist()):
@@ -55,7 +59,12 @@ def theirs(rows, axes=1):
             task.current_position, task.current_velocity, task.current_acceleration, task.target_position,
             task.target_velocity, task.max_velocity, task.max_acceleration, task.max_jerk,
         ) = row
-        result = planner.calculate(task, motion)
+        try:
+            result = planner.calculate(task, motion)
+        except ValueError as error:
+            require(axes > 1 and "-101" in str(error), f"Ruckig has no plan for {row}: {error}")
+            found[place] = np.nan
+            continue
         require(result == ruckig.Result.Working, f"Ruckig has no plan for {row}: {result}")
         found[place] = motion.duration
     return found.repeat(axes)
@@ -74,7 +83,7 @@ def judge(rows, expected, durations, samples):
     start, target, limits = rows[:, :3], rows[:, 3:5], rows[:, 5:]
     times, values, jerks = samples[:, :, 0], samples[:, :, 1:4], samples[:, :, 4]
     jerk = limits[:, [2]]
-    worst = {"duration": (np.abs(durations - expected) / np.maximum(1, expected)).max() / DURATION}
+    worst = {"duration": np.nanmax(np.abs(durations - expected) / np.maximum(1, expected)) / DURATION}
     # A state beyond its limits, or that will be when its acceleration has fallen to zero, must not go any further.
     at_rest = start[:, 1] + np.abs(start[:, 2]) * start[:, 2] / (2 * limits[:, 2])
     most = np.max([limits[:, 0], np.abs(start[:, 1]), np.abs(at_rest)], 0)
@@ -113,6 +122,11 @@ def compare(program, random, count, verb, axes):
     for name, value in worst.items():
         require(value <= 1, f"{verb}: {name} is off by {value:.2f} times what is allowed")
     differences = np.concatenate(differences)
+    unknown = np.isnan(differences)
+    require(unknown.mean() < 1e-3, f"{verb}: Ruckig has no plan for {unknown.sum()} rows")
+    if unknown.any():
+        print(f"  {verb}: {unknown.sum()} rows without a plan of Ruckig, with one of ours")
+    differences = differences[~unknown]
     print(
         f"  {verb}: {count} motions of {axes}: durations within {differences.max():.1e} (99.99 %: {np.quantile(differences, 0.9999):.1e}), "
         f"limits within {LIMIT * max(worst[name] for name in ('velocity', 'acceleration', 'jerk')):.1e}"
