@@ -113,7 +113,7 @@ def parse(lines):
             found["spread"][fields[0]] = [int(fields[2]), int(fields[3])]
         elif kind == "closed_loop":
             found["closed_loop"] = " ".join(fields)
-        else:
+        elif kind != "level":
             found[{"size": "sizes", "stack": "stack"}[kind]][fields[0]] = int(fields[1])
     return found
 

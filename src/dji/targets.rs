@@ -210,7 +210,7 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Sets the velocity that the speed loop follows.
     ///
-    /// Costs 39 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 27 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// See above.
@@ -243,7 +243,7 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
     ///
-    /// Costs 92 instructions on a Cortex-M4F (`docs/figures.md`).
+    /// Costs 73 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// See above.

@@ -225,7 +225,7 @@ def plugged_late(robot):
     return {"zero_us": frames[0].us - 40_000, "stale": len(robot.stale()), "note": "zeros first; drives when armed"}
 
 
-@row("F12")
+@row("F12", needs="receive irq")
 def receive_starved(robot):
     """The receive interrupts of the controller are not served for 50 ms."""
     driving(robot)

@@ -73,7 +73,7 @@ impl Pid {
 
     /// Steps by a validated time step, and returns the output.
     ///
-    /// Costs 30 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
+    /// Costs 32 instructions on a Cortex-M4F, with limits, while the output is free (`docs/figures.md`).
     ///
     /// # Examples
     /// ```
