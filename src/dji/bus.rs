@@ -19,10 +19,8 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
-/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. It can stand in a `static`.
-///
-/// `N` is the number of motors that it has room for: the protocol's 11 unless a [sized](Self::sized) bus saves memory. On a
-/// Cortex-M a motor takes 296 bytes, and the bus 320 beside them.
+/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. A bus can stand in a `static`.
+/// `N` is its capacity: the protocol's 11 unless a [sized](Self::sized) bus saves memory. A motor takes 296 bytes on a Cortex-M.
 ///
 /// # Examples
 /// ```
@@ -52,10 +50,10 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 /// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug)]
-// The motors first: their addresses need no offset then.
 ///
 /// Takes 3552 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
+#[derive(Debug)]
+// The motors first: their addresses need no offset then.
 #[repr(C)]
 pub struct Bus<B = (), const N: usize = IDS> {
     pub(super) motors: Motors<N>,
