@@ -94,8 +94,11 @@ fn commensurate(distance: f32, from: &ProfileState, to: &MotionTarget, limits: L
     let jerk = of_jerk
         .min(2 * acceleration + 48 - of_velocity)
         .min((3 * acceleration + 98 - of_distance) / 2)
-        .clamp(2 * acceleration - 90, 2 * acceleration + 90)
-        .clamp((3 * acceleration - 90) / 2, (3 * acceleration + 90) / 2);
+        // Not `clamp`, which asserts the order of ends that are calculated.
+        .max(2 * acceleration - 90)
+        .min(2 * acceleration + 90)
+        .max((3 * acceleration - 90) / 2)
+        .min((3 * acceleration + 90) / 2);
     Limits {
         velocity: limits.velocity,
         acceleration: power_of_two(acceleration),
