@@ -164,7 +164,7 @@ fn chassis() -> Result<(), Box<dyn Error>> {
             module.position.to_degrees(),
         ));
     }
-    let [x, y, ..] = motions.at(duration_s);
+    let [x, y, _, module] = motions.at(duration_s);
     let errors = [x.position - 2.0, y.velocity - 0.5, module.position - to_angle];
     if errors.iter().any(|error| error.abs() > 1e-6) {
         return Err("the chassis is not where it was to be".into());
