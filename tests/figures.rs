@@ -133,7 +133,7 @@ fn documentation(source: &str, name: &str) -> Vec<String> {
     assert_eq!(items.len(), 1, "items of the name {name}");
     let above = lines[..items[0]].iter().rev();
     above
-        .take_while(|line| line.starts_with("///") || line.starts_with("#["))
+        .take_while(|line| line.starts_with("//") || line.starts_with("#["))
         .map(|line| (*line).to_owned())
         .collect()
 }
