@@ -5,6 +5,7 @@
 
 use drivetrain::control::*;
 use drivetrain::error::ConfigError;
+use drivetrain::time::TimeStep;
 use proptest::prelude::*;
 use std::fmt::Debug;
 

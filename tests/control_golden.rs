@@ -3,9 +3,10 @@
 #![cfg(test)]
 
 use drivetrain::control::{
-    Biquad, Differentiator, LoadObserver, LowPass, MotionLimits, Pid, PidConfig, Profile, TimeStep,
+    Biquad, Differentiator, LoadObserver, LowPass, MotionLimits, Pid, PidConfig, Profile,
     TuningRule, fhan,
 };
+use drivetrain::time::TimeStep;
 
 /// The rows of a file, each with its cells; what is not a number is NaN.
 fn rows(csv: &'static str) -> impl Iterator<Item = (&'static str, Vec<f32>)> {

@@ -3,11 +3,12 @@
 #![cfg(test)]
 #![cfg(feature = "sim")]
 
-use drivetrain::control::{Pid, PidConfig, StepResponse, TimeStep};
+use drivetrain::control::{Pid, PidConfig, StepResponse};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
+use drivetrain::time::TimeStep;
 use drivetrain::units::{AngularVelocity, Current};
 
 const TARGET: f32 = 30.0; // rad/s

@@ -4,10 +4,11 @@
 
 #![cfg(test)]
 
-use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, M3508};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::Current;
 

@@ -6,12 +6,13 @@
 
 #![cfg(test)]
 
-use drivetrain::control::{PidConfig, TimeStep};
+use drivetrain::control::PidConfig;
 use drivetrain::dji::{AnyHandle, Bus, Config, Gm6020Voltage, M2006, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     ArmError, Condition, HealthConfig, Ingest, Link, Malformed, Reaction, TargetError, Timeouts,
 };
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use embedded_can::{ExtendedId, Frame, StandardId};

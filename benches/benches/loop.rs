@@ -5,10 +5,11 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use drivetrain::chassis::Mecanum;
-use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Body, Twist, Vec2};
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Instant, Tick};
 use drivetrain::units::AngularVelocity;
 use std::hint::black_box;

@@ -3,9 +3,10 @@
 
 use drivetrain::control::{
     Biquad, Differentiator, LowPass, MotionLimits, Pid, PidConfig, PositionActuator, Profile,
-    RelayTuner, SlewLimiter, SpeedActuator, StepResponse, TimeStep, Window,
+    RelayTuner, SlewLimiter, SpeedActuator, StepResponse, Window,
 };
 use drivetrain::error::ConfigError;
+use drivetrain::time::TimeStep;
 use drivetrain_fuzz::{Input, Observed};
 use libfuzzer_sys::fuzz_target;
 

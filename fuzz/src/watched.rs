@@ -26,13 +26,13 @@ use crate::alone::{
 };
 use crate::gesture::Gesture;
 use crate::motors::{COUNT, FACTS, INTEGRATOR, Motor, Target};
-use drivetrain::control::TimeStep;
 use drivetrain::dji::{Bus, Counters};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     ArmError, CanDevice, Claim, Condition, Devices, Edge, Ingest, Link, MotorName, TargetError,
     Timeouts, Visitor, WrongSetting,
 };
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Instant, Tick};
 use std::collections::VecDeque;
 

@@ -1,8 +1,9 @@
 use super::clock::DeadClock;
-use crate::control::{Pid, PidConfig, TimeStep};
+use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
 use crate::geometry::{Body, Gimbal, Heading, Twist};
 use crate::math::{sin_cos, wrap_tau};
+use crate::time::TimeStep;
 use crate::units::Angle;
 use core::f32::consts::TAU;
 

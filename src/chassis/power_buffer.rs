@@ -1,7 +1,8 @@
 use super::clock::DeadClock;
 use super::error::not_negative;
-use crate::control::{Pid, PidConfig, TimeStep};
+use crate::control::{Pid, PidConfig};
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// Spends an energy buffer down to a reserve and refills it: the allowed power from the charge.
 ///

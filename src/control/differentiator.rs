@@ -1,8 +1,8 @@
 use super::error::{check, positive};
 use super::number::{Sum, finite};
-use super::step::TimeStep;
 use crate::error::ConfigError;
 use crate::math;
+use crate::time::TimeStep;
 
 /// A tracking differentiator: follows a signal and gives its rate of change, by a linear or a time-optimal law.
 ///

@@ -34,7 +34,8 @@
 //! Signs: an output grows with `setpoint - measurement`; a positive `kd` damps. Units are the caller's; gains are per second.
 //!
 //! ```
-//! use drivetrain::control::{Pid, PidConfig, TimeStep};
+//! use drivetrain::control::{Pid, PidConfig};
+//! use drivetrain::time::TimeStep;
 //!
 //! let speed = PidConfig::new(2.0, 2.5, 0.0).with_output_limit(20.0).with_integral_limit(10.0);
 //! let mut wheel = Pid::new(speed)?;
@@ -51,7 +52,6 @@ mod number;
 mod observer;
 mod pid;
 mod shaping;
-mod step;
 mod tuning;
 
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
@@ -64,5 +64,4 @@ pub use observer::LoadObserver;
 pub(crate) use pid::ErrorPid;
 pub use pid::{Pid, PidConfig, Terms};
 pub use shaping::{FeedForward, MotionLimits, Profile, ProfileState, SlewLimiter};
-pub use step::TimeStep;
 pub use tuning::{RelayTuner, StepResponse, TuningRule, WheelTuning};

@@ -1,7 +1,7 @@
 use super::error::{check, positive};
 use super::number::finite;
-use super::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// Estimates speed and load torque of a motor from its feedback: an extended-state observer (Luenberger).
 ///

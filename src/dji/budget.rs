@@ -15,6 +15,17 @@ impl Budget {
         Self { bit_rate: 1_000_000, tick_hz: 1_000, ceiling_percent: None }
     }
 
+    /// Sets the ceiling of the load, a share, to whole percent.
+    pub(super) const fn set_ceiling(&mut self, ceiling: f32) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, NaN gives 0: nothing can be attached"
+        )]
+        let percent = (ceiling * 100.0 + 0.5) as u16;
+        self.ceiling_percent = Some(percent);
+    }
+
     pub(super) const fn load(&self, motors: u32, feedback_hz: u32, commands: u32) -> BusLoad {
         BusLoad::new(self.bit_rate)
             .with_frames(motors, feedback_hz)

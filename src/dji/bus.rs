@@ -1,21 +1,16 @@
 use super::budget::Budget;
 use super::command::Outbox;
 use super::counters::{Counters, Rejects};
-use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors};
+use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
 use super::slot::LONGEST_STEP_S;
 use super::{
-    AnyHandle, AttachError, CommandFrame, Config, Feedback, Handle, Model, attach, deadlines,
-    receiving, rounds,
+    AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, deadlines, receiving, rounds,
 };
-use crate::control::TimeStep;
 use crate::frame::CanFrame;
-use crate::motor::{BusLoad, Ingest, MotorName, Timeouts};
+use crate::motor::{BusLoad, Devices, Ingest, MotorName, Timeouts, Visitor};
+use crate::time::TimeStep;
 use crate::time::{Duration, Instant, Tick};
 use core::marker::PhantomData;
-
-/// All commands, and the feedback, lie from 0x1FE to 0x2FF.
-const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
-const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
@@ -50,7 +45,6 @@ const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 /// assert_eq!(format!("{frame:?}"), "200 [8] 03 33 00 00 00 00 00 00"); // 819 of 16384 = 1 A of 20 A
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-///
 /// Takes 3552 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
 #[derive(Debug)]
 // The motors first: their addresses need no offset then.
@@ -137,8 +131,7 @@ impl<B, const N: usize> Bus<B, N> {
         self
     }
 
-    /// Says that the driver hands back the frames that it sent, so that a command frame that is received is no sign of a
-    /// second master. None is looked for then.
+    /// Says that the driver hands back the frames that it sent: a received command frame is then no sign of a second master.
     #[must_use]
     pub const fn with_loopback(mut self) -> Self {
         self.motors.rounds.echoes = true;
@@ -152,9 +145,7 @@ impl<B, const N: usize> Bus<B, N> {
         self
     }
 
-    /// Sets the rate of each motor's feedback in Hz, for [`load`](Self::load); 1000 at first.
-    ///
-    /// The rate itself is set in the ESCs, with RoboMaster Assistant.
+    /// Sets the rate of feedback in Hz that RoboMaster Assistant set in the ESCs, for [`load`](Self::load); 1000 at first.
     #[must_use]
     pub const fn with_feedback_rate(mut self, hz: u32) -> Self {
         self.motors.rounds.feedback_hz = hz;
@@ -185,13 +176,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// ```
     #[must_use]
     pub const fn with_load_ceiling(mut self, ceiling: f32) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates, NaN gives 0: nothing can be attached"
-        )]
-        let percent = (ceiling * 100.0 + 0.5) as u16;
-        self.budget.ceiling_percent = Some(percent);
+        self.budget.set_ceiling(ceiling);
         self
     }
 
@@ -273,9 +258,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// let mut bus = Bus::new();
     /// bus.attach_all([1, 2, 3, 4].map(Config::<M3508>::new))?;
     /// assert_eq!(bus.load().to_string(), "56 % to 68 %"); // four feedback frames and one command
-    /// bus.attach_all([5, 6].map(Config::<M3508>::new))?;
-    /// assert_eq!(bus.load().to_string(), "89 % to 108 %");
-    /// bus.attach_all([7, 8].map(Config::<M3508>::new))?;
+    /// bus.attach_all([5, 6, 7, 8].map(Config::<M3508>::new))?;
     /// assert_eq!(bus.load().to_string(), "111 % to 135 %");
     /// assert_eq!(bus.with_feedback_rate(500).load().to_string(), "67 % to 81 %");
     /// # Ok::<(), drivetrain::dji::AttachError>(())
@@ -393,8 +376,25 @@ impl<B, const N: usize> Bus<B, N> {
     }
 }
 
-/// Tells whether a frame is of no id of this family. Twice the header: then it takes no mask to leave the bit of short frames out.
-#[inline]
-const fn is_of_others(frame: &CanFrame) -> bool {
-    (frame.header() << 1).wrapping_sub(LOWEST_COMMAND_ID << 1) > (COMMAND_IDS << 1 | 1)
+/// One device needs no search among several: each call goes straight to the bus.
+impl<B, const N: usize> Devices for Bus<B, N> {
+    #[inline]
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.visit(self);
+    }
+
+    #[inline]
+    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
+        Self::ingest(self, frame, now)
+    }
+
+    #[inline]
+    fn update(&mut self, tick: Tick) {
+        Self::update(self, tick);
+    }
+
+    #[inline]
+    fn next_frame(&mut self, _: u32) -> Option<CanFrame> {
+        Self::next_frame(self)
+    }
 }

@@ -4,7 +4,7 @@ use super::Bus;
 use super::arming::{self, claim};
 use super::slot::{Slot, health};
 use crate::frame::CanFrame;
-use crate::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Role, Visitor, WrongSetting};
+use crate::motor::{CanDevice, Claim, Edge, Ingest, MotorName, Role, WrongSetting};
 use crate::time::{Instant, Tick};
 
 impl<B, const N: usize> CanDevice for Bus<B, N> {
@@ -97,29 +97,6 @@ impl<B, const N: usize> CanDevice for Bus<B, N> {
 
     fn is_stopped(&self) -> bool {
         Self::is_stopped(self)
-    }
-}
-
-/// One device needs no search among several: each goes straight to the bus.
-impl<B, const N: usize> crate::motor::Devices for Bus<B, N> {
-    #[inline]
-    fn visit(&mut self, visitor: &mut impl Visitor) {
-        visitor.visit(self);
-    }
-
-    #[inline]
-    fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
-        Self::ingest(self, frame, now)
-    }
-
-    #[inline]
-    fn update(&mut self, tick: Tick) {
-        Self::update(self, tick);
-    }
-
-    #[inline]
-    fn next_frame(&mut self, _: u32) -> Option<CanFrame> {
-        Self::next_frame(self)
     }
 }
 

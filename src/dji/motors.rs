@@ -1,8 +1,9 @@
 //! The motors of a bus in their slots, and the handles that name them.
 
-use super::Model;
 use super::rounds::Rounds;
 use super::slot::Slot;
+use super::{CommandFrame, Model};
+use crate::frame::CanFrame;
 use crate::motor::{DeviceGuard, TargetError};
 use crate::time::Instant;
 use core::marker::PhantomData;
@@ -10,6 +11,17 @@ use core::marker::PhantomData;
 /// The lowest feedback id, and how many there are: 0x201..=0x20B.
 pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
 pub(super) const IDS: usize = 11;
+
+/// All commands, and the feedback, lie from 0x1FE to 0x2FF.
+const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
+const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
+
+/// Tells whether the id of a frame is not of this family.
+// Twice the header: the comparison takes no mask to leave the bit of short frames out.
+#[inline]
+pub(super) const fn is_of_others(frame: &CanFrame) -> bool {
+    (frame.header() << 1).wrapping_sub(LOWEST_COMMAND_ID << 1) > (COMMAND_IDS << 1 | 1)
+}
 
 /// The motors of a bus in their slots, and the rules that hold for all of them.
 #[derive(Debug)]

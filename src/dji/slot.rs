@@ -13,10 +13,11 @@ use super::config::USUAL;
 use super::motors::Key;
 use super::range::Range;
 use super::{Facts, Feedback, State};
-use crate::control::{ErrorPid, Pid, PidConfig, TimeStep};
+use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::encoder::{GearRatio, Homing, Position, Shaft, shortest};
 use crate::error::ConfigError;
 use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetError, Traffic};
+use crate::time::TimeStep;
 use crate::units::{AngularVelocity, Current};
 
 /// The refusal of a handle whose motor is gone.

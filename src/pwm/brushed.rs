@@ -4,9 +4,10 @@ mod health;
 
 use super::Direction;
 use super::rc::duty;
-use crate::control::{Pid, TimeStep};
+use crate::control::Pid;
 use crate::error::ConfigError;
 use crate::motor::{ArmError, Guard, Missing, TargetError, Watch};
+use crate::time::TimeStep;
 use crate::time::{Instant, Tick};
 pub use config::BrushedConfig;
 use core::f32::consts::TAU;

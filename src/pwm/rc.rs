@@ -1,9 +1,9 @@
-use crate::control::TimeStep;
 use crate::error::ConfigError;
 use crate::motor::{
     ArmError, Capabilities, Capability, Condition, Conditions, Edge, Guard, Health, MotorName,
     OPENING, TargetError, Timeouts, VelocityDrive,
 };
+use crate::time::TimeStep;
 use crate::time::{Duration, Instant, Tick};
 use crate::units::AngularVelocity;
 use embedded_hal::pwm::SetDutyCycle;

@@ -5,9 +5,9 @@ use super::model::IDS;
 use super::schedule;
 use super::slot::{Slot, health, name};
 use super::{AttachError, Command, Config, Joint, Reply, State};
-use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorName, Timeouts};
+use crate::time::TimeStep;
 use crate::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
 

@@ -7,6 +7,7 @@
 //! | [`ManualClock`] | a clock that a test moves by hand |
 //! | [`ExtendedCounter`] | a 16- or 32-bit hardware counter, extended to an [`Instant`] |
 //! | [`Ticker`], [`Tick`] | the cadence of the control loop, without drift, overruns counted |
+//! | [`TimeStep`] | the step of a tick, validated once for all loops |
 //! | [`ConditionEdge`] | a condition of a bus or of a source of data began or ended |
 //!
 //! ```
@@ -24,6 +25,7 @@ mod counter;
 mod duration;
 mod edge;
 mod instant;
+mod step;
 mod ticker;
 
 pub use clock::{Clock, ManualClock};
@@ -31,4 +33,5 @@ pub use counter::ExtendedCounter;
 pub use duration::Duration;
 pub use edge::ConditionEdge;
 pub use instant::Instant;
+pub use step::TimeStep;
 pub use ticker::{Tick, Ticker};

@@ -2,7 +2,6 @@
 //! torques beyond the limit.
 
 use super::bench::{Bench, mit};
-use drivetrain::control::TimeStep;
 use drivetrain::damiao::{Mode, Model, Motor, Register};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
@@ -10,6 +9,7 @@ use drivetrain::motor::{
 };
 use drivetrain::sim::{DamiaoDrive, DriveShaft};
 use drivetrain::time::Tick;
+use drivetrain::time::TimeStep;
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::Frame;
 

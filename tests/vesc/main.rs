@@ -653,8 +653,8 @@ fn a_velocity_target_keeps_within_the_largest_of_the_model() {
 /// Heat opens less of the range: 5 A of 20 A at a quarter.
 #[test]
 fn the_share_of_the_order_scales_the_current() {
-    use drivetrain::control::TimeStep;
     use drivetrain::motor::{Order, OwnMotor, Target};
+    use drivetrain::time::TimeStep;
     for (share, expected) in [(1.0, 20_000), (0.25, 5_000), (0.0, 0)] {
         let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
         _ = motor.decode(&drive(23).report(9).unwrap());

@@ -2,7 +2,7 @@
 
 use crate::opaque::{Function, any};
 use core::hint::black_box;
-use drivetrain::control::{Differentiator, Pid, PidConfig, TimeStep, WheelTuning, fhan};
+use drivetrain::control::{Differentiator, Pid, PidConfig, WheelTuning, fhan};
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, CommandFrame, Config, Facts, Feedback, Gm6020Current,
     Gm6020Voltage, Handle, M2006, M3508, Message, WordGains,
@@ -19,6 +19,7 @@ use drivetrain::motor::{
 use drivetrain::runner::{
     BlockingTx, EmergencyStop, ErrorCounts, FrameQueue, FrameReceiver, FrameSender, Nb, Runner,
 };
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Clock, Duration, ExtendedCounter, Instant, ManualClock, Tick, Ticker};
 use drivetrain::units::{Angle, AngularVelocity, Current, Voltage};
 use embedded_can::{ErrorKind, Frame, Id};

@@ -7,10 +7,11 @@ use drivetrain::chassis::Odometry;
 use drivetrain::control::{
     Biquad, Cascade, Differentiator, FeedForward, LowPass, MotionLimits, Pid, PidConfig,
     PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator, StepResponse,
-    TimeStep, Window,
+    Window,
 };
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist};
+use drivetrain::time::TimeStep;
 
 const DT_S: f32 = 0.001;
 

@@ -5,7 +5,7 @@ use crate::wiring::{Drive, START, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
-use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::dji::{Bus, Config, Feedback, Handle, M3508, State};
 use drivetrain::encoder::{Position, Shaft};
 use drivetrain::frame::CanFrame;
@@ -15,6 +15,7 @@ use drivetrain::geometry::{
 };
 use drivetrain::math as maths;
 use drivetrain::motor::Ingest;
+use drivetrain::time::TimeStep;
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 

@@ -1,6 +1,6 @@
 use crate::control::pid::{Pid, PidConfig};
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// A position loop over a speed loop: the position error becomes a velocity, and the velocity an effort.
 ///
@@ -20,7 +20,8 @@ use crate::error::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{Cascade, PidConfig, TimeStep};
+/// use drivetrain::control::{Cascade, PidConfig};
+/// use drivetrain::time::TimeStep;
 ///
 /// // 10 rad/s per rad, at most 4 rad/s; 2 A per rad/s.
 /// let position = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);

@@ -19,8 +19,8 @@ pub use speed::SpeedActuator;
 
 use super::error::positive;
 use super::filter::LowPass;
-use super::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// An optional low-pass.
 #[derive(Debug, Clone, Copy, PartialEq)]

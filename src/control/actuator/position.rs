@@ -1,8 +1,8 @@
 use super::speed::SpeedFilters;
 use super::{Cascade, OptionalFilter, SpeedActuator};
 use crate::control::pid::{Pid, PidConfig};
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// An angle loop over a speed loop, with their filters: a [`Cascade`] for floating-point angles.
 ///
@@ -24,7 +24,8 @@ use crate::error::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator, TimeStep};
+/// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator};
+/// use drivetrain::time::TimeStep;
 ///
 /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);
 /// let speed = SpeedActuator::new(PidConfig::new(2.0, 0.0, 0.0))?;
@@ -145,7 +146,8 @@ impl PositionActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator, TimeStep};
+    /// use drivetrain::control::{PidConfig, PositionActuator, SpeedActuator};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let speed = SpeedActuator::new(PidConfig::new(2.0, 5.0, 0.0).with_output_limit(20.0))?;
     /// let angle = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(4.0);

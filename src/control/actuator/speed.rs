@@ -1,7 +1,7 @@
 use super::OptionalFilter;
 use crate::control::pid::{Pid, PidConfig};
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// A speed loop with its filters.
 ///
@@ -19,7 +19,8 @@ use crate::error::ConfigError;
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::{PidConfig, SpeedActuator, TimeStep};
+/// use drivetrain::control::{PidConfig, SpeedActuator};
+/// use drivetrain::time::TimeStep;
 ///
 /// let mut wheel = SpeedActuator::new(PidConfig::new(2.0, 2.5, 0.0))?;
 /// assert_eq!(wheel.step(14.0, 10.0, &TimeStep::of(0.001)), 8.0);
@@ -157,7 +158,8 @@ impl SpeedActuator {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{PidConfig, SpeedActuator, TimeStep};
+    /// use drivetrain::control::{PidConfig, SpeedActuator};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let loop_ = PidConfig::new(0.0, 1.0, 0.5);
     /// let mut wheel = SpeedActuator::new(loop_)?.with_feedback_filter(10.0)?;

@@ -1,7 +1,7 @@
 use crate::control::error::{check, positive};
 use crate::control::number::finite;
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// A first-order low-pass filter.
 ///

@@ -250,7 +250,8 @@ impl PidConfig {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let mut pid = Pid::new(PidConfig::new(1.0, 0.0, 0.0).with_tracking(100.0))?;
     /// let step = TimeStep::of(0.001);
@@ -274,7 +275,8 @@ impl PidConfig {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let mut pid = Pid::new(PidConfig::new(2.0, 0.0, 0.0).with_incremental_form())?;
     /// let step = TimeStep::of(0.001);

@@ -5,8 +5,8 @@ use super::error_pid::ErrorPid;
 use super::law::{CLOSED, UNKNOWN, gate, limit_of, open_gate};
 use crate::control::error::{check, gains};
 use crate::control::number::{finite, limited};
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// A PID controller, positional or incremental, with the options of its [`PidConfig`].
 ///
@@ -32,10 +32,10 @@ use crate::error::ConfigError;
 /// * The first call gives P and feed-forward only, regardless of the age of the controller: there is no interval yet to
 ///   integrate or to differentiate over. [`step_error`](Self::step_error) gives D too: the rate is given.
 /// * `dt_s` zero, negative, NaN or infinite: nothing changes, the last output is returned, [`rejected`](Self::rejected) grows.
-/// * `dt_s` above the maximum of the [`TimeStep`](crate::control::TimeStep): the integral and D stay for this step, P and
+/// * `dt_s` above the maximum of the [`TimeStep`](crate::time::TimeStep): the integral and D stay for this step, P and
 ///   feed-forward follow, a tracked setpoint moves on by the maximum, and [`rejected`](Self::rejected) grows, except in a first
 ///   call. A loop slower than 10 Hz has to set its longest step (`TimeStep::new(dt_s, 0.5)`): with the 0.1 s of
-///   [`TimeStep::of`](crate::control::TimeStep::of) such a loop has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms
+///   [`TimeStep::of`](crate::time::TimeStep::of) such a loop has no integral at 9.9 Hz, and half of it at 100.05 and 99.95 ms
 ///   in turn.
 /// * NaN or infinity in any input: the last output is returned, [`rejected`](Self::rejected) grows, and the integral stays. D
 ///   rests in the next good step and keeps its value, since the travel of the missing time spans more than one step.
@@ -52,7 +52,8 @@ use crate::error::ConfigError;
 /// The gains are those of continuous time: one second of a constant error of 1 integrates to `ki` at any rate, and a
 /// measurement growing by 1 a second gives a D of `-kd`.
 /// ```
-/// use drivetrain::control::{Pid, PidConfig, TimeStep};
+/// use drivetrain::control::{Pid, PidConfig};
+/// use drivetrain::time::TimeStep;
 ///
 /// for rate_hz in [100_u16, 1000] {
 ///     let dt_s = 1.0 / f32::from(rate_hz);
@@ -146,7 +147,8 @@ impl Pid {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let mut pid = Pid::new(PidConfig::new(0.0, 1.0, 0.5))?;
     /// let step = TimeStep::of(0.001);
@@ -377,8 +379,8 @@ impl Pid {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
-    use crate::control::TimeStep;
     use crate::control::pid::config::FEED_FORWARD;
+    use crate::time::TimeStep;
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -1218,7 +1220,8 @@ mod tests {
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod incremental {
     use super::*;
-    use crate::control::{Differentiator, TimeStep};
+    use crate::control::Differentiator;
+    use crate::time::TimeStep;
     use proptest::prelude::*;
 
     const DT_S: f32 = 0.001;
@@ -1604,7 +1607,8 @@ mod incremental {
 
 #[cfg(test)]
 mod limited_beyond {
-    use crate::control::{Pid, PidConfig, TimeStep};
+    use crate::control::{Pid, PidConfig};
+    use crate::time::TimeStep;
 
     /// A second at an error of 1 with only half of the output let through, and the first output after it.
     fn after_a_second(tells: bool) -> f32 {

@@ -2,8 +2,8 @@ use super::config::{NOT_PLAIN, Parameters, PidConfig, REST_DERIVATIVE, TRACK_OUT
 use super::controller::Pid;
 use super::law::{CLOSED, UNKNOWN, gate};
 use crate::control::number::limited;
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// A controller whose error is formed elsewhere: the part of a [`Pid`] that knows neither setpoint nor measurement.
 ///

@@ -13,8 +13,8 @@ use super::config::{
 use super::controller::Pid;
 use super::error_pid::ErrorPid;
 use crate::control::number::{finite, limited};
-use crate::control::step::TimeStep;
 use crate::math;
+use crate::time::TimeStep;
 
 impl ErrorPid {
     /// The plain law: gains, integral limit, one output limit.
@@ -49,7 +49,6 @@ impl ErrorPid {
         Ok(limit)
     }
 
-    /// Tells whether the output has limits.
     #[inline]
     pub(crate) const fn is_limited(&self) -> bool {
         self.parameters.output_upper < f32::MAX
@@ -77,12 +76,12 @@ impl Pid {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let mut pid = Pid::new(PidConfig::new(2.0, 10.0, 0.0))?;
-    /// let step = TimeStep::of(0.01);
-    /// assert_eq!(pid.step(1.0, 0.0, &step), 2.0); // P
-    /// assert_eq!(pid.step(1.0, 0.0, &step), 2.1); // and 10/s for 10 ms
+    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.0); // P
+    /// assert_eq!(pid.step(1.0, 0.0, &TimeStep::of(0.01)), 2.1); // and 10/s for 10 ms
     /// # Ok::<(), drivetrain::error::ConfigError>(())
     /// ```
     #[inline]
@@ -108,7 +107,8 @@ impl Pid {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::{Pid, PidConfig, TimeStep};
+    /// use drivetrain::control::{Pid, PidConfig};
+    /// use drivetrain::time::TimeStep;
     ///
     /// let mut pid = Pid::new(PidConfig::new(10.0, 0.0, 0.5))?;
     /// assert_eq!(pid.step_error(0.3, 2.0, &TimeStep::of(0.001)), 2.0); // 10 times 0.3, less 0.5 times 2

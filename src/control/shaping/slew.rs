@@ -1,7 +1,7 @@
 use crate::control::error::{check, positive};
 use crate::control::number::limited;
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// Limits the rate of rise and fall of a value.
 ///

@@ -2,9 +2,9 @@ use super::TuningRule;
 use crate::control::error::{check, finite, not_negative, positive};
 use crate::control::number::{self, Sum};
 use crate::control::pid::PidConfig;
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
 use crate::math;
+use crate::time::TimeStep;
 use core::f32::consts::PI;
 
 /// Finds the ultimate gain and period of a plant with a relay in place of the controller.

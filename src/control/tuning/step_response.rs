@@ -1,7 +1,7 @@
 use crate::control::error::{self, check, positive};
 use crate::control::number::{Sum, finite};
-use crate::control::step::TimeStep;
 use crate::error::ConfigError;
+use crate::time::TimeStep;
 
 /// Measures the response of a loop to a step, sample by sample, without storing it.
 ///

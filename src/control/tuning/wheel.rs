@@ -97,7 +97,8 @@ impl WheelTuning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{Pid, TimeStep};
+    use crate::control::Pid;
+    use crate::time::TimeStep;
 
     const WHEEL: WheelTuning = WheelTuning {
         mass_kg: 20.0,

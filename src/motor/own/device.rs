@@ -1,10 +1,10 @@
 //! The motor as a device of the runner.
 
 use super::{Impedance, Order, Own, OwnMotor, Target};
-use crate::control::TimeStep;
 use crate::frame::CanFrame;
 use crate::math::wrap_pi;
 use crate::motor::{CanDevice, Claim, Edge, Ingest, Link, MotorName, Role, WrongSetting};
+use crate::time::TimeStep;
 use crate::time::{Duration, Instant, Tick};
 use crate::units::Angle;
 use embedded_can::Frame;

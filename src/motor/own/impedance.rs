@@ -106,7 +106,7 @@ impl From<Impedance> for mit::Command {
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::TimeStep;
+/// use drivetrain::time::TimeStep;
 /// use drivetrain::motor::{Impedance, ImpedanceControl, Order, Target};
 /// use drivetrain::units::{Angle, AngularVelocity};
 ///

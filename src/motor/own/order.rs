@@ -1,7 +1,7 @@
 //! The input of an own motor for one step.
 
 use super::Impedance;
-use crate::control::TimeStep;
+use crate::time::TimeStep;
 use crate::units::{Angle, AngularVelocity};
 
 /// A target of the output shaft. It is finite, and of a kind that the motor's capabilities have.

@@ -1,11 +1,12 @@
 //! A motor of a family whose drives have frames of their own, and the speed loop over its torque.
 
 use crate::motors::{Model, Spec};
-use drivetrain::control::{Pid, PidConfig, TimeStep};
+use drivetrain::control::{Pid, PidConfig};
 use drivetrain::encoder::GearRatio;
 use drivetrain::motor::{
     CanDevice, Devices, Health, ImpedanceControl, Own, OwnMotor, TargetError, Visitor,
 };
+use drivetrain::time::TimeStep;
 use drivetrain::units::AngularVelocity;
 use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 

@@ -8,7 +8,7 @@
 ///
 /// # Examples
 /// ```
-/// use drivetrain::control::TimeStep;
+/// use drivetrain::time::TimeStep;
 ///
 /// assert_eq!(TimeStep::new(0.001, 0.1).dt_s(), 0.001);
 /// assert!(TimeStep::new(0.0, 0.1).is_hold());
@@ -17,10 +17,10 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStep {
-    pub(super) dt_s: f32,
+    pub(crate) dt_s: f32,
     /// Infinite unless the step is normal, so no plain arithmetic mistakes it for a number.
-    pub(super) half_dt_s: f32,
-    pub(super) per_dt: f32,
+    pub(crate) half_dt_s: f32,
+    pub(crate) per_dt: f32,
 }
 
 impl TimeStep {
@@ -32,7 +32,7 @@ impl TimeStep {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::control::TimeStep;
+    /// use drivetrain::time::TimeStep;
     ///
     /// assert_eq!(TimeStep::of(0.001), TimeStep::new(0.001, 0.1));
     /// ```
@@ -83,7 +83,7 @@ impl TimeStep {
     }
 
     /// Returns whether time has passed and the inputs are finite; refusals are counted, up to 65535.
-    pub(super) const fn admits(&self, finite: bool, rejected: &mut u16) -> bool {
+    pub(crate) const fn admits(&self, finite: bool, rejected: &mut u16) -> bool {
         let admitted = finite && !self.is_hold();
         if !admitted {
             *rejected = rejected.saturating_add(1);
