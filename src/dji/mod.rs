@@ -155,8 +155,8 @@
 //!     torque: bus.commanded_current(wheel).map_or(0.0, |current| current.as_amperes()),
 //!     speed_rad_s: bus.state(wheel).map_or(0.0, |state| state.velocity.as_rad_per_s()),
 //! });
-//! let cut = model.cut(loads, 60.0); // both together would take 112 W
-//! bus.scale_outputs(wheels, cut.scale);
+//! let (scale, _) = model.cut(loads, 60.0); // both together would take 112 W
+//! bus.scale_outputs(wheels, scale);
 //! let left = bus.commanded_current(wheels[0]).ok_or("detached")?;
 //! assert!((left.as_amperes() - 5.62).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
