@@ -23,7 +23,7 @@
 //!
 //! # Common behaviour
 //! * Time is `dt_s`, seconds since the call before. A `dt_s` that is zero, negative, NaN or infinite changes nothing. Each
-//!   type states the effect of a very long `dt_s`; for the controllers see [`TimeStep`].
+//!   type states the effect of a very long `dt_s`; for the controllers see [`TimeStep`](crate::time::TimeStep).
 //! * If a setpoint or measurement is NaN or infinite, the last output is returned and the sample is counted. The next good
 //!   sample works as if the bad sample had not come, except that the D of a controller rests in it, since the time between is
 //!   longer than one step.
