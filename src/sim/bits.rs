@@ -29,30 +29,29 @@ const POLYNOMIAL: u16 = 0x4599;
 /// ```
 #[must_use]
 pub fn frame_bits(frame: &CanFrame) -> u32 {
-    let mut stuffed = Stuffed::default();
+    let mut bits = Bits::START_OF_FRAME;
     let remote = u32::from(frame.is_remote_frame());
-    stuffed.field(0, 1); // start of frame
     match frame.id() {
         Id::Standard(id) => {
-            stuffed.field(u32::from(id.as_raw()), 11);
-            stuffed.field(remote, 1);
-            stuffed.field(0, 2); // standard id, reserved bit
+            bits.push(u32::from(id.as_raw()), 11);
+            bits.push(remote, 1);
+            bits.push(0, 2); // standard id, reserved bit
         }
         Id::Extended(id) => {
-            stuffed.field(id.as_raw() >> 18, 11);
-            stuffed.field(0b11, 2); // substitute for the remote bit, extended id
-            stuffed.field(id.as_raw() & 0x3_FFFF, 18);
-            stuffed.field(remote, 1);
-            stuffed.field(0, 2); // reserved bits
+            bits.push(id.as_raw() >> 18, 11);
+            bits.push(0b11, 2); // substitute for the remote bit, extended id
+            bits.push(id.as_raw() & 0x3_FFFF, 18);
+            bits.push(remote, 1);
+            bits.push(0, 2); // reserved bits
         }
     }
-    stuffed.field(u32::from(frame.length()), 4);
-    for byte in frame.data() {
-        stuffed.field(u32::from(*byte), 8);
+    bits.push(u32::from(frame.length()), 4);
+    for bytes in frame.data().chunks(4) {
+        let value = bytes.iter().fold(0, |value, byte| (value << 8) | u32::from(*byte));
+        bits.push(value, if bytes.len() == 4 { 32 } else { 8 * (u32::from(frame.length()) & 3) });
     }
-    let checksum = u32::from(stuffed.checksum);
-    stuffed.field(checksum, 15);
-    stuffed.bits + TAIL_BITS + INTERMISSION_BITS
+    bits.push(u32::from(bits.checksum()), 15);
+    bits.count + bits.stuff_bits() + TAIL_BITS + INTERMISSION_BITS
 }
 
 /// Returns the length of a data frame without stuff bits, with the pause after it, in bits.
@@ -96,39 +95,124 @@ const fn stuffable_bits(extended: bool, length: u8) -> u32 {
     head + 8 * (if length > 8 { 8 } else { length as u32 })
 }
 
-/// Counts bits as sent, stuff bits included, and keeps the checksum of the bits before stuffing.
-#[derive(Default)]
-struct Stuffed {
-    bits: u32,
-    last: bool,
-    run: u8,
-    checksum: u16,
+/// Bits of a frame before stuffing: `count` of them, the last one lowest. At most 118.
+struct Bits {
+    value: u128,
+    count: u32,
 }
 
-impl Stuffed {
-    /// Sends the low `width` bits, the highest first.
-    fn field(&mut self, value: u32, width: u32) {
-        for place in (0..width).rev() {
-            self.bit((value >> place) & 1 != 0);
-        }
+impl Bits {
+    /// A zero.
+    const START_OF_FRAME: Self = Self { value: 0, count: 1 };
+
+    /// Appends the low `width` bits of a value.
+    fn push(&mut self, value: u32, width: u32) {
+        self.value = (self.value << width) | u128::from(value);
+        self.count += width;
     }
 
-    fn bit(&mut self, bit: bool) {
-        let feedback = bit != (self.checksum & 0x4000 != 0);
-        self.checksum = (self.checksum << 1) & 0x7FFF;
-        if feedback {
-            self.checksum ^= POLYNOMIAL;
+    /// Returns the checksum. The zeros above the first bit leave it at zero.
+    fn checksum(&self) -> u16 {
+        self.value.to_be_bytes().into_iter().fold(0, |checksum, byte| {
+            let [_, index] = ((checksum >> 7) ^ u16::from(byte)).to_be_bytes();
+            ((checksum << 8) & 0x7FFF) ^ CHECKSUMS.get(usize::from(index)).copied().unwrap_or(0)
+        })
+    }
+
+    /// Counts the stuff bits.
+    ///
+    /// Bits that alternate, and end with a one before the first zero, fill the first byte: they cause none.
+    fn stuff_bits(&self) -> u32 {
+        let padded = self.value | (0x55 << self.count);
+        let bytes = padded.to_be_bytes();
+        let unused = bytes.len() - self.count.div_ceil(8) as usize;
+        let (mut run, mut stuffed) = (Run::START, 0);
+        for byte in bytes.get(unused..).unwrap_or_default() {
+            let row = STUFFED.get(usize::from(run)).unwrap_or(&[0; 256]);
+            let found = row.get(usize::from(*byte)).copied().unwrap_or(0);
+            stuffed += u32::from(found >> 4);
+            run = found & 0xF;
         }
-        self.bits += 1;
-        self.run = if bit == self.last { self.run + 1 } else { 1 };
-        self.last = bit;
-        if self.run == 5 {
-            self.bits += 1;
-            self.last = !bit;
-            self.run = 1;
-        }
+        stuffed
     }
 }
+
+/// The equal bits up to now, 1 to 4, and their value.
+#[derive(Clone, Copy)]
+struct Run {
+    bit: bool,
+    length: u8,
+}
+
+impl Run {
+    /// A one.
+    const START: u8 = Self { bit: true, length: 1 }.number();
+    const NUMBERS: usize = 10;
+
+    const fn number(self) -> u8 {
+        self.length << 1 | self.bit as u8
+    }
+
+    /// Takes one more bit; returns whether a stuff bit follows: after five equal bits, of the other value.
+    const fn take(&mut self, bit: bool) -> bool {
+        self.length = if bit == self.bit { self.length + 1 } else { 1 };
+        self.bit = bit;
+        let is_full = self.length == 5;
+        if is_full {
+            *self = Self { bit: !bit, length: 1 };
+        }
+        is_full
+    }
+}
+
+/// Stuff bits of each byte after each run, times 16, and the number of the run after it.
+#[expect(
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    reason = "a constant: an index out of range does not compile, and a number of a run fits"
+)]
+const STUFFED: [[u8; 256]; Run::NUMBERS] = {
+    let mut table = [[0; 256]; Run::NUMBERS];
+    let mut number = 2;
+    while number < Run::NUMBERS {
+        let mut byte = 0;
+        while byte < 256 {
+            let mut run = Run { bit: number & 1 != 0, length: (number >> 1) as u8 };
+            let (mut stuffed, mut place) = (0, 8);
+            while place > 0 {
+                place -= 1;
+                stuffed += run.take(byte >> place & 1 != 0) as u8;
+            }
+            table[number][byte] = stuffed << 4 | run.number();
+            byte += 1;
+        }
+        number += 1;
+    }
+    table
+};
+
+/// The checksum of each byte.
+#[expect(
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    reason = "a constant: an index out of range does not compile, and a byte fits"
+)]
+const CHECKSUMS: [u16; 256] = {
+    let mut checksums = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let mut checksum = (byte as u16) << 7;
+        let mut bit = 0;
+        while bit < 8 {
+            let feedback = if checksum & 0x4000 != 0 { POLYNOMIAL } else { 0 };
+            checksum = ((checksum << 1) & 0x7FFF) ^ feedback;
+            bit += 1;
+        }
+        checksums[byte] = checksum;
+        byte += 1;
+    }
+    checksums
+};
 
 #[cfg(test)]
 mod tests {
@@ -196,9 +280,9 @@ mod tests {
     #[test]
     fn the_checksum_is_the_one_of_the_catalogue() {
         // CRC-15/CAN of "123456789" is 0x059E.
-        let mut stuffed = Stuffed::default();
-        b"123456789".iter().for_each(|byte| stuffed.field(u32::from(*byte), 8));
-        assert_eq!(stuffed.checksum, 0x059E);
+        let mut bits = Bits::START_OF_FRAME;
+        b"123456789".iter().for_each(|byte| bits.push(u32::from(*byte), 8));
+        assert_eq!(bits.checksum(), 0x059E);
     }
 
     #[test]

@@ -3,7 +3,7 @@ use super::esc::Esc;
 use super::fault::Faults;
 use super::joint::Drive;
 use super::line::{Line, Sender, Transmission, Wire};
-use super::mailbox::{Mailboxes, Offer};
+use super::mailbox::{Mailboxes, Offer, rank};
 use super::motor::{JOINTS, MOTORS, MotorConfig, MotorState};
 use super::ring::Ring;
 use super::{Fault, JointConfig, MotorKey, SimError};
@@ -37,6 +37,11 @@ pub(crate) struct Engine {
     wires: [Wire; 3],
     escs: Escs,
     joints: [Option<Drive>; JOINTS],
+    /// Taken places, from the first on.
+    esc_count: usize,
+    joint_count: usize,
+    /// The feedback that is due first, and its ESC.
+    feedback: (u64, usize),
     pub(crate) chassis: Option<Chassis>,
     pub(crate) faults: Faults,
     /// Frames that passed during a blocking call.
@@ -53,6 +58,9 @@ impl Engine {
             wires: [Wire::new(Line::Can1), Wire::new(Line::Can2), Wire::new(Line::Can3)],
             escs: [None; MOTORS],
             joints: [None; JOINTS],
+            esc_count: 0,
+            joint_count: 0,
+            feedback: (u64::MAX, 0),
             chassis: None,
             faults: Faults::new(),
             unseen: Ring::new(),
@@ -68,39 +76,53 @@ impl Engine {
         }
     }
 
+    /// Returns a wire to change, after which a frame may be ready.
     pub(crate) const fn wire_mut(&mut self, line: Line) -> &mut Wire {
         let [can1, can2, can3] = &mut self.wires;
-        match line {
+        let wire = match line {
             Line::Can1 => can1,
             Line::Can2 => can2,
             Line::Can3 => can3,
-        }
+        };
+        wire.stirred = true;
+        wire
     }
 
     pub(crate) fn attach(&mut self, config: MotorConfig) -> Result<MotorKey, SimError> {
-        let free = self.escs.iter().position(Option::is_none).ok_or(SimError::Full)?;
-        let key = MotorKey::new(free).ok_or(SimError::Full)?;
-        let esc = Esc::new(config, self.seed, free as u64, self.now_ns);
+        let index = self.esc_count;
+        let key = MotorKey::new(index).ok_or(SimError::Full)?;
+        let esc = Esc::new(config, self.seed, index as u64, self.now_ns);
         let esc = esc.ok_or(SimError::Id { model: config.facts().name, id: config.id })?;
-        if let Some(slot) = self.escs.get_mut(free) {
-            *slot = Some(esc);
-        }
+        *self.escs.get_mut(index).ok_or(SimError::Full)? = Some(esc);
+        self.esc_count += 1;
+        self.feedback = self.next_feedback();
         Ok(key)
     }
 
     pub(crate) fn attach_joint(&mut self, config: JointConfig) -> Result<MotorKey, SimError> {
         let refused = SimError::Joint { id: config.id };
-        let free = self.joints.iter().position(Option::is_none).ok_or(refused)?;
-        let key = MotorKey::of_joint(free).ok_or(refused)?;
-        let drive = Drive::new(config, self.seed, free as u64).ok_or(refused)?;
-        if let Some(slot) = self.joints.get_mut(free) {
-            *slot = Some(drive);
-        }
+        let index = self.joint_count;
+        let key = MotorKey::of_joint(index).ok_or(refused)?;
+        let drive = Drive::new(config, self.seed, index as u64).ok_or(refused)?;
+        *self.joints.get_mut(index).ok_or(refused)? = Some(drive);
+        self.joint_count += 1;
         Ok(key)
     }
 
     pub(crate) fn esc_mut(&mut self, key: MotorKey) -> Option<&mut Esc> {
         self.escs.get_mut(key.index())?.as_mut()
+    }
+
+    /// Iterates over the attached ESCs.
+    fn escs(&self) -> impl Iterator<Item = (usize, &Esc)> {
+        let slots = self.escs.iter().take(self.esc_count).enumerate();
+        slots.filter_map(|(index, slot)| Some((index, slot.as_ref()?)))
+    }
+
+    /// Iterates over the attached joints.
+    fn joints(&self) -> impl Iterator<Item = (usize, &Drive)> {
+        let slots = self.joints.iter().take(self.joint_count).enumerate();
+        slots.filter_map(|(index, slot)| Some((index, slot.as_ref()?)))
     }
 
     fn mailboxes_mut(&mut self, key: MotorKey) -> Option<&mut Mailboxes> {
@@ -145,6 +167,8 @@ impl Engine {
                     let silent = key.is_some_and(|fault| self.faults.is_active(fault, self.now_ns));
                     if let Some(Some(joint)) = self.joints.get_mut(index) {
                         joint.reply(silent);
+                        let line = joint.config.line;
+                        self.wire_mut(line).stirred = true;
                     }
                 }
                 Event::Fault => {
@@ -171,51 +195,63 @@ impl Engine {
             }
         }
         offer(self.stepped_ns + STEP_NS, Event::Step);
-        for (index, esc) in self.escs.iter().enumerate() {
-            if let Some(due_ns) = esc.as_ref().and_then(Esc::due) {
-                offer(due_ns, Event::Feedback(index));
-            }
-        }
-        for (index, joint) in self.joints.iter().enumerate() {
-            if let Some(due_ns) = joint.as_ref().and_then(Drive::due) {
+        let (due_ns, index) = self.feedback;
+        offer(due_ns, Event::Feedback(index));
+        for (index, joint) in self.joints() {
+            if let Some(due_ns) = joint.due() {
                 offer(due_ns, Event::Reply(index));
             }
         }
         offer(self.faults.next_event(self.now_ns), Event::Fault);
         for wire in &self.wires {
-            if let Some(idle_ns) = wire.idle_from() {
-                if self.winner(wire.line).is_some() {
-                    offer(idle_ns.max(self.now_ns), Event::Arbitration(wire.line));
-                }
+            let is_connected = || self.faults.is_connected(wire.line, self.now_ns);
+            if let Some(idle_ns) = wire.arbitration(is_connected) {
+                offer(idle_ns.max(self.now_ns), Event::Arbitration(wire.line));
             }
         }
         next
+    }
+
+    fn next_feedback(&self) -> (u64, usize) {
+        let due = self.escs().filter_map(|(index, esc)| Some((esc.due()?, index)));
+        due.min().unwrap_or((u64::MAX, 0))
     }
 
     /// Moves motors and chassis by one step.
     fn step(&mut self) {
         self.stepped_ns += STEP_NS;
         self.steps += 1;
-        for (index, slot) in self.escs.iter_mut().enumerate() {
-            let (Some(esc), Some(key)) = (slot, MotorKey::new(index)) else { continue };
-            let dead = self.faults.power_loss(key, self.now_ns);
-            esc.set_powered(dead, self.now_ns);
-            esc.rotor.mechanics = self.faults.mechanics(key, self.now_ns);
+        if !self.faults.is_empty() {
+            self.apply_faults();
+        }
+        for esc in self.escs.iter_mut().take(self.esc_count).flatten() {
             esc.step_current(self.now_ns, STEP_S);
         }
-        for (index, slot) in self.joints.iter_mut().enumerate() {
-            let (Some(joint), Some(key)) = (slot, MotorKey::of_joint(index)) else { continue };
-            joint.set_powered(self.faults.power_loss(key, self.now_ns).is_none());
+        for joint in self.joints.iter_mut().take(self.joint_count).flatten() {
             joint.step(STEP_S);
         }
         let ground = self.chassis.as_mut().map(|chassis| chassis.step(&self.escs, STEP_S));
-        for (esc, ground_nm) in self.escs.iter_mut().zip(ground.unwrap_or_default()) {
-            let Some(esc) = esc else { continue };
+        let escs = self.escs.iter_mut().take(self.esc_count).flatten();
+        for (esc, ground_nm) in escs.zip(ground.unwrap_or_default()) {
             esc.rotor.step_motion(ground_nm, STEP_S);
             if self.steps.is_multiple_of(STEPS_A_WARMING) {
                 esc.rotor.step_temperature(STEP_S * STEPS_A_WARMING as f32);
             }
         }
+    }
+
+    /// Gives and removes supplies, and changes mechanics, as the faults say.
+    fn apply_faults(&mut self) {
+        for (index, slot) in self.escs.iter_mut().enumerate() {
+            let (Some(esc), Some(key)) = (slot, MotorKey::new(index)) else { continue };
+            esc.set_powered(self.faults.power_loss(key, self.now_ns), self.now_ns);
+            esc.rotor.mechanics = self.faults.mechanics(key, self.now_ns);
+        }
+        for (index, slot) in self.joints.iter_mut().enumerate() {
+            let (Some(joint), Some(key)) = (slot, MotorKey::of_joint(index)) else { continue };
+            joint.set_powered(self.faults.power_loss(key, self.now_ns).is_none());
+        }
+        self.feedback = self.next_feedback();
     }
 
     /// Lets an ESC hand its feedback to its mailboxes.
@@ -225,54 +261,62 @@ impl Engine {
             return;
         };
         let tampering = self.faults.tampering(key, self.now_ns);
-        let Some(frame) = esc.feedback(since_step_s, &tampering) else { return };
+        let frame = esc.feedback(since_step_s, &tampering);
+        self.feedback = self.next_feedback();
+        let (Some(Some(esc)), Some(frame)) = (self.escs.get_mut(index), frame) else { return };
         let (line, offer) = (esc.config.line, esc.mailboxes.offer(frame));
+        let wire = self.wire_mut(line);
         if offer != Offer::Taken {
-            let traffic = &mut self.wire_mut(line).traffic;
-            traffic.starved = traffic.starved.saturating_add(1);
+            wire.traffic.starved = wire.traffic.starved.saturating_add(1);
         }
     }
 
-    /// Returns the pending frame of highest priority on a bus, and its sender.
-    fn winner(&self, line: Line) -> Option<(CanFrame, Sender)> {
+    /// Returns the sender of the pending frame of highest priority on a bus.
+    fn winner(&self, line: Line) -> Option<Sender> {
         let wire = self.wire(line);
         let connected = self.faults.is_connected(line, self.now_ns);
-        let controller = wire.mailboxes.candidate().filter(|_| connected);
-        let controller = controller.map(|frame| (frame, Sender::Controller));
-        let foreign = wire.foreign.peek().map(|frame| (frame, Sender::Foreign));
-        let motors = self.escs.iter().enumerate().filter_map(|(index, esc)| {
-            let esc = esc.as_ref().filter(|esc| esc.config.line == line)?;
-            Some((esc.mailboxes.candidate()?, Sender::Motor(MotorKey::new(index)?)))
+        let controller = wire.mailboxes.rank().filter(|_| connected);
+        let controller = controller.map(|rank| (rank, Sender::Controller));
+        let foreign = wire.foreign.peek().map(|frame| (rank(&frame), Sender::Foreign));
+        let motors = self.escs().filter(|(_, esc)| esc.config.line == line);
+        let motors = motors.filter_map(|(index, esc)| {
+            Some((esc.mailboxes.rank()?, Sender::Motor(MotorKey::new(index)?)))
         });
-        let joints = self.joints.iter().enumerate().filter_map(|(index, joint)| {
-            let joint = joint.as_ref().filter(|joint| joint.config.line == line)?;
-            Some((joint.mailboxes.candidate()?, Sender::Motor(MotorKey::of_joint(index)?)))
+        let joints = self.joints().filter(|(_, joint)| joint.config.line == line);
+        let joints = joints.filter_map(|(index, joint)| {
+            Some((joint.mailboxes.rank()?, Sender::Motor(MotorKey::of_joint(index)?)))
         });
-        let rank = |(frame, _): &(CanFrame, Sender)| (frame.id(), frame.is_remote_frame());
-        controller.into_iter().chain(foreign).chain(motors).chain(joints).min_by_key(rank)
+        let all = controller.into_iter().chain(foreign).chain(motors).chain(joints);
+        all.min_by_key(|(rank, _)| *rank).map(|(_, sender)| sender)
     }
 
     fn arbitrate(&mut self, line: Line) {
-        let Some((frame, sender)) = self.winner(line) else { return };
         let now_ns = self.now_ns;
-        match sender {
-            Sender::Controller => {
-                for joint in self.joints.iter_mut().flatten() {
-                    let reply = joint.mailboxes.candidate().filter(|_| joint.config.line == line);
-                    if reply.is_some_and(|reply| reply.id() == frame.id()) {
-                        joint.collisions = joint.collisions.saturating_add(1);
-                    }
-                }
-                self.wire_mut(line).mailboxes.begin();
-            }
-            Sender::Foreign => {}
-            Sender::Motor(key) => {
-                if let Some(mailboxes) = self.mailboxes_mut(key) {
-                    mailboxes.begin();
+        let winner = self.winner(line);
+        let Some((frame, sender)) =
+            winner.and_then(|sender| Some((self.begin(line, sender)?, sender)))
+        else {
+            self.wire_mut(line).stirred = false;
+            return;
+        };
+        if sender == Sender::Controller {
+            for joint in self.joints.iter_mut().flatten() {
+                let reply = joint.mailboxes.candidate().filter(|_| joint.config.line == line);
+                if reply.is_some_and(|reply| reply.id() == frame.id()) {
+                    joint.collisions = joint.collisions.saturating_add(1);
                 }
             }
         }
         self.wire_mut(line).begin(frame, sender, now_ns);
+    }
+
+    /// Takes the first frame of a sender, which keeps it until the end of the transmission.
+    fn begin(&mut self, line: Line, sender: Sender) -> Option<CanFrame> {
+        match sender {
+            Sender::Controller => self.wire_mut(line).mailboxes.begin(),
+            Sender::Foreign => self.wire(line).foreign.peek(),
+            Sender::Motor(key) => self.mailboxes_mut(key)?.begin(),
+        }
     }
 
     /// Removes a frame from the wire and delivers it to all other nodes.

@@ -148,12 +148,14 @@ impl Scheduled {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Faults {
     scheduled: [Option<Scheduled>; 16],
+    /// Taken places, from the first on.
+    used: usize,
     total: u64,
 }
 
 impl Faults {
     pub(crate) const fn new() -> Self {
-        Self { scheduled: [None; 16], total: 0 }
+        Self { scheduled: [None; 16], used: 0, total: 0 }
     }
 
     pub(crate) fn schedule(
@@ -177,16 +179,31 @@ impl Faults {
             Bound::Unbounded => u64::MAX,
         };
         let over = |slot: &&mut Option<Scheduled>| slot.is_none_or(|slot| slot.until_ns <= now_ns);
-        let slot = self.scheduled.iter_mut().find(over).ok_or(SimError::TooManyFaults)?;
+        let mut slots = self.scheduled.iter_mut().enumerate();
+        let (index, slot) = slots.find(|(_, slot)| over(slot)).ok_or(SimError::TooManyFaults)?;
+        self.used = self.used.max(index + 1);
         self.total += 1;
         let random = Random::new(seed, 2 * self.total);
         *slot = Some(Scheduled { fault, from_ns, until_ns, random, due_ns: from_ns.max(now_ns) });
         Ok(())
     }
 
+    fn slots(&self) -> impl Iterator<Item = &Scheduled> {
+        self.scheduled.iter().take(self.used).flatten()
+    }
+
+    fn slots_mut(&mut self) -> impl Iterator<Item = &mut Scheduled> {
+        self.scheduled.iter_mut().take(self.used).flatten()
+    }
+
     fn active(&self, now_ns: u64) -> impl Iterator<Item = &Fault> {
         let active = move |slot: &&Scheduled| slot.is_active(now_ns);
-        self.scheduled.iter().flatten().filter(active).map(|slot| &slot.fault)
+        self.slots().filter(active).map(|slot| &slot.fault)
+    }
+
+    /// Returns whether there was never a fault.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.used == 0
     }
 
     pub(crate) fn is_active(&self, fault: Fault, now_ns: u64) -> bool {
@@ -240,7 +257,7 @@ impl Faults {
     pub(crate) fn copies(&mut self, line: Line, frame: &CanFrame, now_ns: u64) -> u8 {
         let (mut copies, mut lost) = (1, false);
         let concerns = |id: Option<Id>| id.is_none_or(|id| id == frame.id());
-        for slot in self.scheduled.iter_mut().flatten().filter(|slot| slot.is_active(now_ns)) {
+        for slot in self.slots_mut().filter(|slot| slot.is_active(now_ns)) {
             match slot.fault {
                 Fault::LostFrames { line: bus, id, probability } if bus == line && concerns(id) => {
                     lost |= slot.random.chance(probability);
@@ -257,7 +274,7 @@ impl Faults {
     /// Draws whether a call of the driver fails.
     pub(crate) fn driver_error(&mut self, line: Line, now_ns: u64) -> bool {
         let mut failed = false;
-        for slot in self.scheduled.iter_mut().flatten().filter(|slot| slot.is_active(now_ns)) {
+        for slot in self.slots_mut().filter(|slot| slot.is_active(now_ns)) {
             match slot.fault {
                 Fault::DriverErrors { line: bus, probability } if bus == line => {
                     failed |= slot.random.chance(probability);
@@ -271,7 +288,7 @@ impl Faults {
     /// Returns when the next frame of a flood is due, or the next window begins or ends.
     pub(crate) fn next_event(&self, now_ns: u64) -> u64 {
         let mut next = u64::MAX;
-        for slot in self.scheduled.iter().flatten() {
+        for slot in self.slots() {
             if slot.from_ns > now_ns {
                 next = next.min(slot.from_ns);
             } else if slot.until_ns > now_ns {
@@ -286,7 +303,7 @@ impl Faults {
 
     /// Takes one due frame of a flood.
     pub(crate) fn next_of_flood(&mut self, now_ns: u64) -> Option<(Line, CanFrame)> {
-        self.scheduled.iter_mut().flatten().find_map(|slot| match slot.fault {
+        self.slots_mut().find_map(|slot| match slot.fault {
             Fault::Flood { line, frame, period }
                 if slot.is_active(now_ns) && slot.due_ns <= now_ns =>
             {

@@ -180,6 +180,8 @@ pub(crate) struct Wire {
     filter: (u16, u16),
     overrun: bool,
     pub(crate) foreign: Ring<CanFrame, 64>,
+    /// Whether a frame may have become ready since the last arbitration without a winner.
+    pub(crate) stirred: bool,
     flight: Option<Flight>,
     /// When the pause after the last frame is over.
     idle_ns: u64,
@@ -197,6 +199,7 @@ impl Wire {
             filter: (0, 0),
             overrun: false,
             foreign: Ring::new(),
+            stirred: false,
             flight: None,
             idle_ns: 0,
             traffic: Traffic {
@@ -247,9 +250,11 @@ impl Wire {
         self.flight.map(|flight| flight.end_ns)
     }
 
-    /// Returns the start time of the next frame; `None` during a frame.
-    pub(crate) fn idle_from(&self) -> Option<u64> {
-        self.flight.is_none().then_some(self.idle_ns)
+    /// Returns the time of the next arbitration; `None` during a frame, and without a frame that may be ready. A controller that
+    /// takes part again has had its frames ready before.
+    pub(crate) fn arbitration(&self, is_connected: impl Fn() -> bool) -> Option<u64> {
+        let may_be_ready = self.stirred || !self.mailboxes.is_empty() && is_connected();
+        (self.flight.is_none() && may_be_ready).then_some(self.idle_ns)
     }
 
     /// Puts the winner of an arbitration on the wire.

@@ -14,6 +14,7 @@ pub(crate) enum Offer {
 #[derive(Debug, Clone, Copy)]
 struct Pending {
     frame: CanFrame,
+    rank: u32,
     order: u64,
     in_transmission: bool,
 }
@@ -25,16 +26,22 @@ pub(crate) struct Mailboxes {
     order: u64,
 }
 
-/// The criteria of arbitration: the id, then data before remote; at last the order of arrival.
-type Rank = (Id, bool, u64);
-
-const fn rank_of(frame: &CanFrame, id: Id, order: u64) -> Rank {
-    (id, frame.header() & (1 << 30) != 0, order)
+/// Returns the rank of a frame in an arbitration, the lowest first: the fields of the wire, from the id to the remote bit.
+pub(crate) fn rank(frame: &CanFrame) -> u32 {
+    let remote = u32::from(frame.is_remote_frame());
+    match frame.id() {
+        Id::Standard(id) => (u32::from(id.as_raw()) << 20) | remote,
+        Id::Extended(id) => {
+            let (base, rest) = (id.as_raw() >> 18, id.as_raw() & 0x3_FFFF);
+            (base << 20) | (1 << 19) | (rest << 1) | remote
+        }
+    }
 }
 
 impl Pending {
-    fn rank(&self) -> Rank {
-        rank_of(&self.frame, self.frame.id(), self.order)
+    /// Returns the place among the frames of one node: frames of one rank in the order of arrival.
+    const fn place(&self) -> (u32, u64) {
+        (self.rank, self.order)
     }
 }
 
@@ -46,23 +53,22 @@ impl Mailboxes {
     /// Takes a frame as `embedded_can::nb::Can::transmit` requires: frames of one id keep their order, and full
     /// mailboxes evict their lowest priority for a frame of strictly higher priority.
     pub(crate) fn offer(&mut self, frame: CanFrame) -> Offer {
-        let pending = Pending { frame, order: self.order, in_transmission: false };
+        let rank = rank(&frame);
+        let pending = Pending { frame, rank, order: self.order, in_transmission: false };
         if let Some(free) = self.slots.iter_mut().find(|slot| slot.is_none()) {
             *free = Some(pending);
             self.order += 1;
             return Offer::Taken;
         }
-        // The largest rank: the lowest priority, and the youngest among equal ids.
+        // The last place: the lowest priority, and the youngest among equal ids.
         let lowest = self
             .slots
             .iter_mut()
             .flatten()
             .filter(|slot| !slot.in_transmission)
-            .max_by_key(|slot| slot.rank());
+            .max_by_key(|slot| slot.place());
         match lowest {
-            Some(slot)
-                if (frame.id(), frame.is_remote_frame()) < (slot.rank().0, slot.rank().1) =>
-            {
+            Some(slot) if rank < slot.rank => {
                 let evicted = slot.frame;
                 *slot = pending;
                 self.order += 1;
@@ -73,19 +79,32 @@ impl Mailboxes {
     }
 
     /// Returns the frame for the next arbitration.
-    pub(crate) fn candidate(&self) -> Option<CanFrame> {
-        self.slots.iter().flatten().min_by_key(|slot| slot.rank()).map(|slot| slot.frame)
+    pub(crate) fn candidate(&self) -> Option<&CanFrame> {
+        self.next().map(|slot| &slot.frame)
+    }
+
+    /// Returns the rank of this frame.
+    pub(crate) fn rank(&self) -> Option<u32> {
+        self.next().map(|slot| slot.rank)
+    }
+
+    fn next(&self) -> Option<&Pending> {
+        self.slots.iter().flatten().min_by_key(|slot| slot.place())
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.slots.iter().all(Option::is_none)
     }
 
     pub(crate) fn has_room(&self) -> bool {
         self.slots.iter().any(Option::is_none)
     }
 
-    /// Marks the candidate: it can no longer be evicted.
-    pub(crate) fn begin(&mut self) {
-        if let Some(slot) = self.slots.iter_mut().flatten().min_by_key(|slot| slot.rank()) {
-            slot.in_transmission = true;
-        }
+    /// Returns and marks the candidate: it can no longer be evicted.
+    pub(crate) fn begin(&mut self) -> Option<CanFrame> {
+        let slot = self.slots.iter_mut().flatten().min_by_key(|slot| slot.place())?;
+        slot.in_transmission = true;
+        Some(slot.frame)
     }
 
     /// Frees the mailbox of the frame in transmission.
@@ -138,7 +157,7 @@ mod tests {
 
     fn sent(mailboxes: &mut Mailboxes) -> std::vec::Vec<CanFrame> {
         std::iter::from_fn(|| {
-            let candidate = mailboxes.candidate();
+            let candidate = mailboxes.candidate().copied();
             mailboxes.begin();
             mailboxes.finish();
             candidate
