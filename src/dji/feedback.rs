@@ -189,8 +189,8 @@ impl ErrorTable {
 
 impl ErrorTable {
     /// Returns the severity of a code. The C620's 8 is a warning. All other codes, also unlisted ones, are faults, as in public drivers.
-    /// The C610's 6 (stalled) is a warning here: a jammed feeder frees itself by turning back, and a fault would relax it. Without a known
-    /// list the severity is unknown, and every code is a warning.
+    /// The C610's 6 (stalled) is a warning here: a jammed feeder frees itself by turning back, which is impossible after a fault has
+    /// relaxed the motor. Without a known list the severity is unknown, and every code is a warning.
     pub(crate) const fn severity(self, code: u8) -> Option<Severity> {
         Some(match (code, self) {
             (0, _) => return None,

@@ -87,7 +87,7 @@
 //! chassis turns.
 //!
 //! The measurement counts from its own time. A measurement older than [`Timeouts::measured`](crate::motor::Timeouts::measured) is refused
-//! with an error. If a measurement grows older than that, the output is zero within a tick, as after the end of an application. The
+//! with an error. If a measurement grows older than that, the output is zero within a tick, as if the application had stopped. The
 //! feedback of the motor must be fresh as well. Set the target in each tick; between two measurements, with the last one.
 //!
 //! ```
