@@ -274,7 +274,7 @@ mod tests {
     }
 
     proptest! {
-        /// Law: every byte of a valid frame is kept, in the field that the manual gives it.
+        /// Law: every byte of a valid frame is kept, in its field of the manual.
         #[test]
         fn decode_then_encode_is_the_frame(angle in 0_u16..8192, rest: [u8; 6]) {
             let [high, low] = angle.to_be_bytes();

@@ -57,7 +57,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Law: the nearest command is within, 0 always is, and what is within is kept.
+        /// Law: the nearest command is within the range, 0 is always within, and a command within is kept.
         #[test]
         fn the_nearest_is_within(limit in 0..=i16::MAX, raw: i32, negative: bool, positive: bool) {
             let range = Range::within(limit);

@@ -304,7 +304,7 @@ mod tests {
     use crate::time::{Instant, Tick};
     use crate::units::AngularVelocity;
 
-    /// The short ways are for plain loops with the full output; all others take the one that knows everything.
+    /// The short paths are for plain loops with the full output; all other loops take the general path.
     #[test]
     fn a_plain_loop_with_the_full_output_takes_the_short_way_and_no_other_does() {
         let plain = PidConfig::new(1.0, 0.0, 0.0);
