@@ -1,4 +1,4 @@
-//! Arming, and what forbids it.
+//! Arming, and the conditions that forbid arming.
 
 use super::motors::{Key, Motors};
 use super::slot::{Slot, health};
@@ -43,7 +43,7 @@ pub(super) fn arm_only<const N: usize>(
     Ok(())
 }
 
-/// Arms the motors of some slots that are heard and fit.
+/// Arms the motors of some slots that are online and fit.
 pub(super) fn engage<const N: usize>(motors: &mut Motors<N>, slots: Range<u8>, now: Instant) {
     for index in slots {
         let slot = motors.slots.get(usize::from(index)).filter(|slot| health::is_fit(slot));
@@ -53,14 +53,14 @@ pub(super) fn engage<const N: usize>(motors: &mut Motors<N>, slots: Range<u8>, n
     }
 }
 
-/// Keeps the trip where a motor that was left out still waits to be armed.
+/// Keeps the trip if a motor without an arming still waits to be armed.
 pub(super) fn keep_trip_of_others<const N: usize>(motors: &mut Motors<N>) {
     if motors.slots.iter().any(|slot| slot.guard.is_tripped()) {
         motors.guard.keep_trip();
     }
 }
 
-/// Tells whether there are motors, and each takes targets.
+/// Tells whether there are motors, and all take targets.
 pub(super) fn is_armed(slots: &[Slot]) -> bool {
     let mut attached = slots.iter().filter(|slot| slot.facts().is_some()).peekable();
     attached.peek().is_some() && attached.all(|slot| slot.guard.is_armed())

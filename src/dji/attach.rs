@@ -1,4 +1,4 @@
-//! Motors that join and leave a bus.
+//! Attaching and detaching of motors.
 
 use super::budget::Budget;
 use super::command::{Outbox, Place};

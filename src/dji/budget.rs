@@ -1,8 +1,8 @@
-//! How full the bus is.
+//! Load of the bus.
 
 use crate::motor::BusLoad;
 
-/// The rates from which the load is computed.
+/// Rates for the computation of the load.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     pub(super) bit_rate: u32,
@@ -40,7 +40,7 @@ impl Budget {
         left / motors
     }
 
-    /// Returns the load, when it is above the ceiling: with that, and the feedback rate that fits.
+    /// Returns the load, the ceiling and the highest feedback rate that fits, if the load is above the ceiling.
     pub(super) const fn overload(
         &self,
         motors: u32,

@@ -14,8 +14,8 @@ use core::marker::PhantomData;
 
 /// The motors of one CAN bus, their loops, and the frames for them.
 ///
-/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. A bus can stand in a `static`.
-/// `N` is its capacity: the protocol's 11 unless a [sized](Self::sized) bus saves memory. A motor takes 296 bytes on a Cortex-M.
+/// The bus owns the motors; [`attach`](Self::attach) returns a `Copy` handle for each. A bus can be a `static`. `N` is its capacity: the
+/// protocol's 11 unless a [sized](Self::sized) bus saves memory. A motor takes 296 bytes on a Cortex-M.
 ///
 /// # Examples
 /// ```
@@ -47,7 +47,7 @@ use core::marker::PhantomData;
 /// ```
 /// Takes 3552 bytes on a Cortex-M4F, with its 11 places (`docs/figures.md`).
 #[derive(Debug)]
-// The motors first: their addresses need no offset then.
+// The motors first: their addresses then need no offset.
 #[repr(C)]
 pub struct Bus<B = (), const N: usize = IDS> {
     pub(super) motors: Motors<N>,
@@ -66,7 +66,7 @@ impl Bus {
 }
 
 impl<B> Bus<B> {
-    /// Makes a bus without motors whose handles fit only a bus of the same brand.
+    /// Makes a bus without motors, with handles that fit only a bus of the same brand.
     ///
     /// # Examples
     /// ```compile_fail,E0277
@@ -86,7 +86,7 @@ impl<B> Bus<B> {
 }
 
 impl<B, const N: usize> Bus<B, N> {
-    /// Makes a bus without motors that has room for `N` of them, 1 to 11: another number does not compile.
+    /// Makes a bus without motors and with a capacity of `N`, 1 to 11. Another number does not compile.
     ///
     /// # Examples
     /// ```
@@ -113,14 +113,14 @@ impl<B, const N: usize> Bus<B, N> {
         }
     }
 
-    /// Sets when feedback and commands count as lost.
+    /// Sets the ages at which feedback and commands count as lost.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.motors.guard.set_timeouts(timeouts);
         self
     }
 
-    /// Sets how often a command frame of zeros is repeated; 10 ms at first, at most 10 s.
+    /// Sets the period at which a command frame of zeros is repeated; 10 ms by default, at most 10 s.
     #[must_use]
     pub const fn with_keep_alive(mut self, period: Duration) -> Self {
         self.outbox.set_keep_alive(match period.micros_u32() {
@@ -131,36 +131,36 @@ impl<B, const N: usize> Bus<B, N> {
         self
     }
 
-    /// Says that the driver hands back the frames that it sent: a received command frame is then no sign of a second master.
+    /// Declares that the driver receives its own frames: a received command frame is then no sign of a second master.
     #[must_use]
     pub const fn with_loopback(mut self) -> Self {
         self.motors.rounds.echoes = true;
         self
     }
 
-    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 at first.
+    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 by default.
     #[must_use]
     pub const fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
         self.budget.bit_rate = bits_per_s;
         self
     }
 
-    /// Sets the rate of feedback in Hz that RoboMaster Assistant set in the ESCs, for [`load`](Self::load); 1000 at first.
+    /// Sets the feedback rate of the ESCs in Hz, as set by RoboMaster Assistant, for [`load`](Self::load); 1000 by default.
     #[must_use]
     pub const fn with_feedback_rate(mut self, hz: u32) -> Self {
         self.motors.rounds.feedback_hz = hz;
         self
     }
 
-    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 at first.
+    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 by default.
     #[must_use]
     pub const fn with_tick_rate(mut self, hz: u32) -> Self {
         self.budget.tick_hz = hz;
         self
     }
 
-    /// Has [`attach`](Self::attach) refuse a motor with which the worst case of the load would exceed `ceiling`, to
-    /// whole percent; 1 is a full bus. There is none at first. Set rates before, and attach after.
+    /// Sets a ceiling for the load: [`attach`](Self::attach) refuses a motor if the worst case would exceed `ceiling`, rounded to whole
+    /// percent; 1 is a full bus. By default there is no ceiling. Set rates before, and attach after.
     ///
     /// # Examples
     /// ```
@@ -183,9 +183,8 @@ impl<B, const N: usize> Bus<B, N> {
     /// Attaches a motor.
     ///
     /// # Errors
-    /// When its id is out of range, another motor uses its feedback id or command slot, a parameter of the
-    /// configuration is not usable, or the bus would be loaded beyond its
-    /// [ceiling](Self::with_load_ceiling). The bus is then as it was.
+    /// The id is out of range, another motor uses the feedback id or command slot, a parameter of the configuration is not usable, or the
+    /// load would exceed the [ceiling](Self::with_load_ceiling). The bus stays as before.
     pub const fn attach<M: Model>(
         &mut self,
         config: Config<M>,
@@ -205,7 +204,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Attaches several motors of one model.
     ///
     /// # Errors
-    /// The first error; the bus is then as it was.
+    /// The first error; the bus stays as before.
     pub fn attach_all<M: Model, const K: usize>(
         &mut self,
         configs: [Config<M>; K],
@@ -216,7 +215,7 @@ impl<B, const N: usize> Bus<B, N> {
         Ok(keys.map(Handle::new))
     }
 
-    /// Detaches a motor. Its command slot is sent as zero once more, then the frame stops when nobody else uses it.
+    /// Detaches a motor. Its command slot is sent as zero once more; then the frame stops unless another motor uses the frame.
     pub fn detach(&mut self, motor: impl Into<AnyHandle<B>>) {
         attach::detach(&mut self.motors, &mut self.outbox, motor.into().key());
     }
@@ -229,10 +228,10 @@ impl<B, const N: usize> Bus<B, N> {
         })
     }
 
-    /// Returns id and mask for a hardware filter that lets all attached motors' feedback through.
+    /// Returns id and mask of a hardware filter that passes the feedback of all attached motors.
     ///
-    /// A frame passes when `frame id & mask == id & mask`. A mask cannot name any set of ids exactly, so a few
-    /// others may pass too. Without motors nothing but 0x7FF passes.
+    /// A frame passes if `frame id & mask == id & mask`. A mask cannot name every set of ids exactly, so a few other frames may pass too.
+    /// Without motors, only 0x7FF passes.
     ///
     /// # Examples
     /// ```
@@ -248,8 +247,7 @@ impl<B, const N: usize> Bus<B, N> {
         attach::acceptance_filter(&self.motors)
     }
 
-    /// Returns the load of the attached motors' feedback and of the command frames in use, when each of these goes out
-    /// with every update.
+    /// Returns the load of the attached motors' feedback and of the command frames in use, if each command frame is sent with every update.
     ///
     /// # Examples
     /// ```
@@ -269,13 +267,13 @@ impl<B, const N: usize> Bus<B, N> {
         self.budget.load(motors, self.motors.rounds.feedback_hz, commands)
     }
 
-    /// Takes a received frame that arrived at `now`. Constant time for one without an error code, once the updates run;
-    /// before the first one each frame also looks how old all feedback is.
+    /// Takes a frame received at `now`. Runs in constant time for a frame without an error code. Until the first update, each frame also
+    /// checks the age of all feedback.
     ///
-    /// A `now` may lie a little ahead of the next update, as from an interrupt. One that lies ahead by more than
-    /// [`Timeouts::late`] counts as late: not at once, but within twice that time. Its low 32 bits are kept: one that is
-    /// wrong by a multiple of 71 min 35 s is not noticed.
-    // A call of its own costs as much as a tenth of what it does.
+    /// A `now` may lie a little ahead of the next update, as from an interrupt. If `now` lies ahead by more than [`Timeouts::late`], the
+    /// feedback counts as late, not at once but within twice that time. Only the low 32 bits are kept: an error by a multiple of 71 min 35
+    /// s goes undetected.
+    // A call would cost a tenth of the function itself.
     ///
     /// Costs 31 instructions on a Cortex-M4F, for a frame of a motor (`docs/figures.md`).
     #[inline(always)]
@@ -292,7 +290,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.ingest_unusual(frame, now)
     }
 
-    // Four words to pass: with more, the usual way would have to keep a stack ready.
+    // Four words of arguments: with more, the usual path would have to set up a stack.
     #[cold]
     #[inline(never)]
     fn ingest_unusual(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
@@ -309,10 +307,9 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Runs every loop once and encodes the commands.
     ///
-    /// An update that does not lie after the one before, or before the arming, sends zeros and relaxes every motor until it is
-    /// armed again. A `dt_s` of zero, below zero, infinite or NaN changes nothing and leaves the last commands for one update,
-    /// but for motors that were relaxed; a second one in a row, or one that comes late, sends zeros. Above 20 ms integrals and
-    /// derivatives rest for the step.
+    /// If an update lies before the arming, or not after the previous update, it sends zeros and relaxes every motor until armed again. A
+    /// `dt_s` of zero, below zero, infinite or NaN changes nothing, and keeps the last commands for one update, except those of relaxed
+    /// motors. A second such update in a row, or a late one, sends zeros. Above 20 ms, integrals and derivatives rest for the step.
     ///
     /// Costs 508 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
@@ -335,7 +332,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.outbox.finish_update();
     }
 
-    /// Checks the motor whose turn it is.
+    /// Checks the next motor in turn.
     #[inline]
     fn check_next(&mut self) {
         let index = self.motors.rounds.next;
@@ -349,7 +346,7 @@ impl<B, const N: usize> Bus<B, N> {
         }
     }
 
-    /// Returns a command frame that waits to be sent, and takes it off the list.
+    /// Returns the next command frame to send, and removes it from the list.
     ///
     /// Costs 54 instructions on a Cortex-M4F, for the two frames of 8 motors and the end (`docs/figures.md`).
     #[inline]
@@ -357,12 +354,12 @@ impl<B, const N: usize> Bus<B, N> {
         self.outbox.next()
     }
 
-    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+    /// Requeues a frame that was not sent, or was evicted. Returns `false` for a frame of another sender.
     pub fn requeue(&mut self, frame: &CanFrame) -> bool {
         self.outbox.requeue(frame.header())
     }
 
-    /// Returns what the bus has counted.
+    /// Returns the counters of the bus.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         Counters {
@@ -376,7 +373,7 @@ impl<B, const N: usize> Bus<B, N> {
     }
 }
 
-/// One device needs no search among several: each call goes straight to the bus.
+/// A single device needs no search: each call goes straight to the bus.
 impl<B, const N: usize> Devices for Bus<B, N> {
     #[inline]
     fn visit(&mut self, visitor: &mut impl Visitor) {

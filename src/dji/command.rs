@@ -1,4 +1,4 @@
-//! Command frames: values to wire words, and the box they wait in.
+//! Command frames: conversion of values to wire words, and the outbox of frames.
 
 use super::range::Range;
 use crate::frame::CanFrame;
@@ -20,7 +20,7 @@ pub enum CommandFrame {
 }
 
 impl CommandFrame {
-    /// All of them, in the order of their index.
+    /// All command frames, in the order of their index.
     pub const ALL: [Self; 5] = [Self::X200, Self::X1FF, Self::X2FF, Self::X1FE, Self::X2FE];
 
     /// Returns the CAN id.
@@ -56,22 +56,22 @@ const fn swapped(words: [u8; 4]) -> [u8; 4] {
     u32::from_le_bytes(words).swap_bytes().rotate_left(16).to_le_bytes()
 }
 
-/// Converts a command to the wire: to the nearest, saturated at ±`limit`, NaN to 0.
+/// Converts a command to the nearest value on the wire, saturated at ±`limit`; NaN gives 0.
 ///
-/// Odd-symmetric: `to_raw(-x) == -to_raw(x)` for every `x` that is not NaN.
+/// Odd-symmetric: `to_raw(-x) == -to_raw(x)` for every `x` except NaN.
 #[inline]
 pub(super) const fn to_raw(value: f32, raw_per_unit: f32, limit: i16) -> i16 {
     let scaled = value * raw_per_unit;
     #[expect(clippy::cast_possible_truncation, reason = "saturates, NaN gives 0")]
     let halves = (scaled + scaled) as i32;
-    // Half of it, ties away from zero: the shift rounds down, which is away for what is negative.
+    // Half of the value, ties away from zero: the shift rounds down, which is away from zero for negative values.
     saturate((halves >> 1) + (halves & !(halves >> 31) & 1), Range::within(limit))
 }
 
-/// From 2^23 to 2^24 floats are the whole numbers: a sum with this is rounded, and its last bits count from here.
+/// From 2^23 to 2^24, floats are exactly the whole numbers: a sum with this value is rounded, and its last bits count from here.
 const WHOLE: f32 = 1.5 * 8_388_608.0;
 
-/// As [`to_raw`], for what a loop gives in every update: half a count goes to the even neighbour.
+/// As [`to_raw`], for the output of a loop in every update. Half a count is rounded to the even neighbour.
 #[inline]
 pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> i16 {
     let sum = value * raw_per_unit + WHOLE;
@@ -84,7 +84,7 @@ pub(super) const fn loop_to_raw(value: f32, raw_per_unit: f32, range: Range) -> 
     raw
 }
 
-/// As [`loop_to_raw`], for an output that is within the motor's limit and so within 16 bits.
+/// As [`loop_to_raw`], for an output within the motor's limit, and so within 16 bits.
 #[inline]
 #[expect(
     clippy::cast_possible_truncation,
@@ -94,7 +94,7 @@ pub(super) const fn free_to_raw(value: f32, raw_per_unit: f32) -> i16 {
     (value * raw_per_unit + WHOLE).to_bits() as i16
 }
 
-/// Out of the line of [`loop_to_raw`]: also for what is no number, or too large for its sum.
+/// Cold path of [`loop_to_raw`], also for NaN and for values too large for the sum.
 #[cold]
 #[inline(never)]
 const fn beyond(value: f32, raw_per_unit: f32, range: Range) -> i16 {
@@ -112,14 +112,14 @@ pub(super) const fn saturate(raw: i32, range: Range) -> i16 {
     raw
 }
 
-/// Out of the line of [`saturate`].
+/// Cold path of [`saturate`].
 #[cold]
 #[inline(never)]
 const fn at_the_limit(raw: i32, range: Range) -> i16 {
     range.nearest(raw)
 }
 
-/// Counts the frames in a set; a Cortex-M has no instruction for it.
+/// Counts the frames in a set; a Cortex-M has no instruction for this.
 fn ones(frames: u8) -> u32 {
     const ONES: [u8; 32] = [
         0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4, //
@@ -128,8 +128,8 @@ fn ones(frames: u8) -> u32 {
     ONES.get(usize::from(frames & 31)).map_or(0, |ones| u32::from(*ones))
 }
 
-/// Where a motor's word stands: one of four slots in one of five frames.
-// The compiler knows how large one can be, so that it is an index without a question.
+/// Place of a motor's word: a slot, 0 to 3, of a command frame.
+// The compiler knows the largest value, so an index by this type needs no check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 #[rustfmt::skip]
@@ -139,7 +139,7 @@ pub(super) enum Place {
     X2FFAt0, X2FFAt1, X2FFAt2, X2FFAt3,
     X1FEAt0, X1FEAt1, X1FEAt2, X1FEAt3,
     X2FEAt0, X2FEAt1, X2FEAt2, X2FEAt3,
-    /// In no frame: what is put there is never sent.
+    /// In no frame: a word in this place is never sent.
     Nowhere,
 }
 
@@ -181,9 +181,9 @@ impl Place {
     }
 }
 
-/// The command words, each with its low byte first, aligned to be read as 32-bit words.
+/// The command words, each with its low byte first, aligned for reads as 32-bit words.
 ///
-/// The rows above the five frames are nobody's: there is [`Place::Nowhere`], and three bits are an index.
+/// The rows above the five frames are unused: [`Place::Nowhere`] needs a row, and an index has three bits.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(4))]
 struct Words([[[u8; 2]; 4]; 8]);
@@ -192,8 +192,8 @@ impl Words {
     const ZERO: Self = Self([[[0; 2]; 4]; 8]);
 }
 
-/// Which frames wait (are *dirty*), and which of them come before the others, because their turn is next: none when all were
-/// taken. Side by side, so that one load tells whether there is anything.
+/// Waiting (*dirty*) frames, and frames with precedence because their turn is next; no frame has precedence after all were taken. Side by
+/// side, so that one load tests both.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(2))]
 struct Waiting([u8; 2]);
@@ -206,19 +206,19 @@ impl Waiting {
     }
 }
 
-/// The command words, and which frames wait.
+/// The command words, and the waiting frames.
 ///
-/// A frame waits (is *dirty*) after an update that left it a non-zero word, or that turned its last one to zero;
-/// a frame of zeros is repeated only as a keep-alive. The newest words replace older ones that were not sent.
+/// A frame waits (is *dirty*) after an update with a non-zero word in the frame, or with its last non-zero word turned to zero. A frame of
+/// zeros is repeated only as a keep-alive. The newest words supersede older words that were not sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outbox {
     words: Words,
     in_use: u8,
     ever_used: u8,
-    /// Had a word that was not zero in the last update, or has to be sent with the next one all the same.
+    /// Frames with a non-zero word in the last update, and frames to be sent with the next update in any case.
     active: u8,
     waiting: Waiting,
-    /// A frame was refused or evicted since the last update.
+    /// Whether a frame was refused or evicted since the last update.
     came_back: bool,
     keep_alive_us: u32,
     kept_alive: u32,
@@ -250,12 +250,12 @@ impl Outbox {
         self.in_use.count_ones()
     }
 
-    /// Returns how many frames are in use when this one is as well.
+    /// Returns the number of frames in use, including this one.
     pub(super) const fn frames_in_use_with(&self, frame: CommandFrame) -> u32 {
         (self.in_use | frame.bit()).count_ones()
     }
 
-    /// Sends this frame from now on: the first time with the next update, whatever its words are.
+    /// Sends this frame from now on: the first time with the next update, regardless of its words.
     pub(super) const fn open(&mut self, frame: CommandFrame) {
         self.in_use |= frame.bit();
         self.active |= frame.bit();
@@ -276,7 +276,7 @@ impl Outbox {
         }
     }
 
-    /// Returns the word that a motor was given last.
+    /// Returns the last word for a motor.
     #[inline]
     pub(super) fn get(&self, place: Place) -> i16 {
         let word = self.words.0.as_flattened().get(place as usize);
@@ -288,14 +288,14 @@ impl Outbox {
         self.in_use & frame.bit() != 0
     }
 
-    /// Sets every word to zero, and has every frame in use sent.
+    /// Sets every word to zero, and marks every frame in use to be sent.
     pub(super) fn clear(&mut self) {
         self.words = Words::ZERO;
         let due = core::mem::take(&mut self.active);
         self.mark(due | self.in_use);
     }
 
-    /// Has every frame in use sent with this update when it is time for it; returns when it is time again, in µs.
+    /// Marks every frame in use to be sent with this update, if the keep-alive is due. Returns the time until the next, in µs.
     pub(super) fn keep_alive(&mut self, now: u32) -> u32 {
         let since = now.wrapping_sub(self.kept_alive);
         if since < self.keep_alive_us {
@@ -306,7 +306,7 @@ impl Outbox {
         self.keep_alive_us
     }
 
-    /// Marks what this update gave to send.
+    /// Marks the frames that this update made ready.
     #[inline]
     pub(super) fn finish_update(&mut self) {
         let mut active = 0;
@@ -332,7 +332,7 @@ impl Outbox {
         }
     }
 
-    /// Frames still wait, or one came back: there are turns to be kept until all were taken, so that none starves.
+    /// Keeps the turns of the frames until all are taken, because frames still wait or a frame came back: no frame starves.
     #[cold]
     #[inline(never)]
     fn keep_turns(&mut self, frames: u8) {
@@ -347,8 +347,7 @@ impl Outbox {
         self.waiting.0 = [dirty | frames, ahead];
     }
 
-    /// Takes the next waiting frame: in the order of their index as long as each update finds that all were taken, and
-    /// otherwise in turns.
+    /// Takes the next waiting frame: in the order of the index while each update finds all frames taken, and otherwise in turns.
     #[inline]
     pub(super) fn next(&mut self) -> Option<CanFrame> {
         let dirty = self.waiting.0[0];
@@ -369,7 +368,7 @@ impl Outbox {
         CanFrame::standard(id, [a, b, c, d, e, f, g, h])
     }
 
-    /// Takes the next waiting frame after the one before off the list, and returns its index.
+    /// Takes the waiting frame after the previous one off the list, and returns its index.
     #[cold]
     #[inline(never)]
     fn next_in_turn(&mut self) -> u32 {
@@ -381,8 +380,8 @@ impl Outbox {
         index
     }
 
-    /// Takes back a frame that was refused or evicted. It waits for the next update, which replaces its words, so that
-    /// a caller's loop ends; and then it goes first.
+    /// Requeues a frame that was refused or evicted. The frame waits for the next update, which replaces its words, so a caller's loop
+    /// ends; the frame then goes first.
     pub(super) fn requeue(&mut self, header: u32) -> bool {
         match CommandFrame::with_id(header) {
             Some(frame) if self.ever_used & frame.bit() != 0 => {

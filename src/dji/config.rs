@@ -6,7 +6,7 @@ use crate::time::Duration;
 use crate::units::{Current, Voltage};
 use core::marker::PhantomData;
 
-/// What [`Bus::attach`](super::Bus::attach) needs to know of a motor.
+/// Configuration of a motor for [`Bus::attach`](super::Bus::attach).
 ///
 /// # Examples
 /// ```
@@ -27,7 +27,7 @@ pub struct Config<M: Model> {
     model: PhantomData<fn() -> M>,
 }
 
-/// The same without the model as a type: what the body of the bus works on.
+/// The configuration without the model as a type, for the body of the bus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlainConfig {
     pub(super) id: u8,
@@ -35,9 +35,9 @@ pub(super) struct PlainConfig {
     pub(super) gear: GearRatio,
     pub(super) command_raw: i16,
     pub(super) command_full_scale: f32,
-    /// Full scale unless set.
+    /// Full scale if `None`.
     pub(super) limit: Option<f32>,
-    /// That of the model, behind the gearbox, unless set.
+    /// Torque constant of the model behind the gearbox if `None`.
     pub(super) torque_constant_nm_per_a: Option<f32>,
     pub(super) speed: Option<PidConfig>,
     pub(super) position: Option<PidConfig>,
@@ -46,13 +46,13 @@ pub(super) struct PlainConfig {
     pub(super) health: &'static HealthConfig,
 }
 
-/// What is looked for unless it is set.
+/// The default checks.
 pub(super) static USUAL: HealthConfig = HealthConfig::new();
 
 impl<M: Model> Config<M> {
-    /// Takes the id that is set on the ESC: 1..=8 for C610 and C620, 1..=7 for GM6020.
+    /// Takes the id set on the ESC: 1..=8 for C610 and C620, 1..=7 for GM6020.
     ///
-    /// Everything else is as the motor is sold: its gearbox, its full scale as the limit, not reversed, no loops.
+    /// All other settings are those of the motor as sold: its gearbox, its full scale as the limit, not reversed, no loops.
     #[must_use]
     pub const fn new(id: u8) -> Self {
         let facts: &Facts = M::FACTS;
@@ -75,8 +75,7 @@ impl<M: Model> Config<M> {
         }
     }
 
-    /// Turns the positive direction around, for angle, velocity, current and command alike: a motor on the right
-    /// side of a chassis, say.
+    /// Reverses the positive direction of angle, velocity, current and command, for example for a motor on the right side of a chassis.
     #[must_use]
     pub const fn reversed(mut self) -> Self {
         self.plain.reversed = !self.plain.reversed;
@@ -85,11 +84,11 @@ impl<M: Model> Config<M> {
 
     /// Adds a speed loop: rad/s of the output shaft in; amperes, or volts for a motor in voltage mode, out.
     ///
-    /// Without an output limit of its own the loop gets the motor's. `attach` refuses a `kp` with which one rpm of the rotor, the
-    /// finest error that feedback tells, asks for more than the model's whole range: above 3667 A per rad/s for an M3508, 3438 for
-    /// an M2006, 28.6 for a GM6020 in current mode, and 229 V per rad/s in voltage mode, each with its own gearbox.
-    /// [`WheelTuning`](crate::control::WheelTuning) reckons gains for a wheel, [`WordGains`](super::WordGains) converts them.
-    /// Every option of a [`PidConfig`] works here, the incremental form and a tracked setpoint too.
+    /// The loop is limited to the motor's limit unless it has a lower output limit of its own. `attach` refuses a `kp` if the command for
+    /// an error of one rpm of the rotor, the resolution of the feedback, exceeds the model's whole range: above 3667 A per rad/s for an
+    /// M3508, 3438 for an M2006, 28.6 for a GM6020 in current mode, and 229 V per rad/s in voltage mode, each with its own gearbox.
+    /// [`WheelTuning`](crate::control::WheelTuning) computes gains for a wheel, [`WordGains`](super::WordGains) converts gains. Every
+    /// option of a [`PidConfig`] works here, including the incremental form and a tracked setpoint.
     ///
     /// # Examples
     /// ```
@@ -108,22 +107,22 @@ impl<M: Model> Config<M> {
 
     /// Adds a position loop over a speed loop: rad of the output shaft in, rad/s out to the speed loop.
     ///
-    /// The derivative works on the measured velocity. Without an output limit of its own the position loop gets
-    /// the motor's no-load speed. `attach` refuses a `kp` with which one count of the encoder asks for more than that speed.
+    /// The derivative works on the measured velocity. The position loop is limited to the motor's no-load speed unless it has a lower
+    /// output limit of its own. `attach` refuses a `kp` if the command for an error of one count of the encoder exceeds that speed.
     #[must_use]
     pub const fn position_loop(mut self, position: PidConfig, speed: PidConfig) -> Self {
         self.plain.position = Some(position);
         self.speed_loop(speed)
     }
 
-    /// Replaces the gearbox. The torque constant follows, as long as it is not set itself.
+    /// Replaces the gearbox. The torque constant follows, unless set by `with_torque_constant`.
     #[must_use]
     pub const fn with_gear(mut self, gear: GearRatio) -> Self {
         self.plain.gear = gear;
         self
     }
 
-    /// Sets the torque at the output shaft for each ampere, gearbox included. For [`State::torque_nm`] only.
+    /// Sets the torque at the output shaft for each ampere, gearbox included. Used for [`State::torque_nm`] only.
     ///
     /// [`State::torque_nm`]: super::State::torque_nm
     #[must_use]
@@ -132,25 +131,25 @@ impl<M: Model> Config<M> {
         self
     }
 
-    /// Has an armed motor take targets again when it is heard after being offline; its output range opens from zero as after arming.
-    /// Otherwise it stays relaxed until it is armed again.
+    /// Makes an armed motor take targets again after a recovery from offline; its output range then opens from zero as after arming.
+    /// Without this, the motor stays relaxed until armed again.
     #[must_use]
     pub const fn with_resume(mut self) -> Self {
         self.plain.resumes = true;
         self
     }
 
-    /// Sets the time in which the output range opens after arming and after a recovery, from zero to the whole: 0.2 s at first,
-    /// at most 65 s. Less than 1 ms opens it at once.
+    /// Sets the time in which the output range opens after arming and after a recovery, from zero to the whole: 0.2 s by default, at most
+    /// 65 s. Below 1 ms, the range opens at once.
     ///
-    /// A position loop asks for no more than that share of its velocity meanwhile, so it starts from where the shaft is.
+    /// Meanwhile a position loop is limited to the same share of its velocity, so the motion begins at the present angle of the shaft.
     #[must_use]
     pub const fn with_opening(mut self, time: Duration) -> Self {
         self.plain.opening = time;
         self
     }
 
-    /// Sets what is looked for in the motor and what follows. What makes no sense is refused by `attach`.
+    /// Sets the checks of the motor and the reactions. `attach` refuses an unusable parameter.
     ///
     /// # Examples
     /// ```
@@ -177,8 +176,7 @@ impl<M: Model> Config<M> {
 }
 
 impl<M: Model<Command = Current>> Config<M> {
-    /// Lowers the largest current, for loops and direct commands alike. More than the ESC's full scale is refused
-    /// by `attach`.
+    /// Lowers the largest current, for loops and direct commands alike. `attach` refuses more than the ESC's full scale.
     #[must_use]
     pub const fn with_current_limit(mut self, limit: Current) -> Self {
         self.plain.limit = Some(limit.as_amperes());
@@ -187,14 +185,14 @@ impl<M: Model<Command = Current>> Config<M> {
 }
 
 impl<M: Model<Command = Voltage>> Config<M> {
-    /// Lowers the largest voltage, for loops and direct commands alike. More than full scale is refused by `attach`.
+    /// Lowers the largest voltage, for loops and direct commands alike. `attach` refuses more than full scale.
     #[must_use]
     pub const fn with_voltage_limit(mut self, limit: Voltage) -> Self {
         self.plain.limit = Some(limit.as_volts());
         self
     }
 
-    /// Sets the volts that full scale stands for; sources say 24 V or 25.2 V.
+    /// Sets the voltage of full scale; sources state 24 V or 25.2 V.
     #[must_use]
     pub const fn with_nominal_voltage(mut self, full_scale: Voltage) -> Self {
         self.plain.command_full_scale = full_scale.as_volts();
@@ -203,7 +201,7 @@ impl<M: Model<Command = Voltage>> Config<M> {
 }
 
 impl Config<Gm6020Voltage> {
-    /// Sets full scale to ±30000, as motors of 2020 and before take it; today's take ±25000.
+    /// Sets full scale to ±30000, for motors of 2020 and before; current motors have ±25000.
     #[must_use]
     pub const fn with_legacy_full_scale(mut self) -> Self {
         self.plain.command_raw = 30_000;

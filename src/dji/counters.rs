@@ -1,4 +1,4 @@
-/// What a bus has counted; every counter saturates or, for frames, wraps at 2^32.
+/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -7,17 +7,17 @@ pub struct Counters {
     pub bad_length: u32,
     /// Feedback frames with an angle above 8191.
     pub bad_field: u32,
-    /// Frames with a feedback id of this family that no attached motor has: a wrong id switch shows here.
+    /// Frames with a feedback id of this family but no attached motor: a sign of a wrong id switch.
     pub unattached: u32,
-    /// Updates whose time step was zero, negative or NaN, or whose time did not move on.
+    /// Updates with a time step of zero, negative or NaN, or with a time that did not move on.
     pub bad_steps: u32,
-    /// Command frames that an update had ready; wraps.
+    /// Command frames made ready by updates; wraps.
     pub packed: u32,
-    /// Command frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
+    /// Command frames replaced by newer ones before they were taken, or after they were given back; wraps.
     pub superseded: u32,
 }
 
-/// The frames that were refused.
+/// Refused frames.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rejects {
     pub(super) bad_length: u32,

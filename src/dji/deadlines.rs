@@ -5,7 +5,7 @@ use super::motors::Motors;
 use crate::motor::{Ages, Hold};
 use crate::time::Instant;
 
-/// Applies all time-outs and keep-alives that are due, and computes until when none can be; `false` if time did not move on.
+/// Applies all due time-outs and keep-alives, and computes the time of the next. Returns `false` if time did not move on.
 #[cold]
 #[inline(never)]
 pub(super) fn apply<const N: usize>(
@@ -52,9 +52,9 @@ fn expire<const N: usize>(motors: &mut Motors<N>) {
     }
 }
 
-/// Discards each stamp whose age 32 bits can no longer tell; after a pause, discards all stamps.
+/// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
 ///
-/// To be called wherever time passes and ages are not compared.
+/// Call this wherever time passes without a comparison of ages.
 #[cold]
 #[inline(never)]
 pub(super) fn forget_bygones<const N: usize>(motors: &mut Motors<N>, before: Instant) {
@@ -62,7 +62,7 @@ pub(super) fn forget_bygones<const N: usize>(motors: &mut Motors<N>, before: Ins
     motors.change_all(now, |slot| slot.guard.forget_bygones(now.stamp(), is_pause));
 }
 
-/// Ends an update whose time or time step is not usable.
+/// Ends an update without a usable time or time step.
 #[cold]
 #[inline(never)]
 pub(super) fn hold<const N: usize>(

@@ -66,7 +66,7 @@ fn velocity<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<A
     (slot.guard.link() == Link::Online).then(|| slot.velocity())
 }
 
-/// Returns the measured angle of a motor that is online and knows where its shaft points.
+/// Returns the measured angle of a motor that is online, if its absolute angle is known.
 fn angle<B, const N: usize>(bus: &Bus<B, N>, motor: AnyHandle<B>) -> Option<Angle> {
     let state = bus.motors.get(motor.key())?.state()?;
     (state.link == Link::Online && state.homing.is_known()).then(|| state.position.angle())

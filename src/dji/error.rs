@@ -1,74 +1,74 @@
 use super::CommandFrame;
 use crate::motor::{BusLoad, MotorName};
 
-/// Why a motor was not attached. The bus is as it was before.
+/// Reason for a refused motor. The bus stays as before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AttachError {
     /// The model has no such id.
     Id {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
         /// The highest id of its model.
         highest: u8,
     },
     /// Two motors cannot share a bus.
     Collision {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
-        /// The motor that is there.
+        /// The attached motor.
         with: MotorName,
-        /// The feedback id that both would use.
+        /// The feedback id of both.
         feedback_id: u16,
-        /// The command frame and slot that both would use, if they share one.
+        /// The common command frame and slot, if there is one.
         slot: Option<(CommandFrame, u8)>,
     },
     /// A parameter of the configuration is not usable.
     Parameter {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
         /// The name of the parameter.
         parameter: &'static str,
     },
-    /// A proportional gain is impossible for the model: the finest error that feedback tells asks for more than there is.
+    /// A proportional gain is impossible for the model: the command for the smallest error in the feedback exceeds the whole range.
     ///
     /// The gains are whole numbers in the unit of the loop: A, or V in voltage mode, per rad/s of the output shaft, or rad/s per rad.
     Gain {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
         /// The name of the gain and of its loop.
         parameter: &'static str,
-        /// The gain that was given.
+        /// The configured gain.
         value: u32,
-        /// The highest gain that the model takes.
+        /// The highest gain for the model.
         highest: u32,
     },
-    /// The bus would be loaded beyond its ceiling: lower the rate of the feedback, or use a second bus.
+    /// The bus load would exceed its ceiling: lower the rate of the feedback, or use a second bus.
     Load {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
-        /// The load with it.
+        /// The load with this motor.
         load: BusLoad,
         /// The ceiling, in percent.
         ceiling_percent: u16,
-        /// The highest feedback rate of all motors that stays below it, in Hz; 0 when the commands alone do not.
+        /// The highest feedback rate of all motors below the ceiling, in Hz; 0 if the commands alone exceed the ceiling.
         feedback_hz: u32,
     },
-    /// The bus has no free slot: make it with a larger capacity, `Bus<B, N>`.
+    /// The bus has no free slot: use a larger capacity, `Bus<B, N>`.
     Full {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
-        /// The number of motors that the bus has room for.
+        /// The capacity of the bus, in motors.
         capacity: u8,
     },
     /// This place was attached and detached 16 times; a further handle could be confused with an old one.
     WornOut {
-        /// The motor that was to be attached.
+        /// The refused motor.
         motor: MotorName,
     },
 }
 
-/// A proportional gain that is impossible for a model, and its bound.
+/// An impossible proportional gain for a model, and its bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SteepGain {
     pub(super) parameter: &'static str,
@@ -77,7 +77,7 @@ pub(super) struct SteepGain {
 }
 
 impl AttachError {
-    /// Returns the error in words; `const`, so that a `const` wiring can fail to compile with them.
+    /// Returns the error in words; `const`, so a `const` wiring can fail to compile with this text.
     #[must_use]
     pub const fn message(&self) -> Message {
         let message = Message::new();
@@ -151,7 +151,7 @@ impl defmt::Format for AttachError {
     }
 }
 
-/// A short text that is put together in `const` code.
+/// A short text composed in `const` code.
 #[derive(Clone, Copy)]
 pub struct Message {
     text: [u8; Self::CAPACITY],
@@ -201,7 +201,7 @@ impl Message {
     const fn number(self, number: u32) -> Self {
         let mut message = self;
         let mut unit = 1_000_000_000;
-        // After the ones the unit is zero, by which nothing can be divided.
+        // After the ones, the unit is zero: the division then ends the loop.
         while let Some(leading) = number.checked_div(unit) {
             if leading > 0 || unit == 1 {
                 message = message.byte(b'0' + (leading % 10) as u8);

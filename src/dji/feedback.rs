@@ -1,7 +1,7 @@
 use crate::frame::CanFrame;
 use crate::motor::Severity;
 
-/// A feedback frame in integers, as it was on the wire.
+/// A feedback frame in integers, as on the wire.
 ///
 /// # Examples
 /// The first frame of a real C620 at rest:
@@ -26,7 +26,7 @@ pub struct Feedback {
 impl Feedback {
     pub(super) const NONE: Self = Self { motion: 0, condition: 0 };
 
-    /// Takes the eight bytes of a feedback frame; `None` if the angle is above 8191, which no motor of this family reports.
+    /// Takes the eight bytes of a feedback frame. Returns `None` for an angle above 8191, which no motor of this family reports.
     #[must_use]
     #[inline]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
@@ -38,15 +38,15 @@ impl Feedback {
         if feedback.motion < (8192 << 16) { Some(feedback) } else { None }
     }
 
-    /// Takes a frame of 8 bytes whose angle is possible and whose error code is zero, with one comparison for all;
-    /// `None` does not say why.
+    /// Takes a frame of 8 bytes with a possible angle and without an error code, with one comparison for all. `None` does not name the
+    /// reason.
     #[inline]
     pub(super) const fn without_error(frame: &CanFrame) -> Option<Self> {
-        // As one number, so that each half is loaded as it is: a byte that was asked for alone is loaded alone.
+        // As one number, so each half is loaded as a word: a byte read alone would be loaded alone.
         let words = u64::from_le_bytes(*frame.bytes());
         #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
         let (motion, condition) = ((words as u32).swap_bytes(), (words >> 32) as u32);
-        // Where the id is that of a motor, the compiler knows that the frame is whole.
+        // For the id of a motor, the compiler knows that the frame is whole.
         let unusual = !frame.is_whole() as u32 | (motion >> 29) | (condition >> 24);
         if unusual != 0 {
             return None;
@@ -82,14 +82,14 @@ impl Feedback {
         i16::from_be_bytes([high, low])
     }
 
-    /// Returns byte 6: the temperature in °C, on models that have one.
+    /// Returns byte 6: the temperature in °C, on models with a sensor.
     #[must_use]
     pub const fn temperature(self) -> u8 {
         let [_, _, temperature, _] = self.condition.to_le_bytes();
         temperature
     }
 
-    /// Returns bytes 7 and 6: as large as the temperature, or larger than any when there is an error.
+    /// Returns bytes 7 and 6: the temperature, or a larger value if there is an error.
     #[inline]
     pub(super) const fn error_and_temperature(self) -> u32 {
         self.condition >> 16
@@ -115,10 +115,10 @@ impl core::fmt::Debug for Feedback {
     }
 }
 
-/// What an ESC reports in byte 7. When several hold, it reports the smallest code.
+/// An error of an ESC, from byte 7. If several errors hold, the ESC reports the smallest code.
 ///
-/// Sources: two public drivers for each ESC (hcs and IFR for C620; two MR libraries for C610). A code that the
-/// ESC's list does not have is kept as it came.
+/// Sources: two public drivers for each ESC (hcs and IFR for C620; two MR libraries for C610). A code outside the ESC's list is kept as
+/// received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -140,7 +140,7 @@ pub enum ErrorCode {
     Calibration,
     /// 8, C620: the motor is at 125 °C or above. A warning.
     TemperatureWarning,
-    /// A code that the list of this ESC does not have.
+    /// A code outside the list of this ESC.
     Unlisted(u8),
 }
 
@@ -160,12 +160,12 @@ impl core::fmt::Display for ErrorCode {
     }
 }
 
-/// Which list of codes an ESC follows.
+/// List of codes of an ESC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ErrorTable {
     C610,
     C620,
-    /// No list was found: every code is kept as it came.
+    /// No list was found: every code is kept as received.
     None,
 }
 
@@ -188,9 +188,9 @@ impl ErrorTable {
 }
 
 impl ErrorTable {
-    /// Returns how bad a code is. The C620's 8 is a warning, all others are faults, as in public drivers; also unlisted
-    /// ones. The C610's 6 (stalled) is a warning here: a jammed feeder frees itself by turning back, which it could not
-    /// when a fault relaxed it. Where no list is known, nobody knows how bad a code is, and it is a warning.
+    /// Returns the severity of a code. The C620's 8 is a warning. All other codes, also unlisted ones, are faults, as in public drivers.
+    /// The C610's 6 (stalled) is a warning here: a jammed feeder frees itself by turning back, which is impossible after a fault has
+    /// relaxed the motor. Without a known list the severity is unknown, and every code is a warning.
     pub(crate) const fn severity(self, code: u8) -> Option<Severity> {
         Some(match (code, self) {
             (0, _) => return None,
@@ -274,7 +274,7 @@ mod tests {
     }
 
     proptest! {
-        /// Law: every byte of a valid frame is kept, in the field that the manual gives it.
+        /// Law: every byte of a valid frame is kept, in its field of the manual.
         #[test]
         fn decode_then_encode_is_the_frame(angle in 0_u16..8192, rest: [u8; 6]) {
             let [high, low] = angle.to_be_bytes();

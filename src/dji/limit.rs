@@ -1,9 +1,9 @@
-//! A cut of commands between the update of the loops and the frames.
+//! Scaling of commands between the update of the loops and the frames.
 
 use super::command::Outbox;
 use super::motors::{Key, Motors};
 
-/// Cuts the command of a motor by a factor; see [`Bus::scale_outputs`](super::Bus::scale_outputs).
+/// Scales the command of a motor by a factor; see [`Bus::scale_outputs`](super::Bus::scale_outputs).
 pub(super) fn scale_output<const N: usize>(
     motors: &mut Motors<N>,
     outbox: &mut Outbox,
@@ -15,13 +15,13 @@ pub(super) fn scale_output<const N: usize>(
     let after = cut(before, factor);
     if after != before {
         outbox.put(slot.place, after);
-        // The loop does not wind up meanwhile.
+        // Meanwhile the loop must not wind up.
         let passed = slot.in_units(after);
         slot.speed_loop_mut().keep_integral_within(passed);
     }
 }
 
-/// Returns the command cut by a factor: never larger than before, never of the other sign.
+/// Returns the command scaled by a factor: never larger than before, never of the other sign.
 const fn cut(raw: i16, factor: f32) -> i16 {
     if factor >= 1.0 {
         return raw;

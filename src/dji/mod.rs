@@ -10,8 +10,8 @@
 //! | [`Gm6020Voltage`] | 1..=7 | 0x1FF for 1..=4, 0x2FF for 5..=7 | 0x204 + id | 25000 = 24 V nominal | 1:1 |
 //! | [`Gm6020Current`] (a) | 1..=7 | 0x1FE for 1..=4, 0x2FE for 5..=7 | 0x204 + id | 16384 = 3 A | 1:1 |
 //!
-//! (a) Only when current control was switched on in the motor with RoboMaster Assistant, on ESC firmware that
-//! offers it. In the other mode the motor ignores the frame: the two models are not interchangeable.
+//! (a) Only if current control was switched on in the motor with RoboMaster Assistant, on ESC firmware with this mode. In the other mode
+//! the motor ignores the frame: the two models are not interchangeable.
 //!
 //! Command frame: four `i16`, one a slot; a slot without a motor is sent as 0. Feedback frame, 1 kHz by default:
 //!
@@ -21,14 +21,14 @@
 //! | 2..=3 | rotor speed, `i16`, rpm |
 //! | 4..=5 | torque current, `i16`, in the scale of the current command |
 //! | 6 | motor temperature in °C; nothing on C610 |
-//! | 7 | error code ([`ErrorCode`]); 0 on old firmware. For GM6020 no list is known: codes are kept as they come |
+//! | 7 | error code ([`ErrorCode`]); 0 on old firmware. For GM6020 no list is known: codes are kept as received |
 //!
 //! Positive is counter-clockwise looking at the shaft, for angle, speed, current and command alike.
 //!
-//! Gains in these raw numbers, of another program, are converted by [`WordGains`].
+//! [`WordGains`] converts gains of another program, in these raw numbers.
 //!
-//! # What collides on one bus
-//! A frame id and a slot have one owner each, so [`Bus::attach`] refuses:
+//! # Collisions on one bus
+//! A frame id and a slot have one owner each. [`Bus::attach`] therefore refuses:
 //! * the same feedback id: C6x0 #5..=8 with GM6020 #1..=4 *in either mode* (0x205..=0x208);
 //! * the same command slot: C6x0 #5..=8 with GM6020 (voltage) #1..=4 on 0x1FF;
 //! * one physical id in two modes or models: C610 #n with C620 #n, GM6020 #n as voltage and as current.
@@ -54,12 +54,12 @@
 //! let bus = BUS;
 //! ```
 //!
-//! # What starves on a full bus
-//! [`Bus::load`] says how full it is: at 1 kHz five motors fit, six do not in the worst case. The lowest id wins, so
-//! **0x2FE and 0x2FF lose arbitration to all feedback** while 0x1FE, 0x1FF and 0x200 win: on an overloaded bus
-//! GM6020 #5..=7 are the first to miss their commands, and the highest feedback ids are lost next.
+//! # Arbitration on a full bus
+//! [`Bus::load`] returns the load: at 1 kHz five motors fit; six do not fit in the worst case. The lowest id wins, so **0x2FE and 0x2FF
+//! lose arbitration to all feedback** while 0x1FE, 0x1FF and 0x200 win: on an overloaded bus GM6020 #5..=7 are the first to miss their
+//! commands, and the highest feedback ids are lost next.
 //!
-//! With the GM6020 on an id of its own the same compiles:
+//! The example above with a free id for the GM6020 compiles:
 //!
 //! ```
 //! use drivetrain::dji::{Bus, Config, Gm6020Current, M3508};
@@ -79,16 +79,16 @@
 //! assert_eq!(BUS.motors().count(), 2);
 //! ```
 //!
-//! # Targets that another sensor measures
-//! For example a gimbal's yaw that an IMU tells, whatever the chassis under it does.
+//! # Targets measured by another sensor
+//! For example the yaw of a gimbal, measured by an IMU, independent of the chassis.
 //!
-//! **Both loops** run on the measurement: the position loop on its angle, the speed loop on its rate. The rate of the
-//! encoder is that against the base; a speed loop on it would hold the gimbal against the chassis, not in the
-//! world, and the angle would be off for as long as the chassis turns.
+//! **Both loops** run on the measurement: the position loop on its angle, the speed loop on its rate. The rate of the encoder is relative
+//! to the base. A speed loop on this rate would hold the gimbal against the chassis, not in the world, and the angle would be off while the
+//! chassis turns.
 //!
-//! The measurement counts from its own time: older than [`Timeouts::measured`](crate::motor::Timeouts::measured) it is an
-//! error when it is set, and one that becomes so is zero output within a tick, as if the application had stopped. The
-//! feedback of the motor has to be fresh as well. Set it in each tick; between two measurements, the last one again.
+//! The measurement counts from its own time. A measurement older than [`Timeouts::measured`](crate::motor::Timeouts::measured) is refused
+//! with an error. If a measurement grows older than that, the output is zero within a tick, as if the application had stopped. The
+//! feedback of the motor must be fresh as well. Set the target in each tick; between two measurements, with the last one.
 //!
 //! ```
 //! use drivetrain::control::PidConfig;
@@ -127,7 +127,7 @@
 //! ```
 //!
 //! # A limit over several motors
-//! [`Bus::scale_outputs`] cuts the commands of an update by one factor, for instance to keep a power limit:
+//! [`Bus::scale_outputs`] scales the commands of an update by one factor, for instance to keep a power limit:
 //!
 //! ```
 //! use drivetrain::chassis::{PowerModel, WheelLoad};
@@ -163,9 +163,10 @@
 //! ```
 //!
 //! # Sources
-//! DJI C610 user guide V1.0 (2019.03) pages 8 and 9 for layout, ids, scale and rate of C610; for C620 and GM6020,
-//! whose manuals were not at hand, what independent public drivers agree on (taproot, librm, HNU's framework, IFR). They differ on the GM6020 voltage limit: 25000 is today's, 30000 that of old motors
-//! ([`Config::with_legacy_full_scale`]). The volts behind it are nominal: sources say 24 V or 25.2 V.
+//! Layout, ids, scale and rate of the C610: DJI C610 user guide V1.0 (2019.03), pages 8 and 9. The manuals of C620 and GM6020 were not at
+//! hand; their facts are common to independent public drivers (taproot, librm, HNU's framework, IFR). The drivers differ on the GM6020
+//! voltage limit: 25000 for current motors, 30000 for old motors ([`Config::with_legacy_full_scale`]). The voltage of full scale is
+//! nominal: sources state 24 V or 25.2 V.
 
 mod arming;
 mod attach;

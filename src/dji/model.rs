@@ -6,14 +6,14 @@ use crate::encoder::GearRatio;
 use crate::motor::Capability;
 use crate::units::{Current, Voltage};
 
-/// The facts of one motor model: the only home of each number.
+/// Facts of one motor model: the only home of each number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facts {
     /// The name in errors and logs.
     pub name: &'static str,
     /// The highest id; the lowest is 1.
     pub ids: u8,
-    /// The command frame of ids 1..=4, and that of the ids above.
+    /// The command frame of ids 1..=4, and the command frame of higher ids.
     pub command: [CommandFrame; 2],
     /// The feedback id less the motor's id.
     pub feedback_base: u16,
@@ -21,13 +21,13 @@ pub struct Facts {
     pub command_raw: i16,
     /// The largest command, in A or V.
     pub command_full_scale: f32,
-    /// Quantity that the command sets: [`Capability::Current`] in A, or [`Capability::Voltage`] in nominal V.
+    /// Quantity of the command: [`Capability::Current`] in A, or [`Capability::Voltage`] in nominal V.
     pub control: Capability,
-    /// The current feedback that stands for [`current_full_scale_a`](Self::current_full_scale_a), on the wire.
+    /// The current feedback at [`current_full_scale_a`](Self::current_full_scale_a), on the wire.
     pub current_raw: i16,
     /// Amperes at [`current_raw`](Self::current_raw).
     pub current_full_scale_a: f32,
-    /// The gearbox that the motor is sold with.
+    /// The gearbox of the motor as sold.
     pub gear: GearRatio,
     /// Torque at the output shaft of that gearbox, in Nm for each ampere.
     pub torque_constant_nm_per_a: f32,
@@ -35,8 +35,8 @@ pub struct Facts {
     pub no_load_rpm: f32,
     /// Whether byte 6 of the feedback is a temperature.
     pub has_temperature: bool,
-    /// From which temperature on the motor gets less output, and at which none, in °C; unless its
-    /// [`HealthConfig`](crate::motor::HealthConfig) says otherwise.
+    /// Temperatures in °C from which the output falls, and at which the output is zero, unless set by its
+    /// [`HealthConfig`](crate::motor::HealthConfig).
     pub temperatures_c: (i16, i16),
     /// No-load speed of the rotor.
     pub(crate) rotor_rpm: u16,
@@ -73,7 +73,7 @@ impl Facts {
         word as f32 / self.command_raw as f32 * self.command_full_scale
     }
 
-    /// Returns command frame and slot of an id, or `None` when the model has no such id.
+    /// Returns command frame and slot of an id; `None` if the model has no such id.
     #[must_use]
     pub const fn place(&self, id: u8) -> Option<(CommandFrame, u8)> {
         let [low, high] = self.command;
@@ -109,8 +109,8 @@ const fn known_gear(rotor: u16, output: u16) -> GearRatio {
     }
 }
 
-// Ids, slots and scale: C610 user guide, pages 8 and 9. Gear, torque constant: taproot, hcs, IFR. No-load speed:
-// one public source (500 rpm at the output). It reports no temperature, so those of the C620 are never looked at.
+// Ids, slots and scale: C610 user guide, pages 8 and 9. Gear, torque constant: taproot, hcs, IFR. No-load speed: one public source (500 rpm
+// at the output). The M2006 reports no temperature, so the temperatures, of the C620, have no effect.
 static M2006_FACTS: Facts = Facts {
     name: "M2006",
     ids: 8,
@@ -130,8 +130,8 @@ static M2006_FACTS: Facts = Facts {
     errors: ErrorTable::C610,
 };
 
-// Scale: librm, IFR. Gear, torque constant: taproot, hcs, IFR. No-load speed: two public sources. Temperatures: what the
-// ESC itself calls a warning and a fault, its error codes 8 and 5.
+// Scale: librm, IFR. Gear, torque constant: taproot, hcs, IFR. No-load speed: two public sources. Temperatures: those of the ESC's own
+// warning and fault, error codes 8 and 5.
 static M3508_FACTS: Facts = Facts {
     name: "M3508",
     ids: 8,
@@ -151,8 +151,8 @@ static M3508_FACTS: Facts = Facts {
     errors: ErrorTable::C620,
 };
 
-// Limit 25000: taproot and current manuals. Volts: nominal. Torque constant, no-load speed: hcs, devrm. No error
-// list was found, nor a limit of the temperature: 25 K less than where the C620 warns is an estimate, and so is 125.
+// Limit 25000: taproot and current manuals. Volts: nominal. Torque constant, no-load speed: hcs, devrm. No error list was found, nor a
+// limit of the temperature. Both temperatures are estimates: 100 is 25 K below the C620's warning, and 125.
 static GM6020_VOLTAGE_FACTS: Facts = Facts {
     name: "GM6020 (voltage)",
     ids: 7,
@@ -186,7 +186,7 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A motor model of this family, as a type: handles carry it, so that a target of the wrong kind does not compile.
+/// A motor model of this family, as a type. A handle carries the type, so a target of the wrong kind does not compile.
 ///
 /// # Examples
 /// A current for a motor in voltage mode does not compile:
@@ -222,7 +222,7 @@ macro_rules! models {
             }
         )+
 
-        /// Those of every model.
+        /// Facts of every model.
         #[cfg(test)]
         pub(super) const ALL_FACTS: &[&Facts] = &[$(&$facts),+];
     };
@@ -233,7 +233,7 @@ models! {
     M2006, M2006_FACTS, Current;
     /// The M3508 with its C620 ESC: current control.
     M3508, M3508_FACTS, Current;
-    /// The GM6020 as it is delivered: voltage control.
+    /// The GM6020 as delivered: voltage control.
     Gm6020Voltage, GM6020_VOLTAGE_FACTS, Voltage;
     /// The GM6020 with current control switched on in RoboMaster Assistant.
     Gm6020Current, GM6020_CURRENT_FACTS, Current;

@@ -1,4 +1,4 @@
-//! The motors of a bus in their slots, and the handles that name them.
+//! Motors of a bus in their slots, and the handles of motors.
 
 use super::rounds::Rounds;
 use super::slot::Slot;
@@ -8,7 +8,7 @@ use crate::motor::{DeviceGuard, TargetError};
 use crate::time::Instant;
 use core::marker::PhantomData;
 
-/// The lowest feedback id, and how many there are: 0x201..=0x20B.
+/// The lowest feedback id, and the number of feedback ids: 0x201..=0x20B.
 pub(super) const FIRST_FEEDBACK_ID: u32 = 0x201;
 pub(super) const IDS: usize = 11;
 
@@ -17,15 +17,15 @@ const LOWEST_COMMAND_ID: u32 = CommandFrame::X1FE.id() as u32;
 const COMMAND_IDS: u32 = CommandFrame::X2FF.id() as u32 - LOWEST_COMMAND_ID;
 
 /// Tells whether the id of a frame is not of this family.
-// Twice the header: the comparison takes no mask to leave the bit of short frames out.
+// Twice the header: the comparison then needs no mask for the bit of short frames.
 #[inline]
 pub(super) const fn is_of_others(frame: &CanFrame) -> bool {
     (frame.header() << 1).wrapping_sub(LOWEST_COMMAND_ID << 1) > (COMMAND_IDS << 1 | 1)
 }
 
-/// The motors of a bus in their slots, and the rules that hold for all of them.
+/// Motors of a bus in their slots, and their common rules.
 #[derive(Debug)]
-// The slots first: their addresses need no offset then.
+// The slots first: their addresses then need no offset.
 #[repr(C)]
 pub(super) struct Motors<const N: usize> {
     pub(super) slots: [Slot; N],
@@ -33,9 +33,9 @@ pub(super) struct Motors<const N: usize> {
     pub(super) rounds: Rounds,
     /// The slot of each feedback id, from the lowest on; [`NOBODY`](Self::NOBODY) without a motor.
     ///
-    /// Not looked at where there are as many slots as ids: each id has the slot of its number then.
+    /// Not used if there are as many slots as ids: each id then has the slot of its number.
     places: [u8; IDS],
-    /// All slots from here on are free.
+    /// All slots from this one on are free.
     pub(super) used: u8,
 }
 
@@ -50,7 +50,7 @@ impl<const N: usize> Motors<N> {
         used: 0,
     };
 
-    /// Returns the slot for a feedback id, counted from the lowest; beyond all slots where there is none.
+    /// Returns the slot for a feedback id, counted from the lowest; an index beyond all slots if there is none.
     #[inline(always)]
     pub(super) const fn slot_of(&self, id_index: usize) -> usize {
         if N == IDS {
@@ -62,7 +62,7 @@ impl<const N: usize> Motors<N> {
         }
     }
 
-    /// Returns the slot where a motor with this feedback id is, or would be attached; `None` when all are taken.
+    /// Returns the present or future slot of a motor with this feedback id; `None` if all slots are taken.
     pub(super) const fn place_for(&self, id_index: usize) -> Option<u8> {
         let own = self.slot_of(id_index);
         if own < N {
@@ -96,7 +96,7 @@ impl<const N: usize> Motors<N> {
         }
     }
 
-    /// Takes the motor of a slot off the list of ids.
+    /// Removes the motor of a slot from the list of ids.
     pub(super) fn forget(&mut self, index: u8) {
         self.guard.journal_mut().forget(index);
         for place in &mut self.places {
@@ -116,13 +116,13 @@ impl<const N: usize> Motors<N> {
         self.slots.get_mut(motor.index()).filter(|slot| slot.matches(motor))
     }
 
-    /// Returns the slots up to the last that is taken.
+    /// Returns the slots up to the last slot in use.
     #[inline]
     pub(super) fn taken(&self) -> &[Slot] {
         self.slots.get(..usize::from(self.used)).unwrap_or_default()
     }
 
-    /// As [`taken`](Self::taken), to be changed.
+    /// As [`taken`](Self::taken), mutable.
     #[inline]
     pub(super) fn taken_mut(&mut self) -> &mut [Slot] {
         self.slots.get_mut(..usize::from(self.used)).unwrap_or_default()
@@ -137,7 +137,7 @@ impl<const N: usize> Motors<N> {
         })
     }
 
-    /// Returns how many motors are attached.
+    /// Returns the number of attached motors.
     pub(super) const fn count(&self) -> u32 {
         let mut slots = self.slots.as_slice();
         let mut count = 0;
@@ -175,7 +175,7 @@ impl<const N: usize> Motors<N> {
         set(self.get_mut(motor).ok_or(TargetError::Detached)?, now)
     }
 
-    /// Sets a target: by `renew`, which tells whether it was enough, or else by `set`.
+    /// Sets a target by `renew`, or by `set` if `renew` returns `false`.
     #[inline(always)]
     pub(super) fn renew(
         &mut self,
@@ -204,7 +204,7 @@ impl<const N: usize> Motors<N> {
         changed.unwrap_or(Err(TargetError::Detached))
     }
 
-    /// [Changes](Self::change) each slot that may be taken.
+    /// [Changes](Self::change) each slot that may be in use.
     pub(super) fn change_all(&mut self, now: Instant, change: impl Fn(&mut Slot)) {
         for index in 0..self.used {
             self.change(index, now, &change);
@@ -220,14 +220,14 @@ const _: () = {
 
 /// Names a motor of a bus: one byte, `Copy`, with the model as a type.
 ///
-/// `B` is the brand of the bus ([`Bus::branded`](super::Bus::branded)); handles of differently branded buses do
-/// not mix. A handle of a motor that was detached finds nothing, even when another motor took its place.
+/// `B` is the brand of the bus ([`Bus::branded`](super::Bus::branded)); handles of differently branded buses do not mix. A handle of a
+/// detached motor finds nothing, even after another motor took its place.
 pub struct Handle<M: Model, B = ()> {
     key: Key,
     brand: PhantomData<fn() -> (M, B)>,
 }
 
-/// Names a motor of a bus whatever its model: for logging, tuning and everything that all models can do.
+/// Names a motor of any model: for logging, tuning and all functions common to the models.
 pub struct AnyHandle<B = ()> {
     key: Key,
     brand: PhantomData<fn() -> B>,
@@ -250,7 +250,7 @@ impl Key {
         (self.0 & 15) as usize
     }
 
-    /// Returns the index as it is kept in small places.
+    /// Returns the index as a byte.
     pub(super) const fn place(self) -> u8 {
         self.0 & 15
     }

@@ -1,4 +1,4 @@
-/// The raw commands that a motor may be given: 0, and what lies between it and two ends.
+/// Allowed raw commands of a motor: all commands between two ends. The range includes 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Range {
     lowest: i16,
@@ -6,10 +6,10 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// Nothing but 0.
+    /// Only 0.
     pub(super) const ZERO: Self = Self::within(0);
 
-    /// Both directions up to `limit`, which is not negative.
+    /// Both directions up to `limit`, which must not be negative.
     pub(super) const fn within(limit: i16) -> Self {
         Self { lowest: -limit, span: 2 * limit.cast_unsigned() }
     }
@@ -22,18 +22,18 @@ impl Range {
         Self { lowest: self.lowest, span: self.lowest.unsigned_abs() }
     }
 
-    /// Tells whether a command is within, with one comparison for both ends: below the lowest is far above, unsigned.
+    /// Tells whether a command is within the range. One comparison covers both ends: as unsigned, a value below the lowest is far above.
     #[inline]
     pub(super) const fn contains(self, raw: i32) -> bool {
         raw.wrapping_sub(self.lowest as i32).cast_unsigned() <= self.span as u32
     }
 
-    /// Tells whether a command that is not 0 is as large as it may be.
+    /// Tells whether a command is not 0 and at an end of the range.
     pub(super) const fn is_end(self, raw: i16) -> bool {
         (raw < 0 && raw <= self.lowest) || (raw > 0 && raw >= self.highest())
     }
 
-    /// Returns the nearest command that is within.
+    /// Returns the nearest command within the range.
     pub(super) const fn nearest(self, raw: i32) -> i16 {
         if raw < self.lowest as i32 {
             return self.lowest;
@@ -57,7 +57,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Law: the nearest command is within, 0 always is, and what is within is kept.
+        /// Law: the nearest command is within the range, 0 is always within, and a command within is kept.
         #[test]
         fn the_nearest_is_within(limit in 0..=i16::MAX, raw: i32, negative: bool, positive: bool) {
             let range = Range::within(limit);

@@ -1,5 +1,4 @@
-//! Frames that take more than the usual way: the first of a motor, one after a gap, one with an error, and those that are no
-//! feedback.
+//! Frames outside the usual path: the first frame of a motor, a frame after a gap, a frame with an error, and frames that are no feedback.
 
 use super::Feedback;
 use super::command::Outbox;
@@ -63,7 +62,7 @@ pub(super) fn ingest<const N: usize>(
     Ingest::Taken
 }
 
-/// Takes feedback that is in time, with an error that is known or none; `false` when it is not all of this, or was not taken.
+/// Takes feedback in time, without an error or with a known one. Returns `false` for any other feedback, or if the frame was not taken.
 fn has_nothing_new<const N: usize>(
     motors: &mut Motors<N>,
     index: usize,

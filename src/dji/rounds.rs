@@ -7,31 +7,31 @@ use super::slot::{Surroundings, health};
 use crate::motor::{Edge, elapsed};
 use crate::time::Instant;
 
-/// Feedback frames are counted for this long, in µs.
+/// Window for counting feedback frames, in µs.
 const WINDOW_US: u32 = 1_000_000;
 
-/// So long after another node sent a command frame it is forgotten, in µs.
+/// Time after which another node's command frame is forgotten, in µs.
 const RIVAL_FORGOTTEN_US: u32 = 1_000_000;
 
-/// Which motor is checked next, and the times of the round.
+/// The motor to check next, and the times of the round.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rounds {
-    /// When the present window of counting began.
+    /// Begin of the present counting window.
     window_from: u32,
-    /// When another node sent a command frame last.
+    /// Time of the last command frame of another node.
     rival_heard: u32,
-    /// When the present round began.
+    /// Begin of the present round.
     begun: u32,
     /// The rate of each motor's feedback, as configured.
     pub(super) feedback_hz: u32,
     /// The length of the window that ends in this round, in units of 1.024 ms.
     window: u16,
-    /// The length of the round before.
+    /// The length of the previous round.
     pub(super) elapsed: u8,
-    /// Whose turn it is; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
+    /// Place of the motor to check next; in a round that ends a window, beyond [`CLOSING`](Self::CLOSING).
     pub(super) next: u8,
     has_begun: bool,
-    /// Frames that are sent are heard again.
+    /// Whether sent frames are received again.
     pub(super) echoes: bool,
 }
 
@@ -48,15 +48,15 @@ impl Rounds {
         echoes: false,
     };
 
-    /// In a round that ends a window each motor is checked in full: no slot has such a number, so the quick check is not tried.
+    /// In a round that ends a window, each motor is checked in full: no slot has such a number, so the quick check is skipped.
     const CLOSING: u8 = 0x80;
 
-    /// Returns the length of the window that ends in this round, if one does.
+    /// Returns the length of the window that ends in this round; `None` if no window ends.
     const fn window(&self) -> Option<u16> {
         if self.next & Self::CLOSING != 0 { Some(self.window) } else { None }
     }
 
-    /// A new round begins: one tick for each place, and one for this.
+    /// Begins a new round: one tick for each place, and one for this call.
     fn begin(&mut self, now: u32) {
         self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
         self.begun = now;
@@ -82,7 +82,7 @@ pub(super) fn check_without_slot<const N: usize>(motors: &mut Motors<N>, outbox:
             motors.rounds.next += 1;
             check(motors, index, word);
         }
-        // A round has a turn for each id, so that it takes the same time on every bus.
+        // A round has a turn for each id: it takes the same time on every bus.
         None if usize::from(index) < IDS => motors.rounds.next += 1,
         None => motors.rounds.begin(motors.guard.now()),
     }
@@ -103,7 +103,7 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
 }
 
-/// Takes a frame of another node that may be one of our commands.
+/// Takes a frame of another node that may be a command of this bus.
 pub(super) fn hear_command<const N: usize>(
     motors: &mut Motors<N>,
     outbox: &Outbox,
@@ -122,7 +122,7 @@ pub(super) fn hear_command<const N: usize>(
     });
 }
 
-/// Takes the oldest edge that was not read.
+/// Takes the oldest unread edge.
 #[inline(never)]
 pub(super) fn take_edge<const N: usize>(motors: &mut Motors<N>) -> Option<Edge> {
     let updated = motors.guard.updated();

@@ -1,6 +1,6 @@
-//! One motor in a tick: feedback in, what is asked for, loops, raw command out.
+//! One motor in a tick: from feedback and target through the loops to the raw command.
 //!
-//! What a motor needs now and then stands in the files of the folder.
+//! Less frequent tasks of a motor are in the files of the folder.
 
 pub(super) mod config;
 mod duty;
@@ -20,12 +20,12 @@ use crate::motor::{HealthConfig, Link, Monitor, MotorGuard, MotorName, TargetErr
 use crate::time::TimeStep;
 use crate::units::{AngularVelocity, Current};
 
-/// The refusal of a handle whose motor is gone.
+/// The refusal of a handle of a detached motor.
 pub(super) const DETACHED: ConfigError = ConfigError::Unusable("handle of a detached motor");
 use duty::{Action, Duty};
 pub(super) use health::Surroundings;
 
-/// A current that is no sign of a motor that drives itself: a fifth of the full scale of the smallest ESC.
+/// Current of a motor that does not drive itself: a fifth of the full scale of the smallest ESC.
 const CALM_CURRENT: i32 = 2_000;
 
 #[derive(Debug, Clone, Copy)]
@@ -36,12 +36,12 @@ pub(super) struct Slot {
     pub(super) guard: MotorGuard,
     shaft: Shaft,
     rad_per_s_per_rpm: f32,
-    /// What an update does: what is asked for, or nothing while the feedback is late.
+    /// Task of an update: the action, or rest while the feedback is late.
     duty: Duty,
     asked: Action,
     pub(super) place: Place,
     homing: Homing,
-    /// What is left of the full limit.
+    /// Available part of the full limit.
     range: Range,
     full_limit: i16,
     calm_word: u16,
@@ -54,10 +54,10 @@ pub(super) struct Slot {
     ambiguous_gaps: u16,
     generation: u8,
     error_code: u8,
-    /// Below this temperature byte, and below the calm command, the motor need not be looked at closely; 0 unless all was
-    /// well when it was looked at last, and nothing has begun since.
+    /// Below this temperature byte and the calm command, the motor needs no full check. 0 unless the last check found no condition, and no
+    /// condition has begun since.
     cool_below: u8,
-    /// What the last update did.
+    /// Action of the last update.
     acted: Action,
     saturated: u16,
     health: &'static HealthConfig,
@@ -65,7 +65,7 @@ pub(super) struct Slot {
     traffic: Traffic,
 }
 
-/// Where an action goes to. It stands apart from the action, so that an update has one byte to look at.
+/// Goal of an action, separate from the action, so that an update tests only one byte.
 #[derive(Debug, Clone, Copy)]
 struct Goal {
     /// The lower half of the turns, [near](crate::encoder::Shaft::near) to those of the shaft; or bits of the rad/s.
@@ -97,7 +97,7 @@ impl Goal {
         self.turns
     }
 
-    /// A way in rad, and the rate in rad/s that goes with it.
+    /// A way in rad, and its rate in rad/s.
     const fn measured(way: f32, rad_per_s: f32) -> Self {
         Self { turns: rad_per_s.to_bits(), value: way.to_bits().cast_signed() }
     }
@@ -114,12 +114,12 @@ impl Goal {
 /// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
 pub(super) const LONGEST_STEP_S: f32 = 0.02;
 
-/// Returns the time step of an update again, where its values are not at hand.
+/// Returns the time step of an update again, for code without access to its values.
 fn usable(dt_s: f32) -> TimeStep {
     TimeStep::new(dt_s, LONGEST_STEP_S)
 }
 
-/// Stands where a motor has no loop: without gains, its output is zero, and needs no question.
+/// Stands for a missing loop: without gains, the output is zero, and no branch is needed.
 const NO_GAINS: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
 
 const NO_LOOP: Pid = match Pid::new(NO_GAINS) {
@@ -158,7 +158,7 @@ impl Slot {
         traffic: Traffic::NONE,
     };
 
-    /// Tells whether a handle's key names the motor that is here now.
+    /// Tells whether a handle's key names the present motor.
     pub(super) const fn matches(&self, key: Key) -> bool {
         self.facts.is_some() && self.generation == key.generation()
     }
@@ -189,12 +189,12 @@ impl Slot {
         *self = Self { generation: self.generation + 1, ..Self::FREE };
     }
 
-    /// Frees a slot whose handle nobody was given.
+    /// Frees a slot whose handle was never returned.
     pub(super) const fn withdraw(&mut self) {
         *self = Self { generation: self.generation, ..Self::FREE };
     }
 
-    /// Returns the generation of the next motor here, or `None` when there is none left.
+    /// Returns the generation of the next motor here; `None` if all generations are used.
     pub(super) const fn next_generation(&self) -> Option<u8> {
         if self.generation < Key::GENERATIONS { Some(self.generation) } else { None }
     }
@@ -206,15 +206,15 @@ impl Slot {
         }
     }
 
-    /// Returns the id on the ESC, which the place of the command word tells.
+    /// Returns the id on the ESC, computed from the place of the command word.
     const fn id(&self, facts: &Facts) -> u8 {
         let [lower, _] = facts.command;
         let before = if self.place.frame() as u8 == lower as u8 { 0 } else { 4 };
         before + self.place.slot() + 1
     }
 
-    /// Returns what is known; `None` before the first frame.
-    // The compiler leaves out what nobody reads, in line only.
+    /// Returns the state; `None` before the first frame.
+    // Inline only: the compiler then drops the fields without a reader.
     #[inline(always)]
     pub(super) fn state(&self) -> Option<State> {
         let facts = self.facts?;
@@ -245,7 +245,7 @@ impl Slot {
         })
     }
 
-    /// Time did not move on. A free slot loses nothing.
+    /// Handles a time that did not move on. A free slot loses nothing.
     pub(super) fn lose_time(&mut self) {
         if self.facts.is_some() {
             self.guard.lose_time();
@@ -254,8 +254,8 @@ impl Slot {
 
     // Feedback.
 
-    /// Takes a feedback frame that arrived at `now`, shortly after the one before; otherwise does nothing and
-    /// returns `false`. A motor that is not online, and a free slot, trust no gap.
+    /// Takes a feedback frame received at `now`, shortly after the previous one. Otherwise does nothing and returns `false`. A motor that
+    /// is not online, and a free slot, trust no gap.
     #[inline]
     pub(super) fn receive(&mut self, feedback: Feedback, now: u32) -> bool {
         let in_time = self.guard.is_in_time(now);
@@ -269,7 +269,7 @@ impl Slot {
 
     // Targets.
 
-    /// Takes rad/s of the output shaft in place of rad/s: then the motor is armed and has a loop.
+    /// Replaces a target in rad/s of the output shaft by another: a motor with such a target is armed and has a loop.
     #[inline]
     pub(super) fn renew_velocity(&mut self, motor: Key, rad_per_s: f32, now: u32) -> bool {
         let goes_on = self.asked == Action::Velocity
@@ -283,7 +283,7 @@ impl Slot {
         goes_on
     }
 
-    /// Takes turns and angle of the output shaft in place of others, without soft limits.
+    /// Replaces a target in turns and angle of the output shaft by another, without soft limits.
     #[inline]
     pub(super) fn renew_position(&mut self, motor: Key, position: Position, now: u32) -> bool {
         let goes_on = self.asked == Action::Position
@@ -301,9 +301,8 @@ impl Slot {
 
     // Update.
 
-    /// Checks a motor that is well, as it nearly always is: online, cool, turning, no condition and no error. Returns `false` if
-    /// it may be anything else, and has to be [checked](health::check) in full. `elapsed` is the time since its last check, in
-    /// units of 1.024 ms.
+    /// Checks a motor in the usual state: online, cool, turning, no condition and no error. Returns `false` if another state is possible:
+    /// the motor must then be [checked](health::check) in full. `elapsed` is the time since its last check, in units of 1.024 ms.
     #[inline]
     pub(super) fn is_well(&mut self, word: i16, elapsed: u8) -> bool {
         let (feedback, driven) = (self.feedback, i32::from(word));
@@ -321,8 +320,8 @@ impl Slot {
             && self.monitor.follow(feedback.angle(), coarse(word))
     }
 
-    /// Runs the loops of this motor and returns its raw command. `step` is that of `dt_s`: it stays in registers, as only the
-    /// usual way gets to see it.
+    /// Runs the loops of this motor and returns its raw command. `step` is the step of `dt_s`: only the usual path uses `step`, so the step
+    /// stays in registers.
     #[inline]
     pub(super) fn update(&mut self, step: &TimeStep, dt_s: f32, sent: &Outbox) -> i16 {
         let velocity = self.velocity().as_rad_per_s();
@@ -336,7 +335,7 @@ impl Slot {
                 }
             }
             Duty::Raw => return saturate(self.goal.raw(), self.range),
-            // Out of line too: a zero for these would be loaded in every update of every motor.
+            // Out of line too: inline, every update of every motor would load a zero for these.
             Duty::Rest | Duty::First | Duty::Other => return self.update_carefully(dt_s, sent),
         };
         match self.speed.step_plain(goal, velocity, step) {
@@ -345,7 +344,7 @@ impl Slot {
         }
     }
 
-    // Cold, so that the usual way runs straight on; loops with options come here too, and lose nothing but that.
+    // Cold, so that the usual path runs straight on. Loops with options also come here, with no other cost.
     #[cold]
     #[inline(never)]
     fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
@@ -358,7 +357,7 @@ fn needs(is_there: bool) -> Result<(), TargetError> {
     if is_there { Ok(()) } else { Err(TargetError::NoLoop) }
 }
 
-/// Tells whether a value is in ±`limit`, give or take 1, with one comparison for both ends; none is within zero.
+/// Tells whether a value is within ±`limit`, with a tolerance of 1 and one comparison for both ends; with a limit of 0, no value is within.
 const fn is_within(value: i32, limit: i32) -> bool {
     (value + limit).cast_unsigned() < 2 * limit.cast_unsigned()
 }

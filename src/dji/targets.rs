@@ -1,4 +1,4 @@
-//! What an application asks of motors and reads of them: state, health, arming, targets.
+//! Functions of an application: state, health, arming, targets.
 
 use super::slot::{DETACHED, config, gap, health};
 use super::{AnyHandle, Bus, Handle, Model, State, arming, limit, measured, rounds};
@@ -13,7 +13,7 @@ use crate::units::{Angle, AngularVelocity, Current, Voltage};
 
 /// State, health and arming.
 impl<B, const N: usize> Bus<B, N> {
-    /// Returns the state of a motor; `None` before its first frame, and once it is detached. A program pays for the fields in use.
+    /// Returns the state of a motor; `None` before its first frame, and for a detached motor. A program pays only for the fields in use.
     ///
     /// Costs 160 instructions on a Cortex-M4F, when every field is read (`docs/figures.md`).
     #[must_use]
@@ -22,7 +22,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.motors.get(motor.into().key())?.state()
     }
 
-    /// Tells whether a motor is heard; `None` once it is detached.
+    /// Returns the link of a motor; `None` for a detached motor.
     #[must_use]
     pub fn link(&self, motor: impl Into<AnyHandle<B>>) -> Option<Link> {
         Some(self.motors.get(motor.into().key())?.guard.link())
@@ -34,7 +34,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.motors.get(motor.into().key()).is_some_and(|slot| slot.guard.is_armed())
     }
 
-    /// Returns how a motor is; `None` once it is detached.
+    /// Returns the health of a motor; `None` for a detached motor.
     ///
     /// # Examples
     /// ```
@@ -56,7 +56,7 @@ impl<B, const N: usize> Bus<B, N> {
         health::report(self.motors.get(motor.into().key())?)
     }
 
-    /// Returns what is wrong with a motor; nothing once it is detached.
+    /// Returns the conditions of a motor that hold; empty for a detached motor.
     #[must_use]
     pub fn conditions(&self, motor: impl Into<AnyHandle<B>>) -> Conditions {
         self.motors
@@ -64,9 +64,9 @@ impl<B, const N: usize> Bus<B, N> {
             .map_or(Conditions::NONE, |slot| slot.guard.latch().active())
     }
 
-    /// Returns the oldest change of a motor's condition that was not read yet.
+    /// Returns the oldest unread edge of a motor.
     ///
-    /// No change is lost; while one waits, the same change is not noted again. Beyond 12, the order is that of the motors.
+    /// No edge is lost. While an edge waits, the same change is not noted again. Beyond 12 edges, the order is that of the motors.
     ///
     /// Costs 6 instructions on a Cortex-M4F, when none waits (`docs/figures.md`).
     ///
@@ -97,9 +97,9 @@ impl<B, const N: usize> Bus<B, N> {
         }
     }
 
-    /// Arms every motor: nothing moves before. After a trip, arming is granted only when nobody asked for 100 ms of updates.
+    /// Arms every motor: before, all outputs are zero. After a trip, arming is granted only after 100 ms of updates without a request.
     ///
-    /// `now` is the time of the present tick: an update before it counts as a clock that went back.
+    /// `now` is the time of the present tick: an update before `now` counts as a set-back of the clock.
     ///
     /// # Errors
     /// As [`Devices::arm`].
@@ -116,7 +116,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.outbox.clear();
     }
 
-    /// Tells whether every motor takes targets: false as long as one of them waits to be armed.
+    /// Tells whether every motor takes targets: false if any motor waits to be armed.
     #[must_use]
     pub fn is_armed(&self) -> bool {
         arming::is_armed(&self.motors.slots)
@@ -140,12 +140,12 @@ impl<B, const N: usize> Bus<B, N> {
         self.motors.guard.is_stopped()
     }
 
-    /// Arms these motors only, whatever the others do.
+    /// Arms only these motors; the others stay as before.
     ///
     /// In a device of several families, check [`clash`](Devices::clash) of the whole first.
     ///
     /// # Errors
-    /// As [`Devices::arm`], which arms all: names those of `motors` that are not heard, or not fit to be driven.
+    /// As [`Devices::arm`], which arms all motors. Names the motors among `motors` that are not online, or not fit to be driven.
     ///
     /// # Examples
     /// ```
@@ -167,14 +167,14 @@ impl<B, const N: usize> Bus<B, N> {
     }
 }
 
-/// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
-/// ([`Timeouts::command`](crate::motor::Timeouts::command)): an application that stops setting targets stops the motor.
+/// Targets. Each replaces the previous one, works in RAM only, and counts until the command deadline
+/// ([`Timeouts::command`](crate::motor::Timeouts::command)): if an application stops setting targets, the motor stops.
 ///
 /// All take the direction of the output shaft, and saturate at the limits of the motor.
 ///
 /// # Errors
-/// Each fails, and the value is not kept for later, when the motor is detached, not armed, relaxed by a fault or
-/// not heard, when it has not the loop that it needs, and for NaN or infinity, which takes the present target away.
+/// A target fails, and is not kept for later, if the motor is detached, not armed, relaxed by a fault or not online, or if the motor has no
+/// loop for this target. NaN or infinity also fails, and cancels the present target.
 impl<B, const N: usize> Bus<B, N> {
     /// Sets a torque current.
     ///
@@ -208,7 +208,7 @@ impl<B, const N: usize> Bus<B, N> {
         self.motors.set(motor.into().key(), |slot, now| slot.set_raw(raw, now))
     }
 
-    /// Sets the velocity that the speed loop follows.
+    /// Sets the velocity for the speed loop.
     ///
     /// Costs 27 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
@@ -228,10 +228,10 @@ impl<B, const N: usize> Bus<B, N> {
         )
     }
 
-    /// Sets the absolute angle that the position loop goes to, by the shortest way: 350° to 10° is +20°.
+    /// Sets the absolute angle for the position loop, by the shortest way: 350° to 10° is +20°.
     ///
     /// # Errors
-    /// See above; also when the angle of a geared motor is not known, see [`zero`](Self::zero).
+    /// See above. Also fails while the angle of a geared motor is unknown, see [`zero`](Self::zero).
     pub fn set_angle(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -241,7 +241,7 @@ impl<B, const N: usize> Bus<B, N> {
             .set(motor.into().key(), |slot, now| slot.set_angle(Position::from_angle(angle), now))
     }
 
-    /// Sets the multi-turn position that the position loop goes to; within the soft limits, where there are some.
+    /// Sets the multi-turn position for the position loop, clamped to the soft limits if there are any.
     ///
     /// Costs 73 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
@@ -260,7 +260,7 @@ impl<B, const N: usize> Bus<B, N> {
         )
     }
 
-    /// Takes the target away: zero output from the next update on, loops reset. The motor stays armed; pending frames are sent.
+    /// Discards the target: zero output from the next update on, loops reset. The motor stays armed; pending frames are sent.
     pub fn relax(&mut self, motor: impl Into<AnyHandle<B>>) {
         if let Some(slot) = self.motors.get_mut(motor.into().key()) {
             slot.relax();
@@ -269,15 +269,15 @@ impl<B, const N: usize> Bus<B, N> {
 
     /// Makes the present position of a motor zero: from then on its angle is known.
     ///
-    /// A motor that holds an angle or position is relaxed, because its target was given in the old terms.
+    /// A motor that holds an angle or position is relaxed, because its target refers to the old zero.
     ///
     /// # Errors
-    /// When the motor is detached, or not heard: where it is now is not known then.
+    /// The motor is detached, or not online: its position is then unknown.
     pub fn zero(&mut self, motor: impl Into<AnyHandle<B>>) -> Result<(), TargetError> {
         self.set_present_position(motor, Position::ZERO)
     }
 
-    /// Calls the present position of a motor `position`; see [`zero`](Self::zero).
+    /// Sets the present position of a motor to `position`; see [`zero`](Self::zero).
     ///
     /// # Errors
     /// As [`zero`](Self::zero); also for NaN or infinity.
@@ -290,10 +290,10 @@ impl<B, const N: usize> Bus<B, N> {
             .change_present(motor.into().key(), |slot| gap::set_present_position(slot, position))
     }
 
-    /// Changes the speed loop of a motor while it runs, without a jump of its output.
+    /// Changes the speed loop of a running motor, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that `attach` would refuse, or a handle without motor or loop. The loop is then as it was.
+    /// Names the parameter that `attach` would refuse, or a handle without motor or loop. The loop stays as before.
     pub fn set_speed_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -303,10 +303,10 @@ impl<B, const N: usize> Bus<B, N> {
         config::set_speed_loop(slot, config)
     }
 
-    /// Changes the position loop of a motor while it runs, without a jump of its output.
+    /// Changes the position loop of a running motor, without a jump of its output.
     ///
     /// # Errors
-    /// Names the parameter that `attach` would refuse, or a handle without motor or loop. The loop is then as it was.
+    /// Names the parameter that `attach` would refuse, or a handle without motor or loop. The loop stays as before.
     pub fn set_position_loop(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -316,7 +316,7 @@ impl<B, const N: usize> Bus<B, N> {
         config::set_position_loop(slot, config)
     }
 
-    /// Returns what a motor offers with the loops that it was attached with; nothing once it is detached.
+    /// Returns the capabilities of a motor with its configured loops; empty for a detached motor.
     ///
     /// # Examples
     /// ```
@@ -337,13 +337,13 @@ impl<B, const N: usize> Bus<B, N> {
         self.motors.get(motor.into().key()).map_or(Capabilities::NONE, config::capabilities)
     }
 
-    /// Sets the angle that the position loop goes to by another sensor, by the shortest way.
+    /// Sets the angle for the position loop, measured by another sensor, by the shortest way.
     ///
     /// The angle of the encoder may be unknown; see the [module](super), and the example `gimbal`.
     ///
     /// # Errors
-    /// Those of every target; also for a measurement that is too old, lies ahead by as much, or is not finite: the
-    /// motor then goes to its safe output at once.
+    /// As for every target. Also fails for a measurement that is too old, lies ahead by as much, or is not finite: the output is then zero
+    /// at once.
     pub fn set_angle_measured(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -354,7 +354,7 @@ impl<B, const N: usize> Bus<B, N> {
         measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
     }
 
-    /// Sets the multi-turn position that the position loop goes to by another sensor.
+    /// Sets the multi-turn position for the position loop, measured by another sensor.
     ///
     /// # Errors
     /// As [`set_angle_measured`](Self::set_angle_measured).
@@ -368,9 +368,9 @@ impl<B, const N: usize> Bus<B, N> {
         measured::set(&mut self.motors, motor.into().key(), way, measured.velocity, measured.at)
     }
 
-    /// Returns the current that the last update asks of a motor, as it goes on the wire; `None` once it is detached.
+    /// Returns the commanded current of the last update, as on the wire; `None` for a detached motor.
     ///
-    /// The direction is that of the shaft. What the motor does about it is in [`State::current`](super::State::current).
+    /// The direction is that of the shaft. [`State::current`](super::State::current) is the measured current.
     #[must_use]
     pub fn commanded_current<M: Model<Command = Current>>(
         &self,
@@ -380,7 +380,7 @@ impl<B, const N: usize> Bus<B, N> {
         Some(Current::from_amperes(slot.in_units(self.outbox.get(slot.place))))
     }
 
-    /// Cuts what the last update asks of some motors, all by one factor: for a limit on several together, of power say.
+    /// Scales the commands of the last update for some motors by one factor: for a common limit, for example of power.
     ///
     /// Call it after [`update`](Self::update) and before [`next_frame`](Self::next_frame); with a runner, in
     /// [`tick_limited`](crate::runner::Runner::tick_limited). A factor of 1 or more changes nothing, a factor of zero, below zero or

@@ -4,8 +4,8 @@ use core::f32::consts::TAU;
 
 /// Gains of a speed loop of another program: command words per rpm.
 ///
-/// Programs for these motors work in the numbers of the frames. [`speed_loop`](Self::speed_loop) converts their gains to A, or V
-/// in voltage mode, per rad/s of the output shaft. By hand, with the gearbox and the full scale that the motor is sold with:
+/// Programs for these motors work in the numbers of the frames. [`speed_loop`](Self::speed_loop) converts their gains to A, or V in voltage
+/// mode, per rad/s of the output shaft. By hand, with the gearbox and the full scale of the motor as sold:
 ///
 /// | `kp`, `ki`, `kd` of a speed loop, in command words per | M2006 | M3508 | GM6020 (voltage) | GM6020 (current) |
 /// |---|--:|--:|--:|--:|
@@ -15,15 +15,14 @@ use core::f32::consts::TAU;
 /// | of any loop | multiply by |
 /// |---|--:|
 /// | limit of output or integral, in command words | full scale / full word: 20 A / 16384 for an M3508 |
-/// | `ki` of a program that adds up the errors without the time between them | steps a second |
+/// | `ki` of a program that sums the errors without the time between them | steps a second |
 /// | `kd` of such a program | seconds a step |
 /// | position loop over a speed loop, rpm of the rotor per count of its encoder | 136.5 (8192 / 60) |
 /// | position loop over a speed loop, rpm per degree, both of one shaft | 6 |
 ///
-/// Gains that were not converted are seldom refused. A `kp` of 10 words per rpm of the output shaft is 0.117 A per rad/s for
-/// an M3508. The same number in A per rad/s is 86 times as much, yet a possible loop: an error of one rpm of the rotor asks for
-/// 0.055 A. `attach` refuses a `kp` above 3667 A per rad/s, with which this error asks for more than the 20 A that there are, and
-/// tells both numbers.
+/// Unconverted gains are seldom refused. A `kp` of 10 words per rpm of the output shaft is 0.117 A per rad/s for an M3508. The same number
+/// in A per rad/s is 86 times as much, yet a possible loop: an error of one rpm of the rotor then commands 0.055 A. `attach` refuses a `kp`
+/// above 3667 A per rad/s, for which this error would command more than the full 20 A, and names both numbers.
 ///
 /// # Examples
 /// A wheel whose loop had `kp` 10 and `ki` 0.5, in words per rpm of the output shaft, with the time in seconds:
@@ -53,7 +52,7 @@ pub struct WordGains {
 }
 
 impl WordGains {
-    /// Takes gains in command words per rpm of the rotor, as the feedback frame has it: `ki` a second, `kd` in seconds.
+    /// Takes gains in command words per rpm of the rotor, as in the feedback frame: `ki` a second, `kd` in seconds.
     #[must_use]
     pub const fn per_rotor_rpm(kp: f32, ki: f32, kd: f32) -> Self {
         Self { kp, ki, kd, of_rotor: true }
@@ -65,8 +64,7 @@ impl WordGains {
         Self { kp, ki, kd, of_rotor: false }
     }
 
-    /// Takes gains in command words per degree/s of the rotor, as `basic_framework` and its descendants have them: `ki` a second, `kd`
-    /// in seconds.
+    /// Takes gains in command words per degree/s of the rotor, as in `basic_framework` and its descendants: `ki` a second, `kd` in seconds.
     ///
     /// # Examples
     /// ```
@@ -86,8 +84,8 @@ impl WordGains {
         )
     }
 
-    /// Takes `ki` and `kd` as those of a program that runs every `dt_s` seconds and knows of no time: it adds the error up, and
-    /// takes the difference to the step before.
+    /// Takes `ki` and `kd` as those of a program that runs every `dt_s` seconds without a measure of time: such a program sums the error,
+    /// and uses the difference to the previous step.
     ///
     /// `dt_s` must be finite and above zero; otherwise `attach` refuses the loop.
     ///

@@ -3,10 +3,10 @@ use crate::time::Duration;
 use crate::units::AngularVelocity;
 use crate::wire::referee::BarrelHeat;
 
-/// The most chambers of a loader, and the most shots in 1 s.
+/// Largest number of chambers of a loader, and of shots in 1 s.
 const MOST: f32 = 64.0;
 
-/// The geometry of a shooter and the limits that it keeps.
+/// Geometry and limits of a shooter.
 ///
 /// | parameter | default |
 /// |---|---|
@@ -62,7 +62,7 @@ impl ShooterConfig {
         }
     }
 
-    /// Sets by which share of their speed the wheels may be off when a shot is let go.
+    /// Sets the largest error of the wheels, as a share of their speed, at which a shot is released.
     #[must_use]
     pub const fn with_tolerance(self, share: f32) -> Self {
         Self { tolerance: share, ..self }
@@ -74,37 +74,38 @@ impl ShooterConfig {
         Self { heat_of_shot: of_shot, reserve: Some(reserve), ..self }
     }
 
-    /// Sets the time after which a loader that is driven and stands counts as jammed.
+    /// Sets the time after which a driven loader at standstill counts as jammed.
     #[must_use]
     pub const fn with_jam_after(self, time: Duration) -> Self {
         Self { jam_s: time.as_secs_f32(), ..self }
     }
 
-    /// Sets how often a jam of one shot is cleared before the shooter stops with [`Jammed`](super::ShooterFault::Jammed).
+    /// Sets the number of attempts to clear a jam of one shot. After the last, the shooter stops with
+    /// [`Jammed`](super::ShooterFault::Jammed).
     #[must_use]
     pub const fn with_tries(self, tries: u8) -> Self {
         Self { tries, ..self }
     }
 
-    /// Sets the speed of the loader per way to its goal, in rad/s per rad.
+    /// Sets the gain of the loader: speed per distance to its goal, in rad/s per rad.
     #[must_use]
     pub const fn with_loader_gain(self, per_s: f32) -> Self {
         Self { gain_per_s: per_s, ..self }
     }
 
-    /// Sets limit and cooling that hold while the referee system is silent, for practice; the heat in it does not count.
+    /// Sets limit and cooling for practice, while the referee system is silent. The field `heat` is ignored.
     #[must_use]
     pub const fn with_heat_without_referee(self, heat: BarrelHeat) -> Self {
         Self { without_referee: Some(heat), ..self }
     }
 
-    /// Returns the speed of the loader while it feeds.
+    /// Returns the feeding speed of the loader.
     #[must_use]
     pub const fn feed_velocity(&self) -> AngularVelocity {
         AngularVelocity::from_rad_per_s(self.shots_per_s * self.pitch_rad())
     }
 
-    /// Returns the way of the loader from one chamber to the next.
+    /// Returns the angle between two chambers of the loader.
     pub(super) const fn pitch_rad(&self) -> f32 {
         core::f32::consts::TAU / self.chambers as f32
     }

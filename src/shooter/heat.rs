@@ -1,8 +1,8 @@
 use crate::wire::referee::BarrelHeat;
 
-/// Heat of the barrel: the larger of the report of the referee system and of the sum over shots that were let go.
+/// Heat of the barrel: the larger of the referee system's report and of the sum over released shots.
 ///
-/// The heat of a shot that was counted twice cools down like any other. The heat of a shot that was missed is in the next report.
+/// Heat of a shot counted twice cools down like any other. Heat of a missed shot is in the next report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Heat {
@@ -15,7 +15,7 @@ impl Heat {
         Self { heat: 0.0, limit: None }
     }
 
-    /// Cools for `dt_s` seconds, and takes a report; without one, limit and cooling of `without`.
+    /// Cools for `dt_s` seconds, and takes a report. Without a report, limit and cooling are those of `without`.
     pub(super) fn update(
         &mut self,
         report: Option<BarrelHeat>,
@@ -31,7 +31,7 @@ impl Heat {
         }
     }
 
-    /// Takes the heat of a shot if it fits below the limit with the reserve, and tells whether.
+    /// Adds the heat of a shot if the sum and the reserve are at most the limit. Returns whether the heat was added.
     pub(super) fn take(&mut self, of_shot: u16, reserve: u16) -> bool {
         let after = self.heat + f32::from(of_shot);
         let fits = self.limit.is_some_and(|limit| after + f32::from(reserve) <= f32::from(limit));

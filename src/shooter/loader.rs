@@ -2,31 +2,31 @@ use super::state::LoaderFeedback;
 use crate::encoder::Position;
 use core::f32::consts::TAU;
 
-/// A shot counts when so much of a chamber's way is left.
+/// Share of a chamber's angle below which the shot counts.
 const COUNTED_SHARE: f32 = 0.1;
-/// The next shot may be let go when so much of a chamber's way is left: the loader then need not slow down between them.
+/// Share of a chamber's angle below which the next shot may be released: the loader then need not slow down between two shots.
 const NEXT_SHARE: f32 = 0.5;
-/// A loader stands when it is slower than this share of its target.
+/// Share of its target speed below which a loader counts as standing.
 const STANDS_SHARE: f32 = 0.2;
-/// The longest time for the way back.
+/// Longest time of the turn back.
 const BACK_S: f32 = 0.2;
-/// The way back, in chambers.
+/// Length of the turn back, in chambers.
 const BACK_SHARE: f32 = 0.5;
 
 /// Result of a step of the loader.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Feed {
-    /// No shot is on its way.
+    /// No shot is in the loader.
     Idle,
-    /// Turns to its goal at so many rad/s.
+    /// Turns to the goal at this speed in rad/s.
     Forward(f32),
-    /// Turns back at so many rad/s.
+    /// Turns back at this speed in rad/s.
     Back(f32),
-    /// Stood again after the last try.
+    /// Stood again after the last attempt.
     Jammed,
 }
 
-/// A chamber of the grid, as turns and chambers since the first: a count of chambers would have to be divided, by 64 bits.
+/// A chamber of the grid, as turns and chambers since the first. A count of chambers alone would need a 64-bit division.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Chamber {
@@ -37,7 +37,7 @@ struct Chamber {
 impl Chamber {
     const FIRST: Self = Self { turns: 0, within: 0 };
 
-    /// Returns the one that is so many further on.
+    /// Returns the chamber `more` further on.
     const fn after(self, more: u8, chambers: u8) -> Self {
         let mut chamber = self;
         let mut left = more;
@@ -50,7 +50,7 @@ impl Chamber {
         chamber
     }
 
-    /// Returns the one that is so many before.
+    /// Returns the chamber `less` before.
     const fn before(self, less: u8, chambers: u8) -> Self {
         let mut chamber = self;
         let mut left = less;
@@ -64,18 +64,18 @@ impl Chamber {
     }
 }
 
-/// The chambers of the loader, counted from where it stood first. The grid is exact over any number of turns.
+/// Chambers of the loader, counted from its first position. The grid is exact over any number of turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Loader {
     chambers: u8,
     tries_allowed: u8,
     home: Option<Position>,
-    /// The last chamber that is past, and how many are to follow: shots that were let go.
+    /// The last chamber passed, and the number of chambers to follow: released shots.
     counted: Chamber,
     waiting: u8,
     stood_s: f32,
-    /// Rest of the time for the way back in s, and the way to the goal in rad when the way back began.
+    /// Rest of the time for the turn back in s, and distance to the goal in rad at its beginning.
     back: Option<(f32, f32)>,
     tries: u8,
 }
@@ -94,7 +94,7 @@ impl Loader {
         }
     }
 
-    /// Drops what is on its way.
+    /// Drops pending shots.
     pub(super) fn stop(&mut self) {
         self.waiting = 0;
         self.stood_s = 0.0;
@@ -102,8 +102,8 @@ impl Loader {
         self.tries = 0;
     }
 
-    /// Begins where the loader stands. The grid stays, so a chamber that was begun is finished by the next shot; if the loader is far
-    /// from where it was, the grid begins anew.
+    /// Begins at the present position. The grid stays, so the next shot completes a chamber already begun. If the loader is far from its
+    /// last position, the grid begins anew.
     pub(super) fn start(&mut self, position: Position) {
         self.stop();
         let passed = COUNTED_SHARE - self.way_rad(position, self.counted) / self.pitch_rad();
@@ -124,7 +124,7 @@ impl Loader {
         self.waiting > 0
     }
 
-    /// Tells whether one more shot may be let go without the loader losing its way.
+    /// Tells whether the loader can accept one more shot without losing its position in the grid.
     pub(super) fn takes_next(&self, position: Position) -> bool {
         self.back.is_none()
             && self.way_rad(position, self.ahead(self.waiting)) < NEXT_SHARE * self.pitch_rad()
@@ -134,7 +134,7 @@ impl Loader {
         self.waiting = self.waiting.saturating_add(1);
     }
 
-    /// Turns to the chamber that is due. Returns what to do, and how many shots were counted.
+    /// Turns to the due chamber. Returns the motion of the loader, and the number of shots counted.
     pub(super) fn step(
         &mut self,
         feedback: &LoaderFeedback,
@@ -185,7 +185,7 @@ impl Loader {
         self.counted.after(more, self.chambers)
     }
 
-    /// Returns the way from a position to a chamber in rad; positive if it lies ahead. Far away it saturates.
+    /// Returns the distance from a position to a chamber in rad, positive if the chamber lies ahead. Large distances saturate.
     fn way_rad(&self, position: Position, chamber: Chamber) -> f32 {
         const FAR: i64 = 1 << 20;
         let Some(home) = self.home else { return 0.0 };

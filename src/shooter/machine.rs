@@ -8,11 +8,11 @@ use crate::error::ConfigError;
 use crate::time::Tick;
 use crate::units::AngularVelocity;
 
-/// The wheels are ready when they were within the tolerance for so long.
+/// Time within the tolerance after which the wheels are ready.
 const SETTLED_S: f32 = 0.02;
 /// The longest time to spin up.
 const SPIN_UP_S: f32 = 3.0;
-/// A longer time step is no time step: the shooter rests for that tick.
+/// Longest usable time step: for a longer one, the shooter rests for that tick.
 const LONGEST_STEP_S: f32 = 0.1;
 
 /// Two friction wheels and a loader: see the [module](crate::shooter).
@@ -53,7 +53,7 @@ pub struct Shooter {
     state: ShooterState,
     loader: Loader,
     heat: Heat,
-    /// Shots of the burst that were not let go yet.
+    /// Shots of the burst not yet released.
     ordered: u8,
     /// Whether the trigger was released since the shooter was armed, and since the last burst.
     is_released: bool,
@@ -66,7 +66,7 @@ impl Shooter {
     /// Takes a configuration.
     ///
     /// # Errors
-    /// Names the parameter that cannot work.
+    /// Names the unusable parameter.
     pub const fn new(config: ShooterConfig) -> Result<Self, ConfigError> {
         match config.validate() {
             Ok(()) => Ok(Self {
@@ -84,10 +84,10 @@ impl Shooter {
         }
     }
 
-    /// Takes order and feedback of a tick, and returns the speeds for the motors.
+    /// Takes order and feedback of a tick, and returns the target speeds of the motors.
     ///
-    /// While the robot is disarmed, everything stands and nothing waits. If the time step is not a positive number up to 0.1 s,
-    /// everything stands for that tick, and nothing else changes.
+    /// While the robot is disarmed, all motors stand and no shot waits. If the time step is not a positive number up to 0.1 s, all motors
+    /// stand for that tick, and nothing else changes.
     pub fn update(
         &mut self,
         order: ShooterOrder,
@@ -135,7 +135,7 @@ impl Shooter {
         self.feed(&loader, is_settled, is_kept_waiting, dt_s)
     }
 
-    /// Tells whether the wheels are at their speed, and have been.
+    /// Tells whether the wheels have been at their speed for the settling time.
     fn settle(&mut self, wheels: [AngularVelocity; 2], dt_s: f32) -> Result<bool, ShooterFault> {
         let target = self.config.wheels.as_rad_per_s();
         let allowed = self.config.tolerance * target;
@@ -154,7 +154,7 @@ impl Shooter {
         if self.spinning_up_s > SPIN_UP_S { Err(ShooterFault::WheelSlow) } else { Ok(false) }
     }
 
-    /// Lets the next shot of the burst go if wheels, loader and heat allow it. Tells whether heat is what keeps it waiting.
+    /// Releases the next shot of the burst if wheels, loader and heat allow. Returns whether a shot waits for the heat alone.
     fn let_go(&mut self, is_settled: bool, loader: &LoaderFeedback) -> bool {
         if self.ordered == 0 || !is_settled || !self.loader.takes_next(loader.position) {
             return false;
@@ -207,25 +207,25 @@ impl Shooter {
         ShooterTargets::REST
     }
 
-    /// Returns what the shooter does.
+    /// Returns the state of the shooter.
     #[must_use]
     pub const fn state(&self) -> ShooterState {
         self.state
     }
 
-    /// Returns the number of shots since it was made; stays at the largest.
+    /// Returns the number of shots since construction, saturating.
     #[must_use]
     pub const fn shots(&self) -> u32 {
         self.shots
     }
 
-    /// Returns how often the jam of the shot that is due was cleared.
+    /// Returns the number of attempts to clear the jam of the due shot.
     #[must_use]
     pub const fn tries(&self) -> u8 {
         self.loader.tries()
     }
 
-    /// Returns the heat of the barrel: the reported one, or more by the shots since.
+    /// Returns the heat of the barrel: the reported heat, plus the heat of later shots.
     #[must_use]
     pub const fn heat(&self) -> f32 {
         self.heat.get()

@@ -1,4 +1,4 @@
-//! A shooter for balls: two friction wheels and a loader that counts, clears a jam, and keeps the heat limit of the barrel.
+//! A shooter for balls: two friction wheels and a loader. Counts shots, clears jams, and keeps the heat limit of the barrel.
 //!
 //! ```text
 //!  pilot ── order ──┐                                     ┌── speed of both wheels
@@ -6,20 +6,20 @@
 //!  referee ── heat ─┘                                     └── speed of the loader
 //! ```
 //!
-//! The module knows no bus and no motor: it takes feedback and returns target speeds ([`ShooterTargets`]). A motor of any family
-//! fits that offers a velocity loop and a position of its shaft over many turns.
+//! The module is independent of bus and motor: from feedback to target speeds ([`ShooterTargets`]). A motor of any family fits, if its
+//! drive has a velocity loop and a position of the shaft over many turns.
 //!
 //! | state | wheels | loader | left when |
 //! |---|---|---|---|
 //! | [`Rest`](ShooterState::Rest) | 0 | 0 | an order other than `Rest`, while armed |
 //! | [`SpinningUp`](ShooterState::SpinningUp) | speed | 0 | both wheels are within 1 % for 20 ms |
-//! | [`Ready`](ShooterState::Ready) | speed | 0 | a shot is let go |
+//! | [`Ready`](ShooterState::Ready) | speed | 0 | a shot is released |
 //! | [`Feeding`](ShooterState::Feeding) | speed | turns to the next chamber | the shot is counted, or the loader stands for 100 ms |
 //! | [`Clearing`](ShooterState::Clearing) | speed | turns half a chamber back | the way back is done, or 200 ms |
 //! | [`Cooling`](ShooterState::Cooling) | speed | 0 | the next shot fits below the heat limit |
 //! | [`Fault`](ShooterState::Fault) | 0 | 0 | the order is `Rest`, or the robot is disarmed |
 //!
-//! The shooter lets a shot go when the wheels are within 1 % and the heat of the shot fits below the limit. The heat counts from then on,
+//! The shooter releases a shot when the wheels are within 1 % and the heat of the shot fits below the limit. The heat counts from then on,
 //! before the referee system reports it: a burst then does not exceed the limit during the 100 ms between two reports.
 //!
 //! ```
@@ -38,8 +38,8 @@
 //! # Ok::<(), drivetrain::error::ConfigError>(())
 //! ```
 //!
-//! Limits: a shot is counted by the way of the loader, so a chamber without a ball counts too; the speed of the ball is not
-//! regulated. Attach one of two wheels that turn against each other as `reversed`: both have one target here.
+//! Limits: a shot is counted by the rotation of the loader, so a chamber without a ball counts too. The speed of the ball is not regulated.
+//! Both wheels have the same target: attach one of two counter-rotating wheels as `reversed`.
 
 mod config;
 mod heat;

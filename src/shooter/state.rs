@@ -10,12 +10,12 @@ pub enum ShooterOrder {
     /// Wheels and loader stand. Clears a fault.
     #[default]
     Rest,
-    /// The wheels turn, and nothing is shot.
+    /// The wheels turn, and the loader stands.
     Spin,
-    /// The wheels turn, and the shooter lets this number of shots go: 1 for a single shot, 255 for long fire.
+    /// The wheels turn, and the shooter releases this number of shots: 1 for a single shot, 255 for continuous fire.
     ///
-    /// A burst begins when the order changes to `Fire`. While the order stays, no further shot follows. When the order changes back,
-    /// the rest of the burst is dropped. If the trigger was held while the robot was armed, it has to be released first.
+    /// A burst begins when the order changes to `Fire`. While the order stays, no further shot follows. When the order changes back, the
+    /// rest of the burst is dropped. If the trigger was held while the robot was armed, release the trigger first.
     Fire(u8),
 }
 
@@ -25,19 +25,19 @@ pub enum ShooterOrder {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum ShooterState {
-    /// Everything stands.
+    /// All motors stand.
     Rest,
-    /// The wheels are not at their speed yet, or no longer.
+    /// The wheels are not yet at their speed, or no longer.
     SpinningUp,
     /// The wheels are at their speed.
     Ready,
-    /// A shot is on its way through the loader.
+    /// A shot moves through the loader.
     Feeding,
-    /// The loader turns back, because it stood.
+    /// The loader turns back after a jam.
     Clearing,
     /// A shot waits until the barrel is cool enough, or until its heat is known.
     Cooling,
-    /// Everything stands until the order is [`ShooterOrder::Rest`], or the robot is disarmed.
+    /// All motors stand until the order is [`ShooterOrder::Rest`], or the robot is disarmed.
     Fault(ShooterFault),
 }
 
@@ -53,7 +53,7 @@ pub enum ShooterFault {
     WheelSlow,
     /// The loader has no fresh feedback.
     LoaderLost,
-    /// The loader stood again after all tries to clear it.
+    /// The loader stood again after the last attempt to clear it.
     Jammed,
 }
 
@@ -72,19 +72,19 @@ impl core::fmt::Display for ShooterFault {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LoaderFeedback {
-    /// Turns and angle, from any zero; the direction that feeds is positive.
+    /// Turns and angle, from any zero; positive in the feeding direction.
     pub position: Position,
-    /// Speed.
+    /// Speed, positive in the feeding direction.
     pub velocity: AngularVelocity,
 }
 
-/// Feedback that a shooter takes in each tick. The default is a robot that is disarmed and has no feedback.
+/// Feedback for one tick of a shooter. The default is a disarmed robot without feedback.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ShooterFeedback {
     /// Whether all three motors may be driven.
     pub is_armed: bool,
-    /// Speeds of the friction wheels; `None` without fresh feedback. The direction that shoots is positive.
+    /// Speeds of the friction wheels, positive in the shooting direction; `None` without fresh feedback.
     pub wheels: [Option<AngularVelocity>; 2],
     /// The loader; `None` without fresh feedback.
     pub loader: Option<LoaderFeedback>,
@@ -92,17 +92,17 @@ pub struct ShooterFeedback {
     pub heat: Option<BarrelHeat>,
 }
 
-/// The target speeds of a shooter's motors.
+/// Target speeds of a shooter's motors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ShooterTargets {
-    /// Of both friction wheels; the direction that shoots is positive.
+    /// Both friction wheels, positive in the shooting direction.
     pub wheels: AngularVelocity,
-    /// Of the loader; the direction that feeds is positive.
+    /// The loader, positive in the feeding direction.
     pub loader: AngularVelocity,
 }
 
 impl ShooterTargets {
-    /// Everything stands.
+    /// All motors stand.
     pub const REST: Self = Self { wheels: AngularVelocity::ZERO, loader: AngularVelocity::ZERO };
 }

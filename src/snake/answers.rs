@@ -1,18 +1,18 @@
-//! Who owes an answer: by id, as an answer may come after its joint was detached.
+//! Outstanding replies, by id: a reply may arrive after its joint was detached.
 
 use super::bus::SLOTS;
 use super::counters::count;
 use super::{Joints, Register};
 use crate::time::{Duration, Instant};
 
-/// What each joint was asked for and has not answered.
+/// Requests without a reply, one place per joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Answers([Owed; SLOTS]);
 
 #[derive(Debug, Clone, Copy)]
 struct Owed {
     due: Option<(Register, Instant)>,
-    /// Questions that were given up and not answered since, a bit each: a driver may still hold them.
+    /// Requests that expired and were not answered since, one bit each: a driver may still hold them.
     given_up: u32,
 }
 
@@ -34,7 +34,7 @@ impl Answers {
         }
     }
 
-    /// Takes an answer: none is due any more, unless it was another.
+    /// Takes a reply: the outstanding one, or a reply for another register.
     pub(super) fn take(&mut self, index: usize, register: Register) {
         if let Some(owed) = self.0.get_mut(index) {
             owed.given_up &= !bit(register);
@@ -42,26 +42,26 @@ impl Answers {
         }
     }
 
-    /// Takes back a question that was not sent; `false` when it is one that was given up, or may be: then the answer to
-    /// another is still due.
+    /// Takes back a request that was not sent. Returns `false` if the request expired before, or may have: the reply to another request is
+    /// then still outstanding.
     pub(super) fn take_back(&mut self, index: usize, register: Register) -> bool {
         let Some(owed) = self.0.get_mut(index) else { return false };
         let is_given_up = owed.given_up & bit(register) != 0;
         owed.due.take_if(|(asked, _)| *asked == register && !is_given_up).is_some()
     }
 
-    /// Returns the joints that owe one, a bit each.
+    /// Returns the joints with an outstanding reply, one bit each.
     pub(super) fn owing(&self) -> u16 {
         (0..).zip(&self.0).map(|(index, owed)| u16::from(owed.due.is_some()) << index).sum()
     }
 }
 
-/// Waits no longer for what is overdue. Without a time-out all is.
+/// Drops overdue replies; without a time-out, drops all.
 pub(super) fn give_up(joints: &mut Joints, reply_timeout: Option<Duration>) {
     let now = joints.now;
     for (owed, slot) in joints.answers.0.iter_mut().zip(&mut joints.slots) {
         let Some((register, since)) = owed.due else { continue };
-        // A clock that was set back would have it wait for long.
+        // After a set-back of the clock, the time since the request alone would delay the expiry for long.
         let passed = now.since(since).max(since.since(now));
         if reply_timeout.is_none_or(|timeout| passed > timeout) {
             *owed = Owed { due: None, given_up: owed.given_up | bit(register) };

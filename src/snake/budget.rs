@@ -1,8 +1,8 @@
-//! How full the bus is.
+//! Load of the bus.
 
 use crate::motor::BusLoad;
 
-/// How many frames an update gives to send, and what the load is reckoned with.
+/// Number of frames in an update, and the rates for the load.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     pub(super) reads: u8,
@@ -16,7 +16,7 @@ impl Budget {
         Self { reads: 1, writes: 1, bit_rate: 1_000_000, tick_hz: 1_000 }
     }
 
-    /// Returns the load of requests, their replies, and writes, while all joints move.
+    /// Returns the load of requests, replies and writes, while all joints move.
     pub(super) const fn load(&self) -> BusLoad {
         let Self { reads, writes, bit_rate, tick_hz } = *self;
         BusLoad::new(bit_rate).with_frames_of(2, reads as u32, tick_hz).with_frames_of(

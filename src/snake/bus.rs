@@ -13,16 +13,16 @@ use embedded_can::Frame;
 
 pub(super) const SLOTS: usize = IDS as usize;
 
-/// A stop waits for an answer that is due: longer than this it must not.
+/// Upper bound on how long a stop may wait for an outstanding reply.
 const LONGEST_REPLY: Duration = Duration::from_millis(10);
 
-/// Any time step is right here: the loops are in the drives.
+/// Any time step is usable: the loops are in the drives.
 const ANY_STEP_S: f32 = f32::INFINITY;
 
 /// The joints of one CAN bus, and the frames for them.
 ///
-/// It owns the joints; [`attach`](Self::attach) returns a `Copy` handle for each. What is polled and written when is said
-/// in the [module](super). It can stand in a `static`.
+/// Owns the joints; [`attach`](Self::attach) returns a `Copy` handle for each. The [module](super) describes the order of requests and
+/// writes. A bus can be a `static`.
 ///
 /// # Examples
 /// ```
@@ -60,29 +60,29 @@ pub struct Joints {
     reply_timeout: Duration,
     pub(super) answers: Answers,
     pub(super) budget: Budget,
-    /// Joints to be disabled before all else, to be written to, and to be asked; a bit each.
+    /// Joints to be disabled before all else, to be written to, and to be polled; one bit each.
     pub(super) stops: u16,
     pub(super) writes: u16,
     pub(super) reads: u16,
-    /// The same, given back: for the next update.
+    /// Requeued frames, by the same three kinds: for the next update.
     pub(super) returned: (u16, u16, u16),
     pub(super) reads_first: bool,
-    /// Who was chosen to be written to and asked last, and who was disabled, written to and asked last.
+    /// Joints last chosen for a write and a request; joints last disabled, written to and polled.
     pub(super) last_write: u8,
     pub(super) last_read: u8,
     pub(super) told: u8,
     pub(super) written: u8,
     pub(super) asked: u8,
-    /// Of time and stop; each joint has a guard of its own.
+    /// Rules of time and stop; each joint has a guard of its own.
     pub(super) guard: DeviceGuard<0>,
-    /// Frames that are sent are heard again.
+    /// Whether sent frames are received again.
     pub(super) echoes: bool,
     pub(super) counters: Counters,
 }
 
 impl Joints {
-    /// Makes a bus without joints. Feedback is late after 40 ms, as a joint of twelve is asked for its position each 12 or
-    /// 24 ms; a joint is offline after 100 ms, and its target counts for 100 ms.
+    /// Makes a bus without joints. Feedback is late after 40 ms, since each of twelve joints is polled for its position every 12 or 24 ms.
+    /// A joint is offline after 100 ms, and a target expires after 100 ms.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -107,15 +107,15 @@ impl Joints {
         }
     }
 
-    /// Sets when feedback and targets count as lost, for joints attached afterwards.
+    /// Sets the ages at which feedback and targets count as lost, for joints attached afterwards.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.guard.set_timeouts(timeouts);
         self
     }
 
-    /// Sets how long a joint has to answer; 2 ms at first, 10 ms at most: a longer time counts as that. Until the first
-    /// update after that nothing is sent to it, a stop neither: see the [module](super).
+    /// Sets the time for a reply: 2 ms by default, at most 10 ms; a longer time counts as 10 ms. Until the first update after that time no
+    /// frame is sent to the joint, not even a stop: see the [module](super).
     #[must_use]
     pub const fn with_reply_timeout(mut self, timeout: Duration) -> Self {
         let is_long = timeout.as_micros() > LONGEST_REPLY.as_micros();
@@ -123,11 +123,11 @@ impl Joints {
         self
     }
 
-    /// Sets how many joints are asked, and how many are written to, in an update; one each at first, 1 to 12.
+    /// Sets the numbers of joints polled and of joints written to in an update: 1 to 12, by default 1 each.
     ///
-    /// The fewer frames, the longer until a joint has its next turn: choose
-    /// [`Timeouts::late`](crate::motor::Timeouts::late) above three turns. More than the driver has room for only wait, and
-    /// take turns; where it has room for fewer than it is given, it must not choose by the lowest id.
+    /// With fewer frames, the turn of a joint comes later: choose [`Timeouts::late`](crate::motor::Timeouts::late) above three turns. If
+    /// the driver has less room than the update has frames, the other frames wait and take turns. Such a driver must not choose by the
+    /// lowest id.
     ///
     /// # Examples
     /// ```
@@ -143,21 +143,21 @@ impl Joints {
         self
     }
 
-    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 at first.
+    /// Sets the bit rate, in bits a second, for [`load`](Self::load); 1 000 000 by default.
     #[must_use]
     pub const fn with_bit_rate(mut self, bits_per_s: u32) -> Self {
         self.budget.bit_rate = bits_per_s;
         self
     }
 
-    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 at first.
+    /// Sets the rate of updates in Hz, for [`load`](Self::load); 1000 by default.
     #[must_use]
     pub const fn with_tick_rate(mut self, hz: u32) -> Self {
         self.budget.tick_hz = hz;
         self
     }
 
-    /// Returns the load of requests, their replies, and writes, while all joints move.
+    /// Returns the load of requests, replies and writes, while all joints move.
     ///
     /// Relaxed joints take less. A stop of all joints takes 12 frames more, once. [`BusLoad::and`] adds other families.
     #[must_use]
@@ -165,10 +165,10 @@ impl Joints {
         self.budget.load()
     }
 
-    /// Attaches a joint. It is disabled with the next update, or as soon as one that was there before owes no answer.
+    /// Attaches a joint. The joint is disabled with the next update, or once an earlier joint with this id has no outstanding reply.
     ///
     /// # Errors
-    /// When its id is out of range or taken, or a parameter is not usable. Nothing changed then.
+    /// The id is out of range or taken, or a parameter is not usable. The bus stays as before.
     pub fn attach(&mut self, config: Config) -> Result<Joint, AttachError> {
         let joint = name(config.id());
         let index = config.id().checked_sub(1).ok_or(AttachError::Id(joint))?;
@@ -182,7 +182,7 @@ impl Joints {
         Ok(Joint::new(index, generation))
     }
 
-    /// Detaches a joint. It is disabled once more.
+    /// Detaches a joint and disables it once more.
     pub fn detach(&mut self, joint: Joint) {
         let Some(slot) = self.slot_mut(joint) else { return };
         slot.free();
@@ -190,7 +190,7 @@ impl Joints {
         schedule::drop_read(self, joint.index());
     }
 
-    /// Takes a received frame that arrived at `now`. Constant time.
+    /// Takes a frame received at `now`. Runs in constant time.
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
@@ -229,11 +229,11 @@ impl Joints {
         })
     }
 
-    /// Chooses who is asked and written to, and relaxes who may not move.
+    /// Chooses the joints for requests and writes, and relaxes joints that may not be driven.
     ///
-    /// An update that does not lie after the one before relaxes every joint until it is armed again. A `dt_s` of zero, below
-    /// zero, infinite or NaN chooses no joint for one update; a second one in a row relaxes all joints. Frames that disable
-    /// a joint are sent all the same.
+    /// An update that does not lie after the previous one relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
+    /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
+    /// nevertheless.
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let moves_on = self.guard.moves_on(before);
@@ -253,7 +253,7 @@ impl Joints {
         schedule::plan(self);
     }
 
-    /// Relaxes every joint until it is armed again: where time did not move on, no age is known.
+    /// Relaxes every joint until armed again: time did not move on, so no age is known.
     fn lose_time(&mut self, now: Instant) {
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index).filter(|slot| slot.id.is_some()) else {
@@ -264,7 +264,7 @@ impl Joints {
         }
     }
 
-    /// An update without a step chooses no joint, but disables joints that have to rest.
+    /// Ends an update without a step: chooses no joint, but disables joints that must rest.
     fn hold(&mut self, before: Instant, moves_on: bool) {
         count(&mut self.counters.bad_steps);
         let now = self.guard.updated();
@@ -275,7 +275,7 @@ impl Joints {
         }
         let stands = now <= self.now;
         self.now = self.now.max(now);
-        // A clock that stands or went back does not tell when an answer is overdue: then an update counts for a millisecond.
+        // A clock that stands or was set back does not show when a reply is overdue: an update then counts for a millisecond.
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
         answers::give_up(self, (!(stands && is_long)).then_some(self.reply_timeout));
@@ -292,7 +292,7 @@ impl Joints {
         }
     }
 
-    /// Takes the target of a joint away.
+    /// Discards the target of a joint.
     pub(super) fn relax_at(&mut self, index: usize) {
         if let Some(slot) = self.slots.get_mut(index) {
             slot.guard.relax();
@@ -300,31 +300,31 @@ impl Joints {
         self.let_go(index);
     }
 
-    /// Has a joint that may no longer be driven disabled: now, as it may be armed and led again before the next update,
-    /// which would see nothing then.
+    /// Disables a joint that may no longer be driven. This happens at once: the joint may be armed and have a target again before the next
+    /// update, which would then find no reason.
     pub(super) fn let_go(&mut self, index: usize) {
         if self.slots.get_mut(index).is_some_and(Slot::let_go) {
             schedule::stop(self, index);
         }
     }
 
-    /// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
+    /// Returns the next frame to send and removes it from the list: first disables, then writes and requests.
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         schedule::next_frame(self)
     }
 
-    /// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+    /// Requeues a frame that was not sent, or was evicted. Returns `false` for a frame of another sender.
     pub fn requeue(&mut self, frame: &CanFrame) -> bool {
         schedule::requeue(self, frame)
     }
 
-    /// Returns what is known of a joint; `None` before its first position, and once it is detached.
+    /// Returns the state of a joint; `None` before its first position, and after it was detached.
     #[must_use]
     pub fn state(&self, joint: Joint) -> Option<State> {
         self.slot(joint)?.state()
     }
 
-    /// Tells whether a joint is heard; `None` once it is detached.
+    /// Returns the link of a joint; `None` after the joint was detached.
     #[must_use]
     pub fn link(&self, joint: Joint) -> Option<Link> {
         Some(self.slot(joint)?.guard.link())
@@ -343,7 +343,7 @@ impl Joints {
         })
     }
 
-    /// Returns what was counted.
+    /// Returns the counters.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.counters

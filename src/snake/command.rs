@@ -1,4 +1,4 @@
-//! What the controller sends.
+//! Frames of the controller.
 
 use super::Register;
 use super::model::IDS;
@@ -28,7 +28,7 @@ const READ: u8 = 0x03;
 pub enum Command {
     /// Sets a register.
     Write(Register, i32),
-    /// Asks for a register.
+    /// Requests a register.
     Read(Register),
 }
 
@@ -36,7 +36,7 @@ impl Command {
     /// The frame that makes a joint safe.
     pub const DISABLE: Self = Self::Write(Register::Enable, 0);
 
-    /// Builds the frame for a joint; `None` for an id that is not 1 to 12.
+    /// Builds the frame for a joint; `None` for an id outside 1 to 12.
     #[must_use]
     pub fn frame(self, id: u8) -> Option<CanFrame> {
         let address = StandardId::new(u16::from(id)).filter(|_| (1..=IDS).contains(&id))?;
@@ -49,7 +49,7 @@ impl Command {
         }
     }
 
-    /// Reads the data of a frame; `None` when it is none of the controller's.
+    /// Reads the data of a frame; `None` if the frame is not from a controller.
     #[must_use]
     pub fn decode(data: &[u8]) -> Option<Self> {
         match *data {
@@ -61,7 +61,7 @@ impl Command {
         }
     }
 
-    /// Tells whether the joint is asked for no motion: a read, a disable, a current of zero.
+    /// Tells whether the command causes no motion: a read, a disable, a current of zero.
     #[must_use]
     pub const fn is_safe(self) -> bool {
         matches!(self, Self::Read(_) | Self::Write(Register::Enable | Register::Current, 0))

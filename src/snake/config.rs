@@ -3,7 +3,7 @@ use crate::motor::Reaction;
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
-/// What [`Joints::attach`](super::Joints::attach) needs to know of a joint.
+/// Configuration of a joint for [`Joints::attach`](super::Joints::attach).
 ///
 /// # Examples
 /// ```
@@ -27,7 +27,7 @@ pub struct Config {
     pub(super) stall: Stall,
 }
 
-/// For how long a joint may stand although it has a way to go, and what follows.
+/// Longest standstill of a joint away from its target, and the reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stall {
     pub(super) window: Duration,
@@ -40,31 +40,29 @@ impl Stall {
 }
 
 impl Config {
-    /// Takes the id that is set on the joint, 1 to 12; 10 rpm, and the settings of the robot's firmware.
+    /// Takes the id set on the joint, 1 to 12; 10 rpm, and the settings of the robot's firmware.
     #[must_use]
     pub const fn new(id: u8) -> Self {
         let speed = AngularVelocity::from_rpm(10.0);
         Self { id, reversed: false, speed, settings: Settings::USUAL, stall: Stall::USUAL }
     }
 
-    /// Turns the positive direction around, for position and speed alike.
+    /// Reverses the positive direction of position and speed.
     #[must_use]
     pub const fn reversed(self) -> Self {
         Self { reversed: !self.reversed, ..self }
     }
 
-    /// Sets the speed with which the joint goes to its targets, until
-    /// [`set_speed`](super::Joints::set_speed) changes it; not negative, at most 255 rpm.
+    /// Sets the speed of moves to a target, until [`set_speed`](super::Joints::set_speed) changes it; not negative, at most 255 rpm.
     #[must_use]
     pub const fn with_speed(self, speed: AngularVelocity) -> Self {
         Self { speed, ..self }
     }
 
-    /// Sets for how long a joint may stand although it is told to move, by more than a 64th of a turn, and what follows: a
-    /// stall after 1 s at first, which is reported. Relaxed, it is disabled and waits to be armed.
+    /// Sets the longest standstill of a joint that is more than a 64th of a turn away from its target, and the reaction. By default, a
+    /// stall begins after 1 s and is reported. If relaxed, the joint is disabled and waits to be armed.
     ///
-    /// A joint that is too slow to be seen to move in that time, by a 64th of a turn, is not looked at. A window of zero is
-    /// refused when it is attached.
+    /// A joint too slow for a visible motion within that time, a 64th of a turn, is not checked. A window of zero is refused by `attach`.
     ///
     /// # Examples
     /// ```
@@ -80,25 +78,25 @@ impl Config {
         Self { stall: Stall { window, reaction }, ..self }
     }
 
-    /// Sets the current that is written before the joint is enabled, in the drive's own unit: 2000 at first.
+    /// Sets the current to write before the joint is enabled, in the drive's own unit: 2000 by default.
     #[must_use]
     pub const fn with_current(self, current: i32) -> Self {
         Self { settings: Settings { current, ..self.settings }, ..self }
     }
 
-    /// Sets the acceleration that is written before the joint is enabled, in pulses a second².
+    /// Sets the acceleration to write before the joint is enabled, in pulses a second².
     #[must_use]
     pub const fn with_acceleration(self, acceleration: i32) -> Self {
         Self { settings: Settings { acceleration, ..self.settings }, ..self }
     }
 
-    /// Sets the deceleration that is written before the joint is enabled, in pulses a second².
+    /// Sets the deceleration to write before the joint is enabled, in pulses a second².
     #[must_use]
     pub const fn with_deceleration(self, deceleration: i32) -> Self {
         Self { settings: Settings { deceleration, ..self.settings }, ..self }
     }
 
-    /// Sets the work mode that is written before the joint is enabled; only 1, position, is documented.
+    /// Sets the work mode to write before the joint is enabled; only 1, position, is documented.
     #[must_use]
     pub const fn with_mode(self, mode: i32) -> Self {
         Self { settings: Settings { mode, ..self.settings }, ..self }
@@ -135,7 +133,7 @@ impl Config {
     }
 }
 
-/// The registers that a drive is set up with, as on the wire: their units are not documented.
+/// Registers for the set-up of a drive, as on the wire: their units are not documented.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Settings {
     pub(super) current: i32,
@@ -145,7 +143,7 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// What the robot's firmware writes.
+    /// Values of the robot's firmware.
     pub(super) const USUAL: Self = Self {
         current: CURRENT,
         acceleration: ACCELERATION,
@@ -153,7 +151,7 @@ impl Settings {
         mode: POSITION_MODE,
     };
 
-    /// Names the first that makes no sense.
+    /// Names the first unusable parameter.
     pub(super) const fn refused(&self) -> Option<&'static str> {
         if self.current <= 0 {
             Some("current")

@@ -1,27 +1,27 @@
-/// What was counted; saturates, but for the frames, which wrap at 2^32.
+/// Counters of a bus. All saturate, except `packed` and `superseded`, which wrap at 2^32.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counters {
-    /// Replies that were taken.
+    /// Accepted replies.
     pub replies: u32,
     /// Frames with a joint's id and another length than 6.
     pub bad_length: u32,
-    /// Frames with a joint's id that are no reply, or of a register that is not known.
+    /// Frames with a joint's id that are no reply, or that name an unknown register.
     pub bad_field: u32,
-    /// Frames with a joint's id that only a controller sends: there is a second one on the bus.
+    /// Frames with a joint's id that only a controller sends: there is a second controller on the bus.
     pub foreign_commands: u32,
     /// Frames with the id of a joint that is not attached.
     pub unattached: u32,
-    /// Requests that were sent, and not given back.
+    /// Requests sent, less requests given back.
     pub requests: u32,
-    /// Requests that were not answered in time, those too that were given back after that.
+    /// Requests not answered in time, including requests given back after that.
     pub unanswered: u32,
-    /// Updates whose time step was zero, negative, infinite or NaN, or whose time stood still.
+    /// Updates with a time step of zero, negative, infinite or NaN, or with a time that stood still.
     pub bad_steps: u32,
-    /// Frames that were ready: chosen by an update, or one that disables, whenever that is due; wraps.
+    /// Frames that were ready: chosen by an update, or disables, whenever due; wraps.
     pub packed: u32,
-    /// Frames that were replaced by newer ones before they were taken, or after they were given back; wraps.
+    /// Frames replaced by newer ones before they were taken, or after they were given back; wraps.
     pub superseded: u32,
 }
 

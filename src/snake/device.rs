@@ -45,7 +45,7 @@ impl CanDevice for Joints {
         self.slots.iter().filter(move |slot| slot.is_missing(now)).filter_map(Slot::name)
     }
 
-    /// A fault of a joint is over when it is armed again.
+    /// A fault of a joint ends when the joint is armed again.
     fn faulty(&self) -> impl Iterator<Item = MotorName> {
         core::iter::empty()
     }
@@ -127,7 +127,7 @@ fn rest_all(joints: &mut Joints, rest: impl Fn(&mut Guard)) {
         let was_armed = slot.guard.is_armed();
         rest(&mut slot.guard);
         _ = slot.let_go();
-        // A program may disarm in each tick: a joint that knows of it already is only reminded.
+        // A program may disarm in each tick: a joint disabled already is only reminded.
         if was_armed || !slot.is_told() {
             schedule::stop(joints, index);
         }

@@ -1,7 +1,7 @@
 use super::model::IDS;
 use crate::motor::MotorName;
 
-/// Why a joint was not attached. The others are as they were before.
+/// Reason for a refused joint. The other joints stay as before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -12,7 +12,7 @@ pub enum AttachError {
     Taken(MotorName),
     /// A parameter of the configuration is not usable.
     Parameter {
-        /// The joint that was to be attached.
+        /// The refused joint.
         joint: MotorName,
         /// The name of the parameter.
         parameter: &'static str,

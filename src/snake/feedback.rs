@@ -1,10 +1,10 @@
-//! What a joint answers.
+//! Replies of a joint.
 
 use super::Register;
 
 const REPLY: u8 = 0x04;
 
-/// The value of a register, as a joint reports it.
+/// Value of a register, as reported by a joint.
 ///
 /// # Examples
 /// ```
@@ -29,7 +29,7 @@ impl Reply {
         Self { register, value }
     }
 
-    /// Takes the data of a reply; `None` if it has not 6 bytes, does not begin with 4, or names no register.
+    /// Takes the data of a reply; `None` unless the data has 6 bytes, begins with 4 and names a register.
     #[must_use]
     pub fn decode(data: &[u8]) -> Option<Self> {
         match *data {
@@ -53,7 +53,7 @@ impl Reply {
         self.register
     }
 
-    /// Returns its value, as on the wire.
+    /// Returns the value of the register, as on the wire.
     #[must_use]
     pub const fn value(self) -> i32 {
         self.value

@@ -1,12 +1,12 @@
 /// Names a joint of a bus: one byte, `Copy`.
 ///
-/// A handle of a joint that was detached finds nothing, even when another joint took its place.
+/// A handle of a detached joint finds nothing, even after another joint took its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Joint(u8);
 
 impl Joint {
-    /// So many joints can follow each other in one place.
+    /// Number of joints that can follow each other in one place.
     pub(super) const GENERATIONS: u8 = 16;
 
     /// Index in the low half, generation in the high half.

@@ -1,8 +1,8 @@
-//! The joint motors of a snake robot: each drive holds its own position loop and is led by registers.
+//! The joint motors of a snake robot: each drive has its own position loop, controlled by registers.
 //!
 //! # The protocol on one page
-//! Classic CAN at 1 Mbit/s, standard data frames, numbers big-endian. A joint has **one id, 1 to 12, for both
-//! directions**: the controller asks and writes on it, the joint answers on it.
+//! Classic CAN at 1 Mbit/s, standard data frames, numbers big-endian. A joint has **one id, 1 to 12, for both directions**: requests and
+//! writes of the controller, and replies of the joint.
 //!
 //! | frame | sender | length | bytes |
 //! |---|---|---|---|
@@ -15,51 +15,50 @@
 //! | `06` | actual speed, read only | pulses a second | |
 //! | `07` | actual position, read only | pulses, 65536 a turn | |
 //! | `08` | current | not known | 2000 |
-//! | `09` | speed with which it goes to its target | pulses a second: rpm * 65536 / 60 | from the host |
+//! | `09` | speed of moves to the target | pulses a second: rpm * 65536 / 60 | from the host |
 //! | `0A` | target position | pulses | from the host |
 //! | `0B`, `0C` | acceleration, deceleration | pulses a second², inferred: 1000 rpm a second | 0x0010AAAA |
 //! | `0F` | work mode | | 1 |
 //! | `10` | 1 enables, 0 disables | | |
 //!
-//! A write is not answered. There is no error reply: what is not a known reply is counted ([`Counters`]).
+//! A write is not answered. There is no error reply. A frame that is no known reply is counted ([`Counters`]).
 //!
-//! # What safe means here
-//! A drive that is enabled goes on to its last target, and holds it, **whatever becomes of its controller**. So a joint is
-//! made safe by a frame, not by silence: *relaxed* and *safe output* are both `01 10 00000000`, disable. It is sent
+//! # Safe output
+//! An enabled drive goes on to its last target, and holds it, **regardless of its controller**. A joint is therefore made safe by a frame,
+//! not by silence: *relaxed* and *safe output* are both `01 10 00000000`, disable. This frame is sent
 //!
-//! * to every joint with the first update, so that a controller that was reset stops what its predecessor left running;
-//! * at once, before all else and to all joints, on emergency stop, disarming, a fault, lost feedback, an old target, a
+//! * to every joint with the first update, so that after a reset of the controller no joint goes on with an earlier command;
+//! * at once, before all else and to all joints, on emergency stop, disarming, a fault, lost feedback, an expired target, a
 //!   target that is not finite, a bad time step, zeroing, detaching: at most 12 frames, 1.4 ms of the bus;
-//! * again each 100 ms as long as a joint is relaxed: a drive may have missed it.
+//! * again each 100 ms while a joint is relaxed: a drive may have missed the frame.
 //!
-//! A relaxed joint is disabled before it is brought up again, however soon that is, and whatever relaxed it: also one that
-//! is armed before the next update. It is written in the order mode, current, acceleration, deceleration, speed, target,
-//! enable, so that none is enabled with a target from before; then its target is repeated in its turn, so that a lost frame does
-//! not last. The enable is never repeated: a drive that lost its supply stays disabled, is seen to be
-//! ([`State::resets`]), and waits to be armed.
+//! A relaxed joint is always disabled before the next bring-up, for any cause and after any time, even if armed before the next update. The
+//! order of writes is mode, current, acceleration, deceleration, speed, target, enable, so no joint is enabled with an earlier target. Then
+//! the target is repeated in its turn, which bounds the effect of a lost frame. The enable is never repeated: a drive that lost its supply
+//! stays disabled, is detected ([`State::resets`]), and waits to be armed.
 //!
-//! # What is noticed
-//! Every change is an [`Edge`](crate::motor::Edge) with its time, which waits until [`Joints::next_edge`] reads it;
-//! [`Joints::health`] is the line for a log.
+//! # Conditions
+//! Every change is an [`Edge`](crate::motor::Edge) with its time, latched until [`Joints::next_edge`] reads it. [`Joints::health`] is the
+//! line for a log.
 //!
-//! | condition | it holds while | the joint |
+//! | condition | holds while | the joint |
 //! |---|---|---|
-//! | late, offline | there is no fresh position; it is lost, until ten came in a row | is disabled; waits to be armed after *offline* |
-//! | ESC fault | it was found disabled, or further off than it can go, until it is armed | is disabled, waits to be armed |
-//! | position uncertain | the drive may have lost its zero, until that is set | goes on |
-//! | stalled | it has a way to go and does not move: blocked in either direction | as configured; goes on |
-//! | command lost | the application let its target grow too old | is disabled, until the next target |
-//! | second master | another node wrote to it or asked it within the last second | goes on, and is not armed |
+//! | late, offline | there is no fresh position; the joint is lost, until ten positions in a row | is disabled; waits to be armed after *offline* |
+//! | ESC fault | the joint was found disabled, or further off than possible, until armed | is disabled, waits to be armed |
+//! | position uncertain | the drive may have lost its zero, until the zero is set | goes on |
+//! | stalled | the joint is away from its target and does not move: blocked in either direction | as configured; goes on |
+//! | command lost | the application let the target expire | is disabled, until the next target |
+//! | second master | another node wrote to the joint or polled it within the last second | goes on, and is not armed |
 //!
 //! # One id, two senders
-//! Two nodes that begin to send one id in the same bit do not arbitrate: they destroy each other's frames until one is
-//! off the bus. So while an answer is due, [`Joints`] sends nothing to that joint, a stop neither, until the first update after
-//! [`Joints::with_reply_timeout`] (2 ms, so the third at 1 kHz; 10 ms at most). `embedded-can` has frames of one id sent in
+//! Two nodes that begin to send one id in the same bit do not arbitrate: each destroys the frames of the other until one node is off the
+//! bus. While a reply is outstanding, [`Joints`] therefore sends no frame to that joint, not even a stop, until the first update after
+//! [`Joints::with_reply_timeout`] (2 ms, so the third at 1 kHz; 10 ms at most). `embedded-can` requires frames of one id to be sent in
 //! order, so a write before a read does no harm.
 //!
 //! # The budget
-//! Each update asks one joint and writes to one ([`Joints::with_frames_per_update`]), in turn: 12 joints report each
-//! 12 ms, two positions for one speed. [`Joints::load`] reckons it. Beside a GM6020 and a C610 at 1 kHz:
+//! Each update polls one joint and writes to one ([`Joints::with_frames_per_update`]), in turn: each of 12 joints replies every 12 ms, with
+//! two positions for one speed. [`Joints::load`] computes the load. Beside a GM6020 and a C610 at 1 kHz:
 //!
 //! ```
 //! use drivetrain::motor::BusLoad;
@@ -71,15 +70,15 @@
 //! assert_eq!(joints.and(&gripper).to_string(), "70 % to 85 %");
 //! ```
 //!
-//! That is four frames in a tick, and 12 more for a stop of all: a controller with three mailboxes needs a driver that
-//! queues what waits and feeds them from its transmit interrupt, as the example `snake` has one. Without it the frames
-//! that found no room go out first in the next tick.
+//! This load is four frames in a tick, and 12 more for a stop of all joints. A controller with three mailboxes needs a driver that queues
+//! frames and sends them from its transmit interrupt, as in the example `snake`. Without a queue, frames without room go out first in the
+//! next tick.
 //!
 //! # Sources
-//! The public firmware of the robot (`can1.c`, `chasis_task.c`, `uart3.c`). It reads only the position and never looks at
-//! the register of a reply; here a reply is sorted by it. What a drive does when it hears nothing is not documented, nor
-//! whether it answers for every register: if not for `10`, that shows as requests without an answer
-//! ([`State::unanswered`]), one of 24, and a drive that lost its enable is noticed only by its position.
+//! The public firmware of the robot (`can1.c`, `chasis_task.c`, `uart3.c`). The firmware reads only the position and ignores the register
+//! of a reply; this module sorts replies by the register. The behaviour of a drive without frames is not documented, nor whether a drive
+//! replies for every register. If a drive does not reply for `10`, one request of 24 stays unanswered ([`State::unanswered`]), and a drive
+//! that lost its enable is detected only by its position.
 
 mod answers;
 mod budget;

@@ -5,13 +5,13 @@ pub use crate::wire::host_link::PULSES_PER_TURN;
 /// The highest id of a joint; the lowest is 1.
 pub const IDS: u8 = 12;
 
-/// What the robot's firmware writes into [`Register::Current`].
+/// Value of the robot's firmware for [`Register::Current`].
 pub(super) const CURRENT: i32 = 2_000;
-/// What the robot's firmware writes into [`Register::Acceleration`] and [`Register::Deceleration`]: 1000 rpm a second.
+/// Value of the robot's firmware for [`Register::Acceleration`] and [`Register::Deceleration`]: 1000 rpm a second.
 pub(super) const ACCELERATION: i32 = 0x0010_AAAA;
-/// What the robot's firmware writes into [`Register::Mode`]: the drive goes to [`Register::Position`].
+/// Value of the robot's firmware for [`Register::Mode`]: the drive goes to [`Register::Position`].
 pub(super) const POSITION_MODE: i32 = 1;
-/// The fastest that the robot's host can ask for, 255 rpm, in pulses a second.
+/// Highest speed of the robot's host, 255 rpm, in pulses a second.
 pub(super) const FASTEST: i32 = 255 * PULSES_PER_TURN / 60;
 
 /// A register of a drive.
@@ -33,9 +33,9 @@ pub enum Register {
     ActualSpeed = 0x06,
     /// The measured position in pulses.
     ActualPosition = 0x07,
-    /// The current that the drive may use, in a unit of its own.
+    /// The largest current of the drive, in a unit of its own.
     Current = 0x08,
-    /// The speed with which it goes to its target, in pulses a second.
+    /// The speed of moves to the target, in pulses a second.
     Speed = 0x09,
     /// The target in pulses.
     Position = 0x0A,
@@ -50,7 +50,7 @@ pub enum Register {
 }
 
 impl Register {
-    /// All of them, in the order of their numbers.
+    /// All registers, in the order of their numbers.
     pub const ALL: [Self; 9] = [
         Self::ActualSpeed,
         Self::ActualPosition,
@@ -63,7 +63,7 @@ impl Register {
         Self::Enable,
     ];
 
-    /// The writable ones, in the order in which a joint is brought up: enabled last.
+    /// The writable registers, in the order of a bring-up: enable last.
     pub(super) const SEQUENCE: [Self; 7] = [
         Self::Mode,
         Self::Current,
@@ -86,7 +86,7 @@ impl Register {
         self as u8
     }
 
-    /// Tells whether it can be written.
+    /// Tells whether the register can be written.
     #[must_use]
     pub const fn is_writable(self) -> bool {
         !matches!(self, Self::ActualSpeed | Self::ActualPosition)

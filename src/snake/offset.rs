@@ -1,11 +1,11 @@
-/// Where the zero of a joint lies in the counts of its motor.
+/// Position of a joint's zero in the counts of its motor.
 ///
 /// ```text
 /// position shown = raw - offset        target sent = wanted + offset
 /// ```
-/// [`Reset::Rezero`](crate::wire::host_link::Reset::Rezero) makes the present position zero. The robot's document does it as
-/// `offset = shown + offset` and doubts that. `shown + offset` is the raw position, so the raw position is the new offset. All
-/// arithmetic wraps as the motor's own 32-bit counter does.
+/// [`Reset::Rezero`](crate::wire::host_link::Reset::Rezero) makes the present position zero. The robot's document states `offset = shown +
+/// offset`, with a doubt. `shown + offset` is the raw position, so the raw position is the new offset. All arithmetic wraps as the motor's
+/// own 32-bit counter does.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Offset(i32);
 

@@ -1,4 +1,4 @@
-//! Which joint is disabled, written to and asked next.
+//! Order of the joints for disables, writes and requests.
 
 use super::counters::count;
 use super::model::IDS;
@@ -6,18 +6,18 @@ use super::{Command, Joints};
 use crate::frame::CanFrame;
 use embedded_can::Frame;
 
-/// Chooses the frames of this update: what was left or given back, then those whose turn it is.
+/// Chooses the frames of this update: first pending and requeued frames, then those of the next joints in turn.
 pub(super) fn plan(joints: &mut Joints) {
     stop_again(joints);
     let (_, writes, reads) = core::mem::take(&mut joints.returned);
     drop_frames(joints, joints.writes.count_ones() + joints.reads.count_ones());
     joints.writes |= writes;
     joints.reads |= reads;
-    // What had no room goes first, and where both had none, they take turns: neither starves the other.
+    // Frames without room go first. If both kinds had none, the kinds take turns: neither starves the other.
     joints.reads_first = joints.reads != 0 && !(joints.writes != 0 && joints.reads_first);
-    // Whoever owes an answer is in nobody's way.
+    // Joints with an outstanding reply do not count against the budget.
     let quiet = joints.answers.owing();
-    // Who has news goes before who only hears the old again.
+    // Joints with new values go before periodic refreshes.
     for news in [true, false] {
         for index in turns(joints.last_write) {
             if (joints.writes & !quiet).count_ones() >= u32::from(joints.budget.writes) {
@@ -44,7 +44,7 @@ pub(super) fn plan(joints: &mut Joints) {
     pack(joints, joints.writes.count_ones() + joints.reads.count_ones());
 }
 
-/// Has the joints whose disable was given back disabled now.
+/// Disables again each joint whose disable was requeued.
 pub(super) fn stop_again(joints: &mut Joints) {
     let stops = core::mem::take(&mut joints.returned.0);
     pack(joints, (stops & !joints.stops).count_ones());
@@ -59,13 +59,13 @@ const fn drop_frames(joints: &mut Joints, frames: u32) {
     joints.counters.superseded = joints.counters.superseded.wrapping_add(frames);
 }
 
-/// Tells whether a joint is there and owes no answer.
+/// Tells whether a joint is attached and has no outstanding reply.
 fn is_free(joints: &Joints, index: u8) -> bool {
     let slot = joints.slots.get(usize::from(index));
     slot.is_some_and(|slot| slot.id.is_some()) && joints.answers.of(index.into()).is_none()
 }
 
-/// Returns a frame that waits to be sent, and takes it off the list: first who is to stop, then writes and questions.
+/// Returns the next frame to send and removes it from the list: first disables, then writes and requests.
 pub(super) fn next_frame(joints: &mut Joints) -> Option<CanFrame> {
     let now = joints.now;
     let quiet = joints.answers.owing();
@@ -78,7 +78,7 @@ pub(super) fn next_frame(joints: &mut Joints) -> Option<CanFrame> {
         return Command::DISABLE.frame(index + 1);
     }
     let write = next_after(joints.written, joints.writes & !quiet);
-    // An update without a step does not know how long an answer is waited for.
+    // In an update without a step, the waiting time for a reply is unknown.
     let reads = if joints.guard.held_steps() == 0 { joints.reads & !quiet } else { 0 };
     let read = next_after(joints.asked, reads);
     match (write, read) {
@@ -102,7 +102,7 @@ fn write_next(joints: &mut Joints, index: u8) -> Option<CanFrame> {
     joints.slots.get_mut(usize::from(index))?.next_write(joints.now).frame(index + 1)
 }
 
-/// Takes back a frame that was not sent, or was evicted; `false` when it is not this bus's.
+/// Requeues a frame that was not sent, or was evicted. Returns `false` for a frame of another sender.
 pub(super) fn requeue(joints: &mut Joints, frame: &CanFrame) -> bool {
     let Ok(index) = u8::try_from(frame.header().wrapping_sub(1)) else { return false };
     let Some(slot) = joints.slots.get_mut(usize::from(index)) else { return false };
@@ -118,7 +118,7 @@ pub(super) fn requeue(joints: &mut Joints, frame: &CanFrame) -> bool {
         }
     }
     let (stops, writes, reads) = &mut joints.returned;
-    // The first that comes back is the next of its kind.
+    // The first frame requeued is the next of its kind.
     let (returned, last) = match command {
         Command::DISABLE => {
             slot.told_to_relax(joints.now);
@@ -145,7 +145,7 @@ pub(super) fn requeue(joints: &mut Joints, frame: &CanFrame) -> bool {
     true
 }
 
-/// Has a joint disabled before all else.
+/// Disables a joint before all else.
 pub(super) const fn stop(joints: &mut Joints, index: usize) {
     let bit = 1 << index;
     pack(joints, (bit & !joints.stops).count_ones());
@@ -161,14 +161,14 @@ pub(super) fn stop_all(joints: &mut Joints) {
     }
 }
 
-/// What is to be disabled is written nothing else before.
+/// Drops other writes to a joint that is to be disabled.
 const fn drop_write(joints: &mut Joints, bit: u16) {
     drop_frames(joints, (joints.writes & bit).count_ones());
     joints.writes &= !bit;
     joints.returned.1 &= !bit;
 }
 
-/// Asks a joint that is detached nothing more.
+/// Drops requests to a detached joint.
 pub(super) const fn drop_read(joints: &mut Joints, index: usize) {
     let bit = 1 << index;
     drop_frames(joints, (joints.reads & bit).count_ones());
@@ -176,7 +176,7 @@ pub(super) const fn drop_read(joints: &mut Joints, index: usize) {
     joints.returned.2 &= !bit;
 }
 
-/// All joints, beginning with the one after `last`.
+/// Returns all joints, beginning with the joint after `last`.
 fn turns(last: u8) -> impl Iterator<Item = u8> {
     (1..=IDS).map(move |step| (last + step) % IDS)
 }

@@ -1,4 +1,4 @@
-//! One joint: replies in, the next frame for it out.
+//! One joint: from replies to the next frame.
 
 pub(super) mod health;
 mod writing;
@@ -15,16 +15,16 @@ use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
 use health::Standing;
 
-/// A relaxed joint is told again after this time: its drive may have missed it.
+/// A relaxed joint is disabled again after this time: its drive may have missed the frame.
 const KEEP_RELAXED: Duration = Duration::from_millis(100);
-/// Beside twice its fastest way, so far may a position be off between two replies: a sixteenth of a turn.
+/// Tolerance between two positions, beside twice the way at full speed: a sixteenth of a turn.
 const JUMP: i32 = PULSES_PER_TURN / 16;
-/// Every so many readings of the speed make way for one that looks whether the drive is still enabled.
+/// One of so many speed requests is replaced by a check that the drive is still enabled.
 const CHECKS: u8 = 8;
-/// Two positions and one of the others, until all others had their turn.
+/// Two positions and one other register, until all others had their turn.
 const TURNS: u8 = 3 * CHECKS;
 
-/// All registers of [`Register::SEQUENCE`], and the last of them: the enable.
+/// All registers of [`Register::SEQUENCE`], and its last register: the enable.
 const ALL: u8 = 0x7F;
 const LAST: u8 = 0x40;
 
@@ -40,11 +40,10 @@ pub(super) struct Slot {
     raw: Option<i32>,
     raw_speed: i32,
     heard: Instant,
-    /// As on the wire.
+    /// Target and speed, as on the wire.
     target: i32,
     speed: i32,
-    /// Registers of [`Register::SEQUENCE`] that wait to be written; and those that come before the others, which are all as long
-    /// as none was written.
+    /// Registers of [`Register::SEQUENCE`] that wait for a write; and registers with precedence, all of them before the first write.
     pending: u8,
     ahead: u8,
     driven: bool,
@@ -58,7 +57,7 @@ pub(super) struct Slot {
     resets: u16,
     traffic: Traffic,
     window_from: Instant,
-    /// When another node wrote to the joint or asked it last.
+    /// Time of the last write or request of another node.
     rival_heard: Option<Instant>,
     stall: Stall,
     stands: Standing,
@@ -147,8 +146,8 @@ impl Slot {
         self.id.map(name)
     }
 
-    /// Takes a reply that arrived at `now`. Every reply is kept, only a position is a sign of life: it is what moves
-    /// without being looked at.
+    /// Takes a reply received at `now`. Every reply is kept, but only a position is a sign of life: only the position changes without the
+    /// attention of the controller.
     pub(super) fn receive(&mut self, reply: Reply, now: Instant) {
         match reply.register() {
             Register::ActualPosition => self.receive_position(reply.value(), now),
@@ -181,7 +180,7 @@ impl Slot {
         self.guard.hear(now);
     }
 
-    /// The drive is not what it was: its zero may be another, so nothing moves until it is armed again.
+    /// Handles a drive in an unexpected state: its zero may differ, so the joint stays relaxed until armed again.
     fn distrust(&mut self, now: Instant) {
         self.guard.note(Condition::Fault, true, now);
         self.lose_zero(now);
@@ -195,21 +194,21 @@ impl Slot {
         }
     }
 
-    /// Takes targets from now on, if the joint is heard. What the drive did before no longer counts.
+    /// Takes targets from now on, if the joint is online. Earlier behaviour of the drive no longer counts.
     pub(super) fn engage(&mut self, now: Instant) {
         if self.guard.engage(now) {
             self.guard.note(Condition::Fault, false, now);
         }
     }
 
-    /// Brings the joint to `now`. Returns whether it has to be told to relax.
+    /// Brings the joint to `now`. Returns whether the joint must be disabled.
     pub(super) fn update(&mut self, now: Instant) -> bool {
         let drives = self.guard.drives(now);
         if self.guard.link() == Link::Offline {
             self.lose_zero(now);
         }
         health::check(self, now);
-        // What was seen may have relaxed it.
+        // The check may have relaxed the joint.
         let drives = drives && self.guard.is_armed();
         let stops = self.driven && !drives;
         if drives && !self.driven {
@@ -219,14 +218,14 @@ impl Slot {
         stops
     }
 
-    /// Tells whether something of a driven joint waits to be written, beside what is only repeated.
+    /// Tells whether a driven joint has a changed value to write, beside periodic refreshes.
     pub(super) const fn has_news(&self) -> bool {
         self.driven && self.pending != 0
     }
 
-    /// Tells whether a relaxed joint is to be told again.
+    /// Tells whether a relaxed joint must be disabled again.
     pub(super) fn wants_reminder(&self, now: Instant) -> bool {
-        // After a clock was set back it was told at a time that is to come.
+        // After a set-back of the clock, the time of the last disable lies ahead.
         !self.driven && (now.since(self.stopped) >= KEEP_RELAXED || now < self.stopped)
     }
 
@@ -234,20 +233,20 @@ impl Slot {
         self.driven
     }
 
-    /// Lets go where the joint was driven and may be no longer; returns whether it has to be told: not where nothing was
-    /// written to it since it was told last.
+    /// Relaxes a driven joint that may no longer be driven. Returns whether the joint must be disabled: not if there was no write since the
+    /// last disable.
     pub(super) const fn let_go(&mut self) -> bool {
         let stops = self.driven && !(self.guard.is_armed() && self.guard.has_target());
         self.driven = self.driven && !stops;
         stops && !self.is_told()
     }
 
-    /// Tells whether it was disabled, and written nothing since.
+    /// Tells whether the joint was disabled, without a write since.
     pub(super) const fn is_told(&self) -> bool {
         self.ahead == ALL
     }
 
-    /// Returns what is next in turn to be asked for.
+    /// Returns the next register to request.
     pub(super) fn next_read(&mut self) -> Register {
         let register = match (self.turn % 3, self.question) {
             (2, Some(question)) => question,
@@ -259,7 +258,7 @@ impl Slot {
         register
     }
 
-    /// Takes back a question that was not sent: its turn comes again.
+    /// Takes back a request that was not sent: its turn comes again.
     pub(super) const fn take_back_question(&mut self) {
         self.turn = (self.turn + TURNS - 1) % TURNS;
     }
@@ -273,7 +272,7 @@ impl Slot {
         }
     }
 
-    /// Sets the speed with which it goes there; saturates.
+    /// Sets the speed of moves to the target; saturates.
     pub(super) fn set_speed(&mut self, rad_per_s: f32) {
         let pulses = to_pulses(rad_per_s.abs());
         let speed = if pulses > FASTEST { FASTEST } else { pulses };
@@ -292,7 +291,7 @@ impl Slot {
         }
     }
 
-    /// Makes the present position zero; `false` when it is not known.
+    /// Makes the present position zero; `false` if the position is unknown.
     pub(super) fn zero(&mut self, now: Instant) -> bool {
         match self.raw {
             Some(raw) if self.guard.link() == Link::Online => {
@@ -313,12 +312,12 @@ impl Slot {
         if self.reversed { pulses.wrapping_neg() } else { pulses }
     }
 
-    /// Tells whether there was no position yet, or none lately.
+    /// Tells whether there is no position yet, or no fresh position.
     pub(super) fn is_missing(&self, now: Instant) -> bool {
         self.id.is_some() && (self.raw.is_none() || self.guard.is_missing(now))
     }
 
-    /// Returns what is known; `None` before the first position.
+    /// Returns the state; `None` before the first position.
     pub(super) fn state(&self) -> Option<State> {
         let (motor, raw_pulses) = (self.name()?, self.raw?);
         let pulses = self.directed(self.offset.shown(raw_pulses));

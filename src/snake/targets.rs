@@ -1,4 +1,4 @@
-//! What an application asks of joints and reads of them.
+//! Targets for joints, and their settings, registers and health.
 
 use super::offset::Offset;
 use super::slot::{Slot, health, to_pulses};
@@ -7,15 +7,14 @@ use crate::encoder::Position;
 use crate::motor::{Capabilities, Capability, Conditions, Edge, Health, TargetError};
 use crate::units::AngularVelocity;
 
-/// Targets. Each replaces the one before, works in RAM only, and counts until the command deadline
-/// ([`Timeouts::command`](crate::motor::Timeouts::command)): an application that stops setting targets has its joints
-/// disabled.
+/// Targets. Each replaces the previous one, works in RAM only, and counts until the command deadline
+/// ([`Timeouts::command`](crate::motor::Timeouts::command)): if an application stops setting targets, its joints are disabled.
 ///
 /// # Errors
-/// A target fails, and is not kept for later, when the joint is detached, not armed, relaxed by a fault or not heard, and
-/// for NaN or infinity, which takes the present target away.
+/// A target fails, and is not kept for later, if the joint is detached, not armed, relaxed by a fault or not online. NaN or infinity also
+/// fails, and cancels the present target.
 impl Joints {
-    /// Sets the position that a joint goes to, from its zero. Saturates at the ±32768 turns of its counter.
+    /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
     /// # Errors
     /// See above.
@@ -26,7 +25,7 @@ impl Joints {
         self.aim(joint, position.is_finite(), |slot| slot.set_target(pulses))
     }
 
-    /// Sets the position that a joint goes to, in pulses from its zero: the wire's own scale, 65536 a turn.
+    /// Sets the position to go to, in pulses from the joint's zero: the wire's own scale, 65536 a turn.
     ///
     /// # Errors
     /// See above.
@@ -34,11 +33,11 @@ impl Joints {
         self.aim(joint, true, |slot| slot.set_target(pulses))
     }
 
-    /// Sets the speed with which a joint goes to its targets, whatever its sign; saturates at 255 rpm. It is no target
-    /// itself: it can be set before arming, and keeps nothing alive.
+    /// Sets the speed of moves to a target; the sign does not count, and the value saturates at 255 rpm. A speed is no target: it can be
+    /// set before arming, and does not keep a target alive.
     ///
     /// # Errors
-    /// When the joint is detached, and for NaN or infinity, which takes the present target away.
+    /// The joint is detached, or the speed is NaN or infinite, which also cancels the present target.
     pub fn set_speed(&mut self, joint: Joint, speed: AngularVelocity) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
         if !speed.is_finite() {
@@ -49,13 +48,13 @@ impl Joints {
         Ok(())
     }
 
-    /// Changes the registers that a joint is set up with to those of `config`: current, acceleration, deceleration and mode.
+    /// Changes the set-up registers of a joint to those of `config`: current, acceleration, deceleration and mode.
     ///
-    /// Nothing else of `config` is looked at. The joint may move meanwhile. If it is being brought up, a change may be written
-    /// after the enable, within seven of its turns.
+    /// The rest of `config` is ignored. The joint may move meanwhile. During a bring-up, a change may be written after the enable, within
+    /// seven turns of the joint.
     ///
     /// # Errors
-    /// When a parameter is not usable. A detached joint changes nothing.
+    /// A parameter is not usable. For a detached joint there is no effect.
     pub fn set_settings(&mut self, joint: Joint, config: &Config) -> Result<(), AttachError> {
         let settings = config.settings;
         let Some(slot) = self.slot_mut(joint) else { return Ok(()) };
@@ -66,19 +65,19 @@ impl Joints {
         Ok(())
     }
 
-    /// Asks a joint for nothing: it is disabled, and stays armed.
+    /// Discards the target of a joint: the joint is disabled, and stays armed.
     pub fn relax(&mut self, joint: Joint) {
         if self.slot(joint).is_some() {
             self.relax_at(joint.index());
         }
     }
 
-    /// Makes the present position of a joint zero. A joint that has a target is relaxed: it was given in the old terms.
+    /// Makes the present position of a joint zero. A joint with a target is relaxed: the target refers to the old zero.
     ///
-    /// The position is that of the last reply: a joint that moves is where it was then.
+    /// The position is that of the last reply, even if the joint moves.
     ///
     /// # Errors
-    /// When the joint is detached, or not heard: where it is now is not known then.
+    /// The joint is detached, or not online: its position is then unknown.
     pub fn zero(&mut self, joint: Joint) -> Result<(), TargetError> {
         let now = self.now;
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
@@ -89,15 +88,15 @@ impl Joints {
         Ok(())
     }
 
-    /// Sets where the zero of a joint lies in the counts of its drive, in pulses: one that was stored, say. A joint that has a
-    /// target is relaxed.
+    /// Sets the position of a joint's zero in the counts of its drive, in pulses: for example a stored one. A joint with a target is
+    /// relaxed.
     ///
     /// ```text
     /// position shown = raw - offset        target sent = wanted + offset
     /// ```
     ///
     /// # Errors
-    /// When the joint is detached.
+    /// The joint is detached.
     pub fn set_offset(&mut self, joint: Joint, raw_pulses: i32) -> Result<(), TargetError> {
         let now = self.now;
         self.slot_mut(joint).ok_or(TargetError::Detached)?.set_offset(Offset::new(raw_pulses), now);
@@ -105,16 +104,16 @@ impl Joints {
         Ok(())
     }
 
-    /// Returns where the zero of a joint lies in the counts of its drive, in pulses: to be stored. `None` for a detached joint.
+    /// Returns the position of a joint's zero in the counts of its drive, in pulses, for storage. `None` for a detached joint.
     #[must_use]
     pub fn offset(&self, joint: Joint) -> Option<i32> {
         Some(self.slot(joint)?.offset.raw())
     }
 
-    /// Asks a joint for a register once, in its turn; [`answer`](Self::answer) has it then.
+    /// Requests a register of a joint once, in its turn. [`answer`](Self::answer) then returns the reply.
     ///
     /// # Errors
-    /// When the joint is detached.
+    /// The joint is detached.
     pub fn read(&mut self, joint: Joint, register: Register) -> Result<(), TargetError> {
         let slot = self.slot_mut(joint).ok_or(TargetError::Detached)?;
         slot.question = Some(register);
@@ -122,27 +121,27 @@ impl Joints {
         Ok(())
     }
 
-    /// Returns the answer to the last [`read`](Self::read), and forgets it.
+    /// Returns the reply to the last [`read`](Self::read), once.
     pub fn answer(&mut self, joint: Joint) -> Option<Reply> {
         self.slot_mut(joint)?.answer.take()
     }
 
-    /// Returns the register that a joint was asked for and has not answered yet.
+    /// Returns the register of an outstanding reply.
     #[must_use]
     pub fn awaited(&self, joint: Joint) -> Option<Register> {
         self.slot(joint).and_then(|_| self.answers.of(joint.index()))
     }
 
-    /// Says that the driver hands back the frames that it sent, so that a frame of a controller that is received is no
-    /// sign of a second one. None is looked for then.
+    /// Declares that the driver receives its own frames. A frame of a controller is then no sign of a second controller, and the check for
+    /// a second one is off.
     #[must_use]
     pub const fn with_loopback(mut self) -> Self {
         self.echoes = true;
         self
     }
 
-    /// Returns what a joint offers: positions over many turns, in radians or in its own pulses, and what it reports of
-    /// them. Nothing once it is detached. There is no function for any other target.
+    /// Returns the capabilities of a joint: positions over many turns, in radians or in its own pulses, and feedback of positions. Empty
+    /// for a detached joint. There is no function for any other target.
     #[must_use]
     pub fn capabilities(&self, joint: Joint) -> Capabilities {
         const OFFERED: Capabilities =
@@ -150,8 +149,8 @@ impl Joints {
         self.slot(joint).map_or(Capabilities::NONE, |_| OFFERED)
     }
 
-    /// Returns how a joint is; `None` once it is detached. Its feedback rate is that of positions, and its ambiguous gaps
-    /// are the positions further off than it can go.
+    /// Returns the health of a joint; `None` for a detached joint. The feedback rate is that of positions, and the ambiguous gaps are
+    /// position changes larger than possible.
     ///
     /// # Examples
     /// ```
@@ -170,16 +169,16 @@ impl Joints {
         health::report(self.slot(joint)?)
     }
 
-    /// Returns what is wrong with a joint; nothing once it is detached.
+    /// Returns the conditions of a joint that hold; empty for a detached joint.
     #[must_use]
     pub fn conditions(&self, joint: Joint) -> Conditions {
         self.slot(joint).map_or(Conditions::NONE, |slot| slot.guard.conditions())
     }
 
-    /// Returns the oldest change of a joint's condition that was not read yet.
+    /// Returns the oldest unread edge of a joint.
     ///
-    /// None is lost, however late it is read; while it waits, the same change is not noted again. Of each joint, beyond 6
-    /// that wait, the later ones have the time of the last of these.
+    /// No edge is lost, however late it is read. While an edge waits, the same change is not noted again. If more than 6 edges of a joint
+    /// wait, the later edges have the time of the sixth.
     ///
     /// # Examples
     /// ```
@@ -217,7 +216,7 @@ impl Joints {
         if outcome.is_ok() {
             set(slot);
         }
-        // A target that is refused takes the present one away.
+        // A refused target also cancels the present one.
         self.let_go(joint.index());
         outcome
     }

@@ -1,4 +1,4 @@
-//! What a motor is configured with: at the start, and while it runs.
+//! Configuration of a motor: at the start, and while running.
 
 use super::{NO_GAINS, Slot};
 use crate::control::{Pid, PidConfig};
@@ -87,14 +87,14 @@ pub(in crate::dji) const fn configured(
     })
 }
 
-/// Returns below which command a motor need not be looked at closely.
+/// Returns the command below which a motor needs no full check.
 const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
-    // A stall, and half of the command for a runaway.
+    // The lower of the bounds of a stall and of a runaway, which is half of the command.
     let effort = if health.stall_effort() < 0.5 { health.stall_effort() } else { 0.5 };
     to_raw(effort, full_limit as f32, full_limit).unsigned_abs()
 }
 
-/// Returns what the motor offers with the loops that it has.
+/// Returns the capabilities of the motor with its loops.
 pub(in crate::dji) fn capabilities(slot: &Slot) -> Capabilities {
     let Some(facts) = slot.facts else { return Capabilities::NONE };
     let set = Capabilities::of(&[Capability::Raw, facts.control, Capability::Feedback]);
@@ -141,12 +141,12 @@ pub(in crate::dji) fn set_position_loop(
     replaced
 }
 
-/// The velocity of the output shaft without load: what a position loop may ask for.
+/// Returns the velocity of the output shaft without load: the limit of a position loop.
 const fn no_load_velocity(facts: &Facts, rad_per_s_per_rpm: f32) -> f32 {
     facts.rotor_no_load_rpm() as f32 * rad_per_s_per_rpm.abs()
 }
 
-/// Narrows the output of a loop to ±`limit`, where there is a loop.
+/// Narrows the output of a loop to ±`limit`, if there is a loop.
 const fn within(config: Option<PidConfig>, limit: f32) -> PidConfig {
     let Some(config) = config else { return NO_GAINS };
     let (lower, upper) = config.output_range();
@@ -155,7 +155,7 @@ const fn within(config: Option<PidConfig>, limit: f32) -> PidConfig {
     config.with_output_range(lower, upper)
 }
 
-/// Returns the configuration for a loop that is there, narrowed to ±`limit`.
+/// Returns the configuration for an existing loop, narrowed to ±`limit`.
 fn checked(
     is_there: bool,
     config: PidConfig,
@@ -172,8 +172,8 @@ fn checked(
     Ok(within(Some(config), limit))
 }
 
-/// Returns the proportional gain of a speed loop with which an error of one rpm of the rotor, the finest that feedback tells, asks
-/// for more than the whole command range of the model.
+/// Returns the proportional gain of a speed loop if its command for an error of one rpm of the rotor, the resolution of the feedback,
+/// exceeds the whole command range of the model.
 const fn steep_speed(
     config: &PidConfig,
     facts: &Facts,
@@ -183,14 +183,14 @@ const fn steep_speed(
     beyond(config, "kp of the speed loop", steepest)
 }
 
-/// Returns the proportional gain of a position loop with which an error of one count of the encoder asks for more than the no-load
-/// speed of the model. The gearbox divides both.
+/// Returns the proportional gain of a position loop if its command for an error of one count of the encoder exceeds the no-load speed of
+/// the model. The gearbox divides both.
 const fn steep_position(config: &PidConfig, facts: &Facts) -> Option<SteepGain> {
     let steepest = facts.rotor_no_load_rpm() as f32 / 60.0 * COUNTS_PER_TURN as f32;
     beyond(config, "kp of the position loop", steepest)
 }
 
-/// NaN and infinity are refused with the other gains.
+/// Returns a gain above the steepest. NaN and infinity are refused with the other gains.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 const fn beyond(config: &PidConfig, parameter: &'static str, steepest: f32) -> Option<SteepGain> {
     let (kp, ..) = config.gains();

@@ -1,38 +1,38 @@
-//! What a motor is asked to do, and what an update does about it.
+//! Action of a motor, and its execution by an update.
 
-/// What a motor is asked to do.
+/// Action set by the target of a motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Action {
     Rest,
     Raw,
     Velocity,
-    /// The shortest way.
+    /// By the shortest way.
     Angle,
     Position,
-    /// The way that another sensor leaves.
+    /// By the remaining way that another sensor measures.
     Measured,
 }
 
 impl Action {
-    /// Tells whether it goes to a place of the shaft.
+    /// Tells whether the action goes to a position of the shaft.
     pub(super) const fn is_way(self) -> bool {
         matches!(self, Self::Angle | Self::Position)
     }
 }
 
-/// What an update does: the action, where that is as simple as it nearly always is.
+/// Task of an update: the action itself in the usual, simple case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Duty {
     Rest,
-    /// Whatever is asked for, for the first time since a rest.
+    /// The first run of any action since a rest.
     First,
     Raw,
-    /// The speed loop, plain and with the full output: what it gives within its limit needs no other.
+    /// The speed loop, plain and with the full output: its own limit is enough.
     Velocity,
     /// Both loops, as above.
     Position,
-    /// Whatever else is asked for, within what is left of the output; also what is asked for in place of another.
+    /// Any other action, within the available output; also the first run of an action in place of another.
     Other,
 }

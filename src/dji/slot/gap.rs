@@ -1,11 +1,11 @@
-//! Feedback that does not come shortly after the one before, and where the shaft then is.
+//! Feedback after a gap, and the position of the shaft after the gap.
 
 use super::{Slot, health};
 use crate::dji::{Facts, Feedback};
 use crate::encoder::{COUNTS_PER_TURN, Homing, Position, resolve_gap, shortest};
 use crate::motor::{Condition, Link, TargetError, Timeouts, age};
 
-/// Takes a feedback frame that arrived at `now`, whenever the one before came.
+/// Takes a feedback frame received at `now`, after a gap of any length.
 pub(in crate::dji) fn receive(
     slot: &mut Slot,
     facts: &Facts,
@@ -33,7 +33,7 @@ pub(in crate::dji) fn receive(
     slot.feedback = feedback;
     slot.guard.hear(now, timeouts);
     if slot.guard.link() == Link::Online {
-        // Before the first update nobody looks at ages, so that every frame has to: it comes this way.
+        // Before the first update no tick checks ages, so every frame must: all frames then take this path.
         let is_trusted = running && !slot.traffic.is_crowded();
         slot.guard.trust(if is_trusted { trusted_gap_us(facts) } else { 0 });
         if link == Link::Recovering || link == Link::Offline {
@@ -43,7 +43,7 @@ pub(in crate::dji) fn receive(
     }
 }
 
-/// Follows the angle of a motor that was heard `gap_us` ago.
+/// Follows the angle of a motor whose last feedback is `gap_us` old.
 fn follow(slot: &mut Slot, facts: &Facts, feedback: Feedback, gap_us: u32) {
     let (before, after) = (slot.feedback, feedback);
     if slot.traffic.is_crowded() && gap_us < trusted_gap_us(facts) {
@@ -65,12 +65,12 @@ fn follow(slot: &mut Slot, facts: &Facts, feedback: Feedback, gap_us: u32) {
     }
 }
 
-/// Looks whether two motors take turns, when more frames come than one motor sends.
+/// Checks whether two motors take turns, if more frames come than one motor sends.
 fn compare(slot: &mut Slot, feedback: Feedback, gap_us: u32) {
     const COUNTS_PER_RPM_MS: f32 = COUNTS_PER_TURN as f32 / 60_000.0;
     let (one, other) = (f32::from(slot.feedback.rpm()), f32::from(feedback.rpm()));
     let predicted = (one + other) * 0.5 * COUNTS_PER_RPM_MS * (gap_us as f32 * 1e-3);
-    // A sample is up to a period old, and so is the one before.
+    // Either sample is up to a period old.
     let tolerance = 200.0 + 2.0 * COUNTS_PER_RPM_MS * one.abs().max(other.abs());
     let counts = shortest(slot.feedback.angle(), feedback.angle());
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
@@ -82,7 +82,7 @@ fn compare(slot: &mut Slot, feedback: Feedback, gap_us: u32) {
     }
 }
 
-/// Follows the angle without counting turns that nobody saw.
+/// Follows the angle by the shortest way, without turns in between.
 fn move_shortest(slot: &mut Slot, feedback: Feedback) {
     slot.shaft.advance(shortest(slot.feedback.angle(), feedback.angle()));
 }
@@ -95,8 +95,7 @@ fn doubt_position(slot: &mut Slot) {
     }
 }
 
-/// Calls the present position `position`. A motor that holds an angle or position is relaxed: its target
-/// was given in the old terms.
+/// Sets the present position to `position`. A motor that holds an angle or position is relaxed: its target refers to the old zero.
 pub(in crate::dji) fn set_present_position(
     slot: &mut Slot,
     position: Position,
@@ -117,7 +116,7 @@ pub(in crate::dji) fn set_present_position(
     Ok(())
 }
 
-/// Half a rotor turn at no-load speed, 30 s / rpm, less what frames may be delayed by others on the bus.
+/// Returns half a rotor turn at no-load speed, 30 s / rpm, less the delay of a frame by others on the bus.
 fn trusted_gap_us(facts: &Facts) -> u32 {
     let half_turn_us = 30_000_000 / u32::from(facts.rotor_no_load_rpm()).max(1);
     half_turn_us.saturating_sub(500)

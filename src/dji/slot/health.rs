@@ -8,36 +8,36 @@ use crate::encoder::Homing;
 use crate::motor::{Condition, Conditions, Health, HealthConfig, Link, Monitor, Sample, age};
 use crate::time::Duration;
 
-/// Inside of a soft limit by this much the motor is no longer at it.
+/// Distance inside of a soft limit from which the motor is no longer at the limit.
 const CLEAR_RAD: f32 = 0.01;
 
 /// The temperature byte that stands for -40 °C.
 const FIRST_BELOW_ZERO: u8 = 216;
 
-/// A motor with one of these is not armed.
+/// A motor with one of these conditions is not armed.
 const OBSTACLES: Conditions = Conditions::NONE.with(Condition::Fault).with(Condition::DuplicateId);
 
-/// What a look at a motor has to know of its bus.
+/// Values of the bus for a check of a motor.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::dji) struct Surroundings {
     pub(in crate::dji) now: u32,
-    /// Time since the look before, in units of 1.024 ms.
+    /// Time since the previous check, in units of 1.024 ms.
     pub(in crate::dji) elapsed: u8,
-    /// The command that was sent.
+    /// The command sent.
     pub(in crate::dji) word: i16,
-    /// Its length in units of 1.024 ms, when a window in which frames are counted ends.
+    /// Length of the counting window in units of 1.024 ms, if the window ends.
     pub(in crate::dji) window: Option<u16>,
     pub(in crate::dji) feedback_hz: u32,
-    /// Nobody else sends commands any more.
+    /// Whether no other node sends commands any more.
     pub(in crate::dji) is_alone: bool,
 }
 
-/// Something began: the motor is looked at closely until all is [well](relent) again.
+/// Requires full checks of the motor until all is [well](waive_check) again.
 pub(super) const fn require_check(slot: &mut Slot) {
     slot.cool_below = 0;
 }
 
-/// From now on a glance is enough, if all is well.
+/// Allows quick checks from now on, if all is well.
 #[inline(never)]
 pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
     let is_well = slot.guard.latch().active().is_empty()
@@ -54,13 +54,13 @@ pub(super) fn waive_check(slot: &mut Slot, facts: &Facts) {
     }
 }
 
-/// A condition began that a look at the motor has to end, or is to see.
+/// Begins a condition that a full check must end or observe.
 pub(super) const fn begin(slot: &mut Slot, condition: Condition) {
     slot.guard.latch_mut().set(condition, true);
     require_check(slot);
 }
 
-/// Checks everything that is not checked in every tick.
+/// Runs all checks that do not run in every tick.
 pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     let Some(facts) = slot.facts else { return };
     let before = slot.guard.latch().active();
@@ -84,8 +84,8 @@ pub(in crate::dji) fn check(slot: &mut Slot, seen: &Surroundings) {
     }
 }
 
-/// [`check`] for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or
-/// frozen feedback may begin.
+/// As [`check`], for a motor that is well and driven hard: cool, no condition, no error. Returns `false` if a stall, runaway or frozen
+/// feedback may begin.
 #[inline(never)]
 pub(super) fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed: u8) -> bool {
     let speed = f32::from(slot.feedback.rpm()) / f32::from(facts.rotor_no_load_rpm());
@@ -98,8 +98,8 @@ pub(super) fn is_driven_well(slot: &mut Slot, facts: &Facts, word: i16, elapsed:
     true
 }
 
-/// Takes the error code of a frame. One that weighs more than that before counts at once: by the motor's turn it may be
-/// over. A lesser one waits for that turn, so that codes which come and go are no flood.
+/// Takes the error code of a frame. A graver code than before counts at once: the error may be over at the motor's turn. Any other code
+/// waits for that turn, so that intermittent codes do not flood the edges.
 pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
     if code == 0 {
         return;
@@ -113,7 +113,7 @@ pub(in crate::dji) fn hear_error(slot: &mut Slot, facts: &Facts, code: u8) {
     }
 }
 
-/// Takes the code of a frame that was in time; `false` for one that is [graver](is_graver) than that before.
+/// Takes the code of a frame in time; `false` for a [graver](is_graver) code than before.
 pub(in crate::dji) fn hear_known_error(slot: &mut Slot, facts: &Facts, code: u8) -> bool {
     if code != 0 {
         if is_graver(slot, facts, code) {
@@ -124,7 +124,7 @@ pub(in crate::dji) fn hear_known_error(slot: &mut Slot, facts: &Facts, code: u8)
     true
 }
 
-/// Tells whether an error code weighs more than that before.
+/// Tells whether an error code is graver than the previous one.
 fn is_graver(slot: &Slot, facts: &Facts, code: u8) -> bool {
     code != slot.error_code && facts.errors.severity(code) > facts.errors.severity(slot.error_code)
 }
@@ -139,7 +139,7 @@ fn take_error(slot: &mut Slot, facts: &Facts, code: u8) {
 fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
     let feedback = slot.feedback;
     let came = slot.monitor.take_error();
-    // What came and went since the look before is not over yet: it may come and go.
+    // An error that came and went since the previous check is not over yet: it may be intermittent.
     if !came || feedback.error() != 0 {
         take_error(slot, facts, feedback.error());
     }
@@ -163,7 +163,7 @@ fn run_checks(slot: &mut Slot, facts: &Facts, seen: &Surroundings) -> f32 {
     slot.monitor.check(slot.guard.latch_mut(), &sample, slot.health)
 }
 
-/// Narrows the output to the share that is left, in the directions that are left.
+/// Narrows the output to the available share, in the available directions.
 fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
     let share = share.min(slot.guard.share(now));
     let limit = to_raw(share, f32::from(slot.full_limit), slot.full_limit);
@@ -174,20 +174,19 @@ fn narrow(slot: &mut Slot, share: f32, elapsed: u8, now: u32) {
     }
 }
 
-/// Keeps the integral of the speed loop within what is left of the output: the loop knows only the full limit, and would
-/// wind up.
+/// Keeps the integral of the speed loop within the available output: the loop knows only the full limit, and would wind up.
 fn hold_back(slot: &mut Slot) {
     let end = |raw: i16| f32::from(slot.range.nearest(raw.into())) / slot.raw_per_unit;
     let (one, other) = (end(i16::MIN), end(i16::MAX));
     slot.speed.keep_integral_between(one.min(other), one.max(other));
 }
 
-/// Tells whether there is a motor, and nothing that keeps it from being armed.
+/// Tells whether there is a motor that may be armed.
 pub(in crate::dji) fn is_fit(slot: &Slot) -> bool {
     slot.facts.is_some() && !is_faulty(slot)
 }
 
-/// Takes targets from now on, starting from rest; what relaxed the motor before is noticed anew.
+/// Takes targets from now on, beginning at rest. A condition that relaxed the motor is detected anew.
 pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     slot.guard.engage(now);
     for condition in Monitor::NOTICED_ANEW {
@@ -198,14 +197,14 @@ pub(in crate::dji) fn engage(slot: &mut Slot, now: u32) {
     keep_inside(slot, 0);
 }
 
-/// The output range opens from zero, where it does not open at once.
+/// Opens the output range from zero, unless the range opens at once.
 pub(super) fn begin_opening(slot: &mut Slot) {
     if slot.guard.is_opening() {
         slot.range = Range::ZERO;
     }
 }
 
-/// Takes the outward direction away at a soft limit. `ahead` is how far to look, in units of 1.024 ms.
+/// Blocks the outward direction at a soft limit. `ahead` is the time to look ahead, in units of 1.024 ms.
 pub(super) fn keep_inside(slot: &mut Slot, ahead: u8) {
     let (up_only, down_only) = soft_limits(slot, ahead);
     let upward = slot.raw_per_unit > 0.0;
@@ -220,7 +219,7 @@ pub(super) fn keep_inside(slot: &mut Slot, ahead: u8) {
     slot.apply_rules();
 }
 
-/// Returns whether the shaft may turn up only, and whether down only.
+/// Returns whether the shaft may turn up only, and whether the shaft may turn down only.
 fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
     let Some((lower, upper)) = slot.health.soft_limits else { return (false, false) };
     if slot.homing == Homing::Relative {
@@ -228,7 +227,7 @@ fn soft_limits(slot: &mut Slot, ahead: u8) -> (bool, bool) {
         return (false, false);
     }
     let here = slot.shaft.position().as_angle().as_radians();
-    // Where it is when it is looked at next.
+    // The position at the next check.
     let there = here + slot.velocity().as_rad_per_s() * (f32::from(ahead) * 1.024e-3);
     let (below, above) = (here.min(there) <= lower, here.max(there) >= upper);
     let lingers = slot.guard.latch().has(Condition::SoftLimit)
@@ -258,7 +257,7 @@ fn close_window(slot: &mut Slot, window: u16, feedback_hz: u32) {
     }
 }
 
-/// Relaxes the motor when something began, or still holds, for which it has to be.
+/// Relaxes the motor if a condition with this reaction began, or an obstacle to arming holds.
 pub(super) fn react(slot: &mut Slot, before: Conditions) {
     let active = slot.guard.latch().active();
     let begun = active.minus(before).and(slot.health.relaxing());
@@ -267,7 +266,7 @@ pub(super) fn react(slot: &mut Slot, before: Conditions) {
     }
 }
 
-/// Another node has sent the motor's command frame.
+/// Notes a command frame of the motor from another node.
 pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
     if !slot.health.ignores(Condition::SecondMaster) {
         let before = slot.guard.latch().active();
@@ -276,7 +275,7 @@ pub(in crate::dji) fn hear_rival(slot: &mut Slot) {
     }
 }
 
-/// Returns how the motor is.
+/// Returns the health of the motor.
 pub(in crate::dji) fn report(slot: &Slot) -> Option<Health> {
     let facts = slot.facts?;
     let heard = slot.guard.link() != Link::Unheard;
@@ -307,7 +306,7 @@ const fn mixed(one: u16, other: u16) -> u16 {
     one.wrapping_mul(0x9E37) ^ other.wrapping_mul(0x79B9)
 }
 
-/// Returns from which temperature on the motor is warm, and from which on it is hot.
+/// Returns the temperatures from which the motor is warm, and from which the motor is hot.
 const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
     match health.temperatures_c() {
         Some(temperatures) => temperatures,
@@ -315,7 +314,7 @@ const fn temperatures(facts: &Facts, health: &HealthConfig) -> (i16, i16) {
     }
 }
 
-/// The byte is signed in some drivers and unsigned in others: -40 to -1 is meant rather than 216 to 255.
+/// Some drivers read the byte as signed, others as unsigned: -40 to -1 is more plausible than 216 to 255.
 pub(super) fn celsius(byte: u8) -> i16 {
     if byte < FIRST_BELOW_ZERO { byte.into() } else { i16::from(byte) - 256 }
 }

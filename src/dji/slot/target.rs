@@ -1,4 +1,4 @@
-//! Targets that do not renew the one before, and the loops where they do more than go on.
+//! Targets of a new kind, and loops outside the usual path.
 
 use super::duty::{Action, Duty};
 use super::{Goal, Slot, health, needs, usable};
@@ -10,7 +10,7 @@ use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
 use crate::units::Angle;
 
 impl Slot {
-    /// Asks for nothing: zero output, loops reset.
+    /// Discards the target: zero output, loops reset.
     pub(in crate::dji) fn relax(&mut self) {
         self.guard.relax();
         self.apply_rules();
@@ -46,7 +46,7 @@ impl Slot {
         Ok(())
     }
 
-    /// Returns the nearest position that is within the soft limits.
+    /// Returns the nearest position within the soft limits.
     fn inside(&self, position: Position) -> Position {
         let Some((lower, upper)) = self.health.soft_limits else { return position };
         let radians = position.as_angle().as_radians();
@@ -59,7 +59,7 @@ impl Slot {
         }
     }
 
-    /// Tells whether a target may be taken; where not, the one before may be over.
+    /// Tells whether a target may be taken; if not, the previous target may be cancelled.
     #[inline]
     fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         match self.guard.admit(is_finite) {
@@ -94,7 +94,7 @@ impl Slot {
         Ok(())
     }
 
-    /// Takes an absolute angle of the output shaft: the shortest way.
+    /// Takes an absolute angle of the output shaft, by the shortest way.
     pub(in crate::dji) fn set_angle(
         &mut self,
         angle: Position,
@@ -110,8 +110,8 @@ impl Slot {
         Ok(())
     }
 
-    /// Takes the way that another sensor leaves, in rad, and the rate that it measures, in rad/s; `at` is `None` when that
-    /// was too long ago for a stamp.
+    /// Takes the remaining way in rad, and the rate in rad/s, both measured by another sensor. `at` is `None` for a measurement too old for
+    /// a stamp.
     pub(in crate::dji) fn set_measured(
         &mut self,
         way: f32,
@@ -149,13 +149,13 @@ impl Slot {
         self.apply_rules();
     }
 
-    /// Tells whether the motor was at rest, not asked or not heard, at any time since the last usable update: its command
-    /// of then is not to be sent again.
+    /// Tells whether the motor was at rest, without a target or fresh feedback, at any time since the last usable update: the command of
+    /// that update must not be sent again.
     pub(in crate::dji) fn has_rested(&self) -> bool {
         matches!(self.duty, Duty::Rest | Duty::First)
     }
 
-    /// Finds out what an update has to do. To be called wherever the guard, the range, a loop or what is asked for changes.
+    /// Determines the task of an update. Call this wherever the guard, the range, a loop or the action changes.
     pub(in crate::dji) fn apply_rules(&mut self) {
         if !self.guard.has_target() {
             self.asked = Action::Rest;
@@ -177,9 +177,9 @@ impl Slot {
         };
     }
 
-    // Cold, so that the usual way of an update runs straight on.
+    // Cold, so that the usual path of an update runs straight on.
 
-    /// Runs the loops whatever they are and however far the output is limited; or rests, or begins after a rest.
+    /// Runs loops of any kind at any limit of the output; or rests, or begins after a rest.
     #[cold]
     #[inline(never)]
     pub(super) fn update_carefully(&mut self, dt_s: f32, sent: &Outbox) -> i16 {
@@ -209,7 +209,7 @@ impl Slot {
         self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
     }
 
-    /// Returns which part of its velocity a position loop may ask for: while the output range opens, that of the range.
+    /// Returns the share of its velocity available to a position loop: the open share of the output range.
     fn opened_part(&self) -> f32 {
         if !self.guard.is_opening() {
             return 1.0;
@@ -219,7 +219,7 @@ impl Slot {
         ) / f32::from(self.full_limit)
     }
 
-    /// What is asked for has an output from now on.
+    /// Begins the action after a rest.
     fn end_rest(&mut self) {
         self.rest_loops();
         self.acted = Action::Rest;
@@ -227,7 +227,7 @@ impl Slot {
         self.apply_rules();
     }
 
-    /// Has the loops rest as the motor did.
+    /// Resets or interrupts the loops, by the kind of the rest.
     pub(super) fn rest_loops(&mut self) {
         match self.guard.end_rest() {
             Rest::Relaxed => self.reset_loops(),
@@ -236,8 +236,8 @@ impl Slot {
         }
     }
 
-    /// What is asked for is done for the first time. The loops that have a part in it go on from what was done until now and
-    /// sent last, so that their output does not jump. What was asked for in between, and never done, is nothing to go on from.
+    /// Runs an action for the first time. The loops in use continue from the last action and the last command sent, so their output does
+    /// not jump. An action set in between, but never run, is ignored.
     #[cold]
     #[inline(never)]
     fn take_over(&mut self, sent: &Outbox) {
@@ -248,7 +248,7 @@ impl Slot {
                 let last = self.in_units(sent.get(self.place));
                 self.speed.reset_to(last);
             }
-            // Another sensor: its last reading says nothing of the next one.
+            // Another sensor: its last reading gives no rate with the next one.
             Action::Measured => self.interrupt_loops(),
             _ => {}
         }
@@ -258,7 +258,7 @@ impl Slot {
                 if !is_placed {
                     self.position.reset_to(self.goal.rate());
                 }
-                // No kick for the step from one velocity to the other.
+                // Avoids a kick at the step from one velocity to the other.
                 self.interrupt_loops();
             }
             _ if self.asked.is_way() && !is_placed => {
@@ -304,7 +304,7 @@ mod tests {
     use crate::time::{Instant, Tick};
     use crate::units::AngularVelocity;
 
-    /// The short ways are for plain loops with the full output; all others take the one that knows everything.
+    /// The short paths are for plain loops with the full output; all other loops take the general path.
     #[test]
     fn a_plain_loop_with_the_full_output_takes_the_short_way_and_no_other_does() {
         let plain = PidConfig::new(1.0, 0.0, 0.0);

@@ -1,22 +1,22 @@
-/// What can be wrong with one motor.
+/// Abnormal condition of one motor.
 ///
-/// | condition | it holds while | the motor |
+/// | condition | holds while | the motor |
 /// |---|---|---|
 /// | [`Late`](Self::Late) | there is no fresh feedback | is safe, and goes on by itself |
-/// | [`Offline`](Self::Offline) | it is lost, until ten good frames came in a row | is relaxed |
+/// | [`Offline`](Self::Offline) | the motor is lost, until ten good frames in a row | is relaxed |
 /// | [`PositionUncertain`](Self::PositionUncertain) | turns may have been missed, until the position is set | goes on |
 /// | [`Warning`](Self::Warning) | the ESC reports a warning | goes on |
 /// | [`Fault`](Self::Fault) | the ESC reports a fault | is relaxed |
-/// | [`Warm`](Self::Warm) | it is above its warning temperature | has less output |
-/// | [`Hot`](Self::Hot) | it is above its limit temperature | has none |
-/// | [`Stalled`](Self::Stalled) | it is driven and does not turn | as configured; goes on |
-/// | [`Runaway`](Self::Runaway) | it sped up against its command, until it is armed | is relaxed |
-/// | [`Frozen`](Self::Frozen) | its feedback contradicts itself by standing still | as configured; goes on |
-/// | [`Overspeed`](Self::Overspeed) | it reports more than twice its speed without load | goes on |
-/// | [`DuplicateId`](Self::DuplicateId) | two motors answer with its id | is relaxed |
-/// | [`SoftLimit`](Self::SoftLimit) | it is at or outside of a soft limit | turns inward only |
-/// | [`CommandLost`](Self::CommandLost) | the application let its target grow too old | is relaxed, until the next target |
-/// | [`SecondMaster`](Self::SecondMaster) | another node sends its command frame | as configured; goes on |
+/// | [`Warm`](Self::Warm) | the motor is above its warning temperature | has less output |
+/// | [`Hot`](Self::Hot) | the motor is above its limit temperature | has no output |
+/// | [`Stalled`](Self::Stalled) | the motor is driven and does not turn | as configured; goes on |
+/// | [`Runaway`](Self::Runaway) | the motor sped up against its command, until armed | is relaxed |
+/// | [`Frozen`](Self::Frozen) | the feedback stands still in contradiction to itself | as configured; goes on |
+/// | [`Overspeed`](Self::Overspeed) | the reported speed is more than twice the speed without load | goes on |
+/// | [`DuplicateId`](Self::DuplicateId) | two motors answer with one id | is relaxed |
+/// | [`SoftLimit`](Self::SoftLimit) | the shaft is at or outside of a soft limit | turns inward only |
+/// | [`CommandLost`](Self::CommandLost) | the application let the target expire | is relaxed, until the next target |
+/// | [`SecondMaster`](Self::SecondMaster) | another node sends the command frame of the motor | as configured; goes on |
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,7 +25,7 @@
 pub enum Condition {
     /// No fresh feedback.
     Late,
-    /// Lost.
+    /// The motor is lost.
     Offline,
     /// Rotor turns may have been missed.
     PositionUncertain,
@@ -37,11 +37,11 @@ pub enum Condition {
     Warm,
     /// Above the limit temperature.
     Hot,
-    /// Driven, and does not turn.
+    /// The motor is driven, and does not turn.
     Stalled,
-    /// Speeds up without or against its command.
+    /// The motor speeds up without or against its command.
     Runaway,
-    /// Feedback that stands still and cannot be true.
+    /// The feedback stands still in contradiction to itself.
     Frozen,
     /// More than twice the speed without load.
     Overspeed,
@@ -49,7 +49,7 @@ pub enum Condition {
     DuplicateId,
     /// At or outside of a soft limit.
     SoftLimit,
-    /// The application set no target in time.
+    /// The target expired.
     CommandLost,
     /// Another node sends the command frame.
     SecondMaster,
@@ -58,7 +58,7 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// All of them.
+    /// All conditions.
     pub const ALL: [Self; 16] = [
         Self::Late,
         Self::Offline,
@@ -78,7 +78,7 @@ impl Condition {
         Self::ClockFault,
     ];
 
-    /// Returns it in the words of a log line.
+    /// Returns the condition in the words of a log line.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -129,55 +129,55 @@ impl core::fmt::Display for Condition {
 pub struct Conditions(u16);
 
 impl Conditions {
-    /// None of them: healthy.
+    /// No condition: healthy.
     pub const NONE: Self = Self(0);
 
-    /// Adds one.
+    /// Adds a condition.
     #[must_use]
     pub const fn with(self, condition: Condition) -> Self {
         Self(self.0 | condition.bit())
     }
 
-    /// Takes one away.
+    /// Removes a condition.
     #[must_use]
     pub const fn without(self, condition: Condition) -> Self {
         Self(self.0 & !condition.bit())
     }
 
-    /// Tells whether one is among them.
+    /// Tells whether a condition is in the set.
     #[must_use]
     pub const fn contains(self, condition: Condition) -> bool {
         self.0 & condition.bit() != 0
     }
 
-    /// Tells whether there is none.
+    /// Tells whether the set is empty.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Iterates over them, in the order of [`Condition::ALL`].
+    /// Iterates over the conditions, in the order of [`Condition::ALL`].
     pub fn iter(self) -> impl Iterator<Item = Condition> {
         let mut left = self.0;
         core::iter::from_fn(move || {
-            // Behind the last bit there is no condition.
+            // Above the last bit there is no condition.
             let first = Condition::ALL.get(left.trailing_zeros() as usize)?;
             left &= left.wrapping_sub(1);
             Some(*first)
         })
     }
 
-    /// Returns those that are in both.
+    /// Returns the conditions in both sets.
     pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// Returns those that are in one of them.
+    /// Returns the conditions in either set.
     pub(crate) const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Returns those that are in this set and not in the other.
+    /// Returns the conditions in this set and not in the other.
     pub(crate) const fn minus(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
@@ -189,7 +189,7 @@ impl core::fmt::Debug for Conditions {
     }
 }
 
-/// Names them in one line, separated by commas.
+/// Names the conditions in one line, separated by commas.
 impl core::fmt::Display for Conditions {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         if self.is_empty() {

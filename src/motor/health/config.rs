@@ -2,11 +2,11 @@ use super::{Condition, Conditions};
 use crate::time::Duration;
 use crate::units::Angle;
 
-/// What follows when a condition begins.
+/// Consequence of a condition at its begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reaction {
-    /// Nothing: it is not looked for.
+    /// Nothing: the condition is not checked.
     Ignore,
     /// An [`Edge`](super::Edge).
     Report,
@@ -16,15 +16,15 @@ pub enum Reaction {
 
 /// Configures the checks of a motor and the reaction to each condition.
 ///
-/// A motor keeps a reference to it, so it stands in a `static` or a `const`, one for all motors that are alike.
+/// A motor keeps a reference to its configuration, so the configuration is a `static` or a `const`, one for all motors of a kind.
 ///
-/// | looked for | at first |
+/// | check | default |
 /// |---|---|
-/// | heat | the temperatures of the model: less output from the warning on, none from the limit on |
+/// | heat | the temperatures of the model: less output from the warning on, zero from the limit on |
 /// | stall | half of the full command and more, at 2 % of the no-load speed and less, for 0.5 s: reported |
 /// | runaway | 30 % of the no-load speed gained against half of the full command: relaxed |
-/// | frozen feedback | 0.1 s of it: reported |
-/// | speed beyond twice that without load | reported |
+/// | frozen feedback | for 0.1 s: reported |
+/// | speed beyond twice the speed without load | reported |
 /// | faults of the ESC, two motors with one id | relaxed |
 /// | warnings of the ESC, a second master | reported |
 /// | soft limits | none |
@@ -57,7 +57,7 @@ pub struct HealthConfig {
 }
 
 impl HealthConfig {
-    /// Looks for everything, as in the table above.
+    /// Checks every condition, as in the table above.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -75,11 +75,11 @@ impl HealthConfig {
         }
     }
 
-    /// Sets what follows when a condition begins.
+    /// Sets the reaction to the begin of a condition.
     ///
-    /// Feedback that is late or lost, targets that are too old and soft limits have their own rules; for them, and for
-    /// [`Condition::PositionUncertain`], this has no effect. [`Condition::Warm`] ignored is no derating,
-    /// [`Condition::Hot`] ignored is no limit.
+    /// Late or lost feedback, expired targets and soft limits have their own rules: for these, and for [`Condition::PositionUncertain`],
+    /// `with_reaction` has no effect. If [`Condition::Warm`] is ignored, there is no derating. If [`Condition::Hot`] is ignored, there is
+    /// no limit.
     #[must_use]
     pub const fn with_reaction(mut self, condition: Condition, reaction: Reaction) -> Self {
         self.ignored = self.ignored.without(condition);
@@ -92,15 +92,15 @@ impl HealthConfig {
         self
     }
 
-    /// Sets from which temperature on the output falls, and at which it is zero, in °C; both end 5 K lower. Instead of
-    /// those of the model; a motor that reports no temperature has none.
+    /// Sets the temperatures in °C from which the output falls, and at which the output is zero, instead of those of the model. Both
+    /// conditions end 5 K lower. No effect for a motor without a reported temperature.
     #[must_use]
     pub const fn with_temperatures(self, warning_c: i16, limit_c: i16) -> Self {
         Self { temperatures_c: Some((warning_c, limit_c)), ..self }
     }
 
-    /// Sets what counts as a stall: at least this share of the full command and at most this share of the no-load speed,
-    /// for this time of up to 60 s.
+    /// Sets the bounds of a stall: at least this share of the full command and at most this share of the no-load speed, for this time of up
+    /// to 60 s.
     #[must_use]
     pub const fn with_stall(self, effort: f32, speed: f32, window: Duration) -> Self {
         let window = match window.micros_u32() {
@@ -110,18 +110,18 @@ impl HealthConfig {
         Self { stall_effort: effort, stall_speed: speed, stall_window: window, ..self }
     }
 
-    /// Limits the output while the motor is stalled, to this share of the full command: 0 to 1; 1 at first. It is full
-    /// again when the motor turns, or when less than half of that is asked for.
+    /// Limits the output of a stalled motor to this share of the full command: 0 to 1; 1 by default. The output is full again when the
+    /// motor turns, or when the command is below half of this share.
     #[must_use]
     pub const fn with_stall_hold(self, share: f32) -> Self {
         Self { stall_hold: share, ..self }
     }
 
-    /// Sets within which positions of the output shaft the motor may be driven outward. They count turns: a limit of
-    /// 720° lies two turns from zero.
+    /// Sets the positions of the output shaft within which the motor may be driven outward. The positions count turns: a limit of 720° lies
+    /// two turns from zero.
     ///
-    /// Outside it is driven inward only, also when it starts there; at speed, a little before. Without effect as long as
-    /// the absolute position is unknown: for a geared motor, until it is set.
+    /// Outside, the motor is driven inward only, also if the shaft starts there; at speed, already a little before. No effect while the
+    /// absolute position is unknown: for a geared motor, until the position is set.
     #[must_use]
     pub const fn with_soft_limits(self, lower: Angle, upper: Angle) -> Self {
         Self { soft_limits: Some((lower.as_radians(), upper.as_radians())), ..self }
@@ -130,7 +130,7 @@ impl HealthConfig {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the first that makes no sense.
+    /// Names the first unusable parameter.
     pub const fn validate(&self) -> Result<(), &'static str> {
         if let Some((warning, limit)) = self.temperatures_c {
             if warning >= limit {
@@ -147,7 +147,7 @@ impl HealthConfig {
             return Err("stall hold");
         }
         if let Some((lower, upper)) = self.soft_limits {
-            // A million turns is where f32 loses the angle.
+            // Beyond a million turns, f32 does not resolve the angle.
             if !(lower < upper && lower > -6e6 && upper < 6e6) {
                 return Err("soft limits");
             }

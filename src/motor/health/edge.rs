@@ -4,8 +4,8 @@ use crate::time::Instant;
 
 /// One change of a condition of one motor.
 ///
-/// Latched until it is read, so none is lost; and as long as it waits, the same change is not noted again, so that an
-/// error that comes and goes at 1 kHz is one edge. It is read once.
+/// An edge is latched until read, and read once, so no edge is lost. While an edge waits, the same change is not noted again: an error that
+/// comes and goes at 1 kHz is one edge.
 ///
 /// # Examples
 /// ```
@@ -22,12 +22,12 @@ use crate::time::Instant;
 pub struct Edge {
     /// The motor.
     pub motor: MotorName,
-    /// What changed.
+    /// The changed condition.
     pub condition: Condition,
-    /// Whether it began; otherwise it ended.
+    /// Whether the condition began; otherwise the condition ended.
     pub began: bool,
-    /// When it was noticed, rounded down to 1.024 ms. Where more edges wait than the owner of the motor keeps times of
-    /// (12 for a [`Bus`](crate::dji::Bus)), the later ones have the time of the last that was kept: they came after it.
+    /// Time of detection, rounded down to 1.024 ms. If more edges wait than the owner of the motor has times for (12 for a
+    /// [`Bus`](crate::dji::Bus)), the later edges have the last time kept: they came later.
     pub at: Instant,
 }
 
@@ -38,7 +38,7 @@ impl core::fmt::Display for Edge {
     }
 }
 
-/// The conditions of a motor, and which of their changes wait to be read.
+/// Conditions of a motor, and their unread changes.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Latch {
     active: Conditions,
@@ -50,7 +50,7 @@ impl Latch {
     pub(crate) const NONE: Self =
         Self { active: Conditions::NONE, began: Conditions::NONE, ended: Conditions::NONE };
 
-    /// Returns what holds now.
+    /// Returns the conditions that hold now.
     pub(crate) const fn active(&self) -> Conditions {
         self.active
     }
@@ -59,7 +59,7 @@ impl Latch {
         self.active.contains(condition)
     }
 
-    /// Says whether a condition holds now; a change waits to be read.
+    /// Sets whether a condition holds. A change is latched until read.
     pub(crate) const fn set(&mut self, condition: Condition, holds: bool) {
         if self.active.contains(condition) == holds {
             return;
@@ -73,7 +73,7 @@ impl Latch {
         }
     }
 
-    /// Says what an ESC reports now; another code of the same weight begins once more.
+    /// Sets the error reported by an ESC. Another code of the same severity begins the condition again.
     pub(crate) fn report(&mut self, error: Option<Severity>, changed: bool, config: &HealthConfig) {
         for (condition, severity) in
             [(Condition::Warning, Severity::Warning), (Condition::Fault, Severity::Fault)]
@@ -86,7 +86,7 @@ impl Latch {
         }
     }
 
-    /// Forgets a change that waits; `false` when it does not wait.
+    /// Removes an unread change; `false` if there is no such change.
     pub(crate) const fn take(&mut self, condition: Condition, began: bool) -> bool {
         let waiting = if began { &mut self.began } else { &mut self.ended };
         let waits = waiting.contains(condition);
@@ -94,7 +94,7 @@ impl Latch {
         waits
     }
 
-    /// Returns a change that waits. Of a condition that began and ended, the earlier one comes first.
+    /// Returns an unread change. If a condition both began and ended, the earlier change comes first.
     pub(crate) fn next(&self) -> Option<(Condition, bool)> {
         let condition = self.began.or(self.ended).iter().next()?;
         let both = self.began.contains(condition) && self.ended.contains(condition);
@@ -102,7 +102,7 @@ impl Latch {
         Some((condition, began))
     }
 
-    /// Returns the changes that wait now and did not before.
+    /// Returns the unread changes that were not unread `before`.
     pub(crate) fn news(&self, before: &Self) -> impl Iterator<Item = (Condition, bool)> + use<> {
         let began = self.began.minus(before.began).iter().map(|condition| (condition, true));
         let ended = self.ended.minus(before.ended).iter().map(|condition| (condition, false));
@@ -110,19 +110,19 @@ impl Latch {
     }
 }
 
-/// The times of the changes that wait, in the order in which they came, as long as there is room.
+/// Times of the unread changes in the order of detection, as long as there is room.
 ///
-/// A change whose time found no room stays latched: only its time is lost.
+/// A change without room stays latched: only its time is lost.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Journal<const N: usize> {
     at: [u32; N],
-    /// Which motor, which condition, whether it began.
+    /// Motor, condition, and whether the condition began.
     what: [u16; N],
     first: u8,
     length: u8,
-    /// Some change has found no room since the last time that none waited.
+    /// Whether a change found no room since all changes were last read.
     is_overfull: bool,
-    /// The time of the entry that was written last.
+    /// Time of the last entry written.
     last: u32,
 }
 
@@ -169,13 +169,13 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// Tells whether no change waits, with an entry or without.
+    /// Tells whether all changes are read, those without an entry too.
     #[inline]
     pub(crate) const fn is_empty(&self) -> bool {
         self.length == 0 && !self.is_overfull
     }
 
-    /// Notes that every change was read, those without an entry too.
+    /// Notes that all changes are read, those without an entry too.
     pub(crate) const fn clear(&mut self) {
         self.is_overfull = false;
     }
@@ -200,7 +200,7 @@ impl<const N: usize> Journal<N> {
         Some(fine(*at, now))
     }
 
-    /// Forgets the entries of a motor that is no longer there.
+    /// Forgets the entries of a detached motor.
     pub(crate) fn forget(&mut self, motor: u8) {
         for what in &mut self.what {
             if *what >> 8 == u16::from(motor) {
@@ -209,13 +209,12 @@ impl<const N: usize> Journal<N> {
         }
     }
 
-    /// Returns the time of an entry, seen from a `now` that may lie a little before it: exact to 1.024 ms, up to an age
-    /// of 25 days.
+    /// Returns the time of an entry, seen from a `now` that may lie a little before the entry: exact to 1.024 ms, up to an age of 25 days.
     pub(crate) fn time_of(&self, entry: &Entry, now: Instant) -> Instant {
         fine(entry.at, now)
     }
 
-    /// Returns the time of the last entry: what found no room came after it.
+    /// Returns the time of the last entry: changes without an entry came later.
     pub(crate) fn last_time(&self, now: Instant) -> Instant {
         fine(self.last, now)
     }
@@ -227,7 +226,7 @@ impl<const N: usize> Journal<N> {
     }
 }
 
-/// 1024 µs: a shift, where milliseconds would need a division of 64 bits.
+/// Time in units of 1024 µs: a shift, whereas milliseconds need a 64-bit division.
 #[expect(clippy::cast_possible_truncation, reason = "ages are told by wrapping difference")]
 const fn coarse(now: Instant) -> u32 {
     (now.as_micros() >> 10) as u32
@@ -331,8 +330,8 @@ mod tests {
     }
 
     proptest! {
-        /// Law: whatever changes and whenever it is read, each kind of change that happened since it was last read is
-        /// read exactly once more, the states that are told follow from the edges, and no edge waits when all are read.
+        /// Law: for any changes and any times of reading, each kind of change since the last reading is read exactly once more, the states
+        /// reported follow from the edges, and after all reads no edge waits.
         #[test]
         fn no_change_is_lost_and_none_is_told_twice(
             steps in proptest::collection::vec((0_usize..3, 0_usize..4, any::<bool>(), 0_u8..6), 1..300),

@@ -1,47 +1,47 @@
 use super::{Condition, HealthConfig, Latch};
 
-/// Returns a time between two looks as the checks take it.
+/// Returns the time between two checks in units of 1.024 ms, at most 128.
 pub(crate) fn elapsed(micros: Option<u32>) -> u8 {
     const LONGEST: u8 = 128;
     let units = micros.and_then(|micros| u8::try_from(micros >> 10).ok());
     units.map_or(LONGEST, |units| units.min(LONGEST))
 }
 
-/// For how long something holds, in units of 1.024 ms; saturates.
+/// Duration of a state, in units of 1.024 ms; saturates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Timer(u16);
 
 impl Timer {
     const ZERO: Self = Self(0);
 
-    /// Goes on while it holds, and starts anew when it does not.
+    /// Continues while the state holds; otherwise starts anew.
     const fn run(&mut self, holds: bool, elapsed: u8) -> u16 {
         self.0 = if holds { self.0.saturating_add(elapsed as u16) } else { 0 };
         self.0
     }
 }
 
-/// What a look at a motor finds, in the direction of its rotor.
+/// Input of a check, in the direction of the rotor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
-    /// Time since the look before, in units of 1.024 ms: at most 128, because what lay between was not seen.
+    /// Time since the previous check, in units of 1.024 ms: at most 128, because the time between was not observed.
     pub(crate) elapsed: u8,
-    /// Whether a frame came since.
+    /// Whether a frame was received since.
     pub(crate) fresh: bool,
-    /// The command that was sent, as a share of the motor's limit.
+    /// The command sent, as a share of the motor's limit.
     pub(crate) effort: f32,
-    /// The reported speed, as a share of that without load.
+    /// The reported speed, as a share of the speed without load.
     pub(crate) speed: f32,
-    /// The reported current, as a share of its full scale; 0 when it is not known.
+    /// The reported current, as a share of its full scale; 0 if unknown.
     pub(crate) current: f32,
-    /// The command that was sent in a coarse unit of its own, and the change of it that a current has to follow.
+    /// The command sent, in a coarse unit, and the smallest change of the command that a current must follow.
     pub(crate) word: i8,
     pub(crate) word_change: u8,
-    /// Rotor angle, as it was reported.
+    /// The reported rotor angle.
     pub(crate) angle: u16,
-    /// Anything that changes with the current; its upper three bits count.
+    /// A value that changes with the current; its upper three bits count.
     pub(crate) rest: u16,
-    /// What the motor reports, and at which temperatures it gets warm and hot.
+    /// The reported temperature, and the temperatures at which the motor is warm and hot.
     pub(crate) temperature: Option<(i16, (i16, i16))>,
 }
 
@@ -61,7 +61,7 @@ impl Sample {
     };
 }
 
-/// The slow checks of one motor: everything that need not be looked at in every tick.
+/// The slow checks of one motor: everything that need not be checked in every tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Monitor {
     stall: Timer,
@@ -78,8 +78,8 @@ impl Monitor {
         error_heard: false,
     };
 
-    /// As [`look`](Self::look), for a motor that is moderately driven and cool; `false` when its angle did not move, and
-    /// has to be looked at.
+    /// As [`check`](Self::check), for a motor that is moderately driven and cool. Returns `false` if the angle did not move: the motor must
+    /// then be checked in full.
     #[inline]
     pub(crate) const fn follow(&mut self, angle: u16, word: i8) -> bool {
         let moved = self.frozen.has_moved(angle);
@@ -91,8 +91,8 @@ impl Monitor {
         moved
     }
 
-    /// As [`check`](Self::check), for a motor that is cool and driven with `effort`, so that its current tells nothing; `false` when
-    /// its angle did not move, or a stall or runaway may begin. Nothing has changed then.
+    /// As [`check`](Self::check), for a cool motor driven with `effort`, so that the current needs no check. Returns `false`, without a
+    /// change, if the angle did not move, or a stall or runaway may begin.
     #[inline]
     pub(crate) fn follow_driven(
         &mut self,
@@ -119,21 +119,21 @@ impl Monitor {
         true
     }
 
-    /// What ends where a motor is armed, so that it begins again, and relaxes again, if it still holds.
+    /// Conditions that end when a motor is armed. If such a condition still holds, it begins again, and relaxes the motor again.
     pub(crate) const NOTICED_ANEW: [Condition; 3] =
         [Condition::Runaway, Condition::Stalled, Condition::Overspeed];
 
-    /// An error code came.
+    /// Notes an error code.
     pub(crate) const fn hear_error(&mut self) {
         self.error_heard = true;
     }
 
-    /// Tells whether an error code came since this was asked last.
+    /// Tells whether an error code was received since the last call.
     pub(crate) const fn take_error(&mut self) -> bool {
         core::mem::replace(&mut self.error_heard, false)
     }
 
-    /// Looks at the motor and returns the share of the output that it is left with.
+    /// Checks the motor and returns the share of the output that stays available.
     pub(crate) fn check(
         &mut self,
         latch: &mut Latch,
@@ -162,7 +162,7 @@ impl Monitor {
     }
 }
 
-/// Below this share of the no-load speed a rotor moves too little between two looks to tell.
+/// Share of the no-load speed below which a rotor moves too little between two checks.
 const MOVES: f32 = 0.05;
 /// 100 ms, in units of 1.024 ms.
 const FROZEN_WINDOW: u8 = 98;
@@ -170,40 +170,40 @@ const FROZEN_WINDOW: u8 = 98;
 /// An angle has 13 bits.
 const ANGLE: u16 = 0x1FFF;
 
-/// What the feedback was when it was looked at last.
+/// Feedback at the last check.
 #[derive(Debug, Clone, Copy)]
 struct Frozen {
     lasted: u8,
-    /// The angle, and three bits that change with the current: by chance they do not, but not ten times in a row.
+    /// The angle, and three bits that change with the current: by chance the bits are equal once, but not ten times in a row.
     feedback: u16,
-    /// The command when the feedback became what it is.
+    /// The command when the feedback last changed.
     word: i8,
 }
 
 impl Frozen {
     const NONE: Self = Self { lasted: 0, feedback: 0, word: 0 };
 
-    /// Tells whether an angle is another one than when it was looked at last.
+    /// Tells whether an angle differs from the angle at the last check.
     #[inline]
     const fn has_moved(&self, angle: u16) -> bool {
         (self.feedback ^ angle) & ANGLE != 0
     }
 
-    /// Takes feedback that moved.
+    /// Takes changed feedback.
     #[inline]
     const fn follow(&mut self, angle: u16, word: i8) {
         *self = Self { lasted: 0, feedback: angle, word };
     }
 
-    /// Looks for feedback that stands still and cannot be true.
+    /// Detects feedback that stands still in contradiction to other values.
     ///
-    /// A motor that truly stands, even one that is blocked at a constant current, may send the same bits for ever. So
-    /// sameness is not enough; it has to contradict something:
+    /// A motor at standstill, even when blocked at a constant current, may send the same bits for ever. Equal bits are therefore not
+    /// enough. The feedback is frozen if
     ///
-    /// * the angle does not move while the reported speed says that it does, or
-    /// * nothing moves, not even the current, although the command has changed by a fifth of full scale since.
+    /// * the angle does not move while the reported speed is not zero, or
+    /// * neither angle nor current change, although the command has changed by a fifth of full scale since.
     ///
-    /// Without a new frame there is nothing to look at.
+    /// Without a new frame there is no check.
     fn check(&mut self, latch: &mut Latch, sample: &Sample) {
         if !sample.fresh {
             return;
@@ -223,21 +223,21 @@ impl Frozen {
     }
 }
 
-/// Below this share of the full command a motor counts as not driven.
+/// Share of the full command below which a motor counts as not driven.
 const UNDRIVEN: f32 = 0.05;
 
 /// Speeds are kept in 64ths of the no-load speed.
 const SCALE: f32 = 64.0;
 /// 30 % of the no-load speed.
 const GAIN: u8 = 19;
-/// A speed that is this much lower than the highest has fallen: 5 %.
+/// A speed lower than the highest by more than this has fallen: 5 %.
 const FALL: u8 = 3;
-/// It has to last 100 ms, and the speed must be gained within 0.5 s, in units of 2.048 ms: more slowly than that, it is
-/// a slope or somebody who pushes.
+/// A runaway lasts at least 100 ms, and gains its speed within 0.5 s, in units of 2.048 ms. A slower gain is a slope, or a person who
+/// pushes.
 const SHORTEST: u8 = 49;
 const LONGEST: u8 = 244;
 
-/// What was seen of a motor that turns the wrong way.
+/// Progress of a possible runaway.
 #[derive(Debug, Clone, Copy)]
 struct Runaway {
     lasted: u8,
@@ -248,14 +248,14 @@ struct Runaway {
 impl Runaway {
     const NONE: Self = Self { lasted: 0, from: 0, highest: 0 };
 
-    /// Looks for a motor that speeds up although its command says otherwise. Latched: it ends when it is armed.
+    /// Detects a motor that speeds up against its command. Latched until armed.
     ///
-    /// A motor slows down when its command opposes its motion, and when there is none. So it runs away when its speed
-    /// rises, and never falls meanwhile,
+    /// A motor slows down if its command opposes its motion, and without a command. A motor runs away if its speed rises, and never falls
+    /// meanwhile,
     ///
-    /// * against at least half of the full command: the sign of the torque is wrong, say; or
-    /// * without a command, while its *current* drives it: the ESC follows somebody else, or nobody. Without the current
-    ///   it is pushed from outside, which is not its fault.
+    /// * against at least half of the full command: the sign of the torque is wrong, for example; or
+    /// * without a command, while the *current* drives the motor: the ESC follows another controller, or no controller. Without the current
+    ///   an external force pushes the motor, which is no fault of the motor.
     fn check(&mut self, latch: &mut Latch, sample: &Sample) {
         let effort = sample.effort * 1.0_f32.copysign(sample.speed);
         let current = sample.current * 1.0_f32.copysign(sample.speed);
@@ -265,7 +265,7 @@ impl Runaway {
         }
     }
 
-    /// Takes a speed, and whether command and current say otherwise; tells whether it runs away.
+    /// Takes a speed, and whether command and current oppose a rise (`wrong`). Returns whether the motor runs away.
     fn holds(&mut self, speed: f32, wrong: bool, elapsed: u8) -> bool {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let speed = (speed.abs() * SCALE) as u8;
@@ -279,11 +279,9 @@ impl Runaway {
     }
 }
 
-/// Looks for a motor that is driven and does not turn, in either direction, and returns the share of the output that it
-/// is left with.
+/// Detects a motor that is driven and does not turn, in either direction. Returns the share of the output that stays available.
 ///
-/// It is over when the motor turns at twice the speed below which it counts as standing, or when half of what it was
-/// left with is not asked for.
+/// The stall ends when the motor turns at twice the speed of a standstill, or when the command is below half of the share.
 fn check_stall(
     timer: &mut Timer,
     latch: &mut Latch,
@@ -303,12 +301,11 @@ fn check_stall(
     if stalled { config.stall_hold() } else { 1.0 }
 }
 
-/// A condition ends this far below the temperature at which it began.
+/// A condition ends this far below the temperature of its begin.
 const HYSTERESIS_K: i16 = 5;
 
-/// Looks at a temperature and returns the share of the output that it leaves: 1 up to the warning, 0 from the limit on,
-/// a straight line between; 0 also until a motor that was at the limit is 5 K below it. What is not looked for is `None`, and
-/// takes nothing away.
+/// Checks a temperature and returns the share of the output that stays available: 1 up to the warning, 0 from the limit on, linear in
+/// between. After the limit, 0 until the motor is 5 K below. A bound of `None` is not checked, and takes nothing away.
 fn check_temperature(
     latch: &mut Latch,
     celsius: i16,

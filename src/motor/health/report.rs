@@ -2,7 +2,7 @@ use super::Conditions;
 use crate::motor::{Link, MotorName};
 use crate::time::Duration;
 
-/// How a motor is, in one line of a log.
+/// State and statistics of a motor, in one line of a log.
 ///
 /// # Examples
 /// ```
@@ -34,36 +34,36 @@ use crate::time::Duration;
 pub struct Health {
     /// The motor.
     pub motor: MotorName,
-    /// Whether it is heard.
+    /// State of the link.
     pub link: Link,
-    /// Whether it takes targets.
+    /// Whether the motor takes targets.
     pub armed: bool,
-    /// What is wrong with it.
+    /// The conditions that hold.
     pub conditions: Conditions,
-    /// Feedback frames a second, over the last whole window of about a second; 0 before there was one.
+    /// Feedback frames a second, over the last whole window of about a second; 0 before the first.
     pub feedback_hz: u16,
-    /// The longest time between two of them, in that window and in the present one; in steps of 16 µs, at most 1.05 s.
+    /// The longest time between two feedback frames, in that window and in the present one; in steps of 16 µs, at most 1.05 s.
     ///
-    /// Of a DJI motor only some gaps count: those of at least half a rotor turn at no-load speed less 500 µs, which
-    /// is 1166 µs for an M2006, 2741 µs for an M3508 and 93 250 µs for a GM6020; and those in which, at any time, the
-    /// motor was not online, its bus was not updated yet, or `feedback_hz` was more than half above the rate that the
-    /// bus was told. 0 without such a gap.
+    /// Of a DJI motor only long gaps and gaps in doubt count. A long gap lasts at least half a rotor turn at no-load speed less 500 µs:
+    /// 1166 µs for an M2006, 2741 µs for an M3508, 93 250 µs for a GM6020. A gap is in doubt if, at any time within the gap, the motor was
+    /// not online, its bus was not updated yet, or `feedback_hz` was more than half above the rate configured at the bus. Without such a
+    /// gap, 0.
     pub longest_gap: Duration,
-    /// Temperature in °C; `None` for a motor that reports none.
+    /// Temperature in °C; `None` for a motor without this reading.
     pub temperature_c: Option<i16>,
-    /// The error code of the ESC as it came, for as long as its condition holds; 0 for none.
+    /// The error code of the ESC as received, while its condition holds; 0 for no error.
     pub error_code: u8,
-    /// How often the output was found at its limit, saturating: one look every few updates.
+    /// Number of checks, one every few updates, that found the output at its limit; saturating.
     pub saturated: u16,
-    /// How often a target was NaN or infinite, saturating.
+    /// Number of NaN or infinite targets, saturating.
     pub refused_targets: u16,
-    /// How often no target came in time, saturating.
+    /// Number of expired targets, saturating.
     pub forgotten_targets: u16,
-    /// How often a gap in the feedback left the number of rotor turns in doubt, saturating.
+    /// Number of feedback gaps that left the number of rotor turns in doubt, saturating.
     pub ambiguous_gaps: u16,
 }
 
-/// In ASCII, for terminals that know no more.
+/// In ASCII, for terminals without Unicode.
 impl core::fmt::Display for Health {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let link = match self.link {

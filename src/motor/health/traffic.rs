@@ -1,17 +1,17 @@
-/// A gap is kept in units of 16 µs: up to a second.
+/// Gaps are kept in units of 16 µs, up to a second.
 const GAP_SHIFT: u32 = 4;
-/// From this many jumps to and fro on, two motors answer.
+/// From this number of jumps to and fro on, two motors answer.
 const JUMPS: u8 = 16;
 
-/// How often and how regularly a motor is heard: counted over windows of about a second.
+/// Rate and regularity of a motor's feedback, over windows of about a second.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Traffic {
     frames: u16,
     longest_gap: u16,
-    /// What the last whole window had.
+    /// Rate in the last whole window.
     rate_hz: u16,
     last_gap: u16,
-    /// Jumps of the angle to and fro, while more frames come than should; and how it jumped last, as a sign.
+    /// Jumps of the angle to and fro, while more frames come than one motor sends. The sign is the direction of the last jump.
     jumps: i8,
     crowded: bool,
 }
@@ -26,12 +26,12 @@ impl Traffic {
         self.frames = self.frames.wrapping_add(1);
     }
 
-    /// Counts frames that were counted elsewhere.
+    /// Adds frames counted elsewhere.
     pub(crate) const fn add(&mut self, frames: u16) {
         self.frames = self.frames.wrapping_add(frames);
     }
 
-    /// Notes the time since the frame before, in µs.
+    /// Notes the time since the previous frame, in µs.
     #[inline]
     pub(crate) const fn gap(&mut self, gap_us: u32) {
         let gap = saturated(gap_us >> GAP_SHIFT);
@@ -40,34 +40,33 @@ impl Traffic {
         }
     }
 
-    /// Tells whether more frames come than one motor sends, so that each has to be [compared](Self::compare).
+    /// Tells whether more frames come than one motor sends: each must then be [compared](Self::compare).
     pub(crate) const fn is_crowded(&self) -> bool {
         self.crowded
     }
 
-    /// Compares the way that the angle went with the one that the speed predicts, in counts, give or take `tolerance`.
+    /// Compares the change of the angle with the change predicted from the speed, both in counts, within `tolerance`.
     ///
-    /// Two motors with one id take turns, and so the angle jumps to and fro between theirs, each time by more than the
-    /// speed explains. One motor may seem to jump, after a gap or when frames are stamped late, but not back again and
-    /// again.
+    /// Two motors with one id take turns, so the angle jumps to and fro between theirs, each time by more than the speed explains. The
+    /// angle of one motor may seem to jump, after a gap or if frames are stamped late, but not to and fro many times.
     pub(crate) const fn compare(&mut self, counts: i32, predicted: i32, tolerance: i32) {
         let off = counts.wrapping_sub(predicted);
         if off.unsigned_abs() <= tolerance.unsigned_abs() {
             return;
         }
-        // To and fro: one more, in the other direction. The same way again: as many as before.
+        // A jump back counts one more. Another jump in the same direction does not count.
         if (off < 0) != (self.jumps < 0) || self.jumps == 0 {
             let jumps = self.jumps.saturating_abs().saturating_add(1);
             self.jumps = if off < 0 { -jumps } else { jumps };
         }
     }
 
-    /// Tells whether two motors answer, as far as this window has seen it.
+    /// Tells whether two motors answer, as far as this window shows.
     pub(crate) const fn is_double(&self) -> bool {
         self.jumps.unsigned_abs() >= JUMPS
     }
 
-    /// Ends a window of `window` units of 1.024 ms. Half as many frames again as `nominal_hz` are a crowd.
+    /// Ends a window of `window` units of 1.024 ms. A rate of more than one and a half times `nominal_hz` counts as crowded.
     pub(crate) const fn close(&mut self, window: u16, nominal_hz: u32) {
         let per_window = self.frames as u32 * 15_625 / 16; // 10^6 / 1024
         let rate = match per_window.checked_div(window as u32) {
@@ -84,12 +83,12 @@ impl Traffic {
         };
     }
 
-    /// Returns the frames a second of the last whole window; 0 before there was one.
+    /// Returns the frames a second of the last whole window; 0 before the first.
     pub(crate) const fn rate_hz(&self) -> u16 {
         self.rate_hz
     }
 
-    /// Returns the longest time between two frames in µs, rounded down to 16: of the last whole window and of this one.
+    /// Returns the longest time between two frames in µs, rounded down to 16, of the last whole window and the present one.
     pub(crate) const fn longest_gap_us(&self) -> u32 {
         let gap = if self.last_gap > self.longest_gap { self.last_gap } else { self.longest_gap };
         (gap as u32) << GAP_SHIFT

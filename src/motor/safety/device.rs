@@ -1,4 +1,4 @@
-//! The rules that hold for the motors of a device together: time, the request to arm, the emergency stop.
+//! Rules shared by the motors of a device: time, the request to arm, the emergency stop.
 
 use super::gesture::Gesture;
 use super::motor::{Known, MotorGuard};
@@ -8,20 +8,20 @@ use crate::time::{Duration, Instant};
 
 pub(crate) const LONGEST_PAUSE: Duration = Duration::from_micros(LONGEST_PAUSE_US as u64);
 
-/// Decides what an update may do, and who may be armed. `N` times of edges are kept.
+/// Decides whether an update may drive the motors of a device, and which motors may be armed. Keeps `N` times of edges.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeviceGuard<const N: usize> {
-    /// The time that new targets get.
+    /// Stamp of new targets.
     now: u32,
     timeouts: Timeouts,
-    /// The time of the last update; before the first one, that of the last feedback.
+    /// Time of the last update; before the first, time of the last feedback.
     updated: Instant,
-    /// Until then no age exceeds its limit, unless something [disturbs](Self::disturb) that.
+    /// Until this time no age exceeds its limit, except after a [disturbance](Self::disturb).
     quiet_until: Instant,
-    /// The time of the last arming: no update lies before it.
+    /// Time of the last arming: no update lies before it.
     armed_at: Instant,
     gesture: Gesture,
-    /// Whether the next update has to compare the ages of each motor.
+    /// Whether the next update must compare the ages of each motor.
     is_disturbed: bool,
     /// Whether there was an update.
     is_running: bool,
@@ -32,14 +32,14 @@ pub(crate) struct DeviceGuard<const N: usize> {
     journal: Journal<N>,
 }
 
-/// What an update without a usable step may do.
+/// Output of an update without a usable step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Hold {
-    /// Leave the last commands.
+    /// Keep the last commands.
     Keep,
     /// Send zeros.
     Rest,
-    /// Send zeros, and [relax](MotorGuard::lose_time) every motor until it is armed again: time did not move on.
+    /// Send zeros, and [relax](MotorGuard::lose_time) all motors until armed again: time did not move on.
     LoseTime,
 }
 
@@ -72,7 +72,7 @@ impl<const N: usize> DeviceGuard<N> {
         &self.timeouts
     }
 
-    /// Returns the stamp that new targets get.
+    /// Returns the stamp of new targets.
     pub(crate) const fn now(&self) -> u32 {
         self.now
     }
@@ -99,7 +99,7 @@ impl<const N: usize> DeviceGuard<N> {
 
     // Time.
 
-    /// Takes the time of an update; returns that of the one before.
+    /// Sets the time of an update and returns the time of the previous one.
     #[inline]
     pub(crate) const fn begin(&mut self, now: Instant) -> Instant {
         self.now = now.stamp();
@@ -112,13 +112,13 @@ impl<const N: usize> DeviceGuard<N> {
         before < self.updated && self.updated < self.quiet_until
     }
 
-    /// Notes feedback before the first update: time passes with it. Returns the time before.
+    /// Notes feedback before the first update, which moves the time on. Returns the previous time.
     pub(crate) const fn pass_unwatched(&mut self, now: Instant) -> Instant {
         core::mem::replace(&mut self.updated, now)
     }
 
-    /// Tells whether the present update lies after the one before, and not before the arming: ages mean nothing where it does
-    /// not. To be asked once in each update that is not [quiet](Self::is_quiet).
+    /// Tells whether the present update lies after the previous one, and not before the arming; otherwise all ages are meaningless. Call
+    /// this once in each update that is not [quiet](Self::is_quiet).
     pub(crate) fn moves_on(&mut self, before: Instant) -> bool {
         let moves_on = self.armed_at <= self.updated && (!self.is_running || before < self.updated);
         let step = if self.is_running { self.updated.since(before) } else { Duration::ZERO };
@@ -126,45 +126,45 @@ impl<const N: usize> DeviceGuard<N> {
         moves_on
     }
 
-    /// Tells whether no stamp tells how long the pause before the present time was.
+    /// Tells whether the pause before the present time was too long for the stamps.
     pub(crate) fn is_pause(&self, before: Instant) -> bool {
         self.updated > before + LONGEST_PAUSE
     }
 
-    /// The update has a usable step, and time moved on.
+    /// Notes an update with a usable step, for which time moved on.
     pub(crate) const fn run(&mut self) {
         self.is_running = true;
         self.held_steps = 0;
     }
 
-    /// Returns the ages of no motor, or `None` where each motor has to be compared by itself; that is over then.
+    /// Returns the ages of no motor. Returns `None`, once, if each motor must be compared by itself.
     pub(crate) fn ages(&mut self) -> Option<Ages> {
         let is_disturbed = core::mem::replace(&mut self.is_disturbed, false);
         (!is_disturbed).then(|| Ages::none(self.now, &self.timeouts))
     }
 
-    /// No age exceeds its limit for so long.
+    /// Sets for how long no age exceeds its limit.
     pub(crate) fn rest_for(&mut self, micros: u32) {
-        // After a trip each update is part of the pause before a request to arm.
+        // After a trip, each update counts towards the pause before a request to arm.
         let micros = if self.gesture.is_tripped() { 0 } else { micros };
         self.quiet_until = self.updated + Duration::from_micros(micros.into());
     }
 
-    /// Makes the next update compare the ages of each motor. To be called wherever an age may become greater than by the time
-    /// that passes, or another limit hold for it.
+    /// Makes the next update compare the ages of each motor. Call this wherever an age may grow faster than time, or the limit of an age
+    /// may change.
     pub(crate) const fn disturb(&mut self) {
         self.quiet_until = Instant::START;
         self.is_disturbed = true;
     }
 
-    /// Ends an update whose time or time step is not usable, after [`moves_on`](Self::moves_on) said whether time moved on.
+    /// Ends an update without a usable time or time step, after the check by [`moves_on`](Self::moves_on).
     pub(crate) fn hold(&mut self, before: Instant, moves_on: bool) -> Hold {
         self.is_running = true;
         self.disturb();
         self.bad_steps = self.bad_steps.saturating_add(1);
         self.held_steps = self.held_steps.saturating_add(1);
         if !moves_on {
-            // No target is left that an update before the arming could make younger.
+            // No target is left, so an update before the arming can make no target younger.
             self.armed_at = self.updated;
             return Hold::LoseTime;
         }
@@ -172,30 +172,30 @@ impl<const N: usize> DeviceGuard<N> {
         if self.held_steps >= 2 || is_late { Hold::Rest } else { Hold::Keep }
     }
 
-    /// Returns how many updates in a row had no usable time or step.
+    /// Returns the number of updates in a row without a usable time or step.
     pub(crate) const fn held_steps(&self) -> u8 {
         self.held_steps
     }
 
     // Arming.
 
-    /// Tells whether a motor's feedback is not fresh, as far as its stamp tells.
+    /// Tells whether a motor's feedback is not fresh, as far as its stamp is valid.
     pub(crate) fn misses(&self, motor: &MotorGuard, now: Instant) -> bool {
         let is_dated = self.is_running || motor.listens();
         is_dated && self.is_far(now) || motor.is_missing(now.stamp(), &self.timeouts)
     }
 
-    /// Tells whether a time lies so far after or before the last one that no stamp tells how far.
+    /// Tells whether the distance between a time and the last update, in either direction, is too long for a stamp.
     pub(crate) fn is_far(&self, now: Instant) -> bool {
         now > self.updated + LONGEST_PAUSE || self.updated > now + LONGEST_PAUSE
     }
 
-    /// Takes a request to arm; `false` if it does not count.
+    /// Takes a request to arm. Returns `false` if the request does not count.
     pub(crate) const fn ask(&mut self) -> bool {
         self.gesture.ask()
     }
 
-    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`, and takes a trip back if so.
+    /// Tells whether motors may be [engaged](MotorGuard::engage) at `now`. If so, ends the trip.
     ///
     /// # Errors
     /// The emergency stop is set, or a request is missing.
@@ -207,24 +207,24 @@ impl<const N: usize> DeviceGuard<N> {
             return Err(ArmError::NotReleased);
         }
         self.now = now.stamp();
-        // An arming at an earlier time takes nothing back: motors that run may have targets of the later one.
+        // An arming at an earlier time changes nothing: running motors may have targets of the later one.
         self.armed_at = self.armed_at.max(now);
         self.disturb();
         Ok(())
     }
 
-    /// Tells whether a motor may be [engaged](MotorGuard::engage): it is heard. One that takes targets goes on undisturbed.
+    /// Tells whether a motor may be [engaged](MotorGuard::engage): online, and not armed yet. An armed motor goes on undisturbed.
     pub(crate) fn may_engage(&self, motor: &MotorGuard, now: Instant) -> bool {
         !motor.is_armed() && !self.misses(motor, now)
     }
 
-    /// Keeps the trip: a motor still waits to be armed.
+    /// Keeps the trip: another motor still waits to be armed.
     pub(crate) const fn keep_trip(&mut self) {
         self.gesture.keep();
     }
 
-    /// Notes what a change of a motor, of which this was [known](MotorGuard::known) before, brings with it: edges, and the
-    /// pause after a trip.
+    /// Notes the consequences of a change of a motor, compared with the state [known](MotorGuard::known) before: edges, and the pause after
+    /// a trip.
     pub(crate) fn note(&mut self, index: u8, before: Known, motor: &MotorGuard, now: Instant) {
         self.journal.note(index, &before.latch, motor.latch(), now);
         if before.is_armed && !motor.is_armed() {
@@ -232,13 +232,13 @@ impl<const N: usize> DeviceGuard<N> {
         }
     }
 
-    /// Begins the pause after a trip, of which each update is a part.
+    /// Begins the pause after a trip. Each update counts towards it.
     pub(crate) const fn trip(&mut self) {
         self.gesture.trip();
         self.quiet_until = Instant::START;
     }
 
-    /// Sets the emergency stop; `false` if it is set already. The motors are to be disarmed.
+    /// Sets the emergency stop. Returns `false` if the stop is set already. The caller disarms the motors.
     pub(crate) const fn stop(&mut self) -> bool {
         if self.is_stopped {
             return false;
@@ -260,8 +260,7 @@ impl<const N: usize> DeviceGuard<N> {
     }
 }
 
-/// The greatest ages among some motors, each counted from as far ahead of now as it may reach back: from 0 to twice its
-/// limit a stamp is near.
+/// Greatest ages among some motors. An age is counted from one limit ahead of now, so a stamp is near for values from 0 to twice the limit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ages {
     now: u32,
@@ -272,13 +271,13 @@ pub(crate) struct Ages {
 }
 
 impl Ages {
-    /// The ages of no motor; but a target may come at any time from now on.
+    /// Returns the ages of no motor. A new target may come at any time from now on.
     pub(super) const fn none(now: u32, timeouts: &Timeouts) -> Self {
         let (late_us, command_us) = (timeouts.late_us(), timeouts.command_us());
         Self { now, late_us, command_us, heard: 0, commanded: command_us }
     }
 
-    /// Adds the ages of a motor's feedback and target, when it is heard.
+    /// Adds the ages of a motor's feedback and target, if the motor is online.
     #[inline]
     pub(crate) fn add(&mut self, motor: &MotorGuard) {
         if motor.link != Link::Online {
@@ -293,7 +292,7 @@ impl Ages {
         }
     }
 
-    /// Returns after how many µs one of them is above its limit; `None` when one is already.
+    /// Returns the time in µs after which an age exceeds its limit; `None` if an age already does.
     pub(crate) fn within_limits_us(&self) -> Option<u32> {
         let heard = (2 * self.late_us).checked_sub(self.heard)?;
         let commanded = (2 * self.command_us).checked_sub(self.commanded)?;

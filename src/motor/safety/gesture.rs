@@ -2,45 +2,43 @@
 
 use crate::time::Duration;
 
-/// Tells a deliberate request to arm from a request that a program repeats.
+/// Distinguishes a deliberate request to arm from a request repeated by a program.
 ///
-/// After a trip, a request counts only if neither a trip nor another request lies within [`PAUSE_US`](Self::PAUSE_US) before
-/// it. A switch that stays on, read in each tick, does not re-arm. A program that reads its switch more slowly than that has to
-/// detect its edge.
+/// After a trip, a request counts only if neither a trip nor another request lies within [`PAUSE_US`](Self::PAUSE_US) before it. A switch
+/// that stays on, read in each tick, does not re-arm. A program that reads its switch more slowly must detect the edge of the switch.
 ///
 /// The pause consists of updates whose time moved on. A gap between two updates counts for no more than
-/// [`LONGEST_STEP_US`](Self::LONGEST_STEP_US): a program that stalls, or whose clock jumps, did not release its switch.
+/// [`LONGEST_STEP_US`](Self::LONGEST_STEP_US): a stall of the program, or a jump of its clock, is no release of the switch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gesture {
-    /// The updates since the last request or trip.
+    /// Time of the updates since the last request or trip.
     quiet_us: u32,
-    /// Whether something was relaxed since it was armed, and waits to be armed again.
+    /// Whether a motor was relaxed since arming, and waits to be armed again.
     tripped: bool,
     /// Whether the last request counts.
     granted: bool,
 }
 
 impl Gesture {
-    /// The pause in which nothing may ask for arming.
+    /// Pause without requests before a request that counts.
     const PAUSE_US: u32 = 100_000;
     const LONGEST_STEP_US: u32 = 20_000;
 
     pub(crate) const NEW: Self = Self { quiet_us: 0, tripped: false, granted: false };
 
-    /// Notes an update that lies `step` after the one before; `None` when its time did not move on, which begins the pause
-    /// anew.
+    /// Notes an update, `step` after the previous one. `None`, for a time that did not move on, begins the pause anew.
     pub(crate) fn pass(&mut self, step: Option<Duration>) {
         let step_us = step.map(|step| step.micros_u32().unwrap_or(u32::MAX));
         self.quiet_us = step_us
             .map_or(0, |step_us| self.quiet_us.saturating_add(step_us.min(Self::LONGEST_STEP_US)));
     }
 
-    /// Notes a trip: a motor was relaxed until it is armed again.
+    /// Notes a trip: a motor was relaxed until armed again.
     pub(crate) const fn trip(&mut self) {
         *self = Self { quiet_us: 0, tripped: true, granted: false };
     }
 
-    /// Takes a request to arm; `false` if it does not count.
+    /// Takes a request to arm. Returns `false` if the request does not count.
     pub(crate) const fn ask(&mut self) -> bool {
         self.granted = !self.tripped || self.quiet_us >= Self::PAUSE_US;
         self.quiet_us = 0;
@@ -53,14 +51,14 @@ impl Gesture {
         self.granted = false;
     }
 
-    /// Tells whether the device may be armed, and takes the trip back if so.
+    /// Tells whether the device may be armed. If so, ends the trip.
     pub(crate) const fn take(&mut self) -> bool {
         let is_free = !self.tripped || self.granted;
         self.tripped = self.tripped && !is_free;
         is_free
     }
 
-    /// Tells whether updates have to be [noted](Self::pass): a request counts only after a pause.
+    /// Tells whether updates must be [noted](Self::pass): a request counts only after a pause.
     pub(crate) const fn is_tripped(&self) -> bool {
         self.tripped
     }

@@ -1,4 +1,4 @@
-//! The rules of a motor that is a device by itself.
+//! Rules of a motor that is a device by itself.
 
 use super::stamp::age;
 use super::{DeviceGuard, MotorGuard, OPENING};
@@ -7,15 +7,15 @@ use crate::motor::{
 };
 use crate::time::{Duration, Instant};
 
-/// Decides whether one motor may be driven: for motors that do not belong to a family of this crate.
+/// Decides whether one motor may be driven: for motors outside the families of this crate.
 ///
-/// The rules of all motors of this crate, for one motor of your own:
+/// Applies the rules of all motors of this crate to one motor of your own:
 ///
-/// * Nothing moves before the motor is armed. After a trip, arming needs a request that nobody made for 100 ms before.
+/// * Before arming, the output is zero. After a trip, a request to arm counts only after 100 ms without a request.
 /// * Late or lost feedback, and a target that is old, NaN or infinite, give zero.
-/// * An update that does not lie after the one before gives zero in that cycle, and trips.
+/// * An update that does not lie after the previous one gives zero in that cycle, and trips.
 /// * The output range [opens](Self::share) from zero after arming.
-/// * An emergency stop stays until it is cleared, and the motor armed.
+/// * An emergency stop stays until cleared; the motor must then be armed again.
 ///
 /// ```text
 /// feedback ──> hear(now)          target ──> admit(is_finite)?
@@ -43,33 +43,33 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Makes one for a motor with feedback: disarmed, not heard.
+    /// Makes a guard for a motor with feedback: disarmed, unheard.
     #[must_use]
     pub const fn new() -> Self {
         Self { device: DeviceGuard::NEW, motor: MotorGuard::NEW }.with_opening(OPENING)
     }
 
-    /// Makes one for a motor that reports nothing, such as a servo: it counts as heard.
+    /// Makes a guard for a motor without feedback, such as a servo: the motor counts as online.
     #[must_use]
     pub const fn without_feedback() -> Self {
         Self { device: DeviceGuard::NEW, motor: MotorGuard::DEAF }.with_opening(OPENING)
     }
 
-    /// Sets when feedback and commands count as lost.
+    /// Sets the ages at which feedback and commands count as lost.
     #[must_use]
     pub const fn with_timeouts(mut self, timeouts: Timeouts) -> Self {
         self.device.set_timeouts(timeouts);
         self
     }
 
-    /// Sets the time in which the output range opens after arming, from zero to the whole; 0.2 s at first, whole milliseconds
-    /// of at most 65 s.
+    /// Sets the time in which the output range opens after arming, from zero to the whole: 0.2 s by default, in whole milliseconds up to 65
+    /// s.
     #[must_use]
     pub const fn with_opening(self, time: Duration) -> Self {
         Self { motor: self.motor.with(time, false), ..self }
     }
 
-    /// Notes valid feedback that arrived at `now`.
+    /// Notes valid feedback received at `now`.
     #[inline]
     pub fn hear(&mut self, now: Instant) {
         let is_usual = self.device.is_running()
@@ -79,7 +79,7 @@ impl Guard {
         }
     }
 
-    /// Notes feedback, whenever the one before came.
+    /// Notes feedback after a gap of any length.
     #[cold]
     #[inline(never)]
     fn hear_anytime(&mut self, now: Instant) {
@@ -103,7 +103,7 @@ impl Guard {
         self.change(now, |motor| motor.forget_bygones(now.stamp(), is_pause));
     }
 
-    /// Changes the motor, and notes what follows.
+    /// Changes the motor, and notes the consequences.
     pub(super) fn change<T>(
         &mut self,
         now: Instant,
@@ -115,11 +115,11 @@ impl Guard {
         outcome
     }
 
-    /// Tells whether a new target may be taken, and notes its time when it is.
+    /// Tells whether a new target may be taken. If so, notes its time.
     ///
     /// # Errors
-    /// Says why not. A target that is not finite is counted. It takes the present one away, as does any that comes without
-    /// fresh feedback: an older target must not act in the place of a newer one when the feedback is back.
+    /// Names the reason. A target that is not finite is counted. Such a target, or any target without fresh feedback, also cancels the
+    /// present one: an older target must not act in place of a newer one when the feedback returns.
     #[inline]
     pub fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         self.motor.admit(is_finite)?;
@@ -130,8 +130,8 @@ impl Guard {
         Ok(())
     }
 
-    /// Moves the time on to that of a tick and tells whether the motor may be driven in it. When it may not, send
-    /// zero; when [`has_target`](Self::has_target) is `false` as well, reset the loops.
+    /// Moves the time on to a tick and tells whether the motor may be driven in this tick. If not, send zero. If
+    /// [`has_target`](Self::has_target) is `false` as well, reset the loops.
     #[must_use]
     #[inline]
     pub fn drives(&mut self, now: Instant) -> bool {
@@ -139,7 +139,7 @@ impl Guard {
         (self.device.is_quiet(before) || self.compare_ages(before, now)) && self.motor.drives()
     }
 
-    /// Applies all time-outs that are due, and computes until when none can be; `false` if time did not move on.
+    /// Applies all due time-outs, and computes the time of the next. Returns `false` if time did not move on.
     #[cold]
     #[inline(never)]
     fn compare_ages(&mut self, before: Instant, now: Instant) -> bool {
@@ -151,7 +151,7 @@ impl Guard {
             self.forget_bygones(before, now);
         }
         self.device.run();
-        // A range that opens for nobody is open before its stamp repeats.
+        // The range of a motor that is not driven must be open before its stamp repeats.
         self.motor.share(now.stamp());
         let timeouts = *self.device.timeouts();
         let is_settled = self.change(now, |motor| {
@@ -171,17 +171,17 @@ impl Guard {
         true
     }
 
-    /// Returns the share of the output range that is open, 0 to 1: it rises from zero after arming.
+    /// Returns the open share of the output range, 0 to 1; the share rises from zero after arming.
     pub fn share(&mut self) -> f32 {
         self.motor.share(self.device.now())
     }
 
-    /// Closes the output range, which opens from now on: the drive did not follow before.
+    /// Closes the output range and opens it from now on: the drive did not follow before.
     pub(in crate::motor) const fn reopen(&mut self) {
         self.motor.open(self.device.now());
     }
 
-    /// Time did not move on, so that no age is known: feedback counts as late until the next one, and the motor trips.
+    /// Handles a time that did not move on, so that no age is known. Feedback counts as late until the next frame, and the motor trips.
     pub(crate) fn lose_time(&mut self, now: Instant) {
         let before = self.device.begin(now);
         self.device.moves_on(before);
@@ -193,18 +193,18 @@ impl Guard {
         self.change(now, MotorGuard::lose_time);
     }
 
-    /// Trips: takes the target away and refuses others until the motor is armed again.
+    /// Trips: discards the target and refuses others until the motor is armed again.
     pub fn relax_until_armed(&mut self) {
         self.change(self.device.updated(), MotorGuard::trip);
     }
 
-    /// Tells whether there is a target that still counts.
+    /// Tells whether the motor has a target that is not expired.
     #[must_use]
     pub const fn has_target(&self) -> bool {
         self.motor.has_target()
     }
 
-    /// Takes the target away.
+    /// Discards the target.
     pub const fn relax(&mut self) {
         self.motor.relax();
     }
@@ -215,9 +215,9 @@ impl Guard {
         self.device.misses(&self.motor, now)
     }
 
-    /// Takes a request to arm; `false` if it does not count: after a trip, when another request or the trip lies less than
-    /// 100 ms back. A request that is repeated in each tick never counts. The 100 ms are those of [updates](Self::drives); one
-    /// counts for no more than 20 ms.
+    /// Takes a request to arm. Returns `false` if the request does not count: after a trip, if another request or the trip lies less than
+    /// 100 ms back. A request repeated in each tick never counts. The 100 ms consist of [updates](Self::drives), each of which counts for
+    /// at most 20 ms.
     ///
     /// # Examples
     /// ```
@@ -242,9 +242,8 @@ impl Guard {
         self.device.ask()
     }
 
-    /// Lets targets through from now on, starting from none, if the motor is heard and, after a trip, the last request
-    /// [counts](Self::ask). A motor that takes targets already goes on undisturbed. Without effect while stopped. Returns
-    /// whether it starts.
+    /// Allows targets from now on, beginning without a target, if the motor is online and, after a trip, the last request
+    /// [counts](Self::ask). An armed motor goes on undisturbed. While stopped, `engage` has no effect. Returns whether the motor was armed.
     pub fn engage(&mut self, now: Instant) -> bool {
         let begins =
             self.device.may_engage(&self.motor, now) && self.device.begin_arming(now).is_ok();
@@ -254,7 +253,7 @@ impl Guard {
         begins
     }
 
-    /// Refuses targets until it is engaged again.
+    /// Refuses targets until engaged again.
     pub const fn disarm(&mut self) {
         self.motor.disarm();
     }
@@ -265,14 +264,14 @@ impl Guard {
         self.device.trip();
     }
 
-    /// Trips, and stays so until it is cleared and armed.
+    /// Sets the emergency stop: disarms, and stays so until cleared and armed.
     pub const fn emergency_stop(&mut self) {
         if self.device.stop() {
             self.motor.disarm();
         }
     }
 
-    /// Takes the emergency stop back; the motor stays disarmed.
+    /// Clears the emergency stop; the motor stays disarmed.
     pub const fn clear_emergency_stop(&mut self) {
         self.device.clear_stop();
     }
@@ -289,19 +288,19 @@ impl Guard {
         self.device.is_stopped()
     }
 
-    /// Returns whether the motor is heard.
+    /// Returns the state of the link.
     #[must_use]
     pub const fn link(&self) -> Link {
         self.motor.link()
     }
 
-    /// Returns how often a target was NaN or infinite, saturating.
+    /// Returns the number of NaN or infinite targets, saturating.
     #[must_use]
     pub const fn refused_targets(&self) -> u16 {
         self.motor.refused_targets()
     }
 
-    /// Returns how often no target came in time, saturating.
+    /// Returns the number of expired targets, saturating.
     #[must_use]
     pub const fn forgotten_targets(&self) -> u16 {
         self.motor.forgotten_targets()
@@ -314,16 +313,16 @@ impl Default for Guard {
     }
 }
 
-/// Conditions, and the edges that wait to be read.
+/// Conditions and their unread edges.
 impl Guard {
-    /// Says whether a condition of the motor holds. A change is an edge, and waits to be read.
+    /// Sets whether a condition of the motor holds. A change is an edge, latched until read.
     ///
-    /// Late and lost feedback and old targets are noted by the guard itself.
+    /// The guard itself notes late and lost feedback and old targets.
     pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
         self.look(now, |latch| latch.set(condition, holds));
     }
 
-    /// Lets conditions change.
+    /// Runs a change of the conditions, and notes its consequences.
     pub(in crate::motor) fn look<T>(
         &mut self,
         now: Instant,
@@ -332,13 +331,13 @@ impl Guard {
         self.change(now, |motor| look(motor.latch_mut()))
     }
 
-    /// Returns what is wrong with the motor.
+    /// Returns the conditions of the motor that hold.
     #[must_use]
     pub const fn conditions(&self) -> Conditions {
         self.motor.latch().active()
     }
 
-    /// Returns the oldest change of a condition that was not read yet; the guard does not know its motor's name.
+    /// Returns the oldest unread edge, with the name passed as `motor`: the guard has no name of its motor.
     ///
     /// # Examples
     /// ```
@@ -368,7 +367,7 @@ impl Guard {
         Some(Edge { motor, condition, began, at: self.device.journal().last_time(now) })
     }
 
-    /// Returns what the guard knows of a motor's health.
+    /// Returns the part of a motor's health that the guard holds.
     pub(crate) const fn health(&self, motor: MotorName) -> Health {
         Health {
             motor,
@@ -386,7 +385,7 @@ impl Guard {
         }
     }
 
-    /// Returns when the change that [`next_edge`](Self::next_edge) returns next was noted: to read several motors in order.
+    /// Returns the time of the edge that [`next_edge`](Self::next_edge) returns next: to read several motors in order.
     pub(crate) fn next_edge_at(&self) -> Option<Instant> {
         self.motor.latch().next()?;
         let (journal, now) = (self.device.journal(), self.device.updated());

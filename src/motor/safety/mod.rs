@@ -1,21 +1,21 @@
-//! The safety core: the rules by which every motor is driven or rests, whatever its family.
+//! The safety core: the rules by which every motor of any family is driven or rests.
 //!
-//! A [`MotorGuard`] has the rules of one motor, a [`DeviceGuard`] those that the motors of a device share. A [`Guard`] is both,
-//! for a motor that is a device by itself. In the order in which they decide:
+//! A [`MotorGuard`] has the rules of one motor, a [`DeviceGuard`] the rules shared by the motors of a device. A [`Guard`] is both, for a
+//! motor that is a device by itself. The rules in order of decision:
 //!
-//! | question | asked of | where the answer is no |
+//! | question | decided by | if not |
 //! |---|---|---|
-//! | did time move on since the update before, and is it not before the arming? | `DeviceGuard::moves_on` | zeros in this cycle, every motor trips |
+//! | did time move on since the previous update, and is the update not before the arming? | `DeviceGuard::moves_on` | zeros in this cycle, all motors trip |
 //! | is the time step usable? | `DeviceGuard::hold` | the last commands once, then zeros |
-//! | is the feedback fresh? | `MotorGuard::age` | late: zero until it is heard; offline: relaxed and latched |
-//! | is the motor armed, and was that a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
-//! | is there a target that is young enough? | `MotorGuard::age` | relaxed |
+//! | is the feedback fresh? | `MotorGuard::age` | late: zero until the next feedback; offline: relaxed and latched |
+//! | is the motor armed, by a gesture? | `MotorGuard::admit`, `DeviceGuard::begin_arming` | no target is taken |
+//! | is there a target that is not expired? | `MotorGuard::age` | relaxed |
 //! | how far is the output range open? | `MotorGuard::share` | that share of the full command |
 //!
-//! Faults, a second master, heat and a stall are found by the [health](super::HealthConfig) of a family, and act by
-//! [`MotorGuard::trip`]: one of the transitions below.
+//! The [health](super::HealthConfig) of a family finds faults, a second master, heat and a stall. Each acts by [`MotorGuard::trip`], as one
+//! of the transitions below.
 //!
-//! | link | feedback comes | it is older than *late* | it is older than *offline* |
+//! | link | feedback is received | feedback is older than *late* | feedback is older than *offline* |
 //! |---|---|---|---|
 //! | unheard | online | | |
 //! | online | online | late | offline |
@@ -30,12 +30,12 @@
 //! | latched | armed | | tripped | disarmed |
 //! | tripped | armed | | | disarmed |
 //!
-//! Latched and tripped differ in one thing: a motor that is latched takes targets again by itself when it is online, where
-//! [`with_resume`](crate::dji::Config::with_resume) is configured. What latches or trips a motor, and the emergency stop, begins the pause of the
-//! gesture; to disarm does not.
+//! A latched and a tripped motor differ in one thing: if [`with_resume`](crate::dji::Config::with_resume) is configured, a latched motor
+//! takes targets again by itself when online. Each latch, each trip and the emergency stop begin the pause of the gesture; disarming does
+//! not.
 //!
-//! Times of a motor are stamps of 32 bits. Ages of several motors are judged together ([`Ages`]): nobody looks at a motor again
-//! before the oldest of them can have exceeded its limit.
+//! Times of a motor are stamps of 32 bits. Ages of several motors are compared together ([`Ages`]): no motor is checked again before the
+//! greatest age can have exceeded its limit.
 
 mod device;
 mod gesture;
@@ -52,5 +52,5 @@ pub(crate) use motor::MotorGuard;
 pub(crate) use stamp::age;
 pub(crate) use state::Rest;
 
-/// The time in which the output range of a motor opens after arming, unless configured otherwise: 0.2 s.
+/// Default time in which the output range of a motor opens after arming: 0.2 s.
 pub const OPENING: Duration = Duration::from_millis(200);

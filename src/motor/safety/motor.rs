@@ -1,19 +1,19 @@
-//! The rules of one motor.
+//! Rules of one motor.
 
 use super::stamp::{LONGEST_PAUSE_US, age, is_near, whole_ms};
 use super::state::{Arming, Rest};
 use crate::motor::{Condition, Latch, Link, TargetError, Timeouts};
 use crate::time::Duration;
 
-/// What a device has to know of a motor before a change of it.
+/// State of a motor before a change, for its device.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Known {
     pub(super) latch: Latch,
     pub(super) is_armed: bool,
 }
 
-/// Counts up to 32 767, which is 4 s of a bus full of one motor's frames. It is asked for each second; beyond, the gap would
-/// grow by 1 µs each time, for a minute at most: then the pause between two updates is too long for any age to be known.
+/// Counts up to 32 767, or 4 s of a bus full of frames of one motor. The count is taken each second. Each overflow would lengthen the gap
+/// by 1 µs, for a minute at most: after a longer pause between two updates no age is known.
 const COUNT_BITS: u32 = 15;
 const COUNT: u32 = (1 << COUNT_BITS) - 1;
 
@@ -22,26 +22,26 @@ const COUNT: u32 = (1 << COUNT_BITS) - 1;
 // In the order of use, so that neighbours are loaded and stored together.
 #[repr(C)]
 pub(crate) struct MotorGuard {
-    /// When its feedback came last.
+    /// Stamp of the last feedback.
     pub(super) heard: u32,
-    /// Feedback that comes sooner after the one before needs no closer look: that gap in µs, 0 unless online, above
-    /// [`COUNT_BITS`] bits that count such feedback. Together they are one word to load and to store.
+    /// Trusted gap in µs, 0 unless online: feedback after a shorter gap needs no further check. The lower [`COUNT_BITS`] bits count such
+    /// feedback, so gap and count are one word to load and to store.
     in_time: u32,
-    /// When its target was set.
+    /// Stamp of the target.
     pub(super) commanded: u32,
     pub(super) link: Link,
     arming: Arming,
     pub(super) has_target: bool,
     rest: Rest,
-    /// When the output range began to open.
+    /// Stamp of the time when the output range began to open.
     opened: u32,
-    /// In what time it opens.
+    /// Time in which the output range opens.
     opening_ms: u16,
     is_opening: bool,
     good_frames: u8,
-    /// Whether it has feedback at all.
+    /// Whether the motor has feedback.
     listens: bool,
-    /// Whether it takes targets again after a recovery.
+    /// Whether targets are taken again after a recovery.
     resumes: bool,
     refused_targets: u16,
     forgotten_targets: u16,
@@ -49,7 +49,7 @@ pub(crate) struct MotorGuard {
 }
 
 impl MotorGuard {
-    /// A motor with feedback: disarmed, not heard.
+    /// A motor with feedback: disarmed, unheard.
     pub(crate) const NEW: Self = Self {
         heard: 0,
         in_time: 0,
@@ -69,7 +69,7 @@ impl MotorGuard {
         latch: Latch::NONE,
     };
 
-    /// A motor that reports nothing: it counts as heard.
+    /// A motor without feedback, which counts as online.
     pub(super) const DEAF: Self = Self { listens: false, link: Link::Online, ..Self::NEW };
 
     /// Sets the time in which the output range opens, at most 65 s, and whether targets are taken again after a recovery.
@@ -90,7 +90,7 @@ impl MotorGuard {
         matches!(self.arming, Arming::Armed)
     }
 
-    /// Tells whether the motor was relaxed since it was armed, and waits to be armed again.
+    /// Tells whether the motor was relaxed since arming, and waits to be armed again.
     pub(crate) const fn is_tripped(&self) -> bool {
         matches!(self.arming, Arming::Latched | Arming::Tripped)
     }
@@ -99,7 +99,7 @@ impl MotorGuard {
         self.has_target
     }
 
-    /// Tells whether the motor may be driven: armed, heard, with a target that counts.
+    /// Tells whether the motor may be driven: armed, online, with a target that is not expired.
     pub(crate) fn drives(&self) -> bool {
         self.is_armed() && self.link == Link::Online && self.has_target
     }
@@ -112,7 +112,7 @@ impl MotorGuard {
         self.forgotten_targets
     }
 
-    /// Returns what a change is to be [compared](super::DeviceGuard::note) with.
+    /// Returns the state to [compare](super::DeviceGuard::note) with after a change.
     pub(crate) const fn known(&self) -> Known {
         Known { latch: self.latch, is_armed: self.is_armed() }
     }
@@ -129,7 +129,7 @@ impl MotorGuard {
         self.listens
     }
 
-    /// Tells whether its feedback is not fresh.
+    /// Tells whether the feedback is not fresh.
     pub(super) fn is_missing(&self, now: u32, timeouts: &Timeouts) -> bool {
         self.listens && !(self.link == Link::Online && self.is_fresh(now, timeouts))
     }
@@ -138,7 +138,7 @@ impl MotorGuard {
         !self.listens || is_near(now, self.heard, timeouts.late_us())
     }
 
-    /// Tells whether feedback comes shortly after the one before, of a motor that is online.
+    /// Tells whether feedback now comes within the trusted gap, for a motor that is online.
     #[inline]
     pub(crate) const fn is_in_time(&self, now: u32) -> bool {
         now.wrapping_sub(self.heard) < self.in_time >> COUNT_BITS
@@ -151,21 +151,21 @@ impl MotorGuard {
         self.in_time = self.in_time.wrapping_add(1);
     }
 
-    /// Returns how often feedback was in time since this was asked last.
+    /// Returns the number of feedback frames in time since the last call.
     pub(crate) const fn take_in_time(&mut self) -> u16 {
         let [low, high, ..] = (self.in_time & COUNT).to_le_bytes();
         self.in_time &= !COUNT;
         u16::from_le_bytes([low, high])
     }
 
-    /// Sets which gap is short, as long as the motor is online.
+    /// Sets the trusted gap; 0 unless the motor is online.
     pub(crate) fn trust(&mut self, gap_us: u32) {
         let gap_us = if self.link == Link::Online { gap_us.min(u32::MAX >> COUNT_BITS) } else { 0 };
         self.in_time = gap_us << COUNT_BITS | self.in_time & COUNT;
     }
 
-    /// Notes feedback of a motor that is online, if it came soon after the one before and after the update before; otherwise
-    /// does nothing and returns `false`.
+    /// Notes feedback of a motor that is online, if the previous feedback and the previous update are recent. Otherwise does nothing and
+    /// returns `false`.
     #[inline]
     pub(super) fn hear_soon(&mut self, now: u32, updated: u32, timeouts: &Timeouts) -> bool {
         let is_soon = |before| now.wrapping_sub(before) <= timeouts.late_us();
@@ -176,7 +176,7 @@ impl MotorGuard {
         is_usual
     }
 
-    /// Notes feedback, whenever the one before came.
+    /// Notes feedback after a gap of any length.
     pub(crate) fn hear(&mut self, now: u32, timeouts: &Timeouts) {
         let was_offline = matches!(self.link, Link::Offline | Link::Recovering);
         let in_a_row = self.link == Link::Recovering && self.is_fresh(now, timeouts);
@@ -195,8 +195,7 @@ impl MotorGuard {
         }
     }
 
-    /// Applies expired time-outs. Returns `false` if the motor has to be checked again with the next update, whatever is received
-    /// until then.
+    /// Applies expired time-outs. Returns `false` if the motor must be checked again on the next update regardless of new input.
     pub(crate) fn age(&mut self, now: u32, timeouts: &Timeouts) -> bool {
         let is_settled = match self.link {
             Link::Unheard | Link::Offline => return true,
@@ -212,7 +211,7 @@ impl MotorGuard {
         is_settled
     }
 
-    /// The last feedback is not fresh; its age decides how far that goes.
+    /// Applies the age of feedback that is not fresh: late, or lost.
     fn grow_old(&mut self, now: u32, timeouts: &Timeouts) {
         if age(now, self.heard) > timeouts.offline_us() {
             self.lose();
@@ -228,7 +227,7 @@ impl MotorGuard {
         self.interrupt();
     }
 
-    /// The motor is lost: relaxed, and refuses targets until it is armed again or, where that is configured, is back.
+    /// Handles a lost motor: relaxes, and refuses targets until armed again or, if configured, until recovered.
     fn lose(&mut self) {
         self.link = Link::Offline;
         self.in_time &= COUNT;
@@ -240,14 +239,14 @@ impl MotorGuard {
         self.relax();
     }
 
-    /// The application has not set a target for too long.
+    /// Discards an expired target.
     pub(crate) fn forget_target(&mut self) {
         self.relax();
         self.latch.set(Condition::CommandLost, true);
         self.forgotten_targets = self.forgotten_targets.saturating_add(1);
     }
 
-    /// Discards each stamp whose age 32 bits can no longer tell; after a pause, discards all stamps.
+    /// Discards each stamp whose age a 32-bit counter can no longer represent; after a pause, discards all stamps.
     pub(crate) fn forget_bygones(&mut self, now: u32, is_pause: bool) {
         let is_bygone = |stamp| is_pause || age(now, stamp) > LONGEST_PAUSE_US;
         if self.listens && self.link != Link::Unheard && is_bygone(self.heard) {
@@ -267,8 +266,7 @@ impl MotorGuard {
 
     /// Tells whether a new target may be taken.
     ///
-    /// A value that cannot be followed takes the target before it away: an older value must not act in its place when the
-    /// feedback comes back.
+    /// A value that is not finite cancels the previous target: an older value must not act in its place when the feedback returns.
     #[inline]
     pub(crate) fn admit(&mut self, is_finite: bool) -> Result<(), TargetError> {
         if is_finite && self.is_armed() && self.link == Link::Online {
@@ -288,7 +286,7 @@ impl MotorGuard {
             Arming::Disarmed => TargetError::Disarmed,
             Arming::Latched | Arming::Tripped => TargetError::Relaxed,
             Arming::Armed => {
-                // Nothing for long: a motor that is late is offline soon.
+                // A pause is enough, without a reset of the loops: a late motor is soon offline.
                 self.has_target = false;
                 self.interrupt();
                 TargetError::NoFeedback
@@ -300,20 +298,20 @@ impl MotorGuard {
         self.rest = self.rest.max(Rest::Pause);
     }
 
-    /// There is a target from now on.
+    /// Sets a target.
     pub(crate) const fn take_target(&mut self, now: u32) {
         self.has_target = true;
         self.renew_target(now);
     }
 
-    /// There is a new target in the place of one.
+    /// Replaces a target by a newer one.
     #[inline]
     pub(crate) const fn renew_target(&mut self, now: u32) {
         self.commanded = now;
     }
 
-    /// Returns the stamp of a target that goes with a measurement of another sensor, taken at `at`: it counts until the
-    /// measurement is too old, as if it had been set so long before. `None` when the measurement is too old already.
+    /// Returns the stamp of a target that belongs to a measurement of another sensor, taken at `at`: the target expires with the
+    /// measurement. Returns `None` if the measurement is too old already.
     pub(crate) const fn stamp_of_measurement(
         at: u32,
         now: u32,
@@ -327,18 +325,18 @@ impl MotorGuard {
         Some(if is_ahead { now } else { stamp })
     }
 
-    /// Asks for nothing.
+    /// Discards the target.
     pub(crate) const fn relax(&mut self) {
         self.has_target = false;
         self.rest = Rest::Relaxed;
     }
 
-    /// Returns how the motor rested, which is over.
+    /// Ends the rest and returns its kind.
     pub(crate) const fn end_rest(&mut self) -> Rest {
         core::mem::replace(&mut self.rest, Rest::None)
     }
 
-    /// Takes targets from now on, starting from rest.
+    /// Takes targets from now on, beginning at rest.
     pub(crate) const fn engage(&mut self, now: u32) {
         self.relax();
         self.arming = Arming::Armed;
@@ -350,7 +348,7 @@ impl MotorGuard {
         self.arming = Arming::Disarmed;
     }
 
-    /// Relaxes the motor, and refuses targets until it is armed again.
+    /// Relaxes the motor, and refuses targets until armed again.
     pub(crate) const fn trip(&mut self) {
         if !matches!(self.arming, Arming::Disarmed) {
             self.arming = Arming::Tripped;
@@ -358,7 +356,7 @@ impl MotorGuard {
         self.relax();
     }
 
-    /// Time did not move on: no age is known. Feedback counts as late until the next one, and the motor trips.
+    /// Handles a time that did not move on: no age is known. Feedback counts as late until the next frame, and the motor trips.
     pub(crate) fn lose_time(&mut self) {
         self.latch.set(Condition::ClockFault, true);
         if self.listens && self.link == Link::Online {
@@ -367,7 +365,7 @@ impl MotorGuard {
         self.trip();
     }
 
-    /// Has the output range open from zero.
+    /// Opens the output range from zero.
     pub(crate) const fn open(&mut self, now: u32) {
         self.is_opening = self.opening_ms > 0;
         self.opened = now;
@@ -378,7 +376,7 @@ impl MotorGuard {
         self.is_opening
     }
 
-    /// Returns the share of the output range that is open, 0 to 1. A time before the beginning gives 0.
+    /// Returns the open share of the output range, 0 to 1; 0 for a time before the beginning.
     pub(crate) fn share(&mut self, now: u32) -> f32 {
         let (passed, whole) = (age(now, self.opened), u32::from(self.opening_ms) * 1_000);
         self.is_opening = self.is_opening && passed < whole;

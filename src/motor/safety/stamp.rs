@@ -1,26 +1,26 @@
-//! Times as stamps of 32 bits in µs, which repeat after 71 min 35 s.
+//! Times as stamps of 32 bits in µs. A stamp repeats after 71 min 35 s.
 
 use crate::time::Duration;
 
-/// Stamps of 32 bits cannot tell how long ago a frame was heard when nobody looked at them for longer than this.
+/// Longest pause between two checks for which a 32-bit stamp still represents an age.
 pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
 
 /// Tells whether a stamp lies within `limit` of `now`, before or after.
 ///
-/// After, because an interrupt may stamp a frame just after a tick has read the clock; no further, because a clock that
-/// was set back must not make an old stamp look fresh.
+/// A stamp may lie after `now`, because an interrupt may stamp a frame just after a tick has read the clock. The limit holds there too:
+/// after a set-back of the clock, an old stamp must not look fresh.
 #[inline]
 pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
     now.wrapping_sub(stamp).wrapping_add(limit) <= limit.wrapping_mul(2)
 }
 
-/// Returns the age of a stamp; zero when it lies ahead.
+/// Returns the age of a stamp; zero for a stamp ahead.
 pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
     let age = now.wrapping_sub(stamp);
     if age.cast_signed() < 0 { 0 } else { age }
 }
 
-/// Whole milliseconds, at most 65 s.
+/// Returns whole milliseconds, at most 65 s.
 pub(super) const fn whole_ms(time: Duration) -> u16 {
     let millis = time.as_micros() / 1_000;
     #[expect(clippy::cast_possible_truncation, reason = "limited before")]

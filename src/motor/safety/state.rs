@@ -1,23 +1,23 @@
-//! The states of one motor beside its link.
+//! States of one motor, apart from its link.
 
 /// Whether a motor takes targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Arming {
     Disarmed,
     Armed,
-    /// Relaxed since it was armed, because it was lost.
+    /// Relaxed since arming, because the feedback was lost.
     Latched,
-    /// Relaxed since it was armed, for something else.
+    /// Relaxed since arming, for another reason.
     Tripped,
 }
 
-/// How a motor rested since its loops ran last.
+/// Rest of a motor since the last run of its loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Rest {
-    /// Not at all.
+    /// No rest.
     None,
-    /// Its feedback was late: what was measured before says nothing of a rate.
+    /// The feedback was late: older measurements give no rate.
     Pause,
-    /// Nothing was asked of it: the loops start afresh.
+    /// There was no target: the loops start afresh.
     Relaxed,
 }

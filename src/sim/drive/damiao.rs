@@ -1,4 +1,4 @@
-//! A drive of Damiao with its shaft, written from the manual: fields are cut out of the frame as one number of 64 bits.
+//! A simulated Damiao drive with its shaft, written from the manual. Fields are extracted from the frame as one 64-bit number.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -16,10 +16,10 @@ const DISABLE: u64 = 0xFFFF_FFFF_FFFF_FFFD;
 const SET_ZERO: u64 = 0xFFFF_FFFF_FFFF_FFFE;
 const CLEAR_ERROR: u64 = 0xFFFF_FFFF_FFFF_FFFB;
 
-/// Error of a drive that gets no commands.
+/// Error of a drive that receives no commands.
 const COMMUNICATION_LOST: u8 = 0xD;
 
-/// Numbers of the registers that the drive has, in the order of their places.
+/// Register numbers of the drive, in the order of their places.
 const REGISTERS: [u8; 7] = [7, 8, 9, 10, 21, 22, 23];
 const TIMEOUT: usize = 2;
 const MODE: usize = 3;
@@ -27,11 +27,11 @@ const PMAX: usize = 4;
 const VMAX: usize = 5;
 const TMAX: usize = 6;
 
-/// A drive of Damiao and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+/// A Damiao drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
-/// Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of another control mode is
-/// discarded without an answer. The shaft is an inertia with viscous friction.
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
+/// answer on the bus. Enabling, errors, the four control modes, registers and the time-out are as in the manual. A frame to the id of
+/// another control mode is discarded without an answer. The shaft is an inertia with viscous friction.
 ///
 /// # Examples
 /// ```
@@ -51,7 +51,7 @@ pub struct DamiaoDrive {
     stored: [f64; REGISTERS.len()],
     is_enabled: bool,
     error: u8,
-    /// Since the last frame of the drive's own.
+    /// Time since the last frame to this drive.
     silence_s: f64,
     command: Command,
     shaft: DriveShaft,
@@ -73,8 +73,8 @@ enum Command {
 }
 
 impl DamiaoDrive {
-    /// Makes a drive with the id of its commands, 1 to 15, that of its feedback, and the registers PMAX in rad, VMAX in rad/s and
-    /// TMAX in Nm: in MIT mode, without a time-out, with an inertia of 0.01 kg m².
+    /// Makes a drive with a command id, 1 to 15, a feedback id, and the registers PMAX in rad, VMAX in rad/s and TMAX in Nm. The drive is
+    /// in MIT mode, without a time-out, with an inertia of 0.01 kg m².
     #[must_use]
     pub fn new(id: u8, master_id: u16, [pmax, vmax, tmax]: [f32; 3]) -> Self {
         let values = [master_id.into(), id.into(), 0.0, 1.0, pmax.into(), vmax.into(), tmax.into()];
@@ -90,7 +90,7 @@ impl DamiaoDrive {
         }
     }
 
-    /// Sets a register, also over a loss of the supply; one that the drive does not have is left out.
+    /// Sets and stores a register: the value survives a loss of the supply. An unknown register is ignored.
     #[must_use]
     pub fn with_register(mut self, number: u8, value: f32) -> Self {
         self.write(number, value.into());
@@ -98,7 +98,7 @@ impl DamiaoDrive {
         self
     }
 
-    /// Gives the drive another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
@@ -110,18 +110,18 @@ impl DamiaoDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
 
-    /// Has the drive report an error, 8 to 14, and switch itself off.
+    /// Makes the drive report an error, 8 to 14, and disable itself.
     pub fn fail(&mut self, error: u8) {
         self.error = error & 0xF;
         self.is_enabled = false;
     }
 
-    /// Takes the supply away for a moment: the drive is disabled, and what was written but not stored is lost.
+    /// Interrupts the supply: the drive is disabled, and values written but not stored are lost.
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
         (self.is_enabled, self.error, self.command) = (false, 0, Command::None);
@@ -133,13 +133,13 @@ impl DamiaoDrive {
         self.is_enabled
     }
 
-    /// Returns the error that the drive reports, 8 to 14; 0 for none.
+    /// Returns the reported error, 8 to 14; 0 for none.
     #[must_use]
     pub const fn error(&self) -> u8 {
         self.error
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let id = standard(frame)?;
         if id == 0x7FF {
@@ -160,7 +160,7 @@ impl DamiaoDrive {
         Some(self.feedback())
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.silence_s += dt_s;

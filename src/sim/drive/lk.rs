@@ -1,5 +1,5 @@
-//! A drive of LK-TECH with its shaft, written from the manual: fields are cut out of the frame as one number of 64 bits, the first
-//! byte lowest.
+//! A simulated LK-TECH drive with its shaft, written from the manual. Fields are extracted from the frame as one 64-bit number, low byte
+//! first.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -22,10 +22,10 @@ const TORQUE: u64 = 0xA1;
 const VELOCITY: u64 = 0xA2;
 const POSITION: u64 = 0xA4;
 
-/// A drive of LK-TECH and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+/// An LK-TECH drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// It is on after its supply came, and goes on with its last command for ever. Off clears the turns that it has counted, and the
-/// command; it still answers then. An error gives no torque. The frames of the manual that the family does not send are not answered.
+/// The drive is on as soon as its supply is, and follows its last command for ever. "Off" clears the counted turns and the command; the
+/// drive still answers. With an error the torque is zero. Frames of the manual that the family does not send are not answered.
 ///
 /// # Examples
 /// ```
@@ -48,10 +48,10 @@ pub struct LkDrive {
     encoder_bits: u8,
     is_on: bool,
     errors: u8,
-    /// The errors whose reason is still there.
+    /// Errors whose cause persists.
     reasons: u8,
     temperature_c: i8,
-    /// The turns of the rotor that the drive does not count, as it was off since.
+    /// Turns of the rotor up to the last "off" or start: the drive does not count them.
     cleared: f64,
     command: Command,
     shaft: DriveShaft,
@@ -69,8 +69,8 @@ enum Command {
 }
 
 impl LkDrive {
-    /// Makes a drive with an id, 1 to 32, the current of a count in A, the torque constant in Nm/A at the output shaft, the
-    /// turns of the rotor for one of that shaft, and the bits of the encoder: on, with an inertia of 0.01 kg m².
+    /// Makes a drive with an id, 1 to 32, the current of a count in A, the torque constant in Nm/A at the output shaft, the gear ratio
+    /// (turns of the rotor per turn of the output shaft), and the bits of the encoder. The drive is on, with an inertia of 0.01 kg m².
     #[must_use]
     pub fn new(
         id: u8,
@@ -94,7 +94,7 @@ impl LkDrive {
         }
     }
 
-    /// Gives the drive another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
@@ -106,7 +106,7 @@ impl LkDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
@@ -116,18 +116,18 @@ impl LkDrive {
         self.temperature_c = temperature_c;
     }
 
-    /// Has the drive report errors, a bit each, which it keeps until they are cleared.
+    /// Makes the drive report errors, one bit each, until they are cleared.
     pub const fn fail(&mut self, errors: u8) {
         self.errors |= errors;
     }
 
-    /// Sets the errors whose reason is there, a bit each: they cannot be cleared until it is gone.
+    /// Sets the errors whose cause persists, one bit each: a command to clear leaves these errors.
     pub const fn set_reasons(&mut self, errors: u8) {
         self.reasons = errors;
         self.fail(errors);
     }
 
-    /// Takes the supply away for a moment: the drive is on again, without a command, and counts its turns from zero.
+    /// Interrupts the supply: the drive is on again, without a command, and counts its turns from zero.
     pub fn lose_supply(&mut self) {
         (self.is_on, self.errors, self.command) = (true, self.reasons, Command::None);
         self.clear_turns();
@@ -139,13 +139,13 @@ impl LkDrive {
         self.is_on
     }
 
-    /// Returns the errors, a bit each.
+    /// Returns the errors, one bit each.
     #[must_use]
     pub const fn errors(&self) -> u8 {
         self.errors
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let id = StandardId::new(0x140 + u16::from(self.id))?;
         if frame.id() != Id::Standard(id) || !frame.is_data_frame() || frame.length() != 8 {
@@ -192,7 +192,7 @@ impl LkDrive {
         Some(CanFrame::of(Id::Standard(id), answer.to_le_bytes()))
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let torque_nm = if self.is_on && self.errors == 0 { self.wanted_nm() } else { 0.0 };
         self.shaft.step(torque_nm, dt_s.into());
@@ -214,7 +214,7 @@ impl LkDrive {
         }
     }
 
-    /// Bytes 1 to 7.
+    /// Returns bytes 1 to 7 of a feedback frame.
     fn feedback(&self) -> u64 {
         let current = (self.shaft.torque_nm / self.torque_per_count) as i16;
         let velocity = (self.shaft.velocity_rad_per_s * self.gear).to_degrees() as i16;
@@ -230,7 +230,7 @@ impl LkDrive {
         self.shaft.angle_rad * self.gear / core::f64::consts::TAU
     }
 
-    /// The angle within the turn stays.
+    /// Clears the whole turns; the angle within the turn stays.
     fn clear_turns(&mut self) {
         self.cleared = floor(self.rotor_turns());
     }

@@ -1,5 +1,5 @@
-//! An axis of an ODrive with its shaft, written from the firmware 0.5.6 and the documentation of 0.6: fields are cut out of the frame as
-//! one number of 64 bits, low byte first.
+//! A simulated ODrive axis with its shaft, written from the firmware 0.5.6 and the documentation of 0.6. Fields are extracted from the
+//! frame as one 64-bit number, low byte first.
 
 #![expect(clippy::cast_possible_truncation, reason = "fields of a frame, which saturate")]
 
@@ -15,12 +15,12 @@ const CLOSED_LOOP: u8 = 8;
 const TORQUE: u32 = 1;
 const VELOCITY: u32 = 2;
 
-/// An axis of an ODrive and the shaft that it turns, for tests: it takes frames, answers remote ones, reports by itself, and moves.
+/// An ODrive axis with its shaft, for tests: takes frames, answers remote ones, sends cyclic frames, and moves.
 ///
-/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear), and put its answer
-/// and its [cyclic frames](Self::next_frame) there. States, modes, limits, errors and the watchdog are as in the firmware: a request for
-/// closed loop by an axis that is in it already drops the torque and begins anew. The endpoints of 0.6 have the numbers 1 to 4: control mode,
-/// input mode, watchdog time-out, watchdog enabled.
+/// The axis is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
+/// answer and the [cyclic frames](Self::next_frame) on the bus. States, modes, limits, errors and the watchdog are as in the firmware: if
+/// an axis in closed loop receives another request for closed loop, the axis drops the torque and begins anew. The endpoints of 0.6 have
+/// the numbers 1 to 4: control mode, input mode, watchdog time-out, watchdog enabled.
 ///
 /// # Examples
 /// ```
@@ -38,13 +38,13 @@ pub struct OdriveDrive {
     node: u8,
     is_0_6: bool,
     torque_constant: f64,
-    /// Turns of the motor for a turn of the shaft.
+    /// Turns of the motor per turn of the shaft.
     gear: f64,
     state: u8,
     error: u32,
     disarm_reason: u32,
     procedure_result: u8,
-    /// What a request for closed loop ends with; 0 when the axis is calibrated.
+    /// Procedure result that ends a request for closed loop; 0 for a calibrated axis.
     refusal: u8,
     control_mode: u32,
     input_mode: u32,
@@ -58,18 +58,18 @@ pub struct OdriveDrive {
     is_watched: bool,
     watchdog_s: f64,
     silence_s: f64,
-    /// Until the firmware runs.
+    /// Time until the firmware runs.
     boot_s: f64,
-    /// Periods of heartbeat and estimates, 0 for never, and the time since.
+    /// Periods of heartbeat and estimates, 0 for never, and the time since each was sent.
     periods_s: [f64; 2],
     since_s: [f64; 2],
     shaft: DriveShaft,
 }
 
 impl OdriveDrive {
-    /// Makes an axis with a node id, of firmware 0.6 or 0.5, with the torque constant of its motor in Nm/A and the turns of the motor for
-    /// one of the shaft: idle, in position mode as at delivery, limits of 2 turns/s and 10 A, no watchdog, a heartbeat each 100 ms
-    /// and estimates each 10 ms, with an inertia of 0.01 kg m² at the shaft.
+    /// Makes an axis with a node id, the firmware 0.6 or 0.5, the torque constant of the motor in Nm/A and the gear ratio (turns of the
+    /// motor per turn of the shaft). The axis is idle, in position mode as at delivery, with limits of 2 turns/s and 10 A, no watchdog, a
+    /// heartbeat each 100 ms, estimates each 10 ms, and an inertia of 0.01 kg m² at the shaft.
     #[must_use]
     pub fn new(node: u8, is_0_6: bool, torque_constant: f32, gear: f32) -> Self {
         Self {
@@ -106,32 +106,32 @@ impl OdriveDrive {
         Self { periods_s: [heartbeat_s.into(), estimates_s.into()], ..self }
     }
 
-    /// Sets the watchdog in s, as by USB.
+    /// Sets the watchdog time-out in s, as over USB.
     #[must_use]
     pub fn with_watchdog(self, time_s: f32) -> Self {
         Self { is_watched: true, watchdog_s: time_s.into(), ..self }
     }
 
-    /// Gives the axis another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
     }
 
-    /// Has the axis refuse closed loop with a procedure result, 14 for one that is not calibrated; 0 to follow it.
+    /// Makes the axis refuse closed loop with a procedure result, 14 for an uncalibrated axis. With 0, the axis follows the request.
     pub const fn refuse(&mut self, procedure_result: u8) {
         self.refusal = procedure_result;
     }
 
-    /// Has the axis report errors, a bit each, and disarm.
+    /// Makes the axis report errors, one bit each, and disarm.
     pub const fn fail(&mut self, errors: u32) {
         self.error |= errors;
         self.disarm_reason = errors;
         self.state = IDLE;
     }
 
-    /// Takes the supply away for a moment: the axis is idle, and has its modes, limits and watchdog as at delivery. It neither hears nor
-    /// sends for 200 ms.
+    /// Interrupts the supply: the axis is idle, with modes, limits and watchdog as at delivery. For 200 ms the axis neither receives nor
+    /// sends.
     pub fn lose_supply(&mut self) {
         let new = Self::new(self.node, self.is_0_6, 1.0, 1.0);
         *self = Self {
@@ -145,7 +145,7 @@ impl OdriveDrive {
         };
     }
 
-    /// Puts the axis into a state, as by USB.
+    /// Puts the axis into a state, as over USB.
     pub const fn set_state(&mut self, state: u8) {
         self.state = state;
     }
@@ -156,7 +156,7 @@ impl OdriveDrive {
         self.state
     }
 
-    /// Returns the errors of the axis, a bit each.
+    /// Returns the errors of the axis, one bit each.
     #[must_use]
     pub const fn error(&self) -> u32 {
         self.error
@@ -174,7 +174,7 @@ impl OdriveDrive {
         (self.velocity_limit as f32, self.current_limit as f32)
     }
 
-    /// Returns the watchdog in s; `None` if it is off.
+    /// Returns the watchdog time-out in s; `None` if the watchdog is off.
     #[must_use]
     pub fn watchdog_s(&self) -> Option<f32> {
         self.is_watched.then_some(self.watchdog_s as f32)
@@ -186,12 +186,12 @@ impl OdriveDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this axis, and to a command.
+    /// Takes a frame from the bus and returns the answer. Returns `None` for a command, and if the frame is not for this axis.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let Id::Standard(id) = frame.id() else { return None };
         let (node, number) = (id.as_raw() >> 5, id.as_raw() & 0x1F);
@@ -222,7 +222,7 @@ impl OdriveDrive {
         None
     }
 
-    /// Returns the next frame that the axis sends by itself; `None` until one is due again.
+    /// Returns the next cyclic frame; `None` until the next is due.
     pub fn next_frame(&mut self) -> Option<CanFrame> {
         if self.boot_s > 0.0 {
             return None;
@@ -237,7 +237,7 @@ impl OdriveDrive {
         None
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.silence_s += dt_s;
@@ -253,7 +253,7 @@ impl OdriveDrive {
         self.shaft.step(within(wanted, most), dt_s);
     }
 
-    /// Returns the torque of the shaft that the loops ask for.
+    /// Returns the torque of the shaft that the loops demand.
     fn wanted_nm(&mut self, dt_s: f64) -> f64 {
         let [position, velocity, torque] = self.input;
         let limit = self.velocity_limit.abs();
@@ -270,7 +270,7 @@ impl OdriveDrive {
         direct + self.shaft.following_nm(within(wanted, limit) * TAU / self.gear)
     }
 
-    /// Moves the setpoint to a position by the input mode; returns it with its velocity.
+    /// Moves the setpoint to a position by the input mode; returns position and velocity of the setpoint.
     fn followed(&mut self, position: f64, velocity: f64, dt_s: f64) -> (f64, f64) {
         let [at, speed] = self.setpoint;
         self.setpoint = match self.input_mode {

@@ -1,5 +1,5 @@
-//! A drive of MyActuator with its shaft, written from the manual: fields are cut out of the frame as one number of 64 bits, the first
-//! byte lowest.
+//! A simulated MyActuator drive with its shaft, written from the manual. Fields are extracted from the frame as one 64-bit number, low byte
+//! first.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -28,19 +28,19 @@ const EXPIRED: u64 = 0xF1;
 /// The id of commands for all drives.
 const ALL: u16 = 0x280;
 
-/// The time that the brake takes to open, and that a reset takes, in s: as users measured them.
+/// Time for the brake to open, and for a reset, in s: measured by users.
 const OPENING_S: f64 = 0.1;
 const STARTING_S: f64 = 1.12;
 
-/// The errors that stay until a reset.
+/// Errors that stay until a reset.
 const LASTING: u16 = 0x0092;
 
-/// A drive of MyActuator (protocol V4) and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+/// A MyActuator drive (protocol V4) with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// It follows any command at once, and goes on with its last one until its time-out, which it does not have at first. Off ends the
-/// command and locks the holding brake; a velocity or a position releases it, a torque does not. After its time-out the output is off
-/// and the brake locked; the next frame is sent back and not followed, and the one before holds on from there. An error gives no
-/// torque. The frames of the manual that the family does not send are not answered.
+/// The drive follows any command at once, and holds its last command until the time-out; a new drive has no time-out. "Off" ends the
+/// command and locks the holding brake. A velocity or a position releases the brake, a torque does not. After the time-out the output is
+/// off and the brake locked. The next frame is echoed without effect, and the command before the time-out holds again. With an error the
+/// torque is zero. Frames of the manual that the family does not send are not answered.
 ///
 /// # Examples
 /// ```
@@ -61,7 +61,7 @@ pub struct RmdDrive {
     torque_constant: f64,
     command: Command,
     errors: u16,
-    /// The errors whose reason is still there.
+    /// Errors whose cause persists.
     reasons: u16,
     temperature_c: i8,
     /// The angle of the shaft at the zero of the drive, in °.
@@ -70,9 +70,9 @@ pub struct RmdDrive {
     timeout_ms: u32,
     silent_s: f64,
     is_expired: bool,
-    /// The time since the last report that it is.
+    /// Time since the last report of an expired time-out.
     unreported_s: f64,
-    /// There is a holding brake, and the time until it is open; `None` while it is locked.
+    /// Whether there is a holding brake, and the time until the brake is open; `None` while it is locked.
     has_brake: bool,
     off_locks: bool,
     opening_s: Option<f64>,
@@ -94,8 +94,8 @@ enum Command {
 }
 
 impl RmdDrive {
-    /// Makes a drive with an id, 1 to 32, and the torque constant in Nm/A at the output shaft: without a command, a time-out and a
-    /// holding brake, with an inertia of 0.01 kg m².
+    /// Makes a drive with an id, 1 to 32, and the torque constant in Nm/A at the output shaft. The drive has no command, no time-out and no
+    /// holding brake, and an inertia of 0.01 kg m².
     #[must_use]
     pub fn new(id: u8, torque_constant: f32) -> Self {
         Self {
@@ -119,25 +119,25 @@ impl RmdDrive {
         }
     }
 
-    /// Gives the drive another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
     }
 
-    /// Gives the drive a holding brake, which is locked.
+    /// Adds a holding brake, locked.
     #[must_use]
     pub const fn with_brake(self) -> Self {
         Self { has_brake: true, opening_s: None, ..self }
     }
 
-    /// Has "off" leave the holding brake as it is: the manual does not say which is so.
+    /// Makes "off" leave the holding brake as it is: the manual does not say whether "off" locks the brake.
     #[must_use]
     pub const fn keeping_brake(self) -> Self {
         Self { off_locks: false, ..self }
     }
 
-    /// Has the drive answer a time-out with zeros, and not take it.
+    /// Makes the drive answer a time-out with zeros and ignore it.
     #[must_use]
     pub const fn refusing_timeouts(self) -> Self {
         Self { takes_timeout: false, ..self }
@@ -149,7 +149,7 @@ impl RmdDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
@@ -159,18 +159,18 @@ impl RmdDrive {
         self.temperature_c = temperature_c;
     }
 
-    /// Has the drive report errors, a bit each: those that a reset clears stay.
+    /// Makes the drive report errors, one bit each. Errors that only a reset clears stay.
     pub const fn fail(&mut self, errors: u16) {
         self.errors |= errors;
     }
 
-    /// Sets the errors whose reason is there, a bit each.
+    /// Sets the errors whose cause persists, one bit each.
     pub const fn set_reasons(&mut self, errors: u16) {
         self.reasons = errors;
         self.errors = self.errors & LASTING | errors;
     }
 
-    /// Takes the supply away for a moment: the drive is silent while its program starts, and counts its angle within a turn again.
+    /// Interrupts the supply: the drive is silent while its program starts, and its angle is within a turn again.
     pub fn lose_supply(&mut self) {
         let (constant, reasons) = (self.torque_constant as f32, self.reasons);
         let turns = floor((self.shaft.angle_rad.to_degrees() - self.zero_deg) / 360.0);
@@ -202,7 +202,7 @@ impl RmdDrive {
         self.opening_s.is_none_or(|left| left > 0.0)
     }
 
-    /// Returns the errors, a bit each.
+    /// Returns the errors, one bit each.
     #[must_use]
     pub const fn errors(&self) -> u16 {
         self.errors
@@ -214,7 +214,7 @@ impl RmdDrive {
         self.timeout_ms
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let own = StandardId::new(0x140 + u16::from(self.id))?;
         let is_for_it = [Some(own), StandardId::new(ALL)]
@@ -240,7 +240,7 @@ impl RmdDrive {
             OFF => Command::None,
             _ => self.command,
         };
-        // Control commands are not run with an error.
+        // With an error, control commands are not run.
         self.command = if self.errors == 0 { command } else { Command::None };
         match code {
             RESET => {
@@ -256,7 +256,7 @@ impl RmdDrive {
             _ => {}
         }
         match code {
-            // It is confirmed when it is done.
+            // The release is confirmed once the brake is open.
             RELEASE if self.is_locked() => None,
             TIMEOUT if !self.takes_timeout => self.answer(code),
             RELEASE | LOCK | OFF | STOP | TIMEOUT => self.answer(bits),
@@ -273,7 +273,7 @@ impl RmdDrive {
         }
     }
 
-    /// Returns the frame that the drive sends by itself: that its time-out has expired, when it has, and each second.
+    /// Returns the frame that reports an expired time-out: once at the end of the time-out, then each second.
     pub fn report(&mut self) -> Option<CanFrame> {
         if !self.is_expired || self.unreported_s < 1.0 {
             return None;
@@ -282,7 +282,7 @@ impl RmdDrive {
         self.answer(EXPIRED)
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.starting_s -= dt_s;
@@ -326,7 +326,7 @@ impl RmdDrive {
         Some(CanFrame::of(Id::Standard(id), bits.to_le_bytes()))
     }
 
-    /// Bytes 1 to 7.
+    /// Returns bytes 1 to 7 of a feedback frame.
     fn feedback(&self) -> u64 {
         let current = (self.shaft.torque_nm / self.torque_constant * 100.0) as i16;
         let velocity = self.shaft.velocity_rad_per_s.to_degrees() as i16;

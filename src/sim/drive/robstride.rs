@@ -1,4 +1,4 @@
-//! A drive of RobStride, or a CyberGear, with its shaft, written from the manual: fields are cut out of the frame as numbers.
+//! A simulated RobStride drive, or a CyberGear, with its shaft, written from the manual. Fields are extracted from the frame as numbers.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -11,7 +11,7 @@ use super::shaft::{float, within};
 use crate::frame::CanFrame;
 use embedded_can::{ExtendedId, Frame, Id};
 
-/// Indices of the parameters that the drive has, in the order of their places.
+/// Parameter indices of the drive, in the order of their places.
 const PARAMETERS: [u16; 8] = [0x7005, 0x7006, 0x700A, 0x700B, 0x7016, 0x7017, 0x7018, 0x7028];
 const RUN_MODE: usize = 0;
 const IQ_REF: usize = 1;
@@ -22,17 +22,18 @@ const LIMIT_SPD: usize = 5;
 const LIMIT_CUR: usize = 6;
 const TIMEOUT: usize = 7;
 
-/// Parameters that the drive measures.
+/// Measured parameters.
 const MECH_POS: u16 = 0x7019;
 const MECH_VEL: u16 = 0x701B;
 const VBUS: u16 = 0x701C;
 
-/// A drive of RobStride and the shaft that it turns, for tests: it takes frames, answers them, and moves.
+/// A RobStride drive with its shaft, for tests: takes frames, answers them, and moves.
 ///
-/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear) and put its answer there.
-/// Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. An ampere makes 1 Nm. It goes on to the targets that it
-/// has when it is enabled. The position that it reports starts again at the other end of its range; that of a
-/// [CyberGear](Self::cybergear) stays at the end. An operation frame names no host, so the drive answers to the last one that it heard.
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
+/// answer on the bus. Run modes 0 to 3 and 5, parameters, faults and the time-out are as in the manual. The torque constant is 1 Nm/A. When
+/// enabled, the drive follows the targets already set. The reported position starts again at the other end of its range; a
+/// [CyberGear](Self::cybergear) clamps the position at the end. An operation frame names no host, so the drive answers to the host of the
+/// last frame with one.
 ///
 /// # Examples
 /// ```
@@ -57,9 +58,9 @@ pub struct RobStrideDrive {
     is_enabled: bool,
     is_calibrating: bool,
     faults: u32,
-    /// The bit rate that a frame has set, 1 for that of the bus.
+    /// Bit rate set by a frame; 1 for the rate of the bus.
     bit_rate: u8,
-    /// Since the last frame of the drive's own.
+    /// Time since the last frame to this drive.
     silence_s: f64,
     /// Position, velocity, kp, kd and torque.
     operation: [f64; 5],
@@ -67,8 +68,8 @@ pub struct RobStrideDrive {
 }
 
 impl RobStrideDrive {
-    /// Makes a drive with an id and the ranges of position in rad, velocity in rad/s, torque in Nm, kp and kd: in the operation mode,
-    /// without a time-out, with an inertia of 0.01 kg m².
+    /// Makes a drive with an id and the ranges of position in rad, velocity in rad/s, torque in Nm, kp and kd. The drive is in operation
+    /// mode, without a time-out, with an inertia of 0.01 kg m².
     #[must_use]
     pub fn new(id: u8, ranges: [f32; 5]) -> Self {
         let ranges = ranges.map(f64::from);
@@ -98,7 +99,7 @@ impl RobStrideDrive {
         Self { is_cybergear: true, ..Self::new(id, [pmax, 30.0, 12.0, 500.0, 5.0]) }
     }
 
-    /// Sets a parameter, also over a loss of the supply; one that the drive does not have is left out.
+    /// Sets and stores a parameter: the value survives a loss of the supply. An unknown parameter is ignored.
     #[must_use]
     pub fn with_parameter(mut self, index: u16, value: f32) -> Self {
         self.write(index, value.into());
@@ -106,7 +107,7 @@ impl RobStrideDrive {
         self
     }
 
-    /// Gives the drive another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
@@ -118,36 +119,35 @@ impl RobStrideDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
 
-    /// Returns the value of a parameter; `None` if the drive does not have it.
+    /// Returns the value of a parameter; `None` for an unknown one.
     #[must_use]
     pub fn parameter(&self, index: u16) -> Option<f32> {
         self.value_of(index).map(single)
     }
 
-    /// Has the drive find faults, by the bits of its report, and switch itself off.
+    /// Makes the drive report faults, as the bits of its report, and disable itself.
     pub const fn fail(&mut self, faults: u32) {
         self.faults = faults;
         self.is_enabled = false;
     }
 
-    /// Has the drive calibrate itself.
+    /// Starts or ends a calibration.
     pub const fn calibrate(&mut self, is_calibrating: bool) {
         self.is_calibrating = is_calibrating;
     }
 
-    /// Returns the report of the drive's faults.
+    /// Returns the fault report of the drive.
     #[must_use]
     pub fn report(&self) -> CanFrame {
         self.answer(21, 0, u64::from(self.faults).to_le_bytes())
     }
 
-    /// Takes the supply away for a moment: the drive is disabled and in the operation mode, and what was written but not stored is
-    /// lost.
+    /// Interrupts the supply: the drive is disabled and in operation mode, and values written but not stored are lost.
     pub fn lose_supply(&mut self) {
         self.values = self.stored;
         self.write(0x7005, 0.0);
@@ -160,19 +160,19 @@ impl RobStrideDrive {
         self.is_enabled
     }
 
-    /// Returns the faults, by the bits of the report; 0 for none.
+    /// Returns the faults, as the bits of the report; 0 for none.
     #[must_use]
     pub const fn faults(&self) -> u32 {
         self.faults
     }
 
-    /// Returns the number of the bit rate, 1 for 1 Mbit/s: another one than that of the bus, and the drive would be gone.
+    /// Returns the number of the bit rate, 1 for 1 Mbit/s. A real drive with another rate than its bus is unreachable.
     #[must_use]
     pub const fn bit_rate(&self) -> u8 {
         self.bit_rate
     }
 
-    /// Takes a frame from the bus and returns the answer; `None` to a frame that is not for this drive.
+    /// Takes a frame from the bus and returns the answer. Returns `None` if the frame is not for this drive.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let Id::Extended(id) = frame.id() else { return None };
         let id = id.as_raw();
@@ -215,7 +215,7 @@ impl RobStrideDrive {
         Some(self.feedback())
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.silence_s += dt_s;
@@ -250,7 +250,7 @@ impl RobStrideDrive {
         within(torque, limit)
     }
 
-    /// The fields of an operation frame, whose torque is in the id.
+    /// Returns the fields of an operation frame, whose torque is in the id.
     fn fields(&self, torque: u32, data: u64) -> [f64; 5] {
         let [pmax, vmax, tmax, kp, kd] = self.ranges;
         let share = |lowest: u32| (data >> lowest & 0xFFFF) as f64 / 65_535.0;
@@ -263,7 +263,7 @@ impl RobStrideDrive {
         ]
     }
 
-    /// Mode and faults, as bits 16 to 23 of the id have them.
+    /// Returns mode and faults, as in bits 16 to 23 of the id.
     fn state(&self) -> u32 {
         let mode = if self.is_calibrating { 1 } else { u32::from(self.is_enabled) << 1 };
         let bit = |bits: u32, place: u32| u32::from(self.faults & bits != 0) << place;
@@ -290,7 +290,7 @@ impl RobStrideDrive {
         extended(kind << 24 | state << 16 | u32::from(self.id) << 8 | u32::from(self.host), data)
     }
 
-    /// The answer about an id: the id, and what its processor is called.
+    /// Returns the answer to an inquiry for ids: the id, and the identifier of the processor.
     fn broadcast(&self) -> CanFrame {
         extended(u32::from(self.id) << 8 | 0xFE, [self.id, 1, 2, 3, 4, 5, 6, 7])
     }
@@ -310,7 +310,7 @@ impl RobStrideDrive {
     fn set(&mut self, index: u16, swapped: u32) {
         let bits = swapped.swap_bytes();
         match index {
-            // The mode of a drive that runs stays.
+            // The mode of a running drive stays.
             0x7005 if self.is_enabled => {}
             0x7005 => {
                 let mode = bits & 0xFF;
@@ -355,7 +355,7 @@ fn extended(raw: u32, data: [u8; 8]) -> CanFrame {
     CanFrame::of(ExtendedId::new(raw).unwrap_or(ExtendedId::MAX), data)
 }
 
-/// The rest of a division, not negative. The shaft is not billions of turns away.
+/// Returns the remainder of a division, not negative. The shaft stays within billions of turns.
 fn rest_of(value: f64, span: f64) -> f64 {
     let rest = value % span;
     if rest < 0.0 { rest + span } else { rest }

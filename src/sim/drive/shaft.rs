@@ -38,7 +38,7 @@ impl DriveShaft {
         }
     }
 
-    /// Sets a torque from outside, in Nm: the weight of an arm, say.
+    /// Sets an external torque in Nm, such as the weight of an arm.
     pub fn set_load(&mut self, torque_nm: f32) {
         self.load_nm = torque_nm.into();
     }
@@ -53,7 +53,7 @@ impl DriveShaft {
         self.velocity_rad_per_s = velocity_rad_per_s.into();
     }
 
-    /// Returns the angle in rad; turns count.
+    /// Returns the angle in rad, over any number of turns.
     #[must_use]
     pub const fn angle_rad(&self) -> f32 {
         self.angle_rad as f32
@@ -71,7 +71,7 @@ impl DriveShaft {
         self.torque_nm as f32
     }
 
-    /// Moves on by a time in s under a torque of the drive in Nm.
+    /// Advances by a time in s under a torque of the drive in Nm.
     pub fn step(&mut self, torque_nm: f64, dt_s: f64) {
         self.torque_nm = torque_nm;
         let sum = torque_nm + self.load_nm - self.friction_nm_s * self.velocity_rad_per_s;
@@ -79,18 +79,18 @@ impl DriveShaft {
         self.angle_rad += self.velocity_rad_per_s * dt_s;
     }
 
-    /// Returns the torque in Nm by which a drive's own speed loop follows a velocity in rad/s.
+    /// Returns the torque in Nm of a drive's own speed loop that follows a velocity in rad/s.
     pub(super) fn following_nm(&self, velocity_rad_per_s: f64) -> f64 {
         100.0 * self.inertia_kg_m2 * (velocity_rad_per_s - self.velocity_rad_per_s)
     }
 }
 
-/// Returns a value between a limit and its negative, whatever the sign of the limit.
+/// Clamps a value to a limit and its negative; the sign of the limit does not count.
 pub(super) const fn within(value: f64, limit: f64) -> f64 {
     value.min(limit.abs()).max(-limit.abs())
 }
 
-/// Returns the value of the bits of a float in a frame: at most a million, and 0 for NaN, so that the shaft stays finite.
+/// Returns the value of the bits of a float in a frame, clamped to a million, and 0 for NaN: the shaft stays finite.
 pub(super) fn float(bits: u32) -> f64 {
     let value = f64::from(f32::from_bits(bits));
     if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) }

@@ -1,4 +1,4 @@
-//! A VESC with its shaft, written from the firmware `bldc`: ids and values are cut out of the frame as numbers.
+//! A simulated VESC with its shaft, written from the firmware `bldc`. Ids and values are extracted from the frame as numbers.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -11,13 +11,13 @@ use crate::frame::CanFrame;
 use core::f64::consts::TAU;
 use embedded_can::{ExtendedId, Frame, Id};
 
-/// After a fault the drive ignores commands for this time.
+/// Time after a fault in which commands are ignored.
 const FAULT_STOP_S: f64 = 0.5;
 
-/// Currents below are taken for 0, in A.
+/// Currents below count as 0, in A.
 const LEAST_CURRENT: f64 = 0.05;
 
-/// Speeds below are taken for 0, in electrical rpm.
+/// Speeds below count as 0, in electrical rpm.
 const LEAST_SPEED: f64 = 900.0;
 
 /// The motor behind a simulated VESC.
@@ -25,9 +25,9 @@ const LEAST_SPEED: f64 = 900.0;
 pub struct VescMotor {
     /// Pole pairs of the rotor.
     pub pole_pairs: u8,
-    /// Turns of the rotor for one of the output shaft.
+    /// Turns of the rotor per turn of the output shaft.
     pub gear: f64,
-    /// Torque of the rotor for a current, in Nm/A.
+    /// Torque constant of the rotor, in Nm/A.
     pub torque_constant_nm_per_a: f64,
     /// The drive's own current limit in A.
     pub current_max_a: f64,
@@ -35,11 +35,11 @@ pub struct VescMotor {
     pub no_load_rad_per_s: f64,
 }
 
-/// A VESC and the shaft that it turns, for tests: it takes frames, answers questions for its fault code, and moves.
+/// A VESC with its shaft, for tests: takes frames, answers requests for its fault code, and moves.
 ///
-/// It stands beside the [`Simulation`](crate::sim::Simulation): give it what is on the bus with [`hear`](Self::hear), and put there its
-/// answers and the status frames that [`report`](Self::report) makes. It brakes with its time-out current when commands stop, and ignores
-/// commands for half a second after a fault. The shaft is an inertia with viscous friction.
+/// The drive is not a part of the [`Simulation`](crate::sim::Simulation): pass each frame of the bus to [`hear`](Self::hear), and put the
+/// answers and the status frames of [`report`](Self::report) on the bus. If commands stop, the drive brakes with its time-out current.
+/// After a fault, commands are ignored for half a second. The shaft is an inertia with viscous friction.
 ///
 /// # Examples
 /// ```
@@ -63,16 +63,16 @@ pub struct VescDrive {
     motor: VescMotor,
     command: Command,
     fault: u8,
-    /// What is left of the time in which commands are ignored.
+    /// Rest of the time in which commands are ignored.
     ignores_s: f64,
-    /// Since the last command that was heard.
+    /// Time since the last command.
     silence_s: f64,
     timeout_s: f64,
     timeout_brake_a: f64,
     celsius: [f64; 2],
-    /// Where the shaft was when the tachometer was this count.
+    /// Angle of the shaft when the tachometer had this count.
     zero: (f64, i32),
-    /// The angle that the handbrake holds.
+    /// Angle held by the handbrake.
     held_rad: f64,
     shaft: DriveShaft,
 }
@@ -88,7 +88,7 @@ enum Command {
 }
 
 impl VescDrive {
-    /// Makes a drive that stands at 0, with a time-out of 1 s, a time-out brake current of 0, and an inertia of 0.01 kg m².
+    /// Makes a drive at rest at 0, with a time-out of 1 s, a time-out brake current of 0, and an inertia of 0.01 kg m².
     #[must_use]
     pub fn new(id: u8, motor: VescMotor) -> Self {
         Self {
@@ -113,13 +113,13 @@ impl VescDrive {
         Self { timeout_s: timeout_s.into(), timeout_brake_a: brake_a.into(), ..self }
     }
 
-    /// Gives the drive another shaft.
+    /// Replaces the shaft.
     #[must_use]
     pub const fn with_shaft(self, shaft: DriveShaft) -> Self {
         Self { shaft, ..self }
     }
 
-    /// Sets the count of the tachometer where the shaft is.
+    /// Sets the count of the tachometer at the present angle of the shaft.
     pub fn set_tachometer(&mut self, count: i32) {
         self.zero = (self.shaft.angle_rad, count);
     }
@@ -135,19 +135,19 @@ impl VescDrive {
         &self.shaft
     }
 
-    /// Returns the shaft, to load or to turn it.
+    /// Returns the shaft, for a load or a turn from outside.
     pub const fn shaft_mut(&mut self) -> &mut DriveShaft {
         &mut self.shaft
     }
 
-    /// Has the drive stop with a fault: it lets the shaft go, and ignores commands for half a second.
+    /// Stops the drive with a fault: the shaft is free, and commands are ignored for half a second.
     pub fn fail(&mut self, fault: u8) {
         self.fault = fault;
         self.ignores_s = FAULT_STOP_S;
         self.command = Command::Current(0.0);
     }
 
-    /// Takes the supply away for a moment: the last command is lost, and the tachometer begins at 0.
+    /// Interrupts the supply: the last command is lost, and the tachometer begins at 0.
     pub fn lose_supply(&mut self) {
         self.zero = (self.shaft.angle_rad, 0);
         (self.fault, self.ignores_s, self.silence_s) = (0, 0.0, 0.0);
@@ -160,7 +160,7 @@ impl VescDrive {
         self.fault
     }
 
-    /// Takes a frame from the bus and returns the answer, if the frame is a question.
+    /// Takes a frame from the bus and returns the answer; `None` unless the frame is a request.
     pub fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let Id::Extended(id) = frame.id() else { return None };
         let id = id.as_raw();
@@ -171,12 +171,12 @@ impl VescDrive {
         let data = frame.data();
         let packet = id >> 8;
         if packet == 8 {
-            // Values are answered by a short message where they fit: the fault code alone is value 15.
+            // Requested values come in a short message if they fit: the fault code alone is value 15.
             let &[host, 0, 50, 0, 0, 0x80, 0, ..] = data else { return None };
             return extended(8 << 8 | u32::from(host))
                 .map(|id| CanFrame::of(id, [self.id, 1, 50, 0, 0, 0x80, 0, self.fault]));
         }
-        // A current of six bytes and more begins with a delay.
+        // A current frame of six bytes or more begins with a delay.
         let from = if packet == 1 && data.len() >= 6 { 2 } else { 0 };
         let bytes = data.get(from..)?.first_chunk::<4>()?;
         let value = f64::from(i32::from_be_bytes(*bytes));
@@ -207,7 +207,7 @@ impl VescDrive {
         self.command = command;
     }
 
-    /// Moves on by a time in s.
+    /// Advances by a time in s.
     pub fn step(&mut self, dt_s: f32) {
         let dt_s = f64::from(dt_s);
         self.silence_s += dt_s;
@@ -223,7 +223,7 @@ impl VescDrive {
         self.shaft.step(within(current, most) * self.nm_per_a(), dt_s);
     }
 
-    /// Returns a status frame, by its packet: 9, 14, 15, 16, 27 or 58; `None` for another.
+    /// Returns a status frame by its packet: 9, 14, 15, 16, 27 or 58; `None` for any other.
     #[must_use]
     pub fn report(&self, packet: u8) -> Option<CanFrame> {
         let electrical = self.motor.gear * f64::from(self.motor.pole_pairs);
@@ -295,7 +295,7 @@ fn extended(raw: u32) -> Option<Id> {
     ExtendedId::new(raw).map(Id::Extended)
 }
 
-/// The angle from 0 to a turn.
+/// Returns the angle from 0 to a turn.
 fn within_turn(angle_rad: f64) -> f64 {
     angle_rad - floor(angle_rad / TAU) as f64 * TAU
 }

@@ -1,30 +1,30 @@
-//! What is wrong with one joint.
+//! Conditions of one joint.
 
 use super::{LAST, Slot};
 use crate::motor::{Condition, Edge, Health, Link, Reaction};
 use crate::snake::PULSES_PER_TURN;
 use crate::time::{Duration, Instant};
 
-/// Positions are counted for this long.
+/// Window in which positions are counted.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// So long after another node led the joint it is forgotten.
+/// Time after which another node on the bus is forgotten.
 const RIVAL_FORGOTTEN: Duration = Duration::from_secs(1);
 
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
 
-/// A joint that is nearer to its target than this is there.
+/// Distance to the target within which a joint has arrived.
 const THERE: u32 = PULSES_PER_TURN.unsigned_abs() / 64;
 
-/// Where a joint stands, and since when it would have to move.
+/// Position of a standing joint, and the time from which the joint must move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Standing {
     pub(super) at: i32,
     pub(super) since: Instant,
 }
 
-/// Counts a position that arrived at `now`, before its time replaces that of the one before.
+/// Counts a position received at `now`, before its time replaces the previous time.
 pub(super) fn count_position(slot: &mut Slot, now: Instant) {
     if slot.raw.is_some() {
         let gap = now.since(slot.heard).micros_u32();
@@ -35,7 +35,7 @@ pub(super) fn count_position(slot: &mut Slot, now: Instant) {
     slot.traffic.count();
 }
 
-/// Another node wrote to the joint, or asked it.
+/// Notes a write or a request of another node.
 pub(in crate::snake) fn hear_rival(slot: &mut Slot, now: Instant) {
     slot.rival_heard = Some(now);
     slot.guard.note(Condition::SecondMaster, true, now);
@@ -45,7 +45,7 @@ pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
     slot.rival_heard.is_some()
 }
 
-/// Ends what is over, and the window in which positions are counted.
+/// Ends expired conditions, and the window in which positions are counted.
 pub(super) fn check(slot: &mut Slot, now: Instant) {
     if slot.rival_heard.is_some_and(|heard| now.since(heard) > RIVAL_FORGOTTEN) {
         slot.rival_heard = None;
@@ -55,13 +55,13 @@ pub(super) fn check(slot: &mut Slot, now: Instant) {
     let window = now.since(slot.window_from);
     if slot.raw.is_some() && window >= WINDOW {
         let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
-        // How often a joint is asked is the application's affair.
+        // The rate of requests is the choice of the application.
         slot.traffic.close(units, u32::MAX);
         slot.window_from = now;
     }
 }
 
-/// A joint that has a way to go and does not move is blocked, or its drive does not do what it is told.
+/// Checks a joint away from its target: without a motion, the joint is blocked, or its drive does not follow.
 fn check_stall(slot: &mut Slot, now: Instant) {
     let Some(raw) = slot.raw else { return };
     let (window, reaction) = (slot.stall.window, slot.stall.reaction);
@@ -79,8 +79,8 @@ fn check_stall(slot: &mut Slot, now: Instant) {
     slot.guard.note(Condition::Stalled, begins, now);
 }
 
-/// Tells whether the joint was enabled. Before that it says of itself that it is not; afterwards it may have news all
-/// the time, from an application that leads it along.
+/// Tells whether the joint was enabled. Before, the drive reports itself as disabled. Afterwards, there may be changed values all the time,
+/// from an application that moves the target along.
 pub(super) const fn is_up(slot: &Slot) -> bool {
     slot.driven && slot.pending & LAST == 0
 }
@@ -92,7 +92,7 @@ fn is_fast_enough(slot: &Slot) -> bool {
     sped_up.min(slot.speed as f32 * time_s) > 4.0 * STANDS as f32
 }
 
-/// Returns when the change was noted that is next to be read.
+/// Returns the time of the edge that is read next.
 pub(in crate::snake) fn next_edge_at(slot: &Slot) -> Option<Instant> {
     slot.id.and_then(|_| slot.guard.next_edge_at())
 }
@@ -102,7 +102,7 @@ pub(in crate::snake) fn next_edge(slot: &mut Slot) -> Option<Edge> {
     slot.guard.next_edge(motor)
 }
 
-/// Returns how the joint is.
+/// Returns the health of the joint.
 pub(in crate::snake) fn report(slot: &Slot) -> Option<Health> {
     Some(Health {
         feedback_hz: slot.traffic.rate_hz(),

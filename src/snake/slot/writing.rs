@@ -1,23 +1,23 @@
-//! What a joint is written, in which order.
+//! Order of the writes to a joint.
 
 use super::{ALL, Slot};
 use crate::snake::{Command, Register};
 use crate::time::Instant;
 
 impl Slot {
-    /// Notes that it is told to relax now. A joint that has a target again is brought up from the beginning after that.
+    /// Notes a disable at `now`. With a new target, the joint is then brought up from the beginning.
     pub(in crate::snake) const fn told_to_relax(&mut self, now: Instant) {
         self.stopped = now;
         (self.pending, self.ahead) = (ALL, ALL);
     }
 
-    /// Returns the frame that is next to be written.
+    /// Returns the next frame to write.
     pub(in crate::snake) fn next_write(&mut self, now: Instant) -> Command {
         if !self.driven {
             self.stopped = now;
             return Command::DISABLE;
         }
-        // In turns, so that none waits for news of another that have no end.
+        // In turns, so that no register waits for endless changes of another.
         let first = self.pending & self.ahead;
         let waiting = if first == 0 { self.pending } else { first };
         let bit = waiting & waiting.wrapping_neg();
@@ -40,13 +40,13 @@ impl Slot {
         }
     }
 
-    /// Takes back a write that was not sent: its turn comes again, and after that those behind it. Whoever is before it in
-    /// the sequence stays there.
+    /// Takes back a write that was not sent: its turn comes again, and then the turns of the registers behind it. Registers before it in
+    /// the sequence keep their places.
     pub(in crate::snake) fn take_back(&mut self, register: Register) {
         self.ahead |= self.renew(register).wrapping_neg();
     }
 
-    /// Has a register written anew; returns its bit.
+    /// Marks a register for a write; returns its bit.
     pub(super) fn renew(&mut self, register: Register) -> u8 {
         let place = Register::SEQUENCE.iter().position(|other| *other == register);
         let bit = place.map_or(0, |place| 1 << place);
