@@ -2,6 +2,7 @@
 from board.board import Board
 from board.chips import Stm32f407, Stm32h723
 from board.imu import Imu
+from board.pc import Pc
 from board.remote import MIDDLE, UP, Remote
 import machines
 
@@ -13,15 +14,16 @@ ARM_AT_US, DRIVE_AT_US, FAULT_AT_US = 60_000, 110_000, 250_000
 
 
 class Program:
-    def __init__(self, name, package, chip, things, remote=None, key=None, held=0, control=None, transmit_irq=None):
+    def __init__(self, name, package, chip, things, remote=None, key=None, held=0, control=None, transmit_irq=None, debug_port=None):
         self.name, self.package, self.chip, self.remote, self.key = name, package, chip, remote, key
         # Frames that may still leave when the line is back, and the interrupt in which the control loop runs.
         self.held, self.control = held, control
         self.things = things
         # The interrupts of its CAN controller; embassy's driver has a queue that the one for sending empties.
         self.receive_irqs = (19, 21) if chip is Stm32h723 else (20, 21)
-        self.transmit_irq = transmit_irq
+        self.transmit_irq, self.debug_port = transmit_irq, debug_port
         self.has = {"loop", "remote" if remote else "key"} | ({"transmit irq"} if transmit_irq else set())
+        self.has |= {"debug port"} if debug_port else set()
         # An FDCAN has one interrupt for both directions: where it is not served, no frame of zeros leaves either.
         if chip is not Stm32h723:
             self.has.add("receive irq")
@@ -40,7 +42,7 @@ PROGRAMS = {
     program.name: program
     for program in (
         Program("one-motor", "c-board-embassy", Stm32f407, wheels(1), key=("A", 0), transmit_irq=19),
-        Program("c-board-embassy", "c-board-embassy", Stm32f407, wheels(4), remote=3, transmit_irq=19),
+        Program("c-board-embassy", "c-board-embassy", Stm32f407, wheels(4), remote=3, transmit_irq=19, debug_port=6),
         Program("c-board-rtic", "c-board-rtic", Stm32f407, wheels(4), remote=3, control=7),
         Program("dm-mc02-embassy", "dm-mc02-embassy", Stm32h723, wheels(4), remote=5),
         machines.Sentry,
@@ -60,6 +62,7 @@ class Robot(Board):
         self.held = program.held
         super().__init__(program.chip, f"{builds}/{program.name}", world, [*program.things, *things])
         self.remote = Remote(self, program.remote) if program.remote else None
+        self.pc = Pc(self, program.debug_port) if program.debug_port else None
         # All boards have the IMU on USART1.
         self.imu = Imu(self, 1) if has_imu else None
         self.at(ARM_AT_US, lambda: self.ask_to_arm(True))

@@ -11,7 +11,7 @@ defects into the images and the chip, each of which a row has to find.
 Instructions are executed by Unicorn, each in one cycle at the clock of the chip. The chips are an STM32F407 and an STM32F427
 (Cortex-M4F, bxCAN) and an STM32H723 (Cortex-M7, FDCAN), with interrupts that nest, timers, USART, DMA and the independent watchdog.
 The models of the chip and of the CAN line are in `firmware/virtual/board`. The motors, the joints and the chassis are those of
-`drivetrain::sim`; remote control, IMU, servo and computer are written from their protocols, not with the code of this crate.
+`drivetrain::sim`; remote control, IMU, servo, PC and computer are written from their protocols, not with the code of this crate.
 
 No board was there: the model of a register is as right as our reading of the reference manual. Code that others wrote checks it. The
 drivers of embassy-stm32, stm32f4xx-hal and bxcan come up unchanged, and the programs `check-embassy`, `check-hal` and `check-h7` use them

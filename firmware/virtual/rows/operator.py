@@ -165,3 +165,54 @@ def imu_frozen(robot):
     driving(robot)
     robot.imu.frozen = frame(200)
     return _without_imu(robot, FAULT_AT_US, FAULT_AT_US + 450_000)
+
+
+# Of the board's firmware/boards/pilot: the gains of a robot of 20 kg, and the least that a PC may set.
+USUAL_KP, LEAST_KP = 1.92, 0.2
+NONSENSE = (b"wheel_kp=400", b"wheel_kp=nan", b"wheel_kp=-1", b"wheel_ki=1e9", b"arm=1", b"wheel_kq=1", b"=", b"wheel_kp", b"\xff" * 60)
+
+
+def _curves(robot, taken, refused):
+    """Speed and gains, when the program says that it took and refused this many lines."""
+    curves = robot.pc.curves()
+    must(len(curves) == 5, f"{len(curves)} curves")
+    must(curves[3:] == (taken, refused), f"{curves[3]} lines taken, {curves[4]} refused")
+    return curves[:3]
+
+
+@row("-", "fresh", needs="debug port")
+def gains_set(robot):
+    """A PC sets the least gain of the wheels before the robot is armed, and the usual one while it drives."""
+    robot.at(20_000, lambda: robot.pc.say(b"wheel_kp=%.3f\nwheel_ki=0\n" % LEAST_KP))
+    robot.run(ARM_AT_US)
+    must(not robot.driven(), "a line of the PC moves it")
+    robot.run(FAULT_AT_US)
+    soft, kp, ki = _curves(robot, 2, 0)
+    must(abs(kp - LEAST_KP) < 1e-3 and ki == 0, f"gains of {kp} and {ki}")
+    must(robot.driven(FAULT_AT_US - 10_000), "it does not drive")
+    robot.pc.say(b"wheel_kp=%.3f\nwheel_ki=2.4\n" % USUAL_KP)
+    robot.run(FAULT_AT_US + 150_000)
+    stiff, kp, _ = _curves(robot, 4, 0)
+    must(abs(kp - USUAL_KP) < 1e-3, f"a gain of {kp}")
+    # Half a stick is 0.75 m/s, 94 rpm of a wheel of 76 mm.
+    must(0 < soft < 40 and 75 < stiff < 115, f"{soft} rpm with the least gain, {stiff} rpm with the usual one")
+    must(abs(stiff - robot.world.state(1)[0]) < 10, f"the curve says {stiff} rpm, the wheel has {robot.world.state(1)[0]} rpm")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": None, "stale": len(robot.stale()), "note": "the wheels follow them; no line moves the robot"}
+
+
+@row("F59", "fresh", needs="debug port")
+def debug_nonsense(robot):
+    """A PC sends lines out of range, unknown ones and noise: each is counted, and nothing moves or changes."""
+    robot.at(0, lambda: robot.ask_to_arm(False))
+    robot.at(ARM_AT_US, lambda: robot.ask_to_arm(False))
+    robot.at(10_000, lambda: robot.pc.say(b"".join(line + b"\n" for line in NONSENSE)))
+    drawn = random.Random(7)
+    noise = bytes(byte for byte in drawn.randbytes(600) if byte != 0x0A)
+    robot.at(40_000, lambda: robot.pc.say(noise + b"\n"))
+    robot.run(120_000)
+    must(not robot.driven(), "a line of the PC moves it")
+    _, kp, ki = _curves(robot, 0, len(NONSENSE) + 1)
+    must(abs(kp - USUAL_KP) < 0.02 and abs(ki - 2.4) < 0.1, f"gains of {kp} and {ki}")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": robot.commands()[0].us, "stale": 0, "note": "each line is counted; at rest"}

@@ -7,7 +7,7 @@
 //! falls silent while one is held, the robot stops until both are let go.
 //!
 //! A PC may set the gains of the wheels while the robot runs: lines such as `wheel_kp=2.5` on a serial port, see
-//! [`Pilot::hear_debug_port`].
+//! [`Pilot::hear_debug_port`]. Curves for VOFA+ go back: [`Pilot::curves`].
 #![cfg_attr(not(test), no_std)]
 
 pub mod gesture;
@@ -26,6 +26,7 @@ use drivetrain::units::{AngularVelocity, Current};
 use drivetrain::wire::dbus::{Dbus, Remote};
 use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use drivetrain::wire::parameters::{Parameter, ParameterCounts, Parameters};
+use drivetrain::wire::vofa::justfloat;
 use drivetrain::wire::{Receiver, Silence};
 use gesture::{Gesture, at_rest};
 
@@ -55,6 +56,9 @@ const PARAMETERS: [Parameter; 2] = [
     Parameter::setting("wheel_kp", "A per rad/s", 0.2, 4.0),
     Parameter::setting("wheel_ki", "A per rad", 0.0, 10.0),
 ];
+
+/// Five curves and the tail of a `JustFloat` frame.
+pub const CURVES_BYTES: usize = 24;
 
 /// Where a stick that is pushed ahead points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,7 +105,7 @@ impl Pilot {
 
     /// Takes bytes of a PC that arrived at `now`, and gives the wheels the gains that they set, without a jump of the output.
     ///
-    /// No board reads a serial port for it yet. A board that does calls this between two ticks, and may show what is returned.
+    /// To be called between two ticks.
     pub fn hear_debug_port(
         &mut self,
         bus: &mut Bus,
@@ -109,15 +113,34 @@ impl Pilot {
         now: Instant,
     ) -> ParameterCounts {
         while self.parameters.read(&mut bytes, now).is_some() {
-            let (kp, ki, kd) = SPEED.gains();
-            let kp = self.parameters.value(KP, now).unwrap_or(kp);
-            let ki = self.parameters.value(KI, now).unwrap_or(ki);
+            let (kp, ki) = self.gains(now);
             for wheel in self.wheels.into_array() {
                 // Refused for a wheel that was detached only, which never happens here.
-                _ = bus.set_speed_loop(wheel, SPEED.with_gains(kp, ki, kd));
+                _ = bus.set_speed_loop(wheel, SPEED.with_gains(kp, ki, 0.0));
             }
         }
         self.parameters.counts()
+    }
+
+    /// Returns a `JustFloat` frame for VOFA+: speed of the front left wheel in rpm (0 before it is heard), `wheel_kp`, `wheel_ki`,
+    /// lines of the PC that were taken, and lines that were refused.
+    pub fn curves(&self, bus: &Bus, now: Instant) -> [u8; CURVES_BYTES] {
+        let speed = bus.state(self.wheels.front_left).map_or(0.0, |state| state.velocity.as_rpm());
+        let (kp, ki) = self.gains(now);
+        let counts = self.parameters.counts();
+        let refused = [counts.out_of_range, counts.unknown, counts.malformed];
+        let refused = refused.into_iter().map(f32::from).sum();
+        let mut frame = [0; CURVES_BYTES];
+        // Refused for a buffer that is too small only, and this one is not.
+        _ = justfloat(&[speed, kp, ki, f32::from(counts.accepted), refused], &mut frame);
+        frame
+    }
+
+    /// Returns the gains of the wheels: those that a PC set, or those of the robot's mass.
+    fn gains(&self, now: Instant) -> (f32, f32) {
+        let (kp, ki, _) = SPEED.gains();
+        let set = |index| self.parameters.value(index, now);
+        (set(KP).unwrap_or(kp), set(KI).unwrap_or(ki))
     }
 
     /// Hands over who was heard and lost since, for the log.
@@ -272,6 +295,29 @@ mod tests {
         for bad in [&b"wheel_kp=400\n"[..], b"wheel_kp=nan\n", b"wheel_kq=1\n", b"wheel_kp=0.5"] {
             assert_eq!(word(bad), usual);
         }
+    }
+
+    #[test]
+    fn curves_show_the_gains_and_what_became_of_the_lines() {
+        let now = Instant::START + Duration::from_secs(1);
+        let mut bus = Bus::new();
+        let mut pilot = Pilot::new(&mut bus).unwrap();
+        _ = bus.ingest(&CanFrame::standard(0x202, [0, 0, 0x07, 0x80, 0, 0, 25, 0]).unwrap(), now);
+        pilot.hear_debug_port(
+            &mut bus,
+            b"wheel_kp=2.5
+wheel_ki=nan
+wheel
+",
+            now,
+        );
+        let frame = pilot.curves(&bus, now);
+        let curve = |at: usize| f32::from_le_bytes(frame[4 * at..4 * at + 4].try_into().unwrap());
+        // 1920 rpm of the rotor behind a gear of 3591 to 187.
+        assert!((curve(0) - 99.98).abs() < 0.01, "{}", curve(0));
+        assert!((curve(2) - 2.4).abs() < 0.1, "{}", curve(2));
+        assert_eq!([curve(1), curve(3), curve(4)], [2.5, 1.0, 2.0]);
+        assert_eq!(frame[20..], [0, 0, 0x80, 0x7F]);
     }
 
     /// A frame of the IMU at a yaw of 180°; its time goes on, otherwise it would count as frozen.
