@@ -1107,7 +1107,7 @@ mod tests {
             pid.reset_to(output);
             let expected = pid.output();
             let first = pid.step(sample.0, sample.1, &TimeStep::of(DT_S));
-            let largest = pid.terms().p.abs().max(pid.terms().feed_forward.abs()).max(1.0);
+            let largest = pid.terms().p.abs().max(pid.terms().feed_forward.abs()).max(expected.abs()).max(1.0);
             prop_assert!((first - expected).abs() <= 1e-6 * largest, "{} {}", first, expected);
         }
 
