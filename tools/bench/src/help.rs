@@ -37,7 +37,7 @@ options
   --geometry R,L,B  radius of the wheels, half of the wheelbase and half of the track in m (default: 0.076,0.2,0.18)
   --amplitude N     of the relay, in A, V or Nm (default: half of the limit)
   --hysteresis N    of the relay, in rad/s (default: 0.5; of a GM6020 by voltage 4)
-  --seconds S       how long (default: 5); Ctrl-C and Ctrl-Z end it as well, with zeros
+  --seconds S       how long (default: 5); Ctrl-C, Ctrl-Z and a terminal that is gone end it as well, with zeros
   --log FILE        every frame: MCAP if the name ends in .mcap, otherwise the form of candump -L
   --json            a line of JSON for each report
 

@@ -211,7 +211,8 @@ impl Session {
         }
     }
 
-    /// Runs until a signal or the pilot ends it, or a motor is lost, and ends with zeros: also if the pilot panics.
+    /// Runs until a signal or the pilot ends it, or a motor is lost, and ends with zeros: also if the pilot panics. A signal
+    /// cannot end the program until the caller says so, when the recordings are whole.
     pub(crate) fn run(&mut self, end: &End, pilot: &mut impl Pilot) {
         end.is_safe(false);
         let flight = catch_unwind(AssertUnwindSafe(|| {
@@ -229,7 +230,6 @@ impl Session {
         while matches!(self.stage, Stage::Resting { .. }) {
             self.cycle(end);
         }
-        end.is_safe(true);
     }
 
     /// Waits a little, takes what came, and runs a tick if one is due.

@@ -190,8 +190,14 @@ fn lead(
     session.messages().into_iter().for_each(|text| say(&mut errors, &text));
     let mut has_failed = session.has_failed() || (task.is_missed() && !end.is_asked_for());
     let report = task.report(&mut session, &mut out);
-    let said = out.outlet.finish(report, |text| say(&mut errors, &text));
-    let mut failures = session.finish(|text| say(&mut errors, &text));
+    // Where a reader or a disk holds up the end, a signal may end the program.
+    let mut wait = |text: String| {
+        end.is_safe(true);
+        say(&mut errors, &text);
+    };
+    let said = out.outlet.finish(report, &mut wait);
+    let mut failures = session.finish(&mut wait);
+    end.is_safe(true);
     failures.extend(said.err());
     for failure in failures {
         say(&mut errors, &failure);
