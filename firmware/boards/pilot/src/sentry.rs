@@ -80,8 +80,8 @@ pub struct Aim {
 pub struct Shot {
     /// The friction wheels turn against each other so fast.
     pub flywheels: AngularVelocity,
-    /// Of the loader, forward positive.
-    pub loader: AngularVelocity,
+    /// Of the loader, forward positive; `None` if it is to take no current.
+    pub loader: Option<AngularVelocity>,
 }
 
 /// What the shooter's motors do.
@@ -241,7 +241,10 @@ impl Sentry {
         for flywheel in self.flywheels {
             _ = second.set_velocity(flywheel, shot.flywheels);
         }
-        _ = second.set_velocity(self.loader, shot.loader);
+        match shot.loader {
+            Some(velocity) => _ = second.set_velocity(self.loader, velocity),
+            None => second.relax(self.loader),
+        }
     }
 
     /// Returns the yaw of the gimbal in the chassis; `None` when it is not known. The encoder shows 0 when it looks ahead.
@@ -261,5 +264,64 @@ impl Sentry {
             loader: loader.map_or(AngularVelocity::ZERO, |state| state.velocity),
             current: loader.map_or(Current::ZERO, |state| state.current),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drivetrain::sim::{Fault, MotorConfig, Simulation};
+    use embedded_can::nb::Can;
+
+    const TRIGGER_MS: u64 = 50;
+    const JAM_MS: u64 = 800;
+    const END_MS: u64 = 2_800;
+
+    #[test]
+    fn a_loader_that_stays_blocked_turns_back_twice_and_then_takes_no_current() {
+        let world = Simulation::new(1);
+        world.attach(MotorConfig::gm6020_voltage(2)).unwrap();
+        world.attach(MotorConfig::m3508(1)).unwrap();
+        world.attach(MotorConfig::m3508(2)).unwrap();
+        let loader = world.attach(MotorConfig::m2006(3)).unwrap();
+        let at = |ms| Instant::START + Duration::from_millis(ms);
+        world.fault(Fault::BlockedShaft(loader), at(JAM_MS)..at(END_MS)).unwrap();
+        let (sentry, _, mut second) = Sentry::new().unwrap();
+        let (mut shooter, mut can) = (Shooter::default(), world.controller());
+        let (mut turned_back, mut was_back, mut rested_ms) = (0, false, None);
+        for ms in 1..END_MS {
+            world.advance(Duration::from_millis(1));
+            let now = world.now();
+            while let Ok(frame) = can.receive() {
+                _ = second.ingest(&frame, now);
+            }
+            if ms == 20 {
+                second.arm(now).unwrap();
+            }
+            let is_shooting = ms >= TRIGGER_MS;
+            if ms % 2 == 0 {
+                let left_switch = if is_shooting { Switch::Up } else { Switch::Middle };
+                let remote = Remote { left_switch, ..Remote::default() };
+                let shot = shooter.update(&remote, sentry.barrel(&second), now);
+                sentry.shoot(&mut second, shot);
+                let is_back = shot.loader.is_some_and(|loader| loader.as_rpm() < 0.0);
+                turned_back += u32::from(is_back && !was_back);
+                was_back = is_back;
+            }
+            second.update(Tick::new(now, 0.001));
+            while let Some(frame) = second.next_frame() {
+                _ = can.transmit(&frame);
+            }
+            let word = world.motor(loader).unwrap().command;
+            if word != 0 {
+                rested_ms = None;
+            } else if rested_ms.is_none() {
+                rested_ms = Some(ms);
+            }
+        }
+        assert_eq!(turned_back, 2);
+        assert!(shooter.is_jammed());
+        assert!(rested_ms.is_some_and(|ms| ms < JAM_MS + 1_200), "{rested_ms:?}");
+        assert!(sentry.barrel(&second).flywheels.as_rpm() > 3_600.0);
     }
 }
