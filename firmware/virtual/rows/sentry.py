@@ -83,8 +83,7 @@ def short_jam(robot):
     return {"zero_us": None, "stale": len(robot.stale(jam)), "note": "turns back, feeds on"}
 
 
-# Not held yet: the loader of the sentry does not rest after its two tries. No program is asked for this row.
-@row("F21", needs="loader that rests")
+@row("F21", needs="sentry")
 def long_jam(robot):
     """The loader is blocked for good: two tries, then it rests, and the friction wheels go on."""
     _shoot(robot, FAULT_AT_US)
