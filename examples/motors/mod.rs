@@ -1,6 +1,5 @@
 //! The motors that a command line names, as in `m3508:1-4,damiao4310:1:0x11`: one syntax for the examples and the bench.
 
-use drivetrain::dji::{Facts, Gm6020Current, Gm6020Voltage, M2006, M3508, Model as _};
 use drivetrain::odrive::Firmware;
 use drivetrain::{damiao, lk, rmd, robstride};
 
@@ -60,18 +59,6 @@ impl Model {
                     .or_else(|| robstride().copied().map(Self::RobStride));
             }
         })
-    }
-
-    /// Returns the facts of a model of DJI.
-    #[allow(dead_code, reason = "not each program needs them")]
-    pub(crate) fn dji(&self) -> Option<&'static Facts> {
-        match self {
-            Self::M3508 => Some(M3508::FACTS),
-            Self::M2006 => Some(M2006::FACTS),
-            Self::Gm6020 => Some(Gm6020Voltage::FACTS),
-            Self::Gm6020Current => Some(Gm6020Current::FACTS),
-            _ => None,
-        }
     }
 }
 

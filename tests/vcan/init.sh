@@ -19,14 +19,7 @@ $bb stty -F /dev/ttyS1 -opost
     for interface in can0 can1; do
         /bin/ip link set $interface up type can bitrate 1000000 || echo "no $interface"
     done
-    # Open: they failed when they were run last, and are left out until they are mended. `tests/vcan/run NAME` runs one.
-    SKIP=""
-    [ -n "$ONLY" ] || for name in an_interface_that_goes_down a_reader_who_does_not_read_holds_up zeros_that_the_interface_does_not_take \
-        every_frame_on_a_real_can_stack foreign::a_foreign_master; do
-        SKIP="$SKIP --skip $name"
-        echo "vcan: OPEN, NOT RUN: $name"
-    done
     PYTHONHOME=$($bb cat /python-home) PYTHONPATH=/opt/masters/python MOTORBRIDGE_TX_GAP_US=0 MOTORBRIDGE_BULK_OP_GAP_MS=0 \
-    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 $SKIP $ONLY </dev/null
+    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
 } >/dev/ttyS1 2>&1
 $bb poweroff -f

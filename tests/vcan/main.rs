@@ -57,7 +57,7 @@ fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
         }
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    panic!("{what}: waited in vain");
+    panic!("{what}: waited in vain; the bench said: {}", said());
 }
 
 fn output(program: &str, arguments: &[&str]) -> String {

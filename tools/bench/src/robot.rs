@@ -5,7 +5,7 @@ use crate::motors::{Model, Spec};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{
     AnyHandle, AttachError, Bus, Config, Counters, Facts, Gm6020Current, Gm6020Voltage, M2006,
-    M3508,
+    M3508, Model as _,
 };
 use drivetrain::motor::{Devices, Health, Link, MotorName, TargetError, Visitor};
 use drivetrain::units::AngularVelocity;
@@ -56,6 +56,17 @@ enum Place {
     Own(usize),
 }
 
+/// Returns the facts of a model of DJI.
+fn facts(model: Model) -> Option<&'static Facts> {
+    match model {
+        Model::M3508 => Some(M3508::FACTS),
+        Model::M2006 => Some(M2006::FACTS),
+        Model::Gm6020 => Some(Gm6020Voltage::FACTS),
+        Model::Gm6020Current => Some(Gm6020Current::FACTS),
+        _ => None,
+    }
+}
+
 /// The motors of a session.
 #[derive(Debug)]
 pub(crate) struct Robot {
@@ -81,7 +92,7 @@ impl Robot {
     pub(crate) fn new(specs: &[Spec], is_chassis: bool) -> Result<Self, String> {
         let mut robot = Self { bus: Bus::new(), own: Vec::new(), places: Vec::new() };
         for spec in specs {
-            let place = match spec.model.dji() {
+            let place = match facts(spec.model) {
                 Some(facts) => Place::Dji(robot.attach(*spec, facts, is_chassis)?),
                 None => {
                     robot.own.push(Drive::new(*spec)?);

@@ -76,6 +76,9 @@ pub(crate) trait Pilot {
 
     /// After each tick: `false` ends the session.
     fn ticked(&mut self, session: &mut Session) -> bool;
+
+    /// Passes on the messages of the session: in [`ticked`](Self::ticked), and while the motors are brought to rest at the end.
+    fn take_messages(&mut self, session: &mut Session);
 }
 
 impl Session {
@@ -216,7 +219,8 @@ impl Session {
     pub(crate) fn run(&mut self, end: &End, pilot: &mut impl Pilot) {
         end.is_safe(false);
         let flight = catch_unwind(AssertUnwindSafe(|| {
-            while !end.is_asked_for() && pilot.goes_on(self) {
+            // A pilot that waited for its step may find that a signal came meanwhile.
+            while !end.is_asked_for() && pilot.goes_on(self) && !end.is_asked_for() {
                 if self.cycle(end) && !pilot.ticked(self) {
                     break;
                 }
@@ -228,7 +232,10 @@ impl Session {
         self.stop();
         self.pace.release();
         while matches!(self.stage, Stage::Resting { .. }) {
-            self.cycle(end);
+            if self.cycle(end) {
+                // Said at once, for somebody may have to cut the battery; a defect of the pilot holds up no zeros.
+                _ = catch_unwind(AssertUnwindSafe(|| pilot.take_messages(self)));
+            }
         }
     }
 

@@ -79,12 +79,16 @@ impl<T: Task> Pilot for Lead<'_, T> {
 
     fn ticked(&mut self, session: &mut Session) -> bool {
         self.ticks += 1;
-        session.messages().into_iter().for_each(|text| say(self.errors, &text));
+        self.take_messages(session);
         let goes_on = !session.has_failed() && self.task.ticked(session, self.ticks, &mut self.out);
         if self.is_lock_step {
             self.out.say(".\n".into());
         }
         goes_on && self.out.is_open
+    }
+
+    fn take_messages(&mut self, session: &mut Session) {
+        session.messages().into_iter().for_each(|text| say(self.errors, &text));
     }
 }
 
@@ -186,8 +190,8 @@ fn lead(
     let mut lead = Lead { task, seconds, is_lock_step, out, errors: &mut errors, ticks: 0 };
     lead.task.begin(&mut session);
     session.run(end, &mut lead);
+    lead.take_messages(&mut session);
     let Lead { mut task, mut out, .. } = lead;
-    session.messages().into_iter().for_each(|text| say(&mut errors, &text));
     let mut has_failed = session.has_failed() || (task.is_missed() && !end.is_asked_for());
     let report = task.report(&mut session, &mut out);
     // Where a reader or a disk holds up the end, a signal may end the program.

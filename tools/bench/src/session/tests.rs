@@ -27,6 +27,8 @@ impl<F: FnMut(&mut Session, u64) -> bool> Pilot for Each<F> {
         self.0 += 1;
         (self.1)(session, self.0)
     }
+
+    fn take_messages(&mut self, _: &mut Session) {}
 }
 
 fn run(session: &mut Session, each: impl FnMut(&mut Session, u64) -> bool) {

@@ -132,11 +132,12 @@ fn lead(
     _ = begun.send(Ok(()));
     let mut remote = Remote::new(&session, actions, shared, options.held);
     session.run(end, &mut remote);
-    let mut failures = session.messages();
+    let (results, mut failures) = remote.results();
+    failures.extend(session.messages());
     // A second SIGHUP of the same terminal does not cut the recordings short; a disk that hangs may be left by a signal.
     failures.extend(session.finish(|_| end.is_safe(true)));
     end.is_safe(true);
-    Ending { results: remote.results(), failures }
+    Ending { results, failures }
 }
 
 /// Draws what the session leaves, and sends what the keys ask for, until the session is over.

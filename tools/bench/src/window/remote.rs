@@ -53,6 +53,7 @@ pub(crate) struct Remote {
     strips: Vec<Strip>,
     log: VecDeque<String>,
     results: Vec<String>,
+    last_messages: Vec<String>,
     pictured: Option<Instant>,
     is_held: bool,
     was_held: bool,
@@ -72,15 +73,16 @@ impl Remote {
             strips: vec![Strip::default(); session.robot().len()],
             log: VecDeque::new(),
             results: Vec::new(),
+            last_messages: Vec::new(),
             pictured: None,
             is_held,
             was_held: false,
         }
     }
 
-    /// What is worth to be kept when the window is gone: the results of tuning.
-    pub(crate) fn results(self) -> Vec<String> {
-        self.results
+    /// The texts for the user when the window is gone: results of tuning, and messages since the end began.
+    pub(crate) fn results(self) -> (Vec<String>, Vec<String>) {
+        (self.results, self.last_messages)
     }
 
     fn act(&mut self, session: &mut Session, action: Action) {
@@ -242,5 +244,14 @@ impl Pilot for Remote {
             self.picture(session);
         }
         true
+    }
+
+    fn take_messages(&mut self, session: &mut Session) {
+        let messages = session.messages();
+        self.last_messages.extend_from_slice(&messages);
+        for message in messages {
+            self.say(session, message);
+        }
+        self.picture(session);
     }
 }
