@@ -3,6 +3,23 @@
 use ros2_client::Message;
 use serde::{Deserialize, Serialize};
 
+/// A message with a topic of its own: the package and the name of its type.
+pub trait TopicMessage: Message + 'static {
+    const TYPE: (&'static str, &'static str);
+}
+
+impl TopicMessage for Twist {
+    const TYPE: (&'static str, &'static str) = ("geometry_msgs", "Twist");
+}
+
+impl TopicMessage for Odometry {
+    const TYPE: (&'static str, &'static str) = ("nav_msgs", "Odometry");
+}
+
+impl TopicMessage for JointState {
+    const TYPE: (&'static str, &'static str) = ("sensor_msgs", "JointState");
+}
+
 #[derive(Debug, Default, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Vector3 {
     pub x: f64,

@@ -3,7 +3,7 @@
 use crate::messages::{
     Header, JointState, Odometry, Pose, Quaternion, Time, Twist as TwistMessage, Vector3,
 };
-use crate::node::{domain, node, topic};
+use crate::node::{domain, node, publisher, subscription};
 use drivetrain::chassis::{Chassis, ChassisLimits, Mecanum, MecanumWheels};
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
@@ -97,14 +97,10 @@ fn simulated() -> Result<Simulation, SimError> {
 /// Runs until the process is killed.
 pub fn run() -> Result<(), Box<dyn Error>> {
     let mut node = node("robot", domain()?)?;
-    let commands = topic(&node, "cmd_vel", "geometry_msgs", "Twist")?;
-    let commands = node.create_subscription::<TwistMessage>(&commands, None)?;
-    let odom = topic(&node, "odom", "nav_msgs", "Odometry")?;
-    let odom = node.create_publisher::<Odometry>(&odom, None)?;
-    let truth = topic(&node, "ground_truth", "nav_msgs", "Odometry")?;
-    let truth = node.create_publisher::<Odometry>(&truth, None)?;
-    let joints = topic(&node, "joint_states", "sensor_msgs", "JointState")?;
-    let joints = node.create_publisher::<JointState>(&joints, None)?;
+    let commands = subscription::<TwistMessage>(&mut node, "cmd_vel")?;
+    let odom = publisher::<Odometry>(&mut node, "odom")?;
+    let truth = publisher::<Odometry>(&mut node, "ground_truth")?;
+    let joints = publisher::<JointState>(&mut node, "joint_states")?;
 
     let world = simulated()?;
     let mut bus = Bus::new();
