@@ -46,9 +46,8 @@ pub fn frame_bits(frame: &CanFrame) -> u32 {
         }
     }
     bits.push(u32::from(frame.length()), 4);
-    for bytes in frame.data().chunks(4) {
-        let value = bytes.iter().fold(0, |value, byte| (value << 8) | u32::from(*byte));
-        bits.push(value, if bytes.len() == 4 { 32 } else { 8 * (u32::from(frame.length()) & 3) });
+    for byte in frame.data() {
+        bits.push(u32::from(*byte), 8);
     }
     bits.push(u32::from(bits.checksum()), 15);
     bits.count + bits.stuff_bits() + TAIL_BITS + INTERMISSION_BITS

@@ -162,15 +162,7 @@ impl Engine {
                 }
                 Event::Step => self.step(),
                 Event::Feedback(index) => self.send_feedback(index),
-                Event::Reply(index) => {
-                    let key = MotorKey::of_joint(index).map(Fault::Silent);
-                    let silent = key.is_some_and(|fault| self.faults.is_active(fault, self.now_ns));
-                    if let Some(Some(joint)) = self.joints.get_mut(index) {
-                        joint.reply(silent);
-                        let line = joint.config.line;
-                        self.wire_mut(line).stirred = true;
-                    }
-                }
+                Event::Reply(index) => self.send_reply(index),
                 Event::Fault => {
                     while let Some((line, frame)) = self.faults.next_of_flood(self.now_ns) {
                         // A foreign node whose queue is full skips a turn.
@@ -262,13 +254,22 @@ impl Engine {
         };
         let tampering = self.faults.tampering(key, self.now_ns);
         let frame = esc.feedback(since_step_s, &tampering);
+        let (line, offer) = (esc.config.line, frame.map(|frame| esc.mailboxes.offer(frame)));
         self.feedback = self.next_feedback();
-        let (Some(Some(esc)), Some(frame)) = (self.escs.get_mut(index), frame) else { return };
-        let (line, offer) = (esc.config.line, esc.mailboxes.offer(frame));
         let wire = self.wire_mut(line);
-        if offer != Offer::Taken {
+        if offer.is_some_and(|offer| offer != Offer::Taken) {
             wire.traffic.starved = wire.traffic.starved.saturating_add(1);
         }
+    }
+
+    /// Lets a joint hand its answer to its mailboxes.
+    fn send_reply(&mut self, index: usize) {
+        let silent = MotorKey::of_joint(index).map(Fault::Silent);
+        let silent = silent.is_some_and(|fault| self.faults.is_active(fault, self.now_ns));
+        let Some(Some(joint)) = self.joints.get_mut(index) else { return };
+        joint.reply(silent);
+        let line = joint.config.line;
+        self.wire_mut(line).stirred = true;
     }
 
     /// Returns the sender of the pending frame of highest priority on a bus.
