@@ -113,10 +113,10 @@ impl Pilot {
         now: Instant,
     ) -> ParameterCounts {
         while self.parameters.read(&mut bytes, now).is_some() {
-            let (kp, ki) = self.gains(now);
+            let (kp, ki, kd) = self.gains(now);
             for wheel in self.wheels.into_array() {
                 // Refused for a wheel that was detached only, which never happens here.
-                _ = bus.set_speed_loop(wheel, SPEED.with_gains(kp, ki, 0.0));
+                _ = bus.set_speed_loop(wheel, SPEED.with_gains(kp, ki, kd));
             }
         }
         self.parameters.counts()
@@ -126,7 +126,7 @@ impl Pilot {
     /// lines of the PC that were taken, and lines that were refused.
     pub fn curves(&self, bus: &Bus, now: Instant) -> [u8; CURVES_BYTES] {
         let speed = bus.state(self.wheels.front_left).map_or(0.0, |state| state.velocity.as_rpm());
-        let (kp, ki) = self.gains(now);
+        let (kp, ki, _) = self.gains(now);
         let counts = self.parameters.counts();
         let refused = [counts.out_of_range, counts.unknown, counts.malformed];
         let refused = refused.into_iter().map(f32::from).sum();
@@ -137,10 +137,10 @@ impl Pilot {
     }
 
     /// Returns the gains of the wheels: those that a PC set, or those of the robot's mass.
-    fn gains(&self, now: Instant) -> (f32, f32) {
-        let (kp, ki, _) = SPEED.gains();
+    fn gains(&self, now: Instant) -> (f32, f32, f32) {
+        let (kp, ki, kd) = SPEED.gains();
         let set = |index| self.parameters.value(index, now);
-        (set(KP).unwrap_or(kp), set(KI).unwrap_or(ki))
+        (set(KP).unwrap_or(kp), set(KI).unwrap_or(ki), kd)
     }
 
     /// Hands over who was heard and lost since, for the log.
@@ -303,14 +303,7 @@ mod tests {
         let mut bus = Bus::new();
         let mut pilot = Pilot::new(&mut bus).unwrap();
         _ = bus.ingest(&CanFrame::standard(0x202, [0, 0, 0x07, 0x80, 0, 0, 25, 0]).unwrap(), now);
-        pilot.hear_debug_port(
-            &mut bus,
-            b"wheel_kp=2.5
-wheel_ki=nan
-wheel
-",
-            now,
-        );
+        pilot.hear_debug_port(&mut bus, b"wheel_kp=2.5\nwheel_ki=nan\nwheel\n", now);
         let frame = pilot.curves(&bus, now);
         let curve = |at: usize| f32::from_le_bytes(frame[4 * at..4 * at + 4].try_into().unwrap());
         // 1920 rpm of the rotor behind a gear of 3591 to 187.
