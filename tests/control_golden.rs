@@ -184,10 +184,9 @@ fn load_observer_by_python_control() {
     let mut compared = 0;
     for (_, row) in rows(include_str!("data/observer/observer.csv")) {
         let key = (row[0], row[1]);
-        if running.is_none_or(|(at, _)| at != key) {
-            running = Some((key, LoadObserver::new(row[0], row[1]).unwrap()));
-        }
-        let Some((_, observer)) = &mut running else { unreachable!() };
+        running = running.filter(|(at, _)| *at == key);
+        let (_, observer) =
+            running.get_or_insert_with(|| (key, LoadObserver::new(row[0], row[1]).unwrap()));
         observer.update(row[4], row[3], row[2]);
         assert_close(observer.velocity_rad_per_s(), row[5], 1e-5, "speed");
         assert_close(observer.load_nm(), row[6], 5e-5, "load");

@@ -29,8 +29,8 @@ use crate::time::TimeStep;
 /// | 400 rad/s | 60 % | 9 ms | 96 Nm |
 ///
 /// The figures are those of white noise; the time does not contain the age of the feedback. An inertia that is twice the true one
-/// makes a step of the load twice as large for the first milliseconds, and never wrong for ever: where speed and torque stay
-/// constant, the load is minus the torque, whatever the inertia.
+/// makes a step of the load twice as large for the first milliseconds, and has no lasting effect: at constant speed and torque, the
+/// load is minus the torque for any inertia.
 ///
 /// # Edge behaviour
 /// The first feedback sets the speed, and the load is zero. If a value is NaN or infinite, or `dt_s` is not a positive finite

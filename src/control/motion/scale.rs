@@ -106,7 +106,7 @@ fn commensurate(distance: f32, from: &ProfileState, to: &MotionTarget, limits: L
     }
 }
 
-/// Returns the exponent of a number; that of the smallest ones for zero.
+/// Returns the exponent of a number; zero has the exponent of the smallest numbers.
 fn exponent(x: f32) -> i32 {
     ((x.to_bits() >> 23) & 0xFF).cast_signed() - 127
 }

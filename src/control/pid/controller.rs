@@ -80,7 +80,7 @@ pub struct Pid {
     pub(super) measurement: f32,
     /// Of half the period; or the bits of the speed of tracking.
     pub(super) way_gate: u32,
-    /// Of the setpoint that is followed.
+    /// The rate of the tracked setpoint.
     pub(super) tracking_rate: f32,
     static_gain: f32,
     velocity_gain: f32,

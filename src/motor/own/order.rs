@@ -25,8 +25,8 @@ pub enum Target {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Order {
-    /// The target. While the output range opens, an angle, that of a spring too, moves from the measured angle to the one that
-    /// was set.
+    /// The target. While the output range opens, the angle of a position or of a spring moves from the measured angle to the
+    /// requested one.
     pub target: Target,
     /// The share of the full output that is allowed, 0 to 1: it rises from 0 after arming, and falls while the motor is warm
     /// or stalled. Keep the command within this share of its range, or multiply the gains of the drive by it.

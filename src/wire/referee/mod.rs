@@ -110,9 +110,10 @@ pub(super) fn checked(frame: &[u8]) -> Result<&[u8], Reject> {
 ///     0xA5, 0x0B, 0x00, 0x01, 0x5C, 0x01, 0x00, 0xAA, 0x2C, 0x01, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
 ///     0xEF, 0x74,
 /// ];
-/// let Some(RefereeMessage::Raw(status)) = decoder.read(&mut bytes) else { unreachable!() };
+/// let Some(RefereeMessage::Raw(status)) = decoder.read(&mut bytes) else { return Err("another message") };
 /// assert_eq!(status.command(), 0x0001); // status of the game
 /// assert_eq!(status.data()[1..3], 300_u16.to_le_bytes()); // seconds left
+/// # Ok::<(), &str>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
