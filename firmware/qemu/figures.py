@@ -229,7 +229,7 @@ def price(place, row):
         image.fail(f"{file} has {len(found)} items of the name {name}")
     (end,) = found
     indent = lines[end][: len(lines[end]) - len(lines[end].lstrip())]
-    while lines[end - 1].lstrip().startswith("#["):
+    while lines[end - 1].lstrip().startswith(("#[", "// ")):
         end -= 1
     start = end
     while lines[start - 1].lstrip().startswith("///"):

@@ -1,6 +1,7 @@
 //! The rows of the byte protocols: a whole frame in one slice, a frame byte by byte, and noise.
 
-use crate::meter::{instructions, row};
+use crate::meter::instructions;
+use crate::report::row;
 use core::hint::black_box;
 use drivetrain::time::Instant;
 use drivetrain::wire::dbus::Dbus;

@@ -1,6 +1,7 @@
 //! What a program calls in its loop beside the tick: reads of the state, targets, edges; and ticks of a bus at rest.
 
-use crate::meter::{instructions, row};
+use crate::meter::instructions;
+use crate::report::row;
 use crate::wiring::{Drive, START, Targets, row_tick};
 use drivetrain::dji::{Bus, Handle, M3508, State};
 use drivetrain::encoder::Position;

@@ -1,6 +1,6 @@
 //! Shows that a figure does not depend on what a motor has seen.
 
-use crate::meter::row;
+use crate::report::row;
 use crate::rows::{decode, tick};
 use crate::wiring::{START, Targets};
 use drivetrain::time::Instant;

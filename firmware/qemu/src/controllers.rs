@@ -1,6 +1,7 @@
 //! The rows of the controllers beside `Pid`, each through its checked `update`.
 
-use crate::meter::{CALLS, instructions, row};
+use crate::meter::{CALLS, instructions};
+use crate::report::row;
 use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;

@@ -1,6 +1,7 @@
 //! Eight own motors of each other family, as a program drives them: with our speed loop, by torque or current.
 
-use crate::meter::{instructions, row};
+use crate::meter::instructions;
+use crate::report::row;
 use core::fmt::Debug;
 use core::hint::black_box;
 use drivetrain::control::PidConfig;

@@ -1,6 +1,7 @@
 //! Eight joints of Damiao in MIT mode, as a program drives them: each an own motor with our speed loop.
 
-use crate::meter::{instructions, row};
+use crate::meter::instructions;
+use crate::report::row;
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
 use drivetrain::damiao::{Model, Motor};

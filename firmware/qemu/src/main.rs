@@ -15,6 +15,8 @@ mod drives;
 mod joints;
 mod meter;
 mod motion;
+mod paint;
+mod report;
 mod rows;
 mod wiring;
 

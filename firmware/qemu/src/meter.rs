@@ -1,8 +1,7 @@
-//! Counts instructions with the timer and bytes of stack with paint.
+//! Counts instructions with the timer.
 
 use core::hint::black_box;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
-use cortex_m_semihosting::hprintln;
 
 /// Calls in one measurement: the figure is their mean.
 pub const CALLS: u32 = 1_000;
@@ -43,46 +42,4 @@ fn ticks<F: Copy>(function: F, each: &mut impl FnMut(F, u32)) -> u32 {
         each(function, call);
     }
     start.wrapping_sub(SYST::get_current()) & 0xFF_FFFF
-}
-
-/// Returns the bytes of stack that `work` uses beyond those of a call that does nothing.
-pub fn stack(work: impl FnOnce()) -> usize {
-    let nothing = painted(|| {
-        black_box(());
-    });
-    painted(work).saturating_sub(nothing)
-}
-
-#[inline(never)]
-fn painted(work: impl FnOnce()) -> usize {
-    const PAINT: u32 = 0xC0FF_EE11;
-    const WORDS: usize = 4_096;
-    let bottom = stack_pointer().wrapping_sub(WORDS);
-    for word in 0..WORDS {
-        // SAFETY: below the frame of this function is memory that nobody uses: 4 MiB, and no interrupt runs.
-        unsafe { bottom.add(word).write_volatile(PAINT) };
-    }
-    work();
-    let kept = (0..WORDS).take_while(|word| {
-        // SAFETY: as above.
-        unsafe { bottom.add(*word).read_volatile() == PAINT }
-    });
-    (WORDS - kept.count()) * size_of::<u32>()
-}
-
-#[inline(always)]
-fn stack_pointer() -> *mut u32 {
-    let pointer: *mut u32;
-    // SAFETY: only reads the register.
-    unsafe { core::arch::asm!("mov {}, sp", out(reg) pointer, options(nomem, nostack)) };
-    pointer
-}
-
-/// Prints the mean of several figures, the least and the most.
-pub fn row(name: &str, figures: &[u32]) {
-    let count = figures.len() as u32;
-    let mean = (figures.iter().sum::<u32>() + count / 2) / count;
-    let (least, most) =
-        figures.iter().fold((u32::MAX, 0), |(least, most), x| (least.min(*x), most.max(*x)));
-    hprintln!("row {} {} {} {}", name, mean, least, most);
 }

@@ -1,6 +1,7 @@
 //! The rows of motions from any state: planning one axis, its mean and its most over states of each kind, and sampling.
 
-use crate::meter::{CALLS, instructions, row};
+use crate::meter::{CALLS, instructions};
+use crate::report::row;
 use core::hint::black_box;
 use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
 use drivetrain::error::ConfigError;

@@ -1,6 +1,8 @@
 //! The rows of the table: each measured function once, out of line, with arguments the optimiser cannot see.
 
-use crate::meter::{self, instructions, row};
+use crate::meter::instructions;
+use crate::paint;
+use crate::report::row;
 use crate::wiring::{Drive, START, Targets, feedback, row_tick};
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -332,19 +334,19 @@ pub fn stack() {
     let mut drive = Drive::new(Targets::Position, 0, START);
     let frame = feedback(1, 200, 0);
     let (bus, _, tick) = drive.parts();
-    let decode = meter::stack(|| {
+    let decode = paint::stack(|| {
         _ = row_decode(bus, &frame, tick.now());
     });
     drive.advance();
     let (bus, _, tick) = drive.parts();
-    let update = meter::stack(|| row_update(bus, tick));
+    let update = paint::stack(|| row_update(bus, tick));
     drive.advance();
     let (bus, frames, tick) = drive.parts();
-    let whole = meter::stack(|| row_tick(bus, frames, tick));
+    let whole = paint::stack(|| row_tick(bus, frames, tick));
     let mut drive = Drive::new(Targets::FarPosition, 0, START);
     drive.advance();
     let (bus, frames, tick) = drive.parts();
-    let limited = meter::stack(|| row_tick(bus, frames, tick));
+    let limited = paint::stack(|| row_tick(bus, frames, tick));
     hprintln!("stack row_decode {}", decode);
     hprintln!("stack row_update {}", update);
     hprintln!("stack row_tick {}", whole.max(limited));

@@ -1,7 +1,9 @@
 //! The cycle of a program: a `Runner` over a driver, and what a program asks of its motors in between.
 
-use crate::driver::{Driver, DriverFrame};
-use crate::meter::{CALLS, instructions, row};
+use crate::driver::Driver;
+use crate::driver_frame::DriverFrame;
+use crate::meter::{CALLS, instructions};
+use crate::report::row;
 use crate::wiring::{Drive, START, Targets, feedback, row_tick};
 use core::cell::Cell;
 use core::hint::black_box;

@@ -9,9 +9,11 @@
 mod cycle;
 mod dearest;
 mod driver;
+mod driver_frame;
 #[path = "../../qemu/src/meter.rs"]
-#[allow(dead_code, reason = "stack is painted in the other bench")]
 mod meter;
+#[path = "../../qemu/src/report.rs"]
+mod report;
 #[path = "../../qemu/src/wiring.rs"]
 mod wiring;
 
@@ -23,7 +25,7 @@ fn main() -> ! {
     if let Some(mut peripherals) = cortex_m::Peripherals::take() {
         meter::start(&mut peripherals.SYST);
         cycle::rows();
-        meter::row("tick_dearest_found", &[dearest::exact(&dearest::found())]);
+        report::row("tick_dearest_found", &[dearest::exact(&dearest::found())]);
         debug::exit(debug::EXIT_SUCCESS);
     }
     fail()

@@ -8,7 +8,6 @@
 
 mod dearest;
 #[path = "../../qemu/src/meter.rs"]
-#[allow(dead_code, reason = "only the timer is used here")]
 mod meter;
 #[path = "../../qemu/src/wiring.rs"]
 mod wiring;

@@ -1,12 +1,11 @@
 //! What stands for a board in the images: a driver, a clock and a pilot, as far as a program sees them.
 
-#[path = "../driver.rs"]
-#[allow(dead_code, reason = "only its frame type is used here")]
-mod driver;
+#[path = "../driver_frame.rs"]
+mod driver_frame;
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
-pub use driver::DriverFrame;
+pub use driver_frame::DriverFrame;
 use embedded_can::ErrorKind;
 
 pub struct Board;
