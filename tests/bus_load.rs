@@ -4,7 +4,7 @@
 
 use drivetrain::dji::{AttachError, Bus, Config, Gm6020Current, Gm6020Voltage, M3508};
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{BusLoad, Devices};
+use drivetrain::motor::{ArmError, BusLoad, Devices};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{
     Line, MotorConfig, Sender, Simulation, frame_bits, nominal_bits, worst_case_bits,
@@ -171,6 +171,46 @@ fn commands_0x2ff_and_0x2fe_starve_on_a_full_bus_and_0x200_does_not() {
     }
     assert!(sent[0x200] > 900 && sent[0x1FF] > 900, "{} {}", sent[0x200], sent[0x1FF]);
     assert!(sent[0x2FF] < 100 && sent[0x2FE] < 100, "{} {}", sent[0x2FF], sent[0x2FE]);
+}
+
+/// Arms motors after 2.2 s, `absent` of which are not on the bus; returns the refusal.
+fn refusal(motors: u8, absent: u8) -> ArmError {
+    let world = Simulation::new(5);
+    let mut bus = Bus::new();
+    for id in 1..=motors {
+        bus.attach(Config::<M3508>::new(id)).unwrap();
+        if id + absent <= motors {
+            world.attach(MotorConfig::m3508(id)).unwrap();
+        }
+    }
+    // As if all moved.
+    let bus = bus.with_keep_alive(Duration::from_millis(1));
+    let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
+    let mut last = None;
+    for _ in 0..22_000 {
+        world.advance(Duration::from_micros(100));
+        runner.poll(16);
+        if let Some(tick) = runner.due() {
+            last = Some(tick);
+            runner.tick(tick);
+        }
+    }
+    runner.arm(last.unwrap()).unwrap_err()
+}
+
+#[test]
+fn a_motor_that_a_full_bus_starves_is_missing_with_the_load_of_the_bus() {
+    let starved = refusal(8, 0);
+    let ArmError::Missing(missing) = starved else { panic!("{starved}") };
+    let load = missing.full_bus().unwrap();
+    assert!(load.worst_case() >= 1.0 && load.nominal() <= 1.0, "{load}");
+    let text = starved.to_string();
+    let remedy = format!(
+        "#8; the bus may be full (load {load}): lower the feedback rate or use a second bus"
+    );
+    assert!(text.starts_with("no feedback from M3508 #") && text.ends_with(&remedy), "{text}");
+    // Unplugged from a bus with room.
+    assert_eq!(refusal(5, 1).to_string(), "no feedback from M3508 #5");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use super::{Claim, MotorName, WrongSetting};
+use super::{BusLoad, Claim, MotorName, WrongSetting};
 
 /// The motors that prevent arming, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -6,6 +6,7 @@ use super::{Claim, MotorName, WrongSetting};
 pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
+    full_bus: Option<BusLoad>,
 }
 
 impl Missing {
@@ -19,7 +20,12 @@ impl Missing {
         (missing.total > 0).then_some(missing)
     }
 
-    pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0 };
+    pub(super) const NONE: Self = Self { names: [None; Self::CAPACITY], total: 0, full_bus: None };
+
+    /// Keeps the load of the bus if the bus may be full.
+    pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
+        Self { full_bus: load.filter(BusLoad::may_be_full), ..self }
+    }
 
     pub(super) fn add(&mut self, name: MotorName) {
         if let Some(place) = self.names.get_mut(usize::from(self.total)) {
@@ -31,6 +37,13 @@ impl Missing {
     /// Iterates over the kept names.
     pub fn names(&self) -> impl Iterator<Item = MotorName> + '_ {
         self.names.iter().flatten().copied()
+    }
+
+    /// Returns the measured load of a bus that may be too full for the feedback of every motor; `None` if the bus has room, or
+    /// its load is not known. [`Runner::arm`](crate::runner::Runner::arm) knows the load from the second second on.
+    #[must_use]
+    pub const fn full_bus(&self) -> Option<BusLoad> {
+        self.full_bus
     }
 
     /// Returns how many motors are missing.
@@ -46,9 +59,14 @@ impl core::fmt::Display for Missing {
             write!(f, "{}{name}", if index == 0 { "" } else { ", " })?;
         }
         match usize::from(self.total).saturating_sub(Self::CAPACITY) {
-            0 => Ok(()),
-            more => write!(f, " and {more} more"),
+            0 => {}
+            more => write!(f, " and {more} more")?,
         }
+        let Some(load) = self.full_bus else { return Ok(()) };
+        write!(
+            f,
+            "; the bus may be full (load {load}): lower the feedback rate or use a second bus"
+        )
     }
 }
 

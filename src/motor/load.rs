@@ -216,6 +216,11 @@ impl BusLoad {
         frames
     }
 
+    /// Tells whether frames of a bus with this measured load may have starved: the carried bits lie between both loads.
+    pub(crate) const fn may_be_full(&self) -> bool {
+        self.worst_bits_per_s >= self.bit_rate as u64
+    }
+
     /// Returns the worst case in percent, rounded up.
     pub(crate) const fn worst_percent(&self) -> u32 {
         self.percent(self.worst_bits_per_s)

@@ -172,15 +172,18 @@ impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
     /// Arms the device: nothing moves before.
     ///
     /// # Errors
-    /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. A refused call
-    /// counts as a request.
+    /// Names the reason, as [`Devices::arm`]; also a watched emergency stop, and a driver that takes no frames. If motors are
+    /// missing on a full bus, the error has the [measured load](Self::measured_load). A refused call counts as a request.
     pub fn arm(&mut self, tick: Tick) -> Result<(), ArmError> {
         let refusal = if self.stop.is_some_and(EmergencyStop::is_set) {
             ArmError::Stopped
         } else if self.is_bus_down() {
             ArmError::BusDown
         } else {
-            return self.device.arm(tick.now());
+            return self.device.arm(tick.now()).map_err(|refusal| match refusal {
+                ArmError::Missing(missing) => ArmError::Missing(missing.on_bus(self.meter.last())),
+                other => other,
+            });
         };
         // A refused request is a request.
         Ask::of(&mut self.device);
