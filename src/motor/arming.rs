@@ -6,7 +6,7 @@ use super::{BusLoad, Claim, MotorName, WrongSetting};
 pub struct Missing {
     names: [Option<MotorName>; Self::CAPACITY],
     total: u16,
-    full_bus: Option<BusLoad>,
+    full_bus: Option<u16>,
 }
 
 impl Missing {
@@ -24,7 +24,7 @@ impl Missing {
 
     /// Keeps the load of the bus if the bus may be full.
     pub(crate) fn on_bus(self, load: Option<BusLoad>) -> Self {
-        Self { full_bus: load.filter(BusLoad::may_be_full), ..self }
+        Self { full_bus: load.and_then(BusLoad::of_full_bus), ..self }
     }
 
     pub(super) fn add(&mut self, name: MotorName) {
@@ -39,10 +39,11 @@ impl Missing {
         self.names.iter().flatten().copied()
     }
 
-    /// Returns the measured load of a bus that may be too full for the feedback of every motor; `None` if the bus has room, or
-    /// its load is not known. [`Runner::arm`](crate::runner::Runner::arm) knows the load from the second second on.
+    /// Returns the load in percent, 100 or more, of a bus that may be too full for the feedback of every motor: the measured
+    /// worst case, rounded up. `None` if the bus has room, or its load is not known.
+    /// [`Runner::arm`](crate::runner::Runner::arm) knows the load from the second second on.
     #[must_use]
-    pub const fn full_bus(&self) -> Option<BusLoad> {
+    pub const fn full_bus(&self) -> Option<u16> {
         self.full_bus
     }
 
@@ -65,7 +66,7 @@ impl core::fmt::Display for Missing {
         let Some(load) = self.full_bus else { return Ok(()) };
         write!(
             f,
-            "; the bus may be full (load {load}): lower the feedback rate or use a second bus"
+            "; the bus may be full (load up to {load} %): lower the feedback rate or use a second bus"
         )
     }
 }

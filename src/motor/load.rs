@@ -216,9 +216,11 @@ impl BusLoad {
         frames
     }
 
-    /// Tells whether frames of a bus with this measured load may have starved: the carried bits lie between both loads.
-    pub(crate) const fn may_be_full(&self) -> bool {
-        self.worst_bits_per_s >= self.bit_rate as u64
+    /// Returns the worst case in percent if frames of a bus with this measured load may have starved: the carried bits lie
+    /// between both loads.
+    pub(super) fn of_full_bus(self) -> Option<u16> {
+        (self.worst_bits_per_s >= u64::from(self.bit_rate))
+            .then(|| u16::try_from(self.worst_percent()).unwrap_or(u16::MAX))
     }
 
     /// Returns the worst case in percent, rounded up.
