@@ -109,6 +109,8 @@ impl<M: Model> Config<M> {
     ///
     /// The derivative works on the measured velocity. The position loop is limited to the motor's no-load speed unless it has a lower
     /// output limit of its own. `attach` refuses a `kp` if the command for an error of one count of the encoder exceeds that speed.
+    /// The loop works on the error of the position: `attach` also refuses the options of a setpoint, which are feed-forward,
+    /// period, tracking and the derivative of the error. The speed loop takes every option.
     #[must_use]
     pub const fn position_loop(mut self, position: PidConfig, speed: PidConfig) -> Self {
         self.plain.position = Some(position);

@@ -1,4 +1,4 @@
-use super::config::{NOT_PLAIN, Parameters, PidConfig, REST_DERIVATIVE, TRACK_OUTPUT};
+use super::config::{NOT_PLAIN, OF_SETPOINT, Parameters, PidConfig, REST_DERIVATIVE, TRACK_OUTPUT};
 use super::controller::Pid;
 use super::law::{CLOSED, UNKNOWN, gate};
 use crate::control::number::limited;
@@ -43,6 +43,11 @@ impl ErrorPid {
             options: 0,
             rejected: 0,
         }
+    }
+
+    /// Tells whether no option of the configuration needs a setpoint.
+    pub(crate) const fn fits(config: &PidConfig) -> bool {
+        config.options() & OF_SETPOINT == 0
     }
 
     /// Steps as [`Pid::step_error`], whatever the options and the arguments.

@@ -1,7 +1,7 @@
 //! Configuration of a motor: at the start, and while running.
 
 use super::{NO_GAINS, Slot};
-use crate::control::{Pid, PidConfig};
+use crate::control::{ErrorPid, Pid, PidConfig};
 use crate::dji::command::{Place, to_raw};
 use crate::dji::config::PlainConfig;
 use crate::dji::error::SteepGain;
@@ -55,6 +55,9 @@ pub(in crate::dji) const fn configured(
         (Ok(position), Ok(speed)) => (position, speed),
         (Err(error), _) | (_, Err(error)) => return Err(parameter!(error.parameter())),
     };
+    if !ErrorPid::fits(&position) {
+        return Err(parameter!(OPTION));
+    }
     if let Some(gain) = steep_position(&position, facts) {
         let SteepGain { parameter, value, highest } = gain;
         return Err(AttachError::Gain { motor, parameter, value, highest });
@@ -86,6 +89,9 @@ pub(in crate::dji) const fn configured(
         ..Slot::FREE
     })
 }
+
+/// Feed-forward, period, tracking, derivative of the error: a position loop has no setpoint, only an error.
+const OPTION: &str = "option of the setpoint";
 
 /// Returns the command below which a motor needs no full check.
 const fn calm_word(health: &HealthConfig, full_limit: i16) -> u16 {
@@ -133,6 +139,9 @@ pub(in crate::dji) fn set_position_loop(
 ) -> Result<(), ConfigError> {
     let facts = slot.facts.ok_or(super::DETACHED)?;
     let limit = no_load_velocity(facts, slot.rad_per_s_per_rpm);
+    if !ErrorPid::fits(&config) {
+        return Err(ConfigError::Unusable(OPTION));
+    }
     let steep = steep_position(&config, facts);
     slot.rest_loops();
     let replaced = checked(slot.has_position_loop(), config, limit, steep)

@@ -120,3 +120,24 @@ fn a_speed_loop_in_words_per_rpm_and_its_conversion_send_the_same_words() {
     }
     assert!(worst <= 1.0, "{worst} words");
 }
+
+#[test]
+fn a_position_loop_refuses_the_options_of_a_setpoint() {
+    for option in [
+        p(10.0).with_tracking(30.0),
+        p(10.0).with_period(360.0),
+        p(10.0).with_derivative_on_error(),
+        p(10.0).with_feed_forward(1.0, 0.0),
+    ] {
+        let mut bus: Bus = Bus::new();
+        let refused = bus.attach(Config::<M3508>::new(1).position_loop(option, p(1.0)));
+        let parameter = "option of the setpoint";
+        let motor = crate::motor::MotorName::new("M3508", 1);
+        assert_eq!(refused.unwrap_err(), AttachError::Parameter { motor, parameter });
+        let config = Config::<M3508>::new(1).position_loop(p(10.0), option);
+        let motor = bus.attach(config).unwrap();
+        let refused = Err(ConfigError::Unusable(parameter));
+        assert_eq!(bus.set_position_loop(motor, option), refused);
+        assert_eq!(bus.set_speed_loop(motor, option), Ok(()));
+    }
+}
