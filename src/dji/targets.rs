@@ -179,7 +179,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Sets a torque current.
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the motor is attached, armed and online, and for NaN and infinity.
     pub fn set_current<M: Model<Command = Current>>(
         &mut self,
         motor: Handle<M, B>,
@@ -191,7 +191,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Sets a terminal voltage, in nominal volts.
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the motor is attached, armed and online, and for NaN and infinity.
     pub fn set_voltage<M: Model<Command = Voltage>>(
         &mut self,
         motor: Handle<M, B>,
@@ -203,7 +203,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Sets the command on the wire's own scale.
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the motor is attached, armed and online.
     pub fn set_raw(&mut self, motor: impl Into<AnyHandle<B>>, raw: i16) -> Result<(), TargetError> {
         self.motors.set(motor.into().key(), |slot, now| slot.set_raw(raw, now))
     }
@@ -213,7 +213,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Costs 27 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the motor is armed, online and has a speed loop, and for NaN and infinity.
     #[inline]
     pub fn set_velocity(
         &mut self,
@@ -231,7 +231,8 @@ impl<B, const N: usize> Bus<B, N> {
     /// Sets the absolute angle for the position loop, by the shortest way: 350° to 10° is +20°.
     ///
     /// # Errors
-    /// See above. Also fails while the angle of a geared motor is unknown, see [`zero`](Self::zero).
+    /// Fails unless the motor is armed, online and has a position loop, and for NaN and infinity; also while the angle of a geared
+    /// motor is unknown, see [`zero`](Self::zero).
     pub fn set_angle(
         &mut self,
         motor: impl Into<AnyHandle<B>>,
@@ -246,7 +247,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Costs 73 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the motor is armed, online and has a position loop, and for NaN and infinity.
     pub fn set_position(
         &mut self,
         motor: impl Into<AnyHandle<B>>,

@@ -17,7 +17,7 @@ impl Joints {
     /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the joint is attached, armed and online, and for NaN and infinity.
     pub fn set_position(&mut self, joint: Joint, position: Position) -> Result<(), TargetError> {
         let turns = position.turns().clamp(-32_768, 32_767);
         let turns = i32::try_from(turns).unwrap_or(0) * PULSES_PER_TURN;
@@ -28,7 +28,7 @@ impl Joints {
     /// Sets the position to go to, in pulses from the joint's zero: the wire's own scale, 65536 a turn.
     ///
     /// # Errors
-    /// See above.
+    /// Fails unless the joint is attached, armed and online.
     pub fn set_pulses(&mut self, joint: Joint, pulses: i32) -> Result<(), TargetError> {
         self.aim(joint, true, |slot| slot.set_target(pulses))
     }
