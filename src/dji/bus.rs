@@ -2,7 +2,6 @@ use super::budget::Budget;
 use super::command::Outbox;
 use super::counters::{Counters, Rejects};
 use super::motors::{FIRST_FEEDBACK_ID, IDS, Key, Motors, is_of_others};
-use super::slot::LONGEST_STEP_S;
 use super::{
     AnyHandle, AttachError, Config, Feedback, Handle, Model, attach, deadlines, receiving, rounds,
 };
@@ -314,7 +313,7 @@ impl<B, const N: usize> Bus<B, N> {
     /// Costs 508 instructions on a Cortex-M4F, with 8 speed loops (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.motors.guard.begin(tick.now());
-        let Some(step) = TimeStep::usable(tick.dt_s(), LONGEST_STEP_S) else {
+        let Some(step) = TimeStep::usable(tick.dt_s(), TimeStep::MOTOR_MAX_S) else {
             let moves_on = self.motors.guard.moves_on(before);
             return deadlines::hold(&mut self.motors, &mut self.outbox, before, moves_on);
         };

@@ -4,14 +4,8 @@ use super::CommandFrame;
 use super::command::Outbox;
 use super::motors::{IDS, Motors};
 use super::slot::{Surroundings, health};
-use crate::motor::{Edge, elapsed};
+use crate::motor::{Edge, Rival, Traffic, elapsed};
 use crate::time::Instant;
-
-/// Window for counting feedback frames, in µs.
-const WINDOW_US: u32 = 1_000_000;
-
-/// Time after which another node's command frame is forgotten, in µs.
-const RIVAL_FORGOTTEN_US: u32 = 1_000_000;
 
 /// The motor to check next, and the times of the round.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +55,7 @@ impl Rounds {
         self.elapsed = elapsed(Some(now.wrapping_sub(self.begun)));
         self.begun = now;
         let elapsed = now.wrapping_sub(self.window_from);
-        let closes_window = self.has_begun && elapsed >= WINDOW_US;
+        let closes_window = self.has_begun && u64::from(elapsed) >= Traffic::WINDOW.as_micros();
         self.next = if closes_window { Self::CLOSING } else { 0 };
         if closes_window || !self.has_begun {
             self.window = u16::try_from(elapsed >> 10).unwrap_or(u16::MAX);
@@ -98,7 +92,8 @@ pub(super) fn check<const N: usize>(motors: &mut Motors<N>, index: u8, word: i16
         word,
         window: motors.rounds.window(),
         feedback_hz: motors.rounds.feedback_hz,
-        is_alone: now.wrapping_sub(motors.rounds.rival_heard) > RIVAL_FORGOTTEN_US,
+        is_alone: u64::from(now.wrapping_sub(motors.rounds.rival_heard))
+            > Rival::FORGOTTEN.as_micros(),
     };
     motors.change(index, motors.guard.updated(), |slot| health::check(slot, &seen));
 }

@@ -111,12 +111,9 @@ impl Goal {
     }
 }
 
-/// Above this step the integrals and derivatives of all loops rest: 20 periods of 1 kHz.
-pub(super) const LONGEST_STEP_S: f32 = 0.02;
-
 /// Returns the time step of an update again, for code without access to its values.
 fn usable(dt_s: f32) -> TimeStep {
-    TimeStep::new(dt_s, LONGEST_STEP_S)
+    TimeStep::new(dt_s, TimeStep::MOTOR_MAX_S)
 }
 
 /// Stands for a missing loop: without gains, the output is zero, and no branch is needed.

@@ -55,7 +55,7 @@ pub use device::{CanDevice, Ingest, Malformed};
 pub use devices::Devices;
 pub use drive::{AngleDrive, OneOf, TargetError, VelocityDrive};
 pub use health::{Condition, Conditions, Edge, Health, HealthConfig, Reaction};
-pub(crate) use health::{Journal, Latch, Monitor, Sample, Traffic, elapsed};
+pub(crate) use health::{Journal, Latch, Monitor, Rival, Sample, Traffic, elapsed};
 pub use homing::{HomingStep, ShaftState, StopHoming};
 pub use link::{Link, Timeouts};
 pub use load::BusLoad;
@@ -66,7 +66,7 @@ pub(crate) use own::{
     TorqueLoops, inside, lowest_bit, mit_model, models, register_questions, registers,
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
-pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age};
+pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, take_age};
 pub use safety::{Guard, OPENING};
 pub use setting::WrongSetting;
 pub(crate) use visitor::Ask;

@@ -1,35 +1,29 @@
 use super::{
-    Condition, Conditions, Guard, Health, HealthConfig, Link, Monitor, MotorName, Sample, Traffic,
-    Vitals, elapsed,
+    Condition, Conditions, Guard, Health, HealthConfig, Link, Monitor, MotorName, Rival, Sample,
+    Traffic, Vitals, elapsed,
 };
 use crate::time::{Duration, Instant};
 
-/// What is looked for in an own motor unless it says otherwise.
+/// The checks of a motor without a configuration of its own.
 static USUAL: HealthConfig = HealthConfig::new();
 
-/// So long after another node sent the command frame it is forgotten.
-const RIVAL_FORGOTTEN: Duration = Duration::from_secs(1);
-
-/// What changes slowly is looked at this often.
+/// Period of the checks of slow quantities: temperature, effort, speed.
 const PERIOD: Duration = Duration::from_millis(8);
 
-/// Frames are counted for this long.
-const WINDOW: Duration = Duration::from_secs(1);
-
-/// Looks after one motor that is no DJI motor's slot: counts its frames, and looks at what it tells of itself.
+/// Checks one motor outside the slots of a bus: counts its frames, and judges its vitals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Watch {
     config: &'static HealthConfig,
     monitor: Monitor,
     traffic: Traffic,
     window_from: Instant,
-    rival: Option<Instant>,
+    rival: Rival,
     saturated: u16,
     error_code: u8,
-    looked: Instant,
-    /// The time of the next look at what changes slowly.
+    checked: Instant,
+    /// Time of the next check of slow quantities.
     next: Instant,
-    /// What is left of the output.
+    /// Share of the output that the conditions leave.
     share: f32,
 }
 
@@ -40,10 +34,10 @@ impl Watch {
             monitor: Monitor::NEW,
             traffic: Traffic::NONE,
             window_from: Instant::START,
-            rival: None,
+            rival: Rival::NONE,
             saturated: 0,
             error_code: 0,
-            looked: Instant::START,
+            checked: Instant::START,
             next: Instant::START,
             share: 1.0,
         }
@@ -54,7 +48,7 @@ impl Watch {
         Ok(Self { config, ..self })
     }
 
-    /// Feedback came; the guard has not heard of it yet.
+    /// Counts feedback before the guard takes its time.
     #[inline]
     pub(crate) fn hear(&mut self, guard: &Guard, now: Instant) {
         match guard.gap_us(now) {
@@ -64,15 +58,15 @@ impl Watch {
         self.traffic.count();
     }
 
-    /// Another node sent the command frame.
+    /// Notes a command frame of another node.
     pub(crate) fn hear_rival(&mut self, now: Instant) {
         if !self.config.ignores(Condition::SecondMaster) {
-            self.rival = Some(now);
+            self.rival.hear(now);
         }
     }
 
     pub(crate) const fn has_rival(&self) -> bool {
-        self.rival.is_some()
+        self.rival.is_present()
     }
 
     /// Tells whether the motor must not be armed.
@@ -81,7 +75,7 @@ impl Watch {
         !guard.conditions().and(fault).and(self.config.relaxing()).is_empty()
     }
 
-    /// The motor is about to be driven.
+    /// Begins anew before the motor is driven.
     pub(crate) fn start(&mut self, guard: &mut Guard, now: Instant) {
         for condition in Monitor::NOTICED_ANEW {
             guard.note(condition, false, now);
@@ -89,9 +83,9 @@ impl Watch {
         self.monitor = Monitor::NEW;
     }
 
-    /// Looks at the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
+    /// Checks the motor, relaxes it where a condition asks for it, and returns the share of the output that is left.
     #[inline]
-    pub(crate) fn look(
+    pub(crate) fn check(
         &mut self,
         guard: &mut Guard,
         vitals: impl Fn() -> Vitals,
@@ -100,31 +94,31 @@ impl Watch {
         let Vitals { error, error_code, .. } = vitals();
         let is_well = error.is_none()
             && error_code == self.error_code
-            && self.rival.is_none()
+            && !self.rival.is_present()
             && guard.link() == Link::Online
             && guard.conditions().is_empty();
         if is_well && now < self.next {
             return self.share;
         }
-        self.look_closely(guard, &vitals(), now)
+        self.check_all(guard, &vitals(), now)
     }
 
     #[cold]
     #[inline(never)]
-    fn look_closely(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
+    fn check_all(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) -> f32 {
         let before = guard.conditions();
-        self.count_frames(now);
-        self.rival = self.rival.filter(|rival| now.since(*rival) <= RIVAL_FORGOTTEN);
+        self.traffic.end_window(&mut self.window_from, now);
+        self.rival.check(now);
         guard.note(Condition::SecondMaster, self.has_rival(), now);
         if guard.link() != Link::Online {
             self.monitor = Monitor::NEW;
         } else {
             self.read_error(guard, vitals, now);
-            let since = now.since(self.looked);
+            let since = now.since(self.checked);
             if since >= PERIOD {
-                self.looked = now;
+                self.checked = now;
                 self.next = now + PERIOD;
-                self.share = self.look_at(guard, vitals, elapsed(since.micros_u32()), now);
+                self.share = self.check_slow(guard, vitals, elapsed(since.micros_u32()), now);
             }
         }
         let begun = guard.conditions().minus(before).and(self.config.relaxing());
@@ -134,7 +128,7 @@ impl Watch {
         self.share
     }
 
-    fn look_at(&mut self, guard: &mut Guard, vitals: &Vitals, elapsed: u8, now: Instant) -> f32 {
+    fn check_slow(&mut self, guard: &mut Guard, vitals: &Vitals, elapsed: u8, now: Instant) -> f32 {
         let sample = Sample {
             elapsed,
             fresh: false,
@@ -150,22 +144,13 @@ impl Watch {
         let saturated = guard.is_armed() && vitals.effort.abs() >= 1.0;
         self.saturated = self.saturated.saturating_add(u16::from(saturated));
         let (monitor, config) = (&mut self.monitor, self.config);
-        guard.look(now, |latch| monitor.check(latch, &sample, config))
+        guard.latch(now, |latch| monitor.check(latch, &sample, config))
     }
 
     fn read_error(&mut self, guard: &mut Guard, vitals: &Vitals, now: Instant) {
         let before = core::mem::replace(&mut self.error_code, vitals.error_code);
         let changed = before != vitals.error_code;
-        guard.look(now, |latch| latch.report(vitals.error, changed, self.config));
-    }
-
-    fn count_frames(&mut self, now: Instant) {
-        let window = now.since(self.window_from);
-        if window >= WINDOW {
-            let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
-            self.traffic.close(units, u32::MAX);
-            self.window_from = now;
-        }
+        guard.latch(now, |latch| latch.report(vitals.error, changed, self.config));
     }
 
     pub(crate) fn health(&self, motor: MotorName, guard: &Guard, vitals: &Vitals) -> Health {

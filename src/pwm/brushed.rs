@@ -13,9 +13,6 @@ pub use config::BrushedConfig;
 use core::f32::consts::TAU;
 use embedded_hal::pwm::SetDutyCycle;
 
-/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
-const LONGEST_STEP_S: f32 = 0.02;
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
     Rest,
@@ -214,7 +211,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     /// # Errors
     /// The error of a pin; the next call tries again.
     pub fn update(&mut self, tick: Tick) -> Result<(), BrushedError<P::Error, D::Error>> {
-        let healthy = self.look(tick.now());
+        let healthy = self.check(tick.now());
         let asked = self.command(tick);
         let limit = self.config.limit * healthy.min(self.guard.share());
         self.output = asked.max(-limit).min(limit);
@@ -266,7 +263,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             }
             return 0.0;
         }
-        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
+        let step = TimeStep::new(tick.dt_s(), TimeStep::MOTOR_MAX_S);
         if step.is_hold() {
             return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
         }

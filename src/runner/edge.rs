@@ -1,6 +1,6 @@
 //! Conditions of the bus as a whole, and the latch that keeps each edge until read.
 
-use super::watch::take_age;
+use crate::motor::take_age;
 use crate::time::{ConditionEdge, Duration, Instant};
 
 /// A fault of the bus as a whole, for a moment or for hours.
@@ -117,7 +117,7 @@ impl Edges {
     }
 
     /// Ends the repeated conditions without a recent incident. Has to be called in each tick, unless all is calm.
-    pub(super) fn settle(&mut self, now: Instant) {
+    pub(super) fn end_calm(&mut self, now: Instant) {
         for (condition, latch) in BusCondition::ALL.into_iter().zip(&mut self.latches) {
             // The clock may have gone back.
             let calm = take_age(now, &mut latch.seen);
@@ -237,12 +237,12 @@ mod tests {
         let mut edges = Edges::new();
         for ms in (0..5_000).step_by(900) {
             edges.begin(OVERRUN, at_ms(ms));
-            edges.settle(at_ms(ms + 899));
+            edges.end_calm(at_ms(ms + 899));
         }
         assert_eq!(drained(&mut edges), [(OVERRUN, 0, true)]);
-        edges.settle(at_ms(5_499));
+        edges.end_calm(at_ms(5_499));
         assert!(edges.is_active(OVERRUN));
-        edges.settle(at_ms(5_500));
+        edges.end_calm(at_ms(5_500));
         assert_eq!(drained(&mut edges), [(OVERRUN, 5_500, false)]);
     }
 
@@ -250,8 +250,8 @@ mod tests {
     fn a_clock_that_went_back_keeps_nothing_alive() {
         let mut edges = Edges::new();
         edges.begin(OVERRUN, at_ms(1_000_000));
-        edges.settle(at_ms(10));
-        edges.settle(at_ms(1_010));
+        edges.end_calm(at_ms(10));
+        edges.end_calm(at_ms(1_010));
         assert!(!edges.is_active(OVERRUN));
     }
 

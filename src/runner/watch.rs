@@ -8,7 +8,6 @@ use super::statistics::increment;
 use super::{BusCondition, Port, Runner};
 use crate::motor::Devices;
 use crate::time::{Clock, Duration, Instant, Tick};
-pub(super) use unsent::take_age;
 use unsent::{Unsent, WATCHED_FRAMES};
 
 impl<P: Port, K: Clock, D: Devices> Runner<P, K, D> {
@@ -190,7 +189,7 @@ impl Watch {
             // Neither down nor silent, and no repeated condition.
             return self.has_unsent && self.watch_sending(now);
         }
-        self.edges.settle(now);
+        self.edges.end_calm(now);
         self.watch_sending(now)
     }
 

@@ -1,8 +1,7 @@
 //! Outstanding replies, by id: a reply may arrive after its joint was detached.
 
-use super::bus::SLOTS;
-use super::counters::count;
-use super::{Joints, Register};
+use super::Register;
+use super::model::SLOTS;
 use crate::time::{Duration, Instant};
 
 /// Requests without a reply, one place per joint.
@@ -54,19 +53,21 @@ impl Answers {
     pub(super) fn owing(&self) -> u16 {
         (0..).zip(&self.0).map(|(index, owed)| u16::from(owed.due.is_some()) << index).sum()
     }
-}
 
-/// Drops overdue replies; without a time-out, drops all.
-pub(super) fn give_up(joints: &mut Joints, reply_timeout: Option<Duration>) {
-    let now = joints.now;
-    for (owed, slot) in joints.answers.0.iter_mut().zip(&mut joints.slots) {
-        let Some((register, since)) = owed.due else { continue };
-        // After a set-back of the clock, the time since the request alone would delay the expiry for long.
-        let passed = now.since(since).max(since.since(now));
-        if reply_timeout.is_none_or(|timeout| passed > timeout) {
-            *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
-            count(&mut slot.unanswered);
-            count(&mut joints.counters.unanswered);
-        }
+    /// Drops overdue replies, and returns their joints; without a time-out, drops all.
+    pub(super) fn give_up(
+        &mut self,
+        now: Instant,
+        reply_timeout: Option<Duration>,
+    ) -> impl Iterator<Item = usize> {
+        self.0.iter_mut().enumerate().filter_map(move |(index, owed)| {
+            let (register, since) = owed.due?;
+            // After a set-back of the clock, the time since the request alone would delay the expiry for long.
+            let passed = now.since(since).max(since.since(now));
+            reply_timeout.is_none_or(|timeout| passed > timeout).then(|| {
+                *owed = Owed { due: None, given_up: owed.given_up | bit(register) };
+                index
+            })
+        })
     }
 }

@@ -1,7 +1,7 @@
-use super::answers::{self, Answers};
+use super::answers::Answers;
 use super::budget::{Budget, limited};
 use super::counters::{Counters, count};
-use super::model::IDS;
+use super::model::{IDS, SLOTS};
 use super::schedule;
 use super::slot::{Slot, health, name};
 use super::{AttachError, Command, Config, Joint, Reply, State};
@@ -10,8 +10,6 @@ use crate::motor::{BusLoad, DeviceGuard, Hold, Ingest, Link, Malformed, MotorNam
 use crate::time::TimeStep;
 use crate::time::{Duration, Instant, Tick};
 use embedded_can::Frame;
-
-pub(super) const SLOTS: usize = IDS as usize;
 
 /// Upper bound on how long a stop may wait for an outstanding reply.
 const LONGEST_REPLY: Duration = Duration::from_millis(10);
@@ -242,7 +240,7 @@ impl Joints {
         }
         self.guard.run();
         self.now = tick.now();
-        answers::give_up(self, Some(self.reply_timeout));
+        self.give_up(Some(self.reply_timeout));
         for index in 0..SLOTS {
             let Some(slot) = self.slots.get_mut(index) else { continue };
             if slot.id.is_some() && slot.update(tick.now()) {
@@ -251,6 +249,16 @@ impl Joints {
         }
         self.remind();
         schedule::plan(self);
+    }
+
+    /// Counts overdue replies; without a time-out, all.
+    fn give_up(&mut self, reply_timeout: Option<Duration>) {
+        for index in self.answers.give_up(self.now, reply_timeout) {
+            if let Some(slot) = self.slots.get_mut(index) {
+                count(&mut slot.unanswered);
+            }
+            count(&mut self.counters.unanswered);
+        }
     }
 
     /// Relaxes every joint until armed again: time did not move on, so no age is known.
@@ -278,7 +286,7 @@ impl Joints {
         // A clock that stands or was set back does not show when a reply is overdue: an update then counts for a millisecond.
         let held = Duration::from_millis(self.guard.held_steps().into());
         let is_long = held > self.reply_timeout;
-        answers::give_up(self, (!(stands && is_long)).then_some(self.reply_timeout));
+        self.give_up((!(stands && is_long)).then_some(self.reply_timeout));
         self.remind();
         schedule::stop_again(self);
     }

@@ -5,6 +5,8 @@ pub use crate::wire::host_link::PULSES_PER_TURN;
 /// The highest id of a joint; the lowest is 1.
 pub const IDS: u8 = 12;
 
+pub(super) const SLOTS: usize = IDS as usize;
+
 /// Value of the robot's firmware for [`Register::Current`].
 pub(super) const CURRENT: i32 = 2_000;
 /// Value of the robot's firmware for [`Register::Acceleration`] and [`Register::Deceleration`]: 1000 rpm a second.

@@ -9,7 +9,7 @@ use super::model::{FASTEST, PULSES_PER_TURN};
 use super::offset::Offset;
 use super::{AttachError, Config, Joint, Register, Reply, State};
 use crate::encoder::{Homing, Position};
-use crate::motor::{Condition, Guard, Link, MotorName, Timeouts, Traffic};
+use crate::motor::{Condition, Guard, Link, MotorName, Rival, Timeouts, Traffic};
 use crate::time::{Duration, Instant};
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -58,7 +58,7 @@ pub(super) struct Slot {
     traffic: Traffic,
     window_from: Instant,
     /// Time of the last write or request of another node.
-    rival_heard: Option<Instant>,
+    rival: Rival,
     stall: Stall,
     stands: Standing,
 }
@@ -90,7 +90,7 @@ impl Slot {
         resets: 0,
         traffic: Traffic::NONE,
         window_from: Instant::START,
-        rival_heard: None,
+        rival: Rival::NONE,
         stall: Stall::USUAL,
         stands: Standing { at: 0, since: Instant::START },
     };

@@ -154,10 +154,10 @@ pub fn motors() {
     row("update_cascade", &[update(Targets::Position)]);
     row("tick_speed", &[tick(Targets::Speed, 0, START)]);
     row("tick_speed_limit", &[tick(Targets::HighSpeed, 0, START)]);
-    row("tick_speed_look", &[dearest_tick(Targets::Speed)]);
+    row("tick_speed_checks", &[dearest_tick(Targets::Speed)]);
     row("tick_cascade", &[tick(Targets::Position, 0, START)]);
     row("tick_cascade_limit", &[tick(Targets::FarPosition, 0, START)]);
-    row("tick_cascade_look", &[dearest_tick(Targets::Position)]);
+    row("tick_cascade_checks", &[dearest_tick(Targets::Position)]);
 }
 
 /// One frame of motor `id`, whose output shaft is at `turns` at the time `start`.

@@ -26,6 +26,7 @@ mod config;
 mod edge;
 mod monitor;
 mod report;
+mod rival;
 mod traffic;
 
 pub use condition::{Condition, Conditions};
@@ -34,4 +35,5 @@ pub use edge::Edge;
 pub(crate) use edge::{Journal, Latch};
 pub(crate) use monitor::{Monitor, Sample, elapsed};
 pub use report::Health;
+pub(crate) use rival::Rival;
 pub(crate) use traffic::Traffic;

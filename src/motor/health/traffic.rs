@@ -1,3 +1,5 @@
+use crate::time::{Duration, Instant};
+
 /// Gaps are kept in units of 16 µs, up to a second.
 const GAP_SHIFT: u32 = 4;
 /// From this number of jumps to and fro on, two motors answer.
@@ -17,6 +19,9 @@ pub(crate) struct Traffic {
 }
 
 impl Traffic {
+    /// Window in which frames are counted.
+    pub(crate) const WINDOW: Duration = Duration::from_secs(1);
+
     pub(crate) const NONE: Self =
         Self { frames: 0, longest_gap: 0, rate_hz: 0, last_gap: 0, jumps: 0, crowded: false };
 
@@ -24,6 +29,16 @@ impl Traffic {
     #[inline]
     pub(crate) const fn count(&mut self) {
         self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Ends a window that began at `from` and is over at `now`, at a rate that the application chose.
+    pub(crate) fn end_window(&mut self, from: &mut Instant, now: Instant) {
+        let window = now.since(*from);
+        if window >= Self::WINDOW {
+            let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
+            self.close(units, u32::MAX);
+            *from = now;
+        }
     }
 
     /// Adds frames counted elsewhere.

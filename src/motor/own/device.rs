@@ -9,9 +9,6 @@ use crate::time::{Duration, Instant, Tick};
 use crate::units::Angle;
 use embedded_can::Frame;
 
-/// Above this step integrals and derivatives rest: 20 periods of 1 kHz.
-const LONGEST_STEP_S: f32 = 0.02;
-
 /// The time between two questions for a setting.
 const INQUIRY: Duration = Duration::from_millis(10);
 
@@ -29,8 +26,8 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
     #[inline]
     fn update(&mut self, tick: Tick) {
-        let step = TimeStep::new(tick.dt_s(), LONGEST_STEP_S);
-        let left = self.look(tick.now());
+        let step = TimeStep::new(tick.dt_s(), TimeStep::MOTOR_MAX_S);
+        let left = self.check(tick.now());
         let drives = self.guard.drives(tick.now());
         if drives && !step.is_hold() && self.is_steady() {
             self.power.pass(tick.now());
@@ -180,8 +177,8 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
-    fn look(&mut self, now: Instant) -> f32 {
-        let share = self.watch.look(&mut self.guard, || self.motor.vitals(), now);
+    fn check(&mut self, now: Instant) -> f32 {
+        let share = self.watch.check(&mut self.guard, || self.motor.vitals(), now);
         if share <= 0.0 {
             self.guard.relax();
         }

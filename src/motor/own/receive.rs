@@ -53,7 +53,7 @@ impl<M: OwnMotor> Own<M> {
             return;
         }
         let vitals = Vitals { error: Some(Severity::Fault), ..self.motor.vitals() };
-        _ = self.watch.look(&mut self.guard, || vitals, now);
+        _ = self.watch.check(&mut self.guard, || vitals, now);
         self.guard.relax_until_armed();
         self.motor.forget_settings();
     }

@@ -319,16 +319,16 @@ impl Guard {
     ///
     /// The guard itself notes late and lost feedback and old targets.
     pub fn note(&mut self, condition: Condition, holds: bool, now: Instant) {
-        self.look(now, |latch| latch.set(condition, holds));
+        self.latch(now, |latch| latch.set(condition, holds));
     }
 
     /// Runs a change of the conditions, and notes its consequences.
-    pub(in crate::motor) fn look<T>(
+    pub(in crate::motor) fn latch<T>(
         &mut self,
         now: Instant,
-        look: impl FnOnce(&mut Latch) -> T,
+        change: impl FnOnce(&mut Latch) -> T,
     ) -> T {
-        self.change(now, |motor| look(motor.latch_mut()))
+        self.change(now, |motor| change(motor.latch_mut()))
     }
 
     /// Returns the conditions of the motor that hold.

@@ -49,7 +49,7 @@ use crate::time::Duration;
 pub(crate) use device::{Ages, DeviceGuard, Hold, LONGEST_PAUSE};
 pub use guard::Guard;
 pub(crate) use motor::MotorGuard;
-pub(crate) use stamp::age;
+pub(crate) use stamp::{age, take_age};
 pub(crate) use state::Rest;
 
 /// Default time in which the output range of a motor opens after arming: 0.2 s.

@@ -1,6 +1,6 @@
 //! Times as stamps of 32 bits in µs. A stamp repeats after 71 min 35 s.
 
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// Longest pause between two checks for which a 32-bit stamp still represents an age.
 pub(super) const LONGEST_PAUSE_US: u32 = 60_000_000;
@@ -18,6 +18,13 @@ pub(crate) const fn is_near(now: u32, stamp: u32, limit: u32) -> bool {
 pub(crate) const fn age(now: u32, stamp: u32) -> u32 {
     let age = now.wrapping_sub(stamp);
     if age.cast_signed() < 0 { 0 } else { age }
+}
+
+/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
+pub(crate) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
+    let micros = age(now.stamp(), *stamp);
+    *stamp = now.stamp().wrapping_sub(micros);
+    Duration::from_micros(micros.into())
 }
 
 /// Returns whole milliseconds, at most 65 s.

@@ -36,9 +36,9 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
     }
 
     /// Monitors the motor, and relaxes it if configured; returns the remaining share of its limit.
-    pub(super) fn look(&mut self, now: Instant) -> f32 {
+    pub(super) fn check(&mut self, now: Instant) -> f32 {
         let vitals = self.vitals();
-        self.watch.look(&mut self.guard, || vitals, now)
+        self.watch.check(&mut self.guard, || vitals, now)
     }
 
     /// A motor without an encoder is not known to turn or to stand.

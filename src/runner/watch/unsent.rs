@@ -1,7 +1,7 @@
 //! Command frames refused or given back by the driver: the time that each has waited.
 
 use super::{BUS_LOST_AFTER, Watch};
-use crate::motor::age;
+use crate::motor::take_age;
 use crate::runner::BusCondition;
 use crate::time::{Duration, Instant};
 
@@ -34,13 +34,6 @@ impl Unsent {
     const fn stays_sent(&self, now: Instant) -> bool {
         self.is_accepted && self.accepted != now.stamp()
     }
-}
-
-/// Returns the age of a stamp, which is brought to `now` if the clock went back behind it.
-pub(in crate::runner) fn take_age(now: Instant, stamp: &mut u32) -> Duration {
-    let micros = age(now.stamp(), *stamp);
-    *stamp = now.stamp().wrapping_sub(micros);
-    Duration::from_micros(micros.into())
 }
 
 impl Watch {

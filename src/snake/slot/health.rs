@@ -5,12 +5,6 @@ use crate::motor::{Condition, Edge, Health, Link, Reaction};
 use crate::snake::PULSES_PER_TURN;
 use crate::time::{Duration, Instant};
 
-/// Window in which positions are counted.
-const WINDOW: Duration = Duration::from_secs(1);
-
-/// Time after which another node on the bus is forgotten.
-const RIVAL_FORGOTTEN: Duration = Duration::from_secs(1);
-
 /// A joint that moves less than this stands.
 const STANDS: u32 = PULSES_PER_TURN.unsigned_abs() / 256;
 
@@ -37,27 +31,21 @@ pub(super) fn count_position(slot: &mut Slot, now: Instant) {
 
 /// Notes a write or a request of another node.
 pub(in crate::snake) fn hear_rival(slot: &mut Slot, now: Instant) {
-    slot.rival_heard = Some(now);
+    slot.rival.hear(now);
     slot.guard.note(Condition::SecondMaster, true, now);
 }
 
 pub(in crate::snake) const fn has_rival(slot: &Slot) -> bool {
-    slot.rival_heard.is_some()
+    slot.rival.is_present()
 }
 
 /// Ends expired conditions, and the window in which positions are counted.
 pub(super) fn check(slot: &mut Slot, now: Instant) {
-    if slot.rival_heard.is_some_and(|heard| now.since(heard) > RIVAL_FORGOTTEN) {
-        slot.rival_heard = None;
-        slot.guard.note(Condition::SecondMaster, false, now);
-    }
+    slot.rival.check(now);
+    slot.guard.note(Condition::SecondMaster, has_rival(slot), now);
     check_stall(slot, now);
-    let window = now.since(slot.window_from);
-    if slot.raw.is_some() && window >= WINDOW {
-        let units = u16::try_from(window.as_micros() >> 10).unwrap_or(u16::MAX);
-        // The rate of requests is the choice of the application.
-        slot.traffic.close(units, u32::MAX);
-        slot.window_from = now;
+    if slot.raw.is_some() {
+        slot.traffic.end_window(&mut slot.window_from, now);
     }
 }
 
