@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The heat of the barrel comes as frames of the referee system, ten times a second. Fails when a ball leaves at another speed than that
-//! of the wheels within 1.5 %, when the count is wrong, or when the true heat exceeds the limit.
+//! of the wheels within 1 %, when the count is wrong, or when the true heat exceeds the limit.
 
 mod picture;
 
@@ -235,7 +235,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     console::line(format_args!("{path}"));
     #[expect(clippy::float_cmp, reason = "whole numbers")]
     let is_right = single == 1.0 && burst == 6.0 && last.shots == last.balls;
-    if is_right && slow < 1.5 && hottest <= f32::from(HEAT_LIMIT) {
+    if is_right && slow < 1.0 && hottest <= f32::from(HEAT_LIMIT) {
         Ok(())
     } else {
         Err("a wrong count, a slow ball, or too much heat".into())

@@ -26,13 +26,23 @@ struct Sample {
 
 /// Runs a motor under a speed loop; `plan` gives target in rad/s and load in Nm for each millisecond.
 fn run(cutoff_hz: f32, millis: u32, plan: impl Fn(u32) -> (f32, f32)) -> Vec<Sample> {
+    run_with(INERTIA, cutoff_hz, millis, plan)
+}
+
+/// As [`run`], with an observer of this inertia.
+fn run_with(
+    inertia: f32,
+    cutoff_hz: f32,
+    millis: u32,
+    plan: impl Fn(u32) -> (f32, f32),
+) -> Vec<Sample> {
     let world = Simulation::new(24);
     let key = world.attach(MotorConfig::m3508(1).with_speed_noise_rpm(NOISE_RPM)).unwrap();
     let mut bus = Bus::new();
     let speed = PidConfig::new(0.6, 6.0, 0.0);
     let motor = bus.attach(Config::<M3508>::new(1).speed_loop(speed)).unwrap();
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    let mut observer = LoadObserver::new(INERTIA, 200.0).unwrap();
+    let mut observer = LoadObserver::new(inertia, 200.0).unwrap();
     let mut filter = LowPass::new(cutoff_hz).unwrap();
     let (mut samples, mut was_armed, mut ms) = (Vec::new(), false, 0);
     while ms < millis {
@@ -109,4 +119,20 @@ fn a_filter_of_the_same_noise_lags_four_times_as_much() {
     let noise = |value: fn(&Sample) -> f32| error(&steady, 500, 1_500, value);
     let (observed, filtered) = (noise(|sample| sample.observed), noise(|sample| sample.filtered));
     assert!((filtered / observed - 1.0).abs() < 0.25, "{observed}, {filtered} rad/s");
+}
+
+#[test]
+fn twice_the_true_inertia_doubles_a_step_of_the_load_at_first_and_has_no_lasting_effect() {
+    let step = |ms| (10.0, if ms < 1_500 { 0.0 } else { 1.0 });
+    let [right, twice] =
+        [INERTIA, 2.0 * INERTIA].map(|inertia| run_with(inertia, 40.0, 2_500, step));
+    let load = |samples: &[Sample], from: u32, until: u32| {
+        let within = samples.iter().filter(|sample| (from..until).contains(&sample.ms));
+        let loads: Vec<f32> = within.map(|sample| sample.load_nm).collect();
+        (loads.iter().sum::<f32>() / loads.len() as f32, loads.iter().copied().fold(0.0, f32::max))
+    };
+    let ((mean, _), (of_twice, _)) = (load(&right, 2_000, 2_500), load(&twice, 2_000, 2_500));
+    assert!((mean - of_twice).abs() < 0.02 && mean > 0.8, "{mean} and {of_twice} Nm");
+    let ((_, peak), (_, of_twice)) = (load(&right, 1_500, 1_550), load(&twice, 1_500, 1_550));
+    assert!((1.3..2.2).contains(&(of_twice / peak)), "{peak} and {of_twice} Nm");
 }

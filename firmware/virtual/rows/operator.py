@@ -201,18 +201,36 @@ def gains_set(robot):
     return {"zero_us": None, "stale": len(robot.stale()), "note": "the wheels follow them; no line moves the robot"}
 
 
+@row("-", needs="debug port")
+def turn_set(robot):
+    """A PC asks the standing robot for a turn, and falls silent: the turn expires after 500 ms."""
+    driving(robot)
+    robot.stick(0.0)
+    robot.run(FAULT_AT_US + 300_000)
+    robot.pc.say(b"turn=1\n")
+    robot.run(FAULT_AT_US + 600_000)
+    # 1 rad/s at 0.38 m from the wheels' axes is 48 rpm of a wheel of 76 mm.
+    turning = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(all(38 < rpm < 58 for rpm in turning), f"the wheels turn with {turning} rpm")
+    robot.run(FAULT_AT_US + 1_100_000)
+    standing = [abs(robot.world.state(motor)[0]) for motor in range(4)]
+    must(max(standing) < 5, f"the wheels turn with {standing} rpm 800 ms after the line")
+    must(not robot.resets, "it was reset")
+    return {"zero_us": None, "stale": len(robot.stale()), "note": "turns; stands when the line has expired"}
+
+
 @row("F59", "fresh", needs="debug port")
 def debug_nonsense(robot):
-    """A PC sends lines out of range, unknown ones and noise: each is counted, and nothing moves or changes."""
+    """A PC sends lines out of range, unknown ones, noise and a turn to a robot at rest: each is counted, and nothing moves."""
     robot.at(0, lambda: robot.ask_to_arm(False))
     robot.at(ARM_AT_US, lambda: robot.ask_to_arm(False))
     robot.at(10_000, lambda: robot.pc.say(b"".join(line + b"\n" for line in NONSENSE)))
     drawn = random.Random(7)
     noise = bytes(byte for byte in drawn.randbytes(600) if byte != 0x0A)
-    robot.at(40_000, lambda: robot.pc.say(noise + b"\n"))
+    robot.at(40_000, lambda: robot.pc.say(noise + b"\nturn=1\n"))
     robot.run(120_000)
     must(not robot.driven(), "a line of the PC moves it")
-    _, kp, ki = _curves(robot, 0, len(NONSENSE) + 1)
+    _, kp, ki = _curves(robot, 1, len(NONSENSE) + 1)
     must(abs(kp - USUAL_KP) < 0.02 and abs(ki - 2.4) < 0.1, f"gains of {kp} and {ki}")
     must(not robot.resets, "it was reset")
     return {"zero_us": robot.commands()[0].us, "stale": 0, "note": "each line is counted; at rest"}

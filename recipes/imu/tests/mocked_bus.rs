@@ -1,7 +1,9 @@
 //! The adapter over a bus that answers as the chip does: data sheet of the BMI088, sections 5 and 6.
 
-use drivetrain::geometry::AttitudeSource;
-use drivetrain::time::Instant;
+use drivetrain::geometry::{AttitudeSource, Body, Twist, World};
+use drivetrain::time::{Duration, Instant};
+use drivetrain::wire::Receiver;
+use drivetrain::wire::hipnuc::{Imu, MAX_FRAME};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use imu::{Bmi088, ImuError};
@@ -169,4 +171,44 @@ fn a_sensor_that_repeats_itself_is_frozen() {
     chip.is_noisy.set(true);
     imu.poll(ms(161)).unwrap();
     assert!(imu.attitude(ms(161)).is_some());
+}
+
+/// A frame of the manual of HiPNUC's CH0x0, 7.34; its quaternion has a yaw of -119.675 degrees.
+#[rustfmt::skip]
+const HIPNUC: [u8; 82] = [
+    0x5A, 0xA5, 0x4C, 0x00, 0x14, 0xBB, 0x91, 0x08, 0x15, 0x23, 0x09, 0xA2, 0xC4, 0x47, 0x08, 0x15,
+    0x1C, 0x00, 0xCC, 0xE8, 0x61, 0xBE, 0x9A, 0x35, 0x56, 0x3E, 0x65, 0xEA, 0x72, 0x3F, 0x31, 0xD0,
+    0x7C, 0xBD, 0x75, 0xDD, 0xC5, 0xBB, 0x6B, 0xD7, 0x24, 0xBC, 0x89, 0x88, 0xFC, 0x40, 0x01, 0x00,
+    0x6A, 0x41, 0xAB, 0x2A, 0x70, 0xC2, 0x96, 0xD4, 0x50, 0x41, 0xED, 0x03, 0x43, 0x41, 0x41, 0xF4,
+    0xF4, 0xC2, 0xCC, 0xCA, 0xF8, 0xBE, 0x73, 0x6A, 0x19, 0xBE, 0xF0, 0x00, 0x1C, 0x3D, 0x8D, 0x37,
+    0x5C, 0x3F,
+];
+
+/// A part of a robot that knows no sensor: what its chassis makes of a way along x of the room.
+fn ahead(source: &impl AttitudeSource, now: Instant) -> Option<Twist<Body>> {
+    let heading = source.heading(now)?;
+    Some(Twist::<World>::new(1.0, 0.0, 0.0).to_body(heading))
+}
+
+#[test]
+fn the_same_robot_drives_with_a_chip_on_the_board_and_with_a_hipnuc() {
+    let chip = Chip::level();
+    let mut bmi088 = imu(&chip);
+    chip.rates.set([0.0, 0.0, 0.0]);
+    for now in 1..=2_000 {
+        bmi088.poll(ms(now)).unwrap();
+    }
+    let start = bmi088.heading(ms(2_000)).unwrap().angle().as_degrees();
+    let of_chip = ahead(&bmi088, ms(2_000)).unwrap();
+    assert!(
+        (of_chip.vy_m_s.atan2(of_chip.vx_m_s).to_degrees() + start).abs() < 1e-3,
+        "{of_chip:?}"
+    );
+
+    let mut hipnuc = Receiver::<Imu, MAX_FRAME>::new(Duration::from_millis(50));
+    assert_eq!(ahead(&hipnuc, ms(1)), None);
+    assert!(hipnuc.read(&mut &HIPNUC[..], ms(1)).is_some());
+    let of_hipnuc = ahead(&hipnuc, ms(1)).unwrap();
+    let degrees = of_hipnuc.vy_m_s.atan2(of_hipnuc.vx_m_s).to_degrees();
+    assert!((degrees - 119.675).abs() < 1e-3, "{degrees}");
 }

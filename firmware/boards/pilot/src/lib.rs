@@ -6,8 +6,9 @@
 //! without one, forward is where the chassis looks. Which of them holds is chosen while both sticks are at rest; when the IMU
 //! falls silent while one is held, the robot stops until both are let go.
 //!
-//! A PC may set the gains of the wheels while the robot runs: lines such as `wheel_kp=2.5` on a serial port, see
-//! [`Pilot::hear_debug_port`]. Curves for VOFA+ go back: [`Pilot::curves`].
+//! A PC may set the gains of the wheels while the robot runs, and a turn that adds to the stick's for 500 ms: lines such as
+//! `wheel_kp=2.5` and `turn=0.5` on a serial port, see [`Pilot::hear_debug_port`]. No line arms the robot. Curves for VOFA+ go back:
+//! [`Pilot::curves`]; a request for the table of parameters (`?`) is not answered, because the port carries frames.
 #![cfg_attr(not(test), no_std)]
 
 pub mod gesture;
@@ -49,12 +50,15 @@ const FASTEST_M_S: f32 = 1.5;
 const FASTEST_RAD_S: f32 = 4.0;
 const IMU_DEADLINE: Duration = Duration::from_millis(50);
 
-/// The gains that a PC may set, by their place in the table. A wheel that is lifted keeps still with each of them.
+/// The parameters of a PC, by their place in the table: the gains of the wheels, with each of which a lifted wheel keeps still, and
+/// a turn that expires.
 const KP: usize = 0;
 const KI: usize = 1;
-const PARAMETERS: [Parameter; 2] = [
+const TURN: usize = 2;
+const PARAMETERS: [Parameter; 3] = [
     Parameter::setting("wheel_kp", "A per rad/s", 0.2, 4.0),
     Parameter::setting("wheel_ki", "A per rad", 0.0, 10.0),
+    Parameter::target("turn", "rad/s", -1.0, 1.0),
 ];
 
 /// Five curves and the tail of a `JustFloat` frame.
@@ -78,7 +82,7 @@ pub struct Pilot {
     chassis: Chassis<Mecanum>,
     dbus: Dbus,
     imu: Receiver<Imu, MAX_FRAME>,
-    parameters: Parameters<2>,
+    parameters: Parameters<3>,
     gesture: Gesture,
     forward: Forward,
 }
@@ -173,7 +177,8 @@ impl Pilot {
     }
 
     fn steer(&mut self, remote: &Remote, now: Instant) {
-        let turn = -remote.left_x * FASTEST_RAD_S;
+        let of_pc = self.parameters.value(TURN, now).unwrap_or(0.0);
+        let turn = of_pc - remote.left_x * FASTEST_RAD_S;
         let (vx, vy) = (remote.right_y * FASTEST_M_S, -remote.right_x * FASTEST_M_S);
         let yaw = self.imu.latest(now).map(|imu| {
             let (_, _, yaw) = imu.euler_roll_x();
