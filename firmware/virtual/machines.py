@@ -130,11 +130,14 @@ class Snake(Machine):
     def gait(self, joint, us):
         return 0.0 if self.gait_since is None else gait_deg(joint, (us - self.gait_since) / 1e6)
 
+    def gripper(self, us):
+        """Where the gripper is to be in degrees; the servo has 180 degrees more."""
+        return 0 if self.gait_since is None else 30 * math.sin((us - self.gait_since) / 1e6 * math.tau)
+
     def wanted(self, us):
         """Where the joints are to be when the next command comes, and how fast they have to be for it."""
         angles = [self.gait(joint, us + 50_000) for joint in range(JOINTS)]
-        gripper = 0 if self.gait_since is None else 30 * math.sin((us - self.gait_since) / 1e6 * math.tau)
-        return angles, 20, gripper
+        return angles, 20, self.gripper(us)
 
     def arm_again(self, at_us):
         def let_go():

@@ -8,6 +8,8 @@ from rows.judge import START_US, WATCHDOG_US, must, row
 # A joint goes on to its last target: it rests when its "disable" was sent.
 DISABLE = bytes((1, 0x10, 0, 0, 0, 0))
 HOST_LOST_US = 160_000 + 50_000 + 7_000 + 3 * CYCLE_US
+# A period of the commands, half a period of the servo's line, and its way.
+SERVO_LAG_US = 60_000
 
 
 def _swinging(robot):
@@ -47,12 +49,13 @@ def _goes_on(robot, until, note):
 @row("-", "fresh", "snake")
 def gait(robot):
     """It is zeroed, enabled and swings: joints, gripper, servo, IMUs and telemetry."""
-    busy, errors = [], []
+    busy, errors, servo = [], [], []
     for cycle in range(51):
         robot.at(FAULT_AT_US - 50_000 + cycle * CYCLE_US, lambda: busy.append((robot.core.busy, robot.core.interrupted)))
     for place in range(30):
         errors_of = lambda: [robot.angle(joint) - robot.gait(joint, robot.clock.us()) for joint in range(JOINTS)]
         robot.at(FAULT_AT_US + place * 10_000, lambda: errors.extend(errors_of()))
+        robot.at(FAULT_AT_US + place * 10_000, lambda: servo.append((robot.servo.degrees() - 180, robot.gripper(robot.clock.us() - SERVO_LAG_US))))
     robot.run(ARM_AT_US)
     must(robot.sent() and not robot.driven() and robot.enabled() == 0, "it drives before it was armed")
     first = [frame.us for frame in robot.sent() if frame.data == DISABLE][0]
@@ -64,7 +67,8 @@ def gait(robot):
     must(off < 12, f"the telemetry is {off:.1f} degrees off")
     must(not any(map(math.isnan, angles)), "an IMU is missing in the telemetry")
     must(robot.host.damaged == 0 and len(robot.host.telemetry) >= 15, f"{len(robot.host.telemetry)} telemetry frames")
-    # That the servo moves is not held yet.
+    off = max(abs(degrees - wanted) for degrees, wanted in servo)
+    must(off < 5 and max(servo)[0] - min(servo)[0] > 20, f"the servo is {off:.1f} degrees off")
     must(robot.servo.answers > 20, f"{robot.servo.answers} answers of the servo")
     must(robot.wire.collisions == 0, f"{robot.wire.collisions} collisions of a joint's id")
     must(not robot.resets and not robot.stale(), "a reset, or stale frames")
