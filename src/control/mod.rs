@@ -18,6 +18,7 @@
 //! | a disturbance of a known period | the mean of a [`Window`] of that many samples | |
 //! | the rate of a noisy signal | [`Differentiator`] | |
 //! | what pushes, brakes or blocks a shaft; a speed with less noise and no lag | [`LoadObserver`] | a bandwidth of 200 rad/s |
+//! | several states at once: a pendulum, a balancing robot, an arm with its load | [`state_space::LinearQuadraticRegulator`], [`state_space::KalmanFilter`] | a model, and the largest error and effort that are acceptable |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
 //! | gains for an unknown plant | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
@@ -52,7 +53,9 @@ mod number;
 mod observer;
 mod pid;
 mod shaping;
+pub mod state_space;
 mod tuning;
+mod wide;
 
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};

@@ -73,6 +73,9 @@ pub enum ConfigError {
     /// The condition number of their normal equations is then above 1000: a motion shows in the wheels with less than
     /// about 3 % of the strongest. A turn counts in m, at the mean distance of the wheels from the origin.
     Singular(&'static str),
+    /// A mode of the plant that does not decay by itself is not reached, not seen or not weighted by this matrix, so that no gain
+    /// makes the loop stable; or the entries are so far apart that the precision of the calculation does not suffice.
+    NotStabilizable(&'static str),
     /// A loop, by its name, and its invalid parameter.
     Loop(&'static str, &'static str),
     /// The model, or its firmware, does not have the parameter.
@@ -128,6 +131,7 @@ impl ConfigError {
             | Self::TooFewSamples(parameter)
             | Self::NoGain(parameter)
             | Self::Singular(parameter)
+            | Self::NotStabilizable(parameter)
             | Self::Loop(_, parameter)
             | Self::Unsupported(parameter)
             | Self::ReadOnly(parameter)
@@ -198,6 +202,7 @@ impl fmt::Display for ConfigError {
             }
             Self::CannotHold(_, value) => return write!(f, "{parameter} cannot hold {value}"),
             Self::Loop(name, _) => return write!(f, "{name}: {parameter} is not usable"),
+            Self::Singular("b") => return f.write_str("b: two inputs move the states in the same way, or one moves none"),
             Self::Singular(_) => return write!(f, "the wheels do not determine {parameter}"),
             _ => parameter,
         })?;
@@ -207,6 +212,7 @@ impl fmt::Display for ConfigError {
             Self::NotAboveZero(_) => ": must be more than zero",
             Self::Reversed(_) => ": the lower end must lie below the upper end",
             Self::Unstable("h0") => ": a value below 1.25 times the longest step would overshoot",
+            Self::Unstable("gain") => ": the loop with this gain does not decay",
             Self::Unstable(_) => ": too fast for this time step",
             Self::NotFinite(_) => ": must be finite",
             Self::Unusable(_) => " is not usable",
@@ -216,6 +222,7 @@ impl fmt::Display for ConfigError {
             Self::OutOfTime(_) => ": no steady swing within the time limit",
             Self::TooFewSamples(_) => ": fewer than 8 samples in half a period of the swing",
             Self::NoGain(_) => ": the swing is not larger than the hysteresis, or beyond f32",
+            Self::NotStabilizable(_) => ": leaves a mode that no gain makes stable",
             Self::Unsupported(_) => ": not available for this model or its firmware",
             Self::ReadOnly(_) => " is read only",
             _ => "",

@@ -1,7 +1,7 @@
 use crate::control::motion::roots::{lesser, root, root_of};
 use crate::control::motion::task::Task;
-use crate::control::motion::wide::Wide;
 use crate::control::number::limited;
+use crate::control::wide::Wide;
 use crate::math;
 
 /// In `f32`, where rounding may keep the steps from becoming close; then with the value in twice its precision, which takes one step,

@@ -1,5 +1,5 @@
 use crate::control::motion::task::Task;
-use crate::control::motion::wide::Wide;
+use crate::control::wide::Wide;
 
 /// Brings a state that is outside of the limits, or will be whatever is done, back inside: with full jerk, then without.
 ///

@@ -1,8 +1,8 @@
 use crate::control::motion::plan::{Motion, MotionTarget};
 use crate::control::motion::planner::Planner;
-use crate::control::motion::wide::Wide;
 use crate::control::number::finite;
 use crate::control::shaping::{MotionLimits, ProfileState};
+use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// Motions of `N` axes that start together and end together.

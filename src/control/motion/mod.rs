@@ -20,7 +20,7 @@
 //! family of `ascent`. The sum of the roots of both slopes is its only unknown, and the way a quartic in it, so there is a motion for
 //! every finite input, and it is found by a bracket that halves at worst. A state outside of its limits is braked first (`brake`). The
 //! way that is left after a direct change of velocity is a small difference of large numbers, so it is calculated in twice the
-//! precision of `f32` (`wide`). Limits that differ by more than 10^15 in these units are brought nearer (`scale`), which changes what
+//! precision of `f32` (`control::wide`). Limits that differ by more than 10^15 in these units are brought nearer (`scale`), which changes what
 //! `f32` cannot show.
 //!
 //! # Limits
@@ -43,7 +43,6 @@ mod task;
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests;
-mod wide;
 
 pub use follower::MotionFollower;
 pub use in_step::Motions;

@@ -4,9 +4,9 @@ use crate::control::motion::brake::Brake;
 use crate::control::motion::plan::{Motion, MotionTarget, Phases};
 use crate::control::motion::scale::{self, Limits};
 use crate::control::motion::task::Task;
-use crate::control::motion::wide::Wide;
 use crate::control::number::{self, limited};
 use crate::control::shaping::{MotionLimits, ProfileState};
+use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// A task after braking, and the way back to units of the position and seconds.

@@ -1,7 +1,7 @@
 use crate::control::motion::plan::MotionTarget;
 use crate::control::motion::task::Task;
-use crate::control::motion::wide::Wide;
 use crate::control::shaping::ProfileState;
+use crate::control::wide::Wide;
 
 /// The limits that a motion has, as plain numbers.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]

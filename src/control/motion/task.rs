@@ -1,4 +1,4 @@
-use crate::control::motion::wide::Wide;
+use crate::control::wide::Wide;
 
 /// A state, a target and the largest velocity, in units where acceleration and jerk end at 1.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
