@@ -12,6 +12,7 @@
 //! drivetrain-judges vesc ...              of the family `vesc`: see `vesc`
 //! drivetrain-judges odrive VERB           see `odrive`
 //! drivetrain-judges motion ...            plans of `control::Motion`: see `motion`
+//! drivetrain-judges state-space ...       gains and filters of `control::state_space`: see `state_space`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
@@ -23,6 +24,7 @@ mod odrive;
 mod rmd;
 mod robstride;
 mod serve;
+mod state_space;
 mod vesc;
 
 use defect::Defect;
@@ -101,6 +103,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["motion", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         motion::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["state-space", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        state_space::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

@@ -7,6 +7,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 /// root, so that an error of 1e-7 becomes one of 5e-3; in `state_space`, a Riccati equation. The algorithms are those of Dekker (1971) and Knuth (TAOCP 2, 4.2.2), without a fused
 /// multiply-add, which `core` does not have.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Wide {
     high: f32,
     low: f32,

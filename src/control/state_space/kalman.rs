@@ -1,9 +1,10 @@
 use super::matrix::{
     Grid, apply, difference, finite, identity, is_finite, not_negative, solved, sum, symmetric,
-    times, times_transposed, transposed,
+    times, times_transposed, transposed, wide,
 };
 use super::riccati;
 use super::system::LinearSystem;
+use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// Estimates `N` states of a plant from `M` inputs and `P` measurements, with a covariance that follows: a Kalman filter.
@@ -12,14 +13,17 @@ use crate::error::ConfigError;
 /// predict   x = A x + B u       P = A P Aᵀ + Q          Q: covariance of the noise that the plant gets in one step
 /// correct   K = P Cᵀ (C P Cᵀ + R)⁻¹                     R: covariance of the noise of one measurement
 ///           x = x + K (y - C x)
-///           P = (1 - K C) P (1 - K C)ᵀ + K R Kᵀ         the form of Joseph: P stays positive in f32
+///           P = (1 - K C) P (1 - K C)ᵀ + K R Kᵀ         the form of Joseph: P stays positive
 /// ```
+/// States and covariance are calculated in twice the precision of `f32`, and rounded when they are returned: in `f32` alone, the filter of
+/// an unstable plant of 6 states with one measurement was seen to fail.
+///
 /// The measurement is `y = C x`: an input that acts on it at once is subtracted before.
 ///
 /// # Which filter?
 /// A measurement that is lost, late or of another kind each time: this filter, with a `predict` for each step and a `correct` for
 /// each measurement. A measurement in each step: [`LuenbergerObserver::steady_state`](super::LuenbergerObserver::steady_state) with the same
-/// arguments, whose gain is that of this filter after some steps, at a twentieth of the instructions.
+/// arguments, whose gain is that of this filter after some steps, at a fraction of the instructions.
 ///
 /// # Edge behaviour
 /// An input, a measurement or a result that is NaN or infinite changes nothing, and [`rejected`](Self::rejected) grows.
@@ -44,11 +48,11 @@ use crate::error::ConfigError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KalmanFilter<const N: usize, const M: usize, const P: usize> {
     plant: LinearSystem<N, M>,
-    c: [[f32; N]; P],
-    q: [[f32; N]; N],
-    r: [[f32; P]; P],
-    state: [f32; N],
-    covariance: [[f32; N]; N],
+    c: Grid<Wide, P, N>,
+    q: Grid<Wide, N, N>,
+    r: Grid<Wide, P, P>,
+    state: [Wide; N],
+    covariance: Grid<Wide, N, N>,
     rejected: u16,
 }
 
@@ -68,8 +72,8 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
         r: &[[f32; P]; P],
     ) -> Result<Self, ConfigError> {
         let (covariance, _) = riccati::filter(plant, c, q, r)?;
-        let (q, r) = (symmetric(q), symmetric(r));
-        Ok(Self { plant: *plant, c: *c, q, r, state: [0.0; N], covariance, rejected: 0 })
+        let (c, q, r) = (wide(c), wide(&symmetric(q)), wide(&symmetric(r)));
+        Ok(Self { plant: *plant, c, q, r, state: [Wide::ZERO; N], covariance, rejected: 0 })
     }
 
     /// Begins with another state and the covariance of its error.
@@ -84,15 +88,15 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     ) -> Result<Self, ConfigError> {
         finite("state", &[*state])?;
         not_negative("covariance", covariance)?;
-        self.state = *state;
-        self.covariance = symmetric(covariance);
+        self.state = state.map(Wide::of);
+        self.covariance = wide(&symmetric(covariance));
         Ok(self)
     }
 
     /// Goes one time step ahead with the inputs of the plant.
     pub fn predict(&mut self, u: &[f32; M]) {
-        let a = self.plant.a();
-        let state = self.plant.predict(&self.state, u);
+        let a = self.plant.exact_a();
+        let state = self.plant.predict_exactly(&self.state, u);
         let moved = times_transposed(&times(a, &self.covariance), a);
         self.take(state, &sum(&moved, &self.q));
     }
@@ -106,7 +110,7 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
         }
     }
 
-    fn corrected(&self, y: &[f32; P]) -> Option<([f32; N], Grid<f32, N, N>)> {
+    fn corrected(&self, y: &[f32; P]) -> Option<([Wide; N], Grid<Wide, N, N>)> {
         let of_output = times(&self.c, &self.covariance);
         let innovation = sum(&times_transposed(&of_output, &self.c), &self.r);
         let gain = transposed(&solved(&innovation, &of_output)?);
@@ -117,7 +121,7 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
         Some((state, sum(&kept, &added)))
     }
 
-    fn take(&mut self, state: [f32; N], covariance: &Grid<f32, N, N>) {
+    fn take(&mut self, state: [Wide; N], covariance: &Grid<Wide, N, N>) {
         let covariance = symmetric(covariance);
         if is_finite(&[state]) && is_finite(&covariance) {
             (self.state, self.covariance) = (state, covariance);
@@ -128,14 +132,14 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
 
     /// Returns the estimated states.
     #[must_use]
-    pub const fn state(&self) -> &[f32; N] {
-        &self.state
+    pub fn state(&self) -> [f32; N] {
+        self.state.map(Wide::narrow)
     }
 
     /// Returns the covariance of the error of the states.
     #[must_use]
-    pub const fn covariance(&self) -> &[[f32; N]; N] {
-        &self.covariance
+    pub fn covariance(&self) -> [[f32; N]; N] {
+        self.covariance.map(|row| row.map(Wide::narrow))
     }
 
     /// Returns the number of predictions and corrections that were refused; stays at 65535.
@@ -148,18 +152,18 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
 /// Returns the state, moved by the gain towards a measurement.
 #[inline]
 pub(super) fn moved<const N: usize, const P: usize>(
-    state: &[f32; N],
-    c: &Grid<f32, P, N>,
-    gain: &Grid<f32, N, P>,
+    state: &[Wide; N],
+    c: &Grid<Wide, P, N>,
+    gain: &Grid<Wide, N, P>,
     y: &[f32; P],
-) -> [f32; N] {
-    let mut residual = *y;
+) -> [Wide; N] {
+    let mut residual = y.map(Wide::of);
     for (residual, expected) in residual.iter_mut().zip(apply(c, state)) {
-        *residual -= expected;
+        *residual = *residual - expected;
     }
     let mut result = *state;
     for (state, change) in result.iter_mut().zip(apply(gain, &residual)) {
-        *state += change;
+        *state = *state + change;
     }
     result
 }

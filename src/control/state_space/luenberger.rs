@@ -1,7 +1,8 @@
 use super::kalman::moved;
-use super::matrix::{difference, finite, identity, is_finite, times};
+use super::matrix::{difference, finite, identity, is_finite, times, wide};
 use super::riccati;
 use super::system::LinearSystem;
+use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// Estimates `N` states of a plant from `M` inputs and `P` measurements with a constant gain: a Luenberger observer.
@@ -38,7 +39,8 @@ pub struct LuenbergerObserver<const N: usize, const M: usize, const P: usize> {
     plant: LinearSystem<N, M>,
     c: [[f32; N]; P],
     gain: [[f32; P]; N],
-    state: [f32; N],
+    /// A slow observer adds up what 10 000 steps round, so it is not `f32`.
+    state: [Wide; N],
     rejected: u16,
 }
 
@@ -58,7 +60,7 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
         if !riccati::decays(&times(&left, plant.a())) {
             return Err(ConfigError::Unstable("gain"));
         }
-        Ok(Self { plant: *plant, c: *c, gain: *gain, state: [0.0; N], rejected: 0 })
+        Ok(Self { plant: *plant, c: *c, gain: *gain, state: [Wide::ZERO; N], rejected: 0 })
     }
 
     /// Calculates the gain that a [`KalmanFilter`](super::KalmanFilter) of the same arguments has in the steady state, in twice the precision
@@ -85,7 +87,7 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
         r: &[[f32; P]; P],
     ) -> Result<Self, ConfigError> {
         let (_, gain) = riccati::filter(plant, c, q, r)?;
-        Ok(Self { plant: *plant, c: *c, gain, state: [0.0; N], rejected: 0 })
+        Ok(Self { plant: *plant, c: *c, gain, state: [Wide::ZERO; N], rejected: 0 })
     }
 
     /// Begins with another state.
@@ -94,21 +96,21 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
     /// Names `state` when an entry is NaN or infinite.
     pub fn with_state(mut self, state: &[f32; N]) -> Result<Self, ConfigError> {
         finite("state", &[*state])?;
-        self.state = *state;
+        self.state = state.map(Wide::of);
         Ok(self)
     }
 
     /// Goes one time step ahead with the inputs of the plant.
     pub fn predict(&mut self, u: &[f32; M]) {
-        self.take(self.plant.predict(&self.state, u));
+        self.take(self.plant.predict_exactly(&self.state, u));
     }
 
     /// Corrects the state with one measurement of each output.
     pub fn correct(&mut self, y: &[f32; P]) {
-        self.take(moved(&self.state, &self.c, &self.gain, y));
+        self.take(moved(&self.state, &wide(&self.c), &wide(&self.gain), y));
     }
 
-    fn take(&mut self, state: [f32; N]) {
+    fn take(&mut self, state: [Wide; N]) {
         if is_finite(&[state]) {
             self.state = state;
         } else {
@@ -118,8 +120,8 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
 
     /// Returns the estimated states.
     #[must_use]
-    pub const fn state(&self) -> &[f32; N] {
-        &self.state
+    pub fn state(&self) -> [f32; N] {
+        self.state.map(Wide::narrow)
     }
 
     /// Returns the gain: a row for each state, a column for each measurement.

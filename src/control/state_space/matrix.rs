@@ -14,6 +14,7 @@ pub(super) trait Number:
 
     /// Returns the absolute value, rounded.
     fn size(self) -> f32;
+    fn half(self) -> Self;
 }
 
 impl Number for f32 {
@@ -24,6 +25,11 @@ impl Number for f32 {
     fn size(self) -> f32 {
         self.abs()
     }
+
+    #[inline]
+    fn half(self) -> Self {
+        0.5 * self
+    }
 }
 
 impl Number for Wide {
@@ -33,6 +39,11 @@ impl Number for Wide {
     #[inline]
     fn size(self) -> f32 {
         self.narrow().abs()
+    }
+
+    #[inline]
+    fn half(self) -> Self {
+        self.scaled(0.5)
     }
 }
 
@@ -128,8 +139,8 @@ pub(super) fn difference<T: Number, const R: usize, const C: usize>(
 }
 
 /// Returns a matrix with its mirror image: a symmetric one without the differences that rounding makes.
-pub(super) fn symmetric<const N: usize>(matrix: &Grid<f32, N, N>) -> Grid<f32, N, N> {
-    paired(matrix, &transposed(matrix), |a, b| 0.5 * (a + b))
+pub(super) fn symmetric<T: Number, const N: usize>(matrix: &Grid<T, N, N>) -> Grid<T, N, N> {
+    paired(matrix, &transposed(matrix), |a, b| (a + b).half())
 }
 
 /// Adds a number to the diagonal.
@@ -221,8 +232,8 @@ pub(super) fn narrow<const R: usize, const C: usize>(
     is_finite(&result).then_some(result)
 }
 
-pub(super) fn is_finite<const R: usize, const C: usize>(matrix: &Grid<f32, R, C>) -> bool {
-    matrix.iter().flatten().all(|entry| entry.is_finite())
+pub(super) fn is_finite<T: Number, const R: usize, const C: usize>(matrix: &Grid<T, R, C>) -> bool {
+    matrix.iter().flatten().all(|entry| entry.size().is_finite())
 }
 
 /// Refuses a matrix with an entry that is NaN or infinite.

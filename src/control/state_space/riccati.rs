@@ -1,5 +1,5 @@
 use super::matrix::{
-    Grid, Number, largest, narrow, not_negative, positive, row_sum, solved, sum, times,
+    Grid, Number, largest, narrow, not_negative, positive, row_sum, solved, sum, symmetric, times,
     times_transposed, transposed, wide, with_diagonal,
 };
 use super::system::LinearSystem;
@@ -45,8 +45,8 @@ pub(super) fn solve<const N: usize, const M: usize>(
         let g_next = solved(&w, &g)?;
         let a_transposed = transposed(&a);
         let change = times(&a_transposed, &times(&h, &a_next));
-        g = mirrored(&sum(&g, &times(&a, &times_transposed(&g_next, &a))));
-        h = mirrored(&sum(&h, &change));
+        g = symmetric(&sum(&g, &times(&a, &times_transposed(&g_next, &a))));
+        h = symmetric(&sum(&h, &change));
         a = times(&a, &a_next);
         let (size, changed) = (largest(&h), largest(&change));
         if !size.is_finite() || !row_sum(&a).is_finite() {
@@ -69,10 +69,6 @@ fn gain<const N: usize, const M: usize>(
     solved(&sum(r, &times(&of_input, b)), &times(&of_input, a))
 }
 
-fn mirrored<const N: usize>(matrix: &Grid<Wide, N, N>) -> Grid<Wide, N, N> {
-    sum(matrix, &transposed(matrix)).map(|row| row.map(|entry| entry.scaled(0.5)))
-}
-
 /// Returns a power of two near the root of `cost / reach`: exact as a factor.
 fn balance(cost: f32, reach: f32) -> f32 {
     let exponent = |value: f32| value.to_bits() >> 23;
@@ -93,7 +89,7 @@ pub(super) fn regulator<const N: usize, const M: usize>(
 ) -> Result<Solution<N, M>, ConfigError> {
     not_negative("q", q)?;
     positive("r", r)?;
-    solve((&wide(system.a()), &wide(system.b())), (&wide(q), &wide(r)))
+    solve((system.exact_a(), &wide(system.b())), (&wide(q), &wide(r)))
         .ok_or(ConfigError::NotStabilizable("b"))
 }
 
@@ -103,18 +99,19 @@ pub(super) fn filter<const N: usize, const M: usize, const P: usize>(
     c: &Grid<f32, P, N>,
     q: &Grid<f32, N, N>,
     r: &Grid<f32, P, P>,
-) -> Result<(Grid<f32, N, N>, Grid<f32, N, P>), ConfigError> {
+) -> Result<(Grid<Wide, N, N>, Grid<f32, N, P>), ConfigError> {
     super::matrix::finite("c", c)?;
     not_negative("q", q)?;
     positive("r", r)?;
-    let (a, c) = (transposed(&wide(system.a())), transposed(&wide(c)));
+    let (a, c) = (transposed(system.exact_a()), transposed(&wide(c)));
     let steady = solve((&a, &c), (&wide(q), &wide(r))).and_then(|solution| {
         let covariance = solution.cost;
         // The gain of a filter that corrects before it predicts has no factor of `a`.
         let of_output = times(&transposed(&c), &covariance);
         let innovation = sum(&wide(r), &times(&of_output, &c));
         let gain = solved(&innovation, &of_output)?;
-        Some((narrow(&covariance)?, narrow(&transposed(&gain))?))
+        narrow(&covariance)?;
+        Some((covariance, narrow(&transposed(&gain))?))
     });
     steady.ok_or(ConfigError::NotStabilizable("c"))
 }
