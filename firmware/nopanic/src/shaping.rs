@@ -1,6 +1,7 @@
 //! Actuators, filters, motion shaping and tuning.
 
 use crate::opaque::Function;
+use drivetrain::control::state_space::*;
 use drivetrain::control::*;
 
 pub fn call_all() {
@@ -96,6 +97,7 @@ pub fn call_all() {
     SlewLimiter::value.call();
     SlewLimiter::rejected.call();
     TuningRule::pid.call();
+    state_space();
     RelayTuner::pid.call();
     RelayTuner::with_bias.call();
     RelayTuner::with_cycles.call();
@@ -115,4 +117,40 @@ pub fn call_all() {
     StepResponse::settling_time_s.call();
     StepResponse::steady_error.call();
     StepResponse::rejected.call();
+}
+
+fn state_space() {
+    diagonal::<6>.call();
+    bryson::<6>.call();
+    LinearSystem::<6, 2>::discrete.call();
+    LinearSystem::<6, 2>::discretized.call();
+    LinearSystem::<6, 2>::a.call();
+    LinearSystem::<6, 2>::b.call();
+    LinearSystem::<6, 2>::predict.call();
+    LinearQuadraticRegulator::<6, 2>::new.call();
+    LinearQuadraticRegulator::<6, 2>::from_gain.call();
+    LinearQuadraticRegulator::<6, 2>::with_output_limit.call();
+    LinearQuadraticRegulator::<6, 2>::step.call();
+    LinearQuadraticRegulator::<6, 2>::set_gain.call();
+    LinearQuadraticRegulator::<6, 2>::gain.call();
+    LinearQuadraticRegulator::<6, 2>::rejected.call();
+    KalmanFilter::<6, 2, 2>::new.call();
+    KalmanFilter::<6, 2, 2>::with_start.call();
+    KalmanFilter::<6, 2, 2>::predict.call();
+    KalmanFilter::<6, 2, 2>::correct.call();
+    KalmanFilter::<6, 2, 2>::state.call();
+    KalmanFilter::<6, 2, 2>::covariance.call();
+    KalmanFilter::<6, 2, 2>::rejected.call();
+    LuenbergerObserver::<6, 2, 2>::new.call();
+    LuenbergerObserver::<6, 2, 2>::steady_state.call();
+    LuenbergerObserver::<6, 2, 2>::with_state.call();
+    LuenbergerObserver::<6, 2, 2>::predict.call();
+    LuenbergerObserver::<6, 2, 2>::correct.call();
+    LuenbergerObserver::<6, 2, 2>::state.call();
+    LuenbergerObserver::<6, 2, 2>::gain.call();
+    LuenbergerObserver::<6, 2, 2>::rejected.call();
+    PlantInversion::<6, 2>::new.call();
+    PlantInversion::<6, 2>::effort.call();
+    GainSchedule::<6, 2, 4>::new.call();
+    GainSchedule::<6, 2, 4>::gain.call();
 }
