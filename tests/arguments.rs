@@ -67,6 +67,7 @@ fn an_argument_that_is_not_utf_8_is_named_and_ends_each_example_with_code_2() {
         "shooter",
         "snake",
         "socketcan",
+        "state_space",
         "swerve",
         "tune",
     ];
