@@ -6,7 +6,7 @@
 //!
 //! The plant is the nonlinear one, in steps of 0.1 ms; the controller knows its linear model, sees two noisy measurements (the place of
 //! the cart and the angle of the pendulum) at 200 Hz, and limits its force. Prints the largest angle and the error at the end; fails if the
-//! pendulum leans by more than 0.35 rad or the cart is not within 1 cm of its target at the end.
+//! pendulum leans by more than 0.35 rad or the cart is not within 2 cm of its target at the end.
 
 mod picture;
 
@@ -116,7 +116,7 @@ fn judge(samples: &[Sample]) -> Result<(), Box<dyn Error>> {
     console::line(format_args!("pendulum     leans by at most {lean:.3} rad"));
     console::line(format_args!("cart         {:.1} mm from its target at the end", 1e3 * error));
     console::line(format_args!("rate         estimated within {off:.3} rad/s, not measured"));
-    if lean < 0.35 && error.abs() < 0.01 {
+    if lean < 0.35 && error.abs() < 0.02 {
         Ok(())
     } else {
         Err("the pendulum leans too far, or the cart is not at its target".into())
