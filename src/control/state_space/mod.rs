@@ -25,8 +25,11 @@
 //! and without `f64`, which small cores lack; regulator, inversion and schedule are `f32`. `judges/README.md` has the measured differences to
 //! python-control, slycot and wpimath, over random systems of 1 to 6 states.
 //!
+//! Admitted conditioning: a solution of the Riccati equation with a condition number of up to 10^8, in units in which the states are of like
+//! size. Beyond it the gain loses digits, or is refused.
+//!
 //! # Cost
-//! The gain of 6 states takes some million instructions: at start, and never in a loop. `docs/figures.md` has the steps of the loop.
+//! Constructors that solve an equation are for the start, not for the loop: a gain takes up to 32 doublings and three steps of Newton.
 //!
 //! # Examples
 //! A motor with inertia 0.01 kg m², damping 0.02 Nm s and a torque up to 3 Nm turns an arm; the angle is measured, its rate is not:
