@@ -41,7 +41,7 @@ use crate::error::ConfigError;
 ///     filter.correct(&[2.0]);
 /// }
 /// assert!((filter.state()[0] - 2.0).abs() < 1e-3);
-/// assert!((filter.covariance()[0][0].sqrt() - 0.0252).abs() < 5e-4); // m: a quarter of the noise
+/// assert!((filter.covariance()[0][0].sqrt() - 0.01764).abs() < 5e-5); // m, of the 0.1 m of a measurement
 /// # Ok::<(), drivetrain::error::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
