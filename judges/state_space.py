@@ -425,11 +425,11 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("judge", choices=["control", "wpimath"])
-    parser.add_argument("--count", type=int, help="10 000 for wpimath, 2 000 for control")
+    parser.add_argument("--count", type=int, help="10 000 for wpimath, 1 000 for control")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only")
     options = parser.parse_args()
-    options.count = options.count or {"control": 2_000, "wpimath": 10_000}[options.judge]
+    options.count = options.count or {"control": 1_000, "wpimath": 10_000}[options.judge]
     if options.only not in (None, "design", "filter", "refused"):
         return
     start = time.monotonic()
