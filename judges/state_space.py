@@ -4,17 +4,23 @@ state_space.py PROGRAM control|wpimath [--count N] [--seed N] [--only design|fil
 """
 
 import argparse
+import os
 import subprocess
 import sys
 import time
 from decimal import Decimal, getcontext
 
-import numpy as np
+# Threads gain nothing with six rows, and take the time of the other judges.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np  # noqa: E402
 
 #: Largest difference of a gain, as a share of its largest entry; of a discrete plant; of a state over all steps, as a share of its largest.
 GAIN, PLANT, STATE = 1e-4, 1e-6, 1e-5
 #: Largest condition number of the solution of a Riccati equation, in units without those of the states. Systems beyond are counted.
 CONDITION = 1e8
+#: Largest one with which the filters keep `STATE`; above, its difference may grow in proportion, up to that of a gain. Numbers of
+#: 48 bits solve the equation within 1e-13, of which the gain gets the condition-fold: 1e-6, and the states of a slow filter some times that.
+WELL = 1e7
 #: Steps of a filter.
 STEPS = 1_000
 #: Systems in one run of the program: bounds the memory.
@@ -208,13 +214,19 @@ class Control:
         discrete = self.module.c2d(plant, dt, "zoh")
         return discrete.A, discrete.B
 
-    def steady(self, systems, start, u, y):
+    def plain(self, systems):
+        """Returns A, B, C, noise, noise of the measurements, and the covariances of the steady filters, in units that are those of no state."""
+        to, per = systems.unit[:, :, None], 1 / systems.unit[:, None, :]
+        a, b, c = systems.discrete_a / to / per, systems.discrete_b / to, systems.c / per
+        noise = systems.noise / to / transposed(to)
+        rows = zip(a, c, noise, systems.of_output)
+        return a, b, c, noise, systems.of_output, np.array([self.estimator(*row)[1] for row in rows])
+
+    def steady(self, plain, unit, u, y):
         """Returns the states of the steady filter, as a simulated system of python-control."""
         control, states = self.module, []
-        to, per = systems.unit[:, :, None], 1 / systems.unit[:, None, :]
-        plain = systems.discrete_a / to / per, systems.discrete_b / to, systems.c / per, systems.noise / to / transposed(to)
-        for a, b, c, q, r, unit, u, y in zip(*plain, systems.of_output, systems.unit, u, y):
-            n, p = len(a), self.estimator(a, c, q, r)[1]
+        for a, b, c, _, r, p, unit, u, y in zip(*plain, unit, u, y):
+            n = len(a)
             k = p @ c.T @ np.linalg.inv(c @ p @ c.T + r)
             left = np.eye(n) - k @ c
             # x[k + 1] = (1 - K C) (A x[k] + B u) + K y, and the result is x[k + 1].
@@ -328,7 +340,8 @@ def signals(systems, random, program):
     """Returns inputs and measurements of a noisy plant that a regulator holds: rows of each system and step."""
     count, (n, m) = len(systems.a), systems.size
     gain = systems.design(program, True)[2]
-    # A plant without a gain, because it is ill-conditioned, gets none: it is not held.
+    # A plant without a gain, because it is ill-conditioned, stays at zero: its measurements are noise.
+    held = np.isfinite(gain).all((1, 2))[:, None]
     gain = np.nan_to_num(gain)
     root = np.linalg.cholesky(systems.noise + 1e-6 * np.trace(systems.noise, axis1=1, axis2=2)[:, None, None] * np.eye(n))
     of_output = np.linalg.cholesky(systems.of_output)
@@ -336,7 +349,7 @@ def signals(systems, random, program):
     for step in range(STEPS):
         u = rounded(random.normal(0, 1, (count, m)) - np.einsum("sij,sj->si", gain, x))
         x = np.einsum("sij,sj->si", systems.discrete_a, x) + np.einsum("sij,sj->si", systems.discrete_b, u)
-        x += np.einsum("sij,sj->si", root, random.normal(0, 1, (count, n)))
+        x = held * (x + np.einsum("sij,sj->si", root, random.normal(0, 1, (count, n))))
         y = np.einsum("sij,sj->si", systems.c, x) + np.einsum("sij,sj->si", of_output, random.normal(0, 1, (count, m)))
         inputs[:, step], outputs[:, step] = u, rounded(y)
     return inputs, outputs
@@ -360,11 +373,19 @@ def compare_filter(judge, program, systems, random, *plant):
     u, y = signals(systems, random, program)
     filtered, observed = ours_filtered(program, systems, start, u, y, isinstance(judge, Control), *plant)
     per = 1 / systems.unit[:, None, :]
-    worst = {"filter": (off(filtered, judge.filter(systems, start, u, y), per), STATE)}
-    if isinstance(judge, Control):
-        few = slice(0, 40)
-        worst["steady filter"] = (off(observed[few], judge.steady(systems, start, u[few], y[few]), per[few]), STATE)
-    return worst
+    values = off(filtered, judge.filter(systems, start, u, y), per)
+    if not isinstance(judge, Control):
+        return {"filter": (values, STATE)}
+    few = slice(0, 40)
+    plain = judge.plain(systems)
+    # Above `WELL`, each difference as a share of what its condition allows.
+    condition = np.linalg.cond(plain[-1])
+    share = np.where(condition > CONDITION, np.nan, np.maximum(1, condition / WELL))
+    states = judge.steady([part[few] for part in plain], systems.unit[few], u[few], y[few])
+    return {
+        "filter": (values / share, STATE),
+        "steady filter": (off(observed[few], states, per[few]) / share[few], STATE),
+    }
 
 
 def compare(verb, judge, program, random, count):
@@ -382,7 +403,7 @@ def compare(verb, judge, program, random, count):
     for name, (allowed, values) in all_of.items():
         values = np.concatenate(values)
         ill = np.isnan(values)
-        require(ill.mean() < 0.01, f"{verb}: {name}: {ill.sum()} of {len(values)} systems are ill-conditioned")
+        require(ill.sum() <= 2 + 0.01 * len(values), f"{verb}: {name}: {ill.sum()} of {len(values)} systems are ill-conditioned")
         values = values[~ill]
         left_out = f", {ill.sum()} ill-conditioned ones left out" if ill.any() else ""
         print(f"  {verb}: {name} of {len(values)}{left_out}: within {values.max():.1e} (99.9 %: {np.quantile(values, 0.999):.1e}), allowed {allowed:.0e}")
@@ -425,11 +446,11 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("judge", choices=["control", "wpimath"])
-    parser.add_argument("--count", type=int, help="10 000 for wpimath, 1 000 for control")
+    parser.add_argument("--count", type=int, help="10 000 for wpimath, 240 for control")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only")
     options = parser.parse_args()
-    options.count = options.count or {"control": 1_000, "wpimath": 10_000}[options.judge]
+    options.count = options.count or {"control": 240, "wpimath": 10_000}[options.judge]
     if options.only not in (None, "design", "filter", "refused"):
         return
     start = time.monotonic()
@@ -437,7 +458,7 @@ def main():
     print(f"state-space: {judge.name}")
     random = np.random.default_rng([options.seed, options.judge == "control"])
     plant(judge, options.program, random)
-    for verb, share in (("design", 1), ("filter", 10)):
+    for verb, share in (("design", 1), ("filter", 8 if options.judge == "control" else 10)):
         if options.only in (None, verb):
             compare(verb, judge, options.program, random, options.count // share)
     if options.judge == "control":

@@ -125,7 +125,7 @@ fn design<const N: usize, const M: usize>(
     let gain = |plant| Some(*LinearQuadraticRegulator::new(plant, &q, &r).ok()?.gain());
     write(&gain(&same).unwrap_or([[f32::NAN; N]; M]), output)?;
     let observer = LuenbergerObserver::steady_state(&same, &c, &noise, &of_output).ok();
-    write(&observer.map_or([[f32::NAN; M]; N], |observer| *observer.gain()), output)?;
+    write(&observer.map_or([[f32::NAN; M]; N], |observer| observer.gain()), output)?;
     write(&plant.as_ref().and_then(gain).unwrap_or([[f32::NAN; N]; M]), output)?;
     let inversion = PlantInversion::new(&same).ok();
     write(&[inversion.map_or([f32::NAN; M], |it| it.effort(&[0.0; N], &[1.0; N]))], output)

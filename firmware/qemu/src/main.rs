@@ -18,6 +18,7 @@ mod motion;
 mod paint;
 mod report;
 mod rows;
+mod state_space;
 mod wiring;
 
 use core::panic::PanicInfo;
@@ -37,6 +38,7 @@ fn main() -> ! {
         rows::control();
         controllers::rows();
         motion::rows();
+        state_space::rows();
         rows::math();
         rows::space();
         bytes::rows();

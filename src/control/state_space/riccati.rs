@@ -1,5 +1,5 @@
 use super::matrix::{
-    Grid, Number, difference, largest, narrow, not_negative, positive, row_sum, solved, sum,
+    Grid, Number, difference, is_finite, largest, not_negative, positive, row_sum, solved, sum,
     symmetric, times, times_transposed, transposed, wide, with_diagonal,
 };
 use super::system::LinearSystem;
@@ -140,7 +140,7 @@ pub(super) fn filter<const N: usize, const M: usize, const P: usize>(
     c: &Grid<f32, P, N>,
     q: &Grid<f32, N, N>,
     r: &Grid<f32, P, P>,
-) -> Result<(Grid<Wide, N, N>, Grid<f32, N, P>), ConfigError> {
+) -> Result<(Grid<Wide, N, N>, Grid<Wide, N, P>), ConfigError> {
     super::matrix::finite("c", c)?;
     not_negative("q", q)?;
     positive("r", r)?;
@@ -151,8 +151,7 @@ pub(super) fn filter<const N: usize, const M: usize, const P: usize>(
         let of_output = times(&transposed(&c), &covariance);
         let innovation = sum(&wide(r), &times(&of_output, &c));
         let gain = solved(&innovation, &of_output)?;
-        narrow(&covariance)?;
-        Some((covariance, narrow(&transposed(&gain))?))
+        (is_finite(&covariance) && is_finite(&gain)).then_some((covariance, transposed(&gain)))
     });
     steady.ok_or(ConfigError::NotStabilizable("c"))
 }

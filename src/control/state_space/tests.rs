@@ -215,6 +215,36 @@ fn the_filter_of_a_chain_of_six_integrators_stays_positive_for_20_s_at_1_khz() {
     assert!((filter.state()[0] - 1.0).abs() < 0.01, "{:?}", filter.state());
 }
 
+#[test]
+fn the_steady_observer_keeps_up_with_the_filter_where_the_gains_nearly_cancel() {
+    // Four integrators in a row at 200 Hz, of which the last is measured.
+    let mut rates = [[0.0; 4]; 4];
+    for (row, entries) in rates.iter_mut().enumerate().take(3) {
+        entries[row + 1] = 1.0;
+    }
+    let plant = LinearSystem::discretized(&rates, &[[0.0], [0.0], [0.0], [1.0]], 0.005).unwrap();
+    let (c, q, r) = ([[1.0, 0.0, 0.0, 0.0]], diagonal(&[1e-6, 1e-4, 1e-2, 1.0]), [[1e-6]]);
+    let mut observer = LuenbergerObserver::steady_state(&plant, &c, &q, &r).unwrap();
+    let mut filter = KalmanFilter::new(&plant, &c, &q, &r).unwrap();
+    for _ in 0..1_000 {
+        filter.predict(&[0.0]);
+        filter.correct(&[0.0]);
+    }
+    for step in 0..1_000_u16 {
+        let (u, y) = ([f32::from(step % 7) - 3.0], [f32::from(step % 5) - 2.0]);
+        filter.predict(&u);
+        filter.correct(&y);
+        observer.predict(&u);
+        observer.correct(&y);
+        assert!(
+            near(&[observer.state()], &[filter.state()], 1e-6),
+            "{:?} {:?}",
+            observer.state(),
+            filter.state()
+        );
+    }
+}
+
 proptest! {
     #[test]
     fn the_regulator_stabilises_and_no_gain_near_it_costs_less(
@@ -245,9 +275,9 @@ proptest! {
         let observer = LuenbergerObserver::steady_state(&plant, &c, &q, &r).unwrap();
         let dual = LinearSystem::discrete(&transposed(&a), &transposed(&c)).unwrap();
         let regulator = LinearQuadraticRegulator::new(&dual, &q, &r).unwrap();
-        let predictor = times(&a, observer.gain());
+        let predictor = times(&a, &observer.gain());
         prop_assert!(near(&predictor, &transposed(regulator.gain()), 1e-5));
-        prop_assert!(LuenbergerObserver::new(&plant, &c, observer.gain()).is_ok());
+        prop_assert!(LuenbergerObserver::new(&plant, &c, &observer.gain()).is_ok());
     }
 
     #[test]
