@@ -1,11 +1,11 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh, standard};
+use super::command::{CLEAR_ERROR, Command, REGISTERS, inquiry, refresh};
 use super::config::Mode;
 use super::feedback::{is_answer, value};
 use super::{Feedback, Model, Register, Status};
 use crate::error::ConfigError;
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, standard_id};
 use crate::motor::{
     Capabilities, Capability, Claim, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
     Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, register_questions,
@@ -119,7 +119,7 @@ impl Motor {
 
     #[inline]
     fn frame_of(&self, command: Command) -> CanFrame {
-        CanFrame::of(standard(self.command_id()), command.encode(self.model.ranges()))
+        CanFrame::of(standard_id(self.command_id()), command.encode(self.model.ranges()))
     }
 
     /// Returns the manual's name of a register, and the value that it has to have.
@@ -146,7 +146,7 @@ impl OwnMotor for Motor {
 
     /// All drives of the family share the id of the registers.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let claim = |id, role| Claim::new(standard(id), role, self.name());
+        let claim = |id, role| Claim::new(standard_id(id), role, self.name());
         let bare = (self.mode.base() > 0).then(|| claim(self.id.into(), Role::Command));
         let shared = [
             claim(REGISTERS, Role::Command).shared(),
@@ -172,7 +172,7 @@ impl OwnMotor for Motor {
     }
 
     fn velocity(&self) -> AngularVelocity {
-        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.velocity())
+        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
     }
 
     fn angle(&self) -> Option<Angle> {
@@ -181,7 +181,8 @@ impl OwnMotor for Motor {
 
     fn rest(&mut self) -> CanFrame {
         if self.mode.0.is_impedance() {
-            CanFrame::of(standard(self.id.into()), self.model.ranges().encode(&mit::Command::REST))
+            let rest = self.model.ranges().encode(&mit::Command::REST);
+            CanFrame::of(standard_id(self.id.into()), rest)
         } else {
             self.off()
         }
@@ -285,6 +286,6 @@ impl Motor {
         self.specials = self.specials.wrapping_add(1);
         let is_bare = self.specials & 1 == 0;
         let id = if is_bare { self.id.into() } else { self.command_id() };
-        CanFrame::of(standard(id), data)
+        CanFrame::of(standard_id(id), data)
     }
 }

@@ -1,10 +1,9 @@
 //! The codec of what a drive is sent.
 
 use super::Register;
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, standard_id};
 use crate::motor::Inquiry;
 use crate::wire::mit;
-use embedded_can::{Id, StandardId};
 
 /// The id of the frames that ask for registers, of every drive.
 pub(super) const REGISTERS: u16 = 0x7FF;
@@ -74,7 +73,7 @@ const fn count(value: f32) -> u16 {
 
 /// Asks for feedback.
 pub(super) fn refresh(id: u8) -> CanFrame {
-    CanFrame::of(standard(REGISTERS), [id, 0, 0xCC, 0, 0, 0, 0, 0])
+    CanFrame::of(standard_id(REGISTERS), [id, 0, 0xCC, 0, 0, 0, 0, 0])
 }
 
 /// Asks about a register.
@@ -92,9 +91,5 @@ pub(super) fn inquiry(id: u8, inquiry: Inquiry<Register>) -> CanFrame {
         Inquiry::Store => (0xAA, 1, [0; 4]),
     };
     let [a, b, c, d] = value;
-    CanFrame::of(standard(REGISTERS), [id, 0, verb, number, a, b, c, d])
-}
-
-pub(super) fn standard(raw: u16) -> Id {
-    StandardId::new(raw).unwrap_or(StandardId::MAX).into()
+    CanFrame::of(standard_id(REGISTERS), [id, 0, verb, number, a, b, c, d])
 }

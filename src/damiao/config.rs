@@ -80,7 +80,7 @@ impl Mode {
         drive: &Feedback,
         model: &Model,
     ) -> Option<Command> {
-        let shaft = (drive.angle(), drive.velocity());
+        let shaft = (drive.angle(), drive.measured.velocity());
         let goal = self.0.impedance_goal(order, shaft, model.ranges(), 4_095)?;
         let limit = self.0.most_velocity();
         let way = match goal {

@@ -2,7 +2,7 @@
 
 use super::Register;
 use crate::motor::Inquiry;
-use crate::units::{Angle, AngularVelocity};
+use crate::units::Angle;
 use crate::wire::mit::{self, Ranges};
 
 /// What a drive reports with each frame.
@@ -47,11 +47,7 @@ impl Feedback {
         if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
     }
 
-    pub(super) const fn velocity(&self) -> AngularVelocity {
-        AngularVelocity::from_rad_per_s(self.measured.velocity_rad_per_s)
-    }
-
-    /// Reads a feedback frame; `None` if its status is none that a drive has.
+    /// Reads a feedback frame; `None` for an unknown status.
     #[must_use]
     pub const fn decode(data: &[u8; 8], ranges: &Ranges) -> Option<Self> {
         let [head, a, b, c, d, e, driver_c, rotor_c] = *data;

@@ -27,6 +27,16 @@ const REMOTE: u32 = 1 << 30;
 const SHORT: u32 = 1 << 31;
 pub(crate) const ID_MASK: u32 = 0x1FFF_FFFF;
 
+/// Returns the id with these 11 bits; a number with more bits gives the largest id.
+pub(crate) fn standard_id(raw: u16) -> Id {
+    StandardId::new(raw).unwrap_or(StandardId::MAX).into()
+}
+
+/// Returns the id with these 29 bits; a number with more bits gives the largest id.
+pub(crate) fn extended_id(raw: u32) -> Id {
+    ExtendedId::new(raw).unwrap_or(ExtendedId::MAX).into()
+}
+
 /// 0 to 8. With this bound known to the compiler, an optional frame takes the room of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]

@@ -1,6 +1,7 @@
 //! The codec of what a drive is sent.
 
-use embedded_can::{Id, StandardId};
+use crate::frame::standard_id;
+use embedded_can::Id;
 
 /// A command to a drive, in the units of the wire: currents in counts, angles and velocities of the rotor.
 ///
@@ -89,5 +90,5 @@ pub(crate) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
 
 /// Returns the id of the frames of a drive.
 pub(crate) fn id_of(ids: u16, id: u8) -> Id {
-    StandardId::new(ids + u16::from(id)).unwrap_or(StandardId::MAX).into()
+    standard_id(ids + u16::from(id))
 }

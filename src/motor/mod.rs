@@ -63,7 +63,8 @@ pub use measured::Measured;
 pub use name::MotorName;
 pub(crate) use own::{
     ControlMode, Form, Goal, Laps, Preparation, Questions, Shaft, Tachometer, TimeoutUnits, Told,
-    TorqueLoops, inside, lowest_bit, mit_model, models, register_questions, registers,
+    TorqueLoops, code_from, ingest_eight, inside, lowest_bit, mit_model, models,
+    register_questions, registers,
 };
 pub use own::{Impedance, ImpedanceControl, Inquiry, Order, Own, OwnMotor, Settings, Target};
 pub(crate) use safety::{Ages, DeviceGuard, Hold, LONGEST_PAUSE, MotorGuard, Rest, age, take_age};

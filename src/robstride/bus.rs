@@ -1,14 +1,15 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
-use super::command::{Command, extended};
+use super::command::Command;
 use super::config::Mode;
-use super::feedback::{FAULTS, VALUE, answer, register, report_code};
+use super::feedback::{FAULTS, VALUE, answer, register};
 use super::{Feedback, Model, Register, Status};
 use crate::error::{ConfigError, check};
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, extended_id};
 use crate::motor::{
-    Capabilities, Capability, Claim, Ingest, Inquiry, Laps, Malformed, MotorName, Order, OwnMotor,
-    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, register_questions,
+    Capabilities, Capability, Claim, Ingest, Inquiry, Laps, MotorName, Order, OwnMotor,
+    Preparation, Role, Settings, Severity, TimeoutUnits, Vitals, WrongSetting, code_from,
+    ingest_eight, register_questions,
 };
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
@@ -205,7 +206,7 @@ impl OwnMotor for Motor {
     /// The state of the drive is in the id of its feedback, and the torque in that of the operation mode.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let (motor, name) = (u32::from(self.id), self.name());
-        let claim = move |raw, mask, role| Claim::new(extended(raw), role, name).with_mask(mask);
+        let claim = move |raw, mask, role| Claim::new(extended_id(raw), role, name).with_mask(mask);
         let answer = 0x1100_0000 | motor << 8 | u32::from(self.host);
         let feedback = [
             claim(0x0200_0000 | motor << 8, 0x1F00_FF00, Role::Feedback),
@@ -216,23 +217,20 @@ impl OwnMotor for Motor {
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
-        if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
-        }
-        let Some(feedback) = Feedback::decode(frame, &self.model) else {
-            return Ingest::Malformed(Malformed::Field);
-        };
-        let before = self.drive.map(|drive| drive.measured.position_rad);
-        self.laps.advance(before, feedback.measured.position_rad, self.model.pmax_rad());
-        if self.has_cleared && feedback.faults == 0 {
-            (self.reported, self.has_cleared) = (0, false);
-        }
-        self.drive = Some(feedback);
-        Ingest::Taken
+        ingest_eight(frame, |_| {
+            let feedback = Feedback::decode(frame, &self.model)?;
+            let before = self.drive.map(|drive| drive.measured.position_rad);
+            self.laps.advance(before, feedback.measured.position_rad, self.model.pmax_rad());
+            if self.has_cleared && feedback.faults == 0 {
+                (self.reported, self.has_cleared) = (0, false);
+            }
+            self.drive = Some(feedback);
+            Some(())
+        })
     }
 
     fn velocity(&self) -> AngularVelocity {
-        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.velocity())
+        self.drive.map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
     }
 
     /// Beyond the range of the feedback there is none: a RobStride reports the rest of a lap then.
@@ -276,7 +274,7 @@ impl OwnMotor for Motor {
     }
 
     fn poll(&mut self) -> Option<CanFrame> {
-        self.drive.map(|drive| self.frame_of(self.mode.stay((self.angle(), drive.velocity()))))
+        self.drive.map(|_| self.frame_of(self.mode.stay((self.angle(), self.velocity()))))
     }
 
     fn is_enabled(&self) -> Option<bool> {
@@ -340,7 +338,7 @@ impl OwnMotor for Motor {
     #[expect(clippy::cast_possible_truncation, reason = "16 bits in tenths")]
     fn vitals(&self) -> Vitals {
         let Some(drive) = self.drive else { return Vitals::default() };
-        let error_code = match (report_code(self.reported), drive.fault_code(), drive.status) {
+        let error_code = match (code_from(32, self.reported), drive.fault_code(), drive.status) {
             (0, 0, Status::Calibration) => CALIBRATION_CODE,
             (0, code, _) | (code, ..) => code,
         };

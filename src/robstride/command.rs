@@ -1,10 +1,10 @@
 //! The codec of what a drive is sent.
 
 use super::{Model, Register};
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, extended_id};
 use crate::motor::Inquiry;
 use crate::wire::mit;
-use embedded_can::{ExtendedId, Id};
+use embedded_can::ExtendedId;
 
 /// A frame to a drive, in units of the output shaft.
 ///
@@ -80,17 +80,13 @@ impl Command {
             Self::Store => (22, [0, host], [1, 2, 3, 4, 5, 6, 7, 8]),
         };
         let [high, low] = middle;
-        CanFrame::of(extended(u32::from_be_bytes([kind, high, low, id])), data)
+        CanFrame::of(extended_id(u32::from_be_bytes([kind, high, low, id])), data)
     }
 }
 
 fn parameter(register: Register, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
     let [low, high] = register.index().to_le_bytes();
     [low, high, 0, 0, a, b, c, d]
-}
-
-pub(super) fn extended(raw: u32) -> Id {
-    ExtendedId::new(raw).unwrap_or(ExtendedId::MAX).into()
 }
 
 /// Returns the 29 bits of the id; `None` for 11 bits.

@@ -3,8 +3,8 @@
 use super::command::raw_of;
 use super::{Model, Register};
 use crate::frame::CanFrame;
-use crate::motor::lowest_bit;
-use crate::units::{Angle, AngularVelocity};
+use crate::motor::code_from;
+use crate::units::Angle;
 use crate::wire::mit;
 
 /// What a drive reports with each answer.
@@ -75,14 +75,10 @@ impl Feedback {
         if self.is_at_end { None } else { Some(Angle::from_radians(self.measured.position_rad)) }
     }
 
-    pub(super) const fn velocity(&self) -> AngularVelocity {
-        AngularVelocity::from_rad_per_s(self.measured.velocity_rad_per_s)
-    }
-
     /// Returns the number of the lowest fault, 16 to 21 as the manual counts the bits of the id; 0 without a fault.
     #[must_use]
     pub const fn fault_code(&self) -> u8 {
-        if self.faults == 0 { 0 } else { 15 + lowest_bit(self.faults as u32) }
+        code_from(16, self.faults as u32)
     }
 }
 
@@ -100,13 +96,8 @@ pub enum Status {
 }
 
 impl Status {
-    const fn of(bits: u8) -> Option<Self> {
-        match bits {
-            0 => Some(Self::Reset),
-            1 => Some(Self::Calibration),
-            2 => Some(Self::Run),
-            _ => None,
-        }
+    fn of(bits: u8) -> Option<Self> {
+        [Self::Reset, Self::Calibration, Self::Run].get(usize::from(bits)).copied()
     }
 }
 
@@ -124,11 +115,6 @@ pub(super) fn answer(frame: &CanFrame) -> Option<(u8, bool, [u8; 8])> {
     let is_version = kind == FEEDBACK && data.starts_with(&VERSION);
     let is_answer = frame.length() == 8 && (is_version || matches!(kind, VALUE | FAULTS));
     is_answer.then_some((kind, status == 0, data))
-}
-
-/// Returns the code of a report of faults: 32 and the number of the lowest bit; 0 without a fault.
-pub(super) const fn report_code(faults: u32) -> u8 {
-    if faults == 0 { 0 } else { 31 + lowest_bit(faults) }
 }
 
 /// Returns the register with an index.

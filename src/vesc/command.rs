@@ -1,7 +1,7 @@
 //! The codec of what a drive is sent.
 
-use crate::frame::CanFrame;
-use embedded_can::{ExtendedId, Id};
+use crate::frame::{CanFrame, extended_id};
+use embedded_can::Id;
 
 /// The packet of a question, and of its answer: a short message of the drive's serial protocol.
 pub(super) const SHORT_MESSAGE: u8 = 8;
@@ -76,8 +76,7 @@ pub(super) fn question(id: u8) -> CanFrame {
 }
 
 pub(super) fn extended(packet: u8, id: u8) -> Id {
-    let raw = u32::from(packet) << 8 | u32::from(id);
-    Id::Extended(ExtendedId::new(raw).unwrap_or(ExtendedId::ZERO))
+    extended_id(u32::from(packet) << 8 | u32::from(id))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]

@@ -34,6 +34,7 @@
 //! Sources: Damiao's protocol and registers as python-damiao-driver documents them; frames of public tests, see `tests/data/wire`.
 
 use crate::error::ConfigError;
+use crate::units::AngularVelocity;
 
 /// The data to enable a drive.
 pub const ENABLE: [u8; 8] = special(0xFC);
@@ -94,6 +95,12 @@ pub struct Feedback {
     pub velocity_rad_per_s: f32,
     /// The torque in Nm.
     pub torque_nm: f32,
+}
+
+impl Feedback {
+    pub(crate) const fn velocity(&self) -> AngularVelocity {
+        AngularVelocity::from_rad_per_s(self.velocity_rad_per_s)
+    }
 }
 
 /// The ranges of the fields, as set in the drive.

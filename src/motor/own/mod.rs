@@ -22,7 +22,10 @@ pub use settings::{Inquiry, Settings};
 
 pub(crate) use mode::{ControlMode, Goal, Shaft, inside};
 pub(crate) use questions::Questions;
-pub(crate) use registers::{Form, lowest_bit, mit_model, models, register_questions, registers};
+pub(crate) use receive::ingest_eight;
+pub(crate) use registers::{
+    Form, code_from, lowest_bit, mit_model, models, register_questions, registers,
+};
 pub(crate) use settings::{Preparation, TimeoutUnits};
 pub(crate) use told::Told;
 pub(crate) use torque_loops::TorqueLoops;

@@ -3,9 +3,17 @@
 use super::route::Route;
 use super::{Own, OwnMotor};
 use crate::frame::CanFrame;
-use crate::motor::{Ingest, Role, Severity, Vitals};
+use crate::motor::{Ingest, Malformed, Role, Severity, Vitals};
 use crate::time::Instant;
 use embedded_can::Frame;
+
+/// Takes feedback of exactly 8 bytes. If `take` returns `None`, a field has an impossible value, and nothing has changed.
+pub(crate) fn ingest_eight(frame: &CanFrame, take: impl FnOnce(&[u8; 8]) -> Option<()>) -> Ingest {
+    if frame.length() != 8 {
+        return Ingest::Malformed(Malformed::Length(frame.length()));
+    }
+    take(frame.bytes()).map_or(Ingest::Malformed(Malformed::Field), |()| Ingest::Taken)
+}
 
 impl<M: OwnMotor> Own<M> {
     /// Takes a frame with an id of the feedback.

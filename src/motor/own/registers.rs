@@ -1,7 +1,7 @@
 //! Registers of a drive as a table of facts.
 
 /// The form of a value on the wire, low byte first.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Form {
     U8,
     U16,
@@ -50,6 +50,11 @@ impl Form {
 #[expect(clippy::cast_possible_truncation, reason = "at most 32")]
 pub(crate) const fn lowest_bit(errors: u32) -> u8 {
     if errors == 0 { 0 } else { errors.trailing_zeros() as u8 + 1 }
+}
+
+/// Returns the error code of the lowest bit, where bit 0 has the code `first`; 0 for no bit.
+pub(crate) const fn code_from(first: u8, errors: u32) -> u8 {
+    if errors == 0 { 0 } else { first - 1 + lowest_bit(errors) }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]

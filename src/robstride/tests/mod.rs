@@ -106,7 +106,7 @@ fn frames_have_the_bytes_of_the_manual() {
 
 #[test]
 fn a_parameter_that_cannot_be_read_has_no_value() {
-    let frame = |raw, data| crate::frame::CanFrame::of(command::extended(raw), data);
+    let frame = |raw, data| crate::frame::CanFrame::of(crate::frame::extended_id(raw), data);
     let data = [0x28, 0x70, 0, 0, 0xD0, 0x07, 0, 0];
     assert_eq!(answer(&frame(0x1100_01FD, data)), Some((VALUE, true, data)));
     assert_eq!(answer(&frame(0x1101_01FD, data)), Some((VALUE, false, data)));
