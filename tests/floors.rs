@@ -321,9 +321,9 @@ fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
 const SIZES: [(&str, usize); 6] = [
     ("damiao", 600),
     ("lk", 600),
-    ("odrive", 730), // see DESIGN, "Lines of a family"
+    ("odrive", 670), // see DESIGN, "Lines of a family"
     ("rmd", 600),
-    ("robstride", 615),
+    ("robstride", 600),
     ("vesc", 600),
 ];
 

@@ -1,17 +1,16 @@
 //! The motor as an own motor: its claims, its frames, and their order.
 
 use super::command::{
-    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, form_of, heard, id,
-    request,
+    ASK_ENDPOINT, COMMANDS, Command, ENDPOINT, ERRORS, ESTIMATES, HEARTBEAT, heard, id, request,
 };
-use super::config::{POSITION, TORQUE, VELOCITY};
+use super::config::{POSITION, TORQUE};
 use super::enabling::{NOT_SET, PARTS, Phase};
-use super::feedback::endpoint_value;
+use super::feedback::{endpoint_value, words};
 use super::{Feedback, Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::{
-    Capabilities, Capability, Claim, Goal, Ingest, Inquiry, Malformed, MotorName, Order, OwnMotor,
-    Role, Severity, Vitals, WrongSetting, lowest_bit,
+    Capabilities, Capability, Claim, Goal, Ingest, Inquiry, MotorName, Order, OwnMotor, Role,
+    Severity, Vitals, WrongSetting, code_from, ingest_eight, lowest_bit,
 };
 use crate::units::{Angle, AngularVelocity};
 use core::f32::consts::TAU;
@@ -35,8 +34,8 @@ const LIMITS_EACH: u8 = 100;
 /// The frames, 10 ms apart, within which a drive is idle and has answered all that it is asked.
 const MOST_FRAMES: u8 = 200;
 
-/// Added to the bit of a reason for which the drive disarmed.
-const DISARMED: u8 = 128;
+/// The code of the first bit of the reason of a disarmed drive.
+const DISARMED: u8 = 129;
 
 impl OwnMotor for Motor {
     fn name(&self) -> MotorName {
@@ -44,35 +43,19 @@ impl OwnMotor for Motor {
     }
 
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
-        let (node, name) = (self.node, self.name());
-        let feedback = heard(self.firmware).iter();
-        let trajectory: &[u8] = if self.mode.acceleration.is_some() { &[0x11, 0x12] } else { &[] };
-        let endpoints: &[u8] = if self.endpoints.is_some() { &[ASK_ENDPOINT] } else { &[] };
-        let target: &[u8] = match self.mode.control.number {
-            TORQUE => &[0x0E],
-            VELOCITY => &[0x0D],
-            _ => &[0x0C],
-        };
-        let commands = COMMANDS.iter().chain(target).chain(trajectory).chain(endpoints);
-        let feedback = feedback.map(|number| (number, Role::Feedback));
-        feedback
-            .chain(commands.map(|number| (number, Role::Command)))
-            .map(move |(number, role)| Claim::new(id(node, *number), role, name))
+        let (node, name, has_endpoints) = (self.node, self.name(), self.endpoints.is_some());
+        let claim = move |role| move |number: &u8| Claim::new(id(node, *number), role, name);
+        let sent = COMMANDS.iter().filter(move |number| has_endpoints || **number != ASK_ENDPOINT);
+        heard(self.firmware).iter().map(claim(Role::Feedback)).chain(sent.map(claim(Role::Command)))
     }
 
     fn decode(&mut self, frame: &CanFrame) -> Ingest {
-        if frame.length() != 8 {
-            return Ingest::Malformed(Malformed::Length(frame.length()));
-        }
-        if frame.id() != id(self.node, ESTIMATES) {
-            return Ingest::Malformed(Malformed::Field);
-        }
-        let Some(drive) = Feedback::decode(frame.bytes()) else {
-            return Ingest::Malformed(Malformed::Field);
-        };
-        self.state.drive = Some(drive);
-        (self.state.age_s, self.state.rests) = (0.0, 0);
-        Ingest::Taken
+        ingest_eight(frame, |data| {
+            let is_feedback = frame.id() == id(self.node, ESTIMATES);
+            self.state.drive = Some(Feedback::decode(data).filter(|_| is_feedback)?);
+            (self.state.age_s, self.state.rests) = (0.0, 0);
+            Some(())
+        })
     }
 
     fn velocity(&self) -> AngularVelocity {
@@ -101,13 +84,8 @@ impl OwnMotor for Motor {
     fn control(&mut self, order: Order) -> CanFrame {
         self.state.age_s += order.step.dt_s();
         self.wait(order.step.dt_s());
-        let (Some(drive), Some(angle), false) = (self.state.drive, self.angle(), self.state.stops)
-        else {
-            return self.rest();
-        };
-        if self.axis() != Some(Heartbeat::CLOSED_LOOP) {
-            return self.rest();
-        }
+        let follows = self.axis() == Some(Heartbeat::CLOSED_LOOP) && !self.state.stops;
+        let Some(drive) = self.state.drive.filter(|_| follows) else { return self.rest() };
         (self.state.rests, self.state.clears) = (0, 0);
         self.state.has_polled = self.state.age_s > POLL_S && !self.state.has_polled;
         if self.state.has_polled {
@@ -122,17 +100,9 @@ impl OwnMotor for Motor {
         if self.state.limits.since() == LIMITS_EACH / 2 && self.mode.control.number != POSITION {
             return self.modes();
         }
-        let limit = self.velocity_limit.as_rad_per_s();
-        let shaft = (Some(angle), self.velocity());
-        match self.mode.control.goal(order, shaft, f32::MAX) {
-            Some(Goal::Torque(nm)) => self.send(Command::Torque(nm / self.gear)),
-            Some(Goal::Velocity(velocity)) => {
-                self.send(Command::Velocity(self.turns(velocity.min(limit).max(-limit)), 0.0))
-            }
-            Some(Goal::Way(way)) => {
-                self.send(Command::Position(drive.turns + self.turns(way), 0.0, 0.0))
-            }
-            Some(Goal::Impedance(_)) | None => self.rest(),
+        match self.mode.control.goal(order, (self.angle(), self.velocity()), f32::MAX) {
+            Some(goal) => self.follow(goal, &drive),
+            None => self.rest(),
         }
     }
 
@@ -163,7 +133,8 @@ impl OwnMotor for Motor {
 
     fn poll(&mut self) -> Option<CanFrame> {
         let asks = self.asks();
-        let stay = self.state.drive.filter(|_| !asks).map(|drive| self.stay(&drive));
+        let goal = self.mode.control.stay(self.velocity().as_rad_per_s());
+        let stay = self.state.drive.filter(|_| !asks).map(|drive| self.follow(goal, &drive));
         Some(stay.unwrap_or_else(|| request(self.node, ESTIMATES)))
     }
 
@@ -193,29 +164,24 @@ impl OwnMotor for Motor {
 
     /// Heartbeats are answers too: they tell nothing of the shaft.
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
-        let (data, length) = (frame.bytes(), frame.length());
-        let is = |number| frame.id() == id(self.node, number);
-        if is(HEARTBEAT) && length == 8 {
-            let Some(heartbeat) = Heartbeat::decode(data, self.firmware) else { return false };
-            self.state.stops &= !heartbeat.is_stopped(self.firmware);
-            self.state.heartbeat = Some(heartbeat);
-            self.state.silence_s = 0.0;
-            return true;
-        }
-        if is(ERRORS) && length == 8 {
-            let [a, b, c, d, e, f, g, h] = *data;
-            self.state.errors =
-                (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
-            return true;
-        }
-        if !is(ENDPOINT) {
-            return false;
-        }
-        if let (Some(Inquiry::Read(number)), Some(values)) = (self.settings.asked(), self.endpoints)
-            && let Some(bytes) = endpoint_value(data, length.into(), number)
-        {
-            let value = form_of(number, &values).value_of(bytes);
-            self.settings.take(Inquiry::Read(number), value);
+        let data = frame.bytes();
+        let mut numbers = heard(self.firmware).iter().copied();
+        let number = numbers.find(|number| frame.id() == id(self.node, *number));
+        match (number, frame.length()) {
+            (Some(HEARTBEAT), 8) => {
+                let Some(heartbeat) = Heartbeat::decode(data, self.firmware) else { return false };
+                self.state.stops &= !heartbeat.is_stopped(self.firmware);
+                (self.state.heartbeat, self.state.silence_s) = (Some(heartbeat), 0.0);
+            }
+            (Some(ERRORS), 8) => self.state.errors = words(data),
+            (Some(ENDPOINT), length) => {
+                if let Some(Inquiry::Read((number, form))) = self.settings.asked()
+                    && let Some(bytes) = endpoint_value(data, length.into(), number)
+                {
+                    self.settings.take(Inquiry::Read((number, form)), form.value_of(bytes));
+                }
+            }
+            _ => return false,
         }
         true
     }
@@ -243,11 +209,14 @@ impl OwnMotor for Motor {
     }
 
     fn vitals(&self) -> Vitals {
-        let (fault, reason) = (self.fault_code(), lowest_bit(self.state.errors.1));
-        let (error, error_code) = match (fault, reason) {
-            (0, 0) => (None, 0),
-            (0, reason) => (Some(Severity::Warning), DISARMED + reason),
-            (fault, _) => (Some(Severity::Fault), fault),
+        let told = self.state.heartbeat.map_or(0, |heartbeat| heartbeat.error_code());
+        let refused = self.state.refused.map_or(0, |(code, _)| code);
+        let faults = [told, lowest_bit(self.state.errors.0), refused];
+        let reason = code_from(DISARMED, self.state.errors.1);
+        let (error, error_code) = match (faults.into_iter().find(|code| *code > 0), reason) {
+            (Some(fault), _) => (Some(Severity::Fault), fault),
+            (None, 0) => (None, 0),
+            (None, reason) => (Some(Severity::Warning), reason),
         };
         Vitals {
             error,
@@ -272,23 +241,17 @@ impl Motor {
         self.state.rests == 0
     }
 
-    /// Returns a command that leaves the shaft as it is.
-    fn stay(&self, drive: &Feedback) -> CanFrame {
-        self.send(match self.mode.control.number {
-            VELOCITY => Command::Velocity(drive.turns_per_s, 0.0),
-            POSITION => Command::Position(drive.turns, 0.0, 0.0),
-            _ => Command::Torque(0.0),
+    /// Returns the command for a goal, within the velocity limit. A drive follows no impedance, so that goal is a torque of zero.
+    fn follow(&self, goal: Goal, drive: &Feedback) -> CanFrame {
+        let limit = self.velocity_limit.as_rad_per_s();
+        self.send(match goal {
+            Goal::Velocity(velocity) => {
+                Command::Velocity(self.turns(velocity.min(limit).max(-limit)), 0.0)
+            }
+            Goal::Way(way) => Command::Position(drive.turns + self.turns(way), 0.0, 0.0),
+            Goal::Torque(nm) => Command::Torque(nm / self.gear),
+            Goal::Impedance(_) => Command::Torque(0.0),
         })
-    }
-
-    /// Returns the code of an error that forbids to drive, 0 for none.
-    fn fault_code(&self) -> u8 {
-        let refused = self.state.refused.map_or(0, |(code, _)| code);
-        let told = self.state.heartbeat.map_or(0, |heartbeat| heartbeat.error_code());
-        [told, lowest_bit(self.state.errors.0), refused]
-            .into_iter()
-            .find(|code| *code > 0)
-            .unwrap_or(0)
     }
 }
 

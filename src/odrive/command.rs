@@ -1,9 +1,10 @@
 //! The codec of what a drive is sent.
 
 use super::Firmware;
-use crate::frame::CanFrame;
+use super::config::Endpoint;
+use crate::frame::{CanFrame, standard_id};
 use crate::motor::Form;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 
 /// The number of the heartbeat.
 pub(super) const HEARTBEAT: u8 = 0x01;
@@ -72,40 +73,31 @@ impl Command {
         let (number, first, second) = match self {
             Self::Stop => return CanFrame::of(id(node, 0x02), []),
             Self::ClearErrors => return CanFrame::of(id(node, 0x18), [0]),
-            Self::AxisState(state) => (0x07, state.to_le_bytes(), None),
-            Self::ControllerMode(control, input) => {
-                (0x0B, control.to_le_bytes(), Some(input.to_le_bytes()))
-            }
+            Self::AxisState(state) => (0x07, state, None),
+            Self::ControllerMode(control, input) => (0x0B, control, Some(input)),
             Self::Position(position, velocity, torque) => {
-                let [a, b] = thousandths(velocity).to_le_bytes();
-                let [c, d] = thousandths(torque).to_le_bytes();
-                (0x0C, position.to_le_bytes(), Some([a, b, c, d]))
+                let beside = thousandths(velocity) | thousandths(torque) << 16;
+                (0x0C, position.to_bits(), Some(beside))
             }
-            Self::Velocity(velocity, torque) => floats(0x0D, velocity, Some(torque)),
-            Self::Torque(torque) => floats(0x0E, torque, None),
-            Self::Limits(velocity, current) => floats(0x0F, velocity, Some(current)),
-            Self::TrajectoryVelocity(limit) => floats(0x11, limit, None),
-            Self::TrajectoryAcceleration(up, down) => floats(0x12, up, Some(down)),
+            Self::Velocity(velocity, torque) => (0x0D, velocity.to_bits(), Some(torque.to_bits())),
+            Self::Torque(torque) => (0x0E, torque.to_bits(), None),
+            Self::Limits(velocity, current) => (0x0F, velocity.to_bits(), Some(current.to_bits())),
+            Self::TrajectoryVelocity(limit) => (0x11, limit.to_bits(), None),
+            Self::TrajectoryAcceleration(up, down) => (0x12, up.to_bits(), Some(down.to_bits())),
         };
-        let ([a, b, c, d], id) = (first, id(node, number));
-        match second {
+        let ([a, b, c, d], id) = (first.to_le_bytes(), id(node, number));
+        match second.map(u32::to_le_bytes) {
             Some([e, f, g, h]) => CanFrame::of(id, [a, b, c, d, e, f, g, h]),
-            None => CanFrame::of(id, first),
+            None => CanFrame::of(id, [a, b, c, d]),
         }
     }
 }
 
-type Words = (u8, [u8; 4], Option<[u8; 4]>);
-
-fn floats(number: u8, first: f32, second: Option<f32>) -> Words {
-    (number, first.to_le_bytes(), second.map(f32::to_le_bytes))
-}
-
-/// Rounds to nearest and saturates; NaN is zero.
+/// Returns an `i16` in 1/1000 as the lower half of a word. Rounds to nearest and saturates; NaN is zero.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn thousandths(value: f32) -> i16 {
+fn thousandths(value: f32) -> u32 {
     let scaled = value * 1_000.0;
-    (scaled + 0.5_f32.copysign(scaled)) as i16
+    u32::from(((scaled + 0.5_f32.copysign(scaled)) as i16).cast_unsigned())
 }
 
 /// Asks for a message: a remote frame with its id and length.
@@ -120,7 +112,7 @@ pub(super) fn request(node: u8, number: u8) -> CanFrame {
 /// byte 0            1 .. 2       3   4 ..
 /// 0 read, 1 write   endpoint     0   value, low byte first
 /// ```
-pub(super) fn endpoint(node: u8, number: u16, form: Form, value: Option<f32>) -> CanFrame {
+pub(super) fn endpoint(node: u8, (number, form): Endpoint, value: Option<f32>) -> CanFrame {
     let ([low, high], id) = (number.to_le_bytes(), id(node, ASK_ENDPOINT));
     match (value.map(|value| form.bytes_of(value)), form) {
         (None, _) => CanFrame::of(id, [0, low, high, 0]),
@@ -129,20 +121,15 @@ pub(super) fn endpoint(node: u8, number: u16, form: Form, value: Option<f32>) ->
     }
 }
 
-/// Returns the form of an endpoint: the watchdog's time is a float, all others have one byte.
-pub(super) const fn form_of(number: u16, endpoints: &[(u16, f32); 4]) -> Form {
-    let [_, _, (timeout, _), _] = *endpoints;
-    if number == timeout { Form::F32 } else { Form::U8 }
-}
-
 /// Returns the id of a message: `node * 32 + number`.
 pub(super) fn id(node: u8, number: u8) -> Id {
-    let raw = u16::from(node & 0x3F) << 5 | u16::from(number & 0x1F);
-    StandardId::new(raw).unwrap_or(StandardId::MAX).into()
+    standard_id(u16::from(node & 0x3F) << 5 | u16::from(number & 0x1F))
 }
 
-/// Numbers of the commands that each motor sends, besides that of its target.
-pub(super) const COMMANDS: [u8; 5] = [0x02, 0x07, 0x0B, 0x0F, 0x18];
+/// Numbers of the commands, claimed in each mode of the motor: firmware 0.5 takes a torque from each target, also in torque mode, and
+/// feeds its watchdog by each frame. The last is a command of motors with endpoints only.
+pub(super) const COMMANDS: [u8; 11] =
+    [0x02, 0x07, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x11, 0x12, 0x18, ASK_ENDPOINT];
 
 /// Returns the numbers of what a firmware sends a motor that listens: all, then those of 0.6.
 pub(super) const fn heard(firmware: Firmware) -> &'static [u8] {

@@ -1,7 +1,7 @@
 //! The control mode and the endpoints, with what a user chooses for each.
 
 use crate::error::ConfigError;
-use crate::motor::{ControlMode, ImpedanceControl};
+use crate::motor::{ControlMode, Form, ImpedanceControl};
 
 /// A control mode of the drive. An [`ImpedanceControl`] is one too: torque mode, in which the drive follows a torque that our gains or
 /// loops compute for each cycle.
@@ -15,7 +15,7 @@ pub struct Mode {
 
 /// Control modes.
 pub(super) const TORQUE: u8 = 1;
-pub(super) const VELOCITY: u8 = 2;
+const VELOCITY: u8 = 2;
 pub(super) const POSITION: u8 = 3;
 
 /// Input modes.
@@ -73,7 +73,10 @@ impl Mode {
     }
 }
 
-/// The numbers of endpoints of a drive with firmware 0.6, from the `flat_endpoints.json` of exactly its version: they differ from
+/// Number and form of an endpoint: a setting of the drive.
+pub(super) type Endpoint = (u16, Form);
+
+/// The numbers of endpoints of a drive with firmware 0.6, from the `flat_endpoints.json` of exactly its version: the numbers differ from
 /// version to version.
 ///
 /// With them a motor sets the drive's watchdog and reads its modes back before it enables the drive.
@@ -92,13 +95,13 @@ pub struct Endpoints {
 }
 
 impl Endpoints {
-    /// Returns the number and the value of each, for a mode and a watchdog in s.
-    pub(super) const fn values(&self, mode: &Mode, watchdog_s: f32) -> [(u16, f32); 4] {
+    /// Returns the expected value of each endpoint, for a mode and a watchdog in s.
+    pub(super) const fn values(&self, mode: &Mode, watchdog_s: f32) -> [(Endpoint, f32); 4] {
         [
-            (self.control_mode, mode.control.number as f32),
-            (self.input_mode, mode.input as f32),
-            (self.watchdog_timeout, watchdog_s),
-            (self.enable_watchdog, 1.0),
+            ((self.control_mode, Form::U8), mode.control.number as f32),
+            ((self.input_mode, Form::U8), mode.input as f32),
+            ((self.watchdog_timeout, Form::F32), watchdog_s),
+            ((self.enable_watchdog, Form::U8), 1.0),
         ]
     }
 }

@@ -1,6 +1,6 @@
 //! How a drive is brought into closed loop, step by step.
 
-use super::command::{Command, ESTIMATES, HEARTBEAT, endpoint, form_of, request};
+use super::command::{Command, ESTIMATES, HEARTBEAT, endpoint, request};
 use super::{Firmware, Heartbeat, Motor};
 use crate::frame::CanFrame;
 use crate::motor::{Inquiry, Preparation, Told};
@@ -82,16 +82,16 @@ impl Motor {
         if self.axis() != Some(Heartbeat::IDLE) {
             return self.idle();
         }
-        let (velocity, acceleration) = (self.most_turns(), self.mode.acceleration);
-        let trajectory = acceleration.map(|limit| self.turns(limit).abs()).map(|limit| {
-            [
-                self.send(Command::TrajectoryVelocity(velocity)),
-                self.send(Command::TrajectoryAcceleration(limit, limit)),
-            ]
-        });
-        let frames = [self.modes(), self.limits_of(1.0)];
-        let next = frames.into_iter().chain(trajectory.into_iter().flatten()).nth(place.into());
-        let Some(frame) = next else { return self.asking() };
+        let frame = match (place, self.mode.acceleration) {
+            (0, _) => self.modes(),
+            (1, _) => self.limits_of(1.0),
+            (2, Some(_)) => self.send(Command::TrajectoryVelocity(self.most_turns())),
+            (3, Some(limit)) => {
+                let limit = self.turns(limit).abs();
+                self.send(Command::TrajectoryAcceleration(limit, limit))
+            }
+            _ => return self.asking(),
+        };
         self.state.phase = Phase::Starting(place + 1);
         self.settings.forget();
         frame
@@ -101,21 +101,12 @@ impl Motor {
     fn asking(&mut self) -> CanFrame {
         let Some(values) = self.endpoints else { return self.request_closed_loop() };
         let [.., timeout, enable] = values;
-        let watchdog = [timeout, enable].map(|(number, value)| Preparation::exact(number, value));
+        let watchdog = [timeout, enable].map(|(setting, value)| Preparation::exact(setting, value));
+        let is_right = |setting, found| values.contains(&(setting, found));
         match self.settings.prepare(watchdog) {
-            Some(Inquiry::Write(number, value)) => {
-                endpoint(self.node, number, form_of(number, &values), Some(value))
-            }
-            Some(Inquiry::Read(number)) => {
-                endpoint(self.node, number, form_of(number, &values), None)
-            }
-            _ if self
-                .settings
-                .wrong(|number, found| values.contains(&(number, found)))
-                .is_some() =>
-            {
-                self.refuse(NOT_SET)
-            }
+            Some(Inquiry::Write(setting, value)) => endpoint(self.node, setting, Some(value)),
+            Some(Inquiry::Read(setting)) => endpoint(self.node, setting, None),
+            _ if self.settings.wrong(is_right).is_some() => self.refuse(NOT_SET),
             _ => self.request_closed_loop(),
         }
     }

@@ -39,9 +39,8 @@ impl Feedback {
     /// Reads the encoder estimates, message 0x09; `None` if one is not finite.
     #[must_use]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
-        let [a, b, c, d, e, f, g, h] = *data;
-        let (turns, turns_per_s) =
-            (f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h]));
+        let (turns, turns_per_s) = words(data);
+        let (turns, turns_per_s) = (f32::from_bits(turns), f32::from_bits(turns_per_s));
         if turns.is_finite() && turns_per_s.is_finite() {
             Some(Self { turns, turns_per_s })
         } else {
@@ -94,17 +93,13 @@ impl Heartbeat {
     #[must_use]
     pub const fn decode(data: &[u8; 8], firmware: Firmware) -> Option<Self> {
         let [a, b, c, d, state, x, y, z] = *data;
-        let is_old = matches!(firmware, Firmware::V0_5);
-        if is_old && (x > 1 || y > 1 || z & 0x7E != 0) {
-            return None;
-        }
-        Some(Self {
-            axis_error: u32::from_le_bytes([a, b, c, d]),
-            state,
-            has_errors: if is_old { [x == 1, y == 1, z & 1 == 1] } else { [false; 3] },
-            procedure_result: if is_old { 0 } else { x },
-            is_done: if is_old { z & 0x80 != 0 } else { y & 1 == 1 },
-        })
+        let (has_errors, procedure_result, is_done) = match firmware {
+            Firmware::V0_5 if x > 1 || y > 1 || z & 0x7E != 0 => return None,
+            Firmware::V0_5 => ([x == 1, y == 1, z & 1 == 1], 0, z & 0x80 != 0),
+            Firmware::V0_6 => ([false; 3], x, y & 1 == 1),
+        };
+        let axis_error = u32::from_le_bytes([a, b, c, d]);
+        Some(Self { axis_error, state, has_errors, procedure_result, is_done })
     }
 
     /// Returns the number of an error, 0 where there is none: 1 to 32 for the lowest bit of the axis error, 33 to 35 for an error of
@@ -130,7 +125,13 @@ impl Heartbeat {
     }
 }
 
-/// Reads the value of an endpoint from an answer of 5 to 8 bytes; `None` for that of another one.
+/// Reads two words, low byte first.
+pub(super) const fn words(data: &[u8; 8]) -> (u32, u32) {
+    let [a, b, c, d, e, f, g, h] = *data;
+    (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
+}
+
+/// Reads the value of an endpoint from an answer of 5 to 8 bytes; `None` for another endpoint.
 ///
 /// ```text
 /// byte 0   1 .. 2     3   4 ..

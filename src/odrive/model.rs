@@ -1,6 +1,6 @@
 //! Facts of the motors, as a table that a program can extend.
 
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check};
 
 /// A motor at an ODrive: its name and its torque constant.
 ///
@@ -46,10 +46,8 @@ impl Model {
     /// # Errors
     /// [`ConfigError::Range`] for a constant that is not between 0.1 and 100000.
     pub const fn new(name: &'static str, kv: f32) -> Result<Self, ConfigError> {
-        match ConfigError::check_range("velocity constant in rpm/V", kv, 0.1, 100_000.0) {
-            Ok(()) => Ok(Self { name, kv }),
-            Err(error) => Err(error),
-        }
+        check!(ConfigError::check_range("velocity constant in rpm/V", kv, 0.1, 100_000.0));
+        Ok(Self { name, kv })
     }
 
     /// Returns the name, as errors print it.

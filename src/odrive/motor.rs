@@ -1,11 +1,11 @@
 //! The motor: what a program configures, and what it may ask and request.
 
-use super::config::{Endpoints, Mode};
+use super::config::{Endpoint, Endpoints, Mode};
 use super::enabling::Phase;
 use super::{Feedback, Firmware, Heartbeat, Model};
 use crate::error::ConfigError;
 use crate::frame::CanFrame;
-use crate::motor::{Settings, Told};
+use crate::motor::{Form, Settings, Told};
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
@@ -33,9 +33,9 @@ pub struct Motor {
     /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
     pub(super) gear: f32,
     pub(super) mode: Mode,
-    /// The numbers of the endpoints, and the values that they have to have.
-    pub(super) endpoints: Option<[(u16, f32); 4]>,
-    pub(super) settings: Settings<u16, 4>,
+    /// The endpoints, with their expected values.
+    pub(super) endpoints: Option<[(Endpoint, f32); 4]>,
+    pub(super) settings: Settings<Endpoint, 4>,
     pub(super) state: State,
 }
 
@@ -95,7 +95,7 @@ impl Motor {
             gear: 1.0,
             mode,
             endpoints: None,
-            settings: Settings::new([0; 4]),
+            settings: Settings::new([(0, Form::U8); 4]),
             state: State::default(),
         })
     }
@@ -131,7 +131,7 @@ impl Motor {
         let micros =
             ConfigError::check_micros("watchdog in us", watchdog.micros_u32(), 10_000, 10_000_000)?;
         let values = endpoints.values(&self.mode, micros as f32 * 1e-6);
-        let settings = Settings::new(values.map(|(number, _)| number));
+        let settings = Settings::new(values.map(|(endpoint, _)| endpoint));
         Ok(Self { endpoints: Some(values), settings, ..self })
     }
 

@@ -251,6 +251,48 @@ fn estimates_that_are_not_cyclic_are_asked_for_within_one_frame_a_cycle() {
     }
 }
 
+/// Firmware 0.5.6, `set_input_pos_callback` and `set_input_vel_callback`: both set the torque beside the target, and an axis in torque
+/// mode follows this torque.
+#[test]
+fn a_target_of_another_node_is_a_second_master_in_each_mode() {
+    let each: [fn() -> Bench; 3] = [
+        || Bench::armed(torque(), Firmware::V0_5),
+        || Bench::armed(Mode::velocity(3.0), Firmware::V0_5),
+        || Bench::armed(Mode::position(3.0), Firmware::V0_6),
+    ];
+    for bench in each {
+        for number in [0x0C, 0x0D, 0x0E, 0x0F, 0x11, 0x12] {
+            let mut bench = bench();
+            let master = |bench: &Bench| drivetrain::motor::CanDevice::second_master(&bench.own);
+            assert_eq!(master(&bench), None);
+            let foreign = CanFrame::of(StandardId::new(0x60 | number).unwrap(), [0; 8]);
+            let now = bench.now();
+            assert_eq!(Devices::ingest(&mut bench.own, &foreign, now), Ingest::Unrelated);
+            let name = master(&bench).map(|claim| claim.to_string());
+            assert_eq!(name, Some(format!("command of D6374 #3 on 0x{:X}", 0x60 | number)));
+        }
+    }
+}
+
+/// A wheel that somebody turns faster than the limit is not asked to go on so fast while its drive is brought into closed loop.
+#[test]
+fn a_velocity_before_closed_loop_keeps_within_the_limit() {
+    let most_turns = 20.0 * GEAR / core::f32::consts::TAU;
+    for (turns_per_s, expected) in
+        [(3.0, 3.0), (-3.0, -3.0), (40.0, most_turns), (-1e30, -most_turns), (f32::MAX, most_turns)]
+    {
+        let mut wheel = motor(Mode::velocity(3.0), Firmware::V0_5);
+        let [[a, b, c, d], [e, f, g, h]] = [0.0, turns_per_s].map(f32::to_le_bytes);
+        let estimates = CanFrame::of(StandardId::new(0x69).unwrap(), [a, b, c, d, e, f, g, h]);
+        assert_eq!(wheel.decode(&estimates), Ingest::Taken);
+        let target = wheel.poll().unwrap();
+        assert_eq!(target.header(), 0x6D);
+        let [a, b, c, d, ..] = *target.bytes();
+        let sent = f32::from_le_bytes([a, b, c, d]);
+        assert!((sent - expected).abs() < 1e-5 * expected.abs(), "{sent} of {turns_per_s}");
+    }
+}
+
 #[test]
 fn a_refused_closed_loop_is_a_fault_with_its_reason_and_can_be_tried_again() {
     let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_6);

@@ -178,7 +178,16 @@ impl ControlMode {
         }
     }
 
-    /// Returns the torque of the last command as a share of the largest; 0 where it is not known.
+    /// Returns the goal of a shaft that is to keep its present velocity in rad/s.
+    pub(crate) const fn stay(&self, velocity: f32) -> Goal {
+        match self.follows {
+            Follows::Impedance(_) | Follows::Torque(_) => Goal::Torque(0.0),
+            Follows::Velocity => Goal::Velocity(velocity),
+            Follows::Angle => Goal::Way(0.0),
+        }
+    }
+
+    /// Returns the torque of the last command as a share of the largest; 0 if unknown.
     pub(crate) fn effort(&self) -> f32 {
         match &self.follows {
             Follows::Impedance(control) => control.effort(),
