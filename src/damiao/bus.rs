@@ -14,10 +14,10 @@ use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit;
 
-/// The largest share by which a range may differ from that of the model: rounding of the drive's display.
+/// The largest share by which a range may differ from the range of the model: rounding of the drive's display.
 const RANGE_TOLERANCE: f32 = 1e-4;
 
-/// The registers that have to be as configured.
+/// The registers compared with the configuration before arming.
 const CHECKED: [Register; 4] = [
     Register::ControlMode,
     Register::PositionRange,
@@ -25,7 +25,7 @@ const CHECKED: [Register; 4] = [
     Register::TorqueRange,
 ];
 
-/// A motor of this family in one of the control modes: see the [module](super).
+/// A motor of this family in a control mode: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -54,7 +54,7 @@ pub struct Motor {
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
     settings: Settings<Register, { CHECKED.len() }>,
-    /// Counts the frames that enable or disable.
+    /// Counts the frames to enable or disable the drive.
     specials: u8,
 }
 
@@ -64,7 +64,7 @@ impl Motor {
     /// Takes the model, the id of the drive, 1 to 15, and the control mode. The master id is `id + 0x10`, as the manual advises.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 15.0)?;
         let mode = mode.into();
@@ -81,10 +81,10 @@ impl Motor {
         })
     }
 
-    /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which may be that of other drives too.
+    /// Sets the register `MST_ID` of the drive: the id of its feedback, 0 to 0x7FE, which several drives may share.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for that of the motor's own commands.
+    /// [`ConfigError::Range`] for another id; [`ConfigError::Conflict`] for the id of the motor's own commands.
     pub fn with_master_id(self, master_id: u16) -> Result<Self, ConfigError> {
         ConfigError::check_range("master id", master_id.into(), 0.0, 2046.0)?;
         if [self.command_id(), self.id.into()].contains(&master_id) {
@@ -93,7 +93,7 @@ impl Motor {
         Ok(Self { master_id, ..self })
     }
 
-    /// Sets the time without a command after which the drive disables itself: 1 ms to 60 s, 100 ms at first.
+    /// Sets the time without a command until the drive disables itself: 1 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
     /// [`ConfigError::Range`] for another time.
@@ -108,7 +108,7 @@ impl Motor {
     }
 
     /// Has the drive keep all of its registers over a loss of the supply; while the motor is disarmed.
-    /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
+    /// The frame goes out once, for flash memory wears: a frame refused by the bus is lost.
     pub const fn store(&mut self) {
         self.settings.request(Inquiry::Store);
     }
@@ -122,7 +122,7 @@ impl Motor {
         CanFrame::of(standard_id(self.command_id()), command.encode(self.model.ranges()))
     }
 
-    /// Returns the manual's name of a register, and the value that it has to have.
+    /// Returns the manual's name of a register, and its configured value.
     fn expected(&self, register: Register) -> (&'static str, f32) {
         match register {
             Register::PositionRange => ("PMAX", self.model.pmax_rad()),
@@ -132,7 +132,7 @@ impl Motor {
         }
     }
 
-    /// Tells whether a value in the drive is the expected one.
+    /// Tells whether a value in the drive is as configured.
     fn is_right(&self, register: Register, found: f32) -> bool {
         let (_, expected) = self.expected(register);
         (found - expected).abs() <= RANGE_TOLERANCE * expected
@@ -200,8 +200,8 @@ impl OwnMotor for Motor {
         self.mode.0.reset();
     }
 
-    /// First what is not known of the settings, then the time-out, written and read back, then the frame that enables: each of
-    /// them needs all of that anew, for the drive may have lost its supply since.
+    /// Asks for unknown settings, then writes the time-out and reads the register back, then enables the drive: each time
+    /// anew, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
         let timeout = Preparation::exact(Register::Timeout, self.timeout.value());
         let asked = self.settings.prepare([timeout]);
@@ -273,14 +273,14 @@ impl OwnMotor for Motor {
 }
 
 impl Motor {
-    /// Disables the drive; where it reports an error, clears that in turn, which leaves it disabled.
+    /// Disables the drive. If the drive reports an error, each second pair of frames clears the error, and the drive stays disabled.
     fn off(&mut self) -> CanFrame {
         let has_error = self.drive.is_some_and(|drive| drive.status.is_error());
         let clears = has_error && self.specials & 2 != 0;
         self.special(if clears { CLEAR_ERROR } else { mit::DISABLE })
     }
 
-    /// Sends a frame that enables or disables to the id of the mode and to the bare id in turn: programs of the vendor use the one,
+    /// Sends a frame to enable or disable to the id of the mode and to the bare id in turn: programs of the vendor use the first,
     /// three public packages the other.
     fn special(&mut self, data: [u8; 8]) -> CanFrame {
         self.specials = self.specials.wrapping_add(1);

@@ -1,20 +1,20 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use super::Register;
 use crate::frame::{CanFrame, standard_id};
 use crate::motor::Inquiry;
 use crate::wire::mit;
 
-/// The id of the frames that ask for registers, of every drive.
+/// The id of the frames with questions for registers, for every drive.
 pub(super) const REGISTERS: u16 = 0x7FF;
 
-/// Clears an error of the drive, which stays disabled.
+/// Clears an error of the drive. The drive stays disabled.
 pub(super) const CLEAR_ERROR: [u8; 8] = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFB];
 
 /// The largest velocity of a force-position command, in rad/s.
 pub(super) const MOST_VELOCITY: f32 = 100.0;
 
-/// A command of one of the four control modes, in units of the output shaft.
+/// A command of any of the four control modes, in units of the output shaft.
 ///
 /// # Examples
 /// ```

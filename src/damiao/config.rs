@@ -1,4 +1,4 @@
-//! The control mode, with what a user chooses for it.
+//! The control mode, with its parameters.
 
 use super::command::{Command, MOST_VELOCITY};
 use super::{Feedback, Model};
@@ -6,7 +6,7 @@ use crate::error::ConfigError;
 use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, inside};
 use crate::units::AngularVelocity;
 
-/// A control mode of the drive. An [`ImpedanceControl`] is one too: MIT mode, in which the drive follows an impedance.
+/// A control mode of the drive. An [`ImpedanceControl`] is also a mode: MIT mode, where the drive follows an impedance.
 ///
 /// # Examples
 /// ```
@@ -59,20 +59,20 @@ impl Mode {
         Self(ControlMode::angle(FORCE_POSITION, Some(velocity_limit), Some(torque_limit_nm)))
     }
 
-    /// What is added to the id of the drive.
+    /// The number added to the id of the drive.
     pub(super) const fn base(&self) -> u16 {
         (self.0.number as u16 - 1) << 8
     }
 
     /// # Errors
-    /// A limit that is not within the ranges of the model.
+    /// A limit beyond the ranges of the model.
     pub(super) fn check(&self, model: &Model) -> Result<(), ConfigError> {
         let is_packed = self.0.number == FORCE_POSITION;
         let vmax = if is_packed { MOST_VELOCITY } else { f32::INFINITY };
         self.0.check(vmax.min(model.vmax_rad_per_s()), 0.0, model.tmax_nm())
     }
 
-    /// Returns what the drive is told within the share of its largest effort; `None` to rest.
+    /// Returns the command to the drive within the share of its largest effort; `None` to rest.
     #[inline]
     pub(super) fn command(
         &mut self,
@@ -97,8 +97,8 @@ impl Mode {
         })
     }
 
-    /// Returns a target where the shaft is, for before the drive is enabled. A drive in MIT mode that is enabled follows the last command,
-    /// which was rest.
+    /// Returns a target where the shaft is, for before the drive is enabled. An enabled drive in MIT mode follows the last command,
+    /// a command of rest.
     pub(super) const fn stay(&self, drive: &Feedback) -> Option<Command> {
         let position = drive.measured.position_rad;
         match self.0.number {

@@ -1,11 +1,11 @@
-//! The codec of what a drive sends: its feedback, and answers about registers.
+//! The codec of frames from a drive: its feedback, and answers about registers.
 
 use super::Register;
 use crate::motor::Inquiry;
 use crate::units::Angle;
 use crate::wire::mit::{self, Ranges};
 
-/// What a drive reports with each frame.
+/// A report of a drive.
 ///
 /// ```text
 /// byte 0          1 ..  2    3 .. 5                    6       7
@@ -63,9 +63,9 @@ impl Feedback {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Status {
-    /// 0: it gives no torque.
+    /// 0: the drive gives no torque.
     Disabled = 0,
-    /// 1: it follows commands.
+    /// 1: the drive follows commands.
     Enabled = 1,
     /// 8: the supply is above its limit.
     OverVoltage = 8,
@@ -99,13 +99,13 @@ impl Status {
         })
     }
 
-    /// Tells whether the drive has switched itself off because of an error, which is to be cleared.
+    /// Tells whether the drive has switched itself off because of an error, still to be cleared.
     #[must_use]
     pub const fn is_error(self) -> bool {
         !matches!(self, Self::Disabled | Self::Enabled)
     }
 
-    /// Returns the number of the error, 0 where there is none.
+    /// Returns the number of the error; 0 without an error.
     #[must_use]
     pub const fn error_code(self) -> u8 {
         if self.is_error() { self as u8 } else { 0 }
@@ -114,7 +114,7 @@ impl Status {
 
 /// Reads the value in the answer to an inquiry; `None` for any other frame. The answer has the id of the feedback.
 ///
-/// Only the register that was asked for, of this drive, counts.
+/// Only the register in question, of this drive, counts.
 ///
 /// ```text
 /// byte 0 .. 1    2                       3                4 ..  7
@@ -133,8 +133,8 @@ pub(super) fn value(data: &[u8; 8], id: u8, inquiry: Inquiry<Register>) -> Optio
 
 /// Tells whether a frame reads like an answer about a register of a drive, awaited or not: of a tool, or come twice.
 ///
-/// A drive that is disabled and turns backward with nearly the largest velocity, at the lower end of its range, reports the same
-/// bytes: it counts as silent then.
+/// If a disabled drive turns backward with nearly the largest velocity, at the lower end of its range, and so reports the same
+/// bytes, the drive counts as silent.
 pub(super) const fn is_answer(data: &[u8; 8], id: u8) -> bool {
     let [low, high, verb, number, ..] = *data;
     low == id && high == 0 && matches!(verb, 0x33 | 0x55 | 0xAA) && number <= LAST_REGISTER

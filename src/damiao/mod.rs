@@ -9,10 +9,10 @@
 //! registers  0x7FF       id 16 | read 0x33, write 0x55, store 0xAA | number | value
 //! feedback   master id   status 4 | id 4 | position 16 | velocity 12 | torque 12 bits | two temperatures
 //! ```
-//! Standard frames of 8 bytes at 1 Mbit/s. A drive sends one for each that it gets, so the bus carries two a motor and cycle: at
-//! 1 kHz it is full with three. Several drives may have one master id.
+//! Standard frames of 8 bytes at 1 Mbit/s. A drive answers each frame with a frame, so the bus carries two a motor and cycle: at
+//! 1 kHz three motors fill the bus. Several drives may share a master id.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its
+//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its
 //! control mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
@@ -22,9 +22,9 @@
 //! | [`Mode::position_velocity`] | angle | the drive alone | disabled |
 //! | [`Mode::velocity`] | velocity | the drive alone | disabled |
 //!
-//! **Before a motor is armed, its registers are read.** `CTRL_MODE`, `PMAX`, `VMAX` and `TMAX` have to be what the configuration
-//! says, else [`arm`](crate::motor::Devices::arm) names the register and both values: a drive in another mode discards the
-//! commands, and one with other ranges gives another torque. The first answer takes some 50 ms.
+//! **Before a motor is armed, its registers are read.** `CTRL_MODE`, `PMAX`, `VMAX` and `TMAX` have to match the configuration,
+//! else [`arm`](crate::motor::Devices::arm) names the register and both values: a drive in another mode discards the
+//! commands, and a drive with other ranges gives another torque. The first answer takes some 50 ms.
 //!
 //! **When the program stops, the drive does**: `TIMEOUT` is written and read back each time before the drive is enabled, 100 ms
 //! unless configured otherwise.
@@ -41,12 +41,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Sources: the register table and frames as python-damiao-driver (damiao-motor 1.0.6) documents them, which agree with librm and
+//! Sources: the register table and frames as python-damiao-driver (damiao-motor 1.0.6) documents them, in agreement with librm and
 //! reBot; the master id, the time-out and the states also from the manual of the DM-J4310-2EC. Frames of public tests are in
-//! `tests/data/wire`. Not known: how a drive behaves that is enabled without a target in the modes other than MIT; so a target
-//! where the shaft is goes out in each cycle until it is. A position mode brakes a shaft that turns when it is enabled with what the
-//! drive has. `Mode::force_position` takes TMAX for the torque at full current, as damiao-motor says. Programs of the vendor send enabling and disabling frames to
-//! the id of the mode, public packages to the bare id: here they go to both in turn.
+//! `tests/data/wire`. Not known: the behaviour of a drive enabled without a target in the modes other than MIT; so a target where the
+//! shaft is goes out in each cycle until it is. In a position mode, a drive enabled while its shaft turns brakes the shaft with the
+//! whole torque of the drive. `Mode::force_position` takes TMAX for the torque at full current, as damiao-motor says. Programs of the
+//! vendor send enabling and disabling frames to the id of the mode, public packages to the bare id: here the frames go to both in
+//! turn.
 
 mod bus;
 mod command;

@@ -1,12 +1,12 @@
-//! Facts of the models, as a table that a program can extend.
+//! Facts of the models, as a table open to further models.
 
 use crate::error::ConfigError;
 use crate::motor::{mit_model, models};
 use crate::wire::mit::Ranges;
 
-/// A model of motor: its name and the ranges of its fields, which are registers of the drive.
+/// A model of motor: its name and the ranges of its fields, registers of the drive.
 ///
-/// The torques and speeds of the ranges are those of the protocol, not of the motor: a program states the
+/// The torques and speeds of the ranges belong to the protocol, not to the motor: a program states the
 /// limit of the motor with its mode.
 ///
 /// | model | PMAX rad | VMAX rad/s | TMAX Nm | seen in |
@@ -24,7 +24,7 @@ use crate::wire::mit::Ranges;
 /// | [`H3510`](Self::H3510) | 12.5 | 280 | 1 | damiao-motor |
 /// | [`H6215`](Self::H6215) | 12.5 | 45 | 10 | damiao-motor, as G6215 |
 ///
-/// They are the values at delivery. A drive may be set otherwise, so a motor reads its registers before it is armed, and is not
+/// The table has the values at delivery. A drive may have other settings, so a motor reads its registers before arming, and is not
 /// armed where they differ: a torque would be wrong by the quotient.
 ///
 /// # Examples
@@ -62,11 +62,11 @@ models! {
 mit_model!(4_095);
 
 impl Model {
-    /// Describes a model that the table does not have, or a drive that is set otherwise: its registers PMAX in rad, VMAX in rad/s
+    /// Describes a model missing from the table, or a drive with other settings: its registers PMAX in rad, VMAX in rad/s
     /// and TMAX in Nm.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] names the first range that is not between 0.001 and 1000000.
+    /// [`ConfigError::Range`] names the first range not between 0.001 and 1000000.
     pub const fn new(
         name: &'static str,
         pmax_rad: f32,

@@ -5,7 +5,7 @@ use crate::motor::registers;
 registers! {
     /// A register of a drive.
     ///
-    /// A [`Float`](Self::is_float) register has an `f32`, another one an integer. Those that calibrate or describe the motor are
+    /// A [`Float`](Self::is_float) register has an `f32`, any other register an integer. Registers to calibrate or describe the motor are
     /// [read only](Self::is_writable).
     "register" number u8;
 

@@ -18,19 +18,19 @@ const FRAMES: u16 = 0x140;
 /// The place of the question for the angle among 32 commands.
 const HALF_WAY: u8 = 16;
 
-/// After so many commands without feedback the drive may have lost its supply. One of them may be a question.
+/// After so many commands without feedback the drive may have lost its supply. A question may be among them.
 pub(crate) const SILENT: u8 = 4;
 
 /// A turn of the rotor in the unit of the drive, 0.01°.
 const TURN: i64 = 36_000;
 
-/// The state of a drive that is off.
+/// The state of a switched-off drive.
 const OFF: u8 = 0x10;
 
 /// How many echoes may be due at once.
 const ECHOES: u8 = 3;
 
-/// A motor of this family in one of the control modes: see the [module](super).
+/// A motor of this family in a control mode: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -54,11 +54,11 @@ pub struct Motor {
     drive: Option<Feedback>,
     /// The angle of the rotor in 1/65536 of a turn, with turns.
     rotor: i64,
-    /// The last state; `None` when it is not known.
+    /// The last state; `None` if unknown.
     state: Option<State>,
-    /// The drive was on when it said last, and was not told to be off since.
+    /// The drive was on by its last report, and no frame has switched the drive off since.
     is_on: bool,
-    /// What the angle that the drive counts is ahead of the rotor's, in 0.01°; `None` when it is not known.
+    /// Angle counted by the drive minus angle of the rotor, in 0.01°; `None` if unknown.
     ahead: Option<i64>,
     /// How many commands were made since the last feedback or the last angle.
     silent: u8,
@@ -74,7 +74,7 @@ impl Motor {
     /// Takes the model, the id of the drive, 1 to 32, and the control mode.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
         let mode = mode.into();
@@ -129,7 +129,7 @@ impl Motor {
         (self.rotor * TURN) >> 16
     }
 
-    /// Returns the command for a goal with a limit; `None` if the drive cannot be told.
+    /// Returns the command for a goal with a limit; `None` if the protocol has no such command.
     fn command(&self, goal: Goal, limit: u16) -> Option<Command> {
         let to_rotor = 100.0 * self.model.gear() / RAD_PER_DEGREE;
         match goal {
@@ -149,8 +149,8 @@ impl Motor {
         }
     }
 
-    /// Takes the angle that the drive has counted. One that differs from the last by more than half a turn has begun anew, so
-    /// the drive had no supply: it counts as off.
+    /// Takes the angle counted by the drive. If the angle differs from the last by more than half a turn, the count has begun anew, so
+    /// the drive had no supply, and counts as off.
     fn take_angle(&mut self, angle: i64) {
         let ahead = angle - self.rotor_angle();
         let is_other = |before: i64| (ahead - before).abs() > TURN / 2;
@@ -162,12 +162,12 @@ impl Motor {
         }
     }
 
-    /// Forgets that the drive is on, until it says so again.
+    /// Counts the drive as off, with an unknown angle, until the drive reports otherwise.
     const fn doubt(&mut self) {
         (self.is_on, self.ahead) = (false, None);
     }
 
-    /// Switches the drive on or off, which it echoes.
+    /// Switches the drive on or off; the drive echoes the frame.
     fn switch(&mut self, command: Command) -> CanFrame {
         self.echoes = (self.echoes + 1).min(ECHOES);
         self.frame_of(command)
@@ -223,8 +223,8 @@ impl OwnMotor for Motor {
         self.frame_of(Command::REST)
     }
 
-    /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
-    /// from the angle until that has been read again.
+    /// Some commands give way to questions: the drive goes on with the command before. A new command goes first. After a silence
+    /// nothing counts from the angle until the angle has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
         let needs_angle = self.mode.0.is_angle();
         let (shaft, scale) = ((self.angle(), self.velocity()), self.model.scale());
@@ -249,7 +249,7 @@ impl OwnMotor for Motor {
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
     }
 
-    /// Run and the question for the state in turn, then the question for the angle if commands count from it.
+    /// Sends run and the question for the state in turn, then the question for the angle if commands count from the angle.
     fn enable(&mut self, sent: u8) -> Option<CanFrame> {
         (self.is_wanted, self.clears) = (true, false);
         if sent == 0 {
@@ -264,7 +264,8 @@ impl OwnMotor for Motor {
         })
     }
 
-    /// Off, which counts as followed until the drive says otherwise; where it reports an error, clears that in turn.
+    /// Switches the drive off; the drive counts as off unless a later report differs. If the drive reports an error, clears the error
+    /// in turn.
     fn disable(&mut self) -> Option<CanFrame> {
         self.is_wanted = false;
         self.doubt();

@@ -1,4 +1,4 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use crate::frame::standard_id;
 use embedded_can::Id;
@@ -16,15 +16,15 @@ use embedded_can::Id;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// Switches the drive off: no torque, and its turns and its last command are forgotten. It still answers.
+    /// Switches the drive off: no torque, and its turns and its last command are forgotten. The drive still answers.
     Off,
-    /// Switches the drive on: it follows the commands that come from now on.
+    /// Switches the drive on: the drive follows later commands.
     Run,
     /// A torque current in counts, -2048 to 2048.
     Torque(i16),
     /// A velocity in 0.01°/s, and the largest current in counts. Drives with protocol V2.35 read no limit there.
     Velocity(i32, u16),
-    /// To an angle in 0.01° over the turns that the drive has counted, with at most so many °/s.
+    /// To an angle in 0.01° over the turns counted by the drive, with at most so many °/s.
     Position(i32, u16),
     /// Asks for [`Feedback`](super::Feedback).
     ReadFeedback,
@@ -37,7 +37,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// The current that gives no torque: what a motor at rest is sent.
+    /// A current without torque: the command of a motor at rest.
     pub const REST: Self = Self::Torque(0);
 
     /// Writes the data of a frame. A current beyond the range is sent as its end.
@@ -74,10 +74,10 @@ const fn within(current: i16) -> i16 {
     }
 }
 
-/// Tells whether a frame reads like a command of a controller rather than like an answer. `limit` is the largest value that the motor
+/// Tells whether a frame reads like a command of a controller rather than like an answer. `limit` is the largest value sent by the motor
 /// writes to bytes 2 and 3.
 ///
-/// Byte 1 of a command is 0, which is a temperature of 0 °C in an answer.
+/// Byte 1 of a command is 0; in an answer a 0 there is a temperature of 0 °C.
 pub(crate) const fn is_command(data: &[u8; 8], limit: u16) -> bool {
     let [code, first, a, b, c, d, e, f] = *data;
     first == 0

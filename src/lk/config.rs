@@ -1,11 +1,11 @@
-//! The control mode, with what a user chooses for it.
+//! The control mode, with its parameters.
 
 use super::model::{RAD_PER_DEGREE, Scale};
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, ImpedanceControl};
 use crate::units::AngularVelocity;
 
-/// A control mode of the drive. An [`ImpedanceControl`] is one too: torque frames, in which the drive follows a current that is
+/// A control mode of the drive. An [`ImpedanceControl`] is also a mode: torque frames, with a current
 /// calculated here from torque, impedance, velocity or angle.
 #[derive(Debug, Clone, Copy)]
 pub struct Mode(pub(crate) ControlMode);
@@ -22,15 +22,16 @@ impl From<ImpedanceControl> for Mode {
 }
 
 impl Mode {
-    /// Velocity mode: the drive's own loop follows a velocity, at most so fast: above 0 and at most what feedback tells: 572 rad/s, of
-    /// the rotor of `lk` and of the output shaft of `rmd`.
+    /// Velocity mode: the drive's own loop follows a velocity, at most so fast: above 0 and at most the range of the feedback:
+    /// 572 rad/s, of the rotor of `lk` and of the output shaft of `rmd`.
     #[must_use]
     pub const fn velocity(velocity_limit: AngularVelocity) -> Self {
         Self(ControlMode::velocity(VELOCITY, Some(velocity_limit), None))
     }
 
-    /// Velocity mode with a limit of the torque in Nm too, on drives that read the limit: protocol V2.35 of `lk` has no field for it, and
-    /// such a drive keeps to its own setting. Motors of `rmd` refuse it. The [share](crate::motor::Order::share) of an order lowers it.
+    /// Velocity mode with a limit of the torque in Nm too, on drives with a field for the limit: protocol V2.35 of `lk` has no such
+    /// field, and such a drive keeps to its own setting. Motors of `rmd` refuse this mode. The [share](crate::motor::Order::share) of
+    /// an order lowers the limit.
     #[must_use]
     pub const fn velocity_with_torque_limit(
         velocity_limit: AngularVelocity,
@@ -39,7 +40,7 @@ impl Mode {
         Self(ControlMode::velocity(VELOCITY, Some(velocity_limit), Some(torque_limit_nm)))
     }
 
-    /// Position mode: the drive's own loops go to an angle over its turns, at most so fast: above 0 and at most what feedback tells:
+    /// Position mode: the drive's own loops go to an angle over its turns, at most so fast: above 0 and at most the range of the feedback:
     /// 572 rad/s, of the rotor of `lk` and of the output shaft of `rmd`.
     #[must_use]
     pub const fn position_velocity(velocity_limit: AngularVelocity) -> Self {
@@ -47,7 +48,7 @@ impl Mode {
     }
 
     /// # Errors
-    /// A limit that is not within the ranges of the model.
+    /// A limit beyond the ranges of the model.
     pub(crate) fn check(&self, scale: &Scale) -> Result<(), ConfigError> {
         let has_limit = self.0.number == VELOCITY && self.0.torque_limit_nm().is_some();
         if has_limit && !scale.limits_torque {
@@ -56,8 +57,8 @@ impl Mode {
         self.0.check(scale.max_velocity, scale.torque_per_count, scale.max_torque_nm)
     }
 
-    /// Returns what a command has in bytes 2 and 3 within this share of the limits: the largest current in counts, or the largest velocity
-    /// in °/s of the wire. 0 is none.
+    /// Returns bytes 2 and 3 of a command within this share of the limits: the largest current in counts, or the largest velocity
+    /// in °/s of the wire. 0 stands for no limit.
     pub(crate) fn limit(&self, share: f32, scale: &Scale) -> u16 {
         match self.0.number {
             VELOCITY => self
@@ -70,7 +71,7 @@ impl Mode {
     }
 }
 
-/// Truncates to a limit of the wire: 0 would be none.
+/// Truncates to a limit of the wire, at least 1: 0 would stand for no limit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn at_least_one(value: f32) -> u16 {
     (value as u16).max(1)

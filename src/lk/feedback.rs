@@ -1,4 +1,4 @@
-//! The codec of what a drive sends.
+//! The codec of frames from a drive.
 
 use super::Model;
 use super::model::RAD_PER_DEGREE;
@@ -118,17 +118,17 @@ pub struct State {
     pub temperature_c: i8,
     /// The voltage of the supply in V.
     pub supply_v: f32,
-    /// The current of the supply in A; negative while the motor generates. The manual has it without a sign, so one beyond 327 A
+    /// The current of the supply in A; negative while the motor generates. The manual has no sign, so a current beyond 327 A
     /// reads negative.
     pub supply_a: f32,
     /// The drive follows commands, as after its supply came.
     pub is_on: bool,
-    /// The errors, a bit each; 0 for none.
+    /// The errors, a bit each; 0 without an error.
     pub errors: u8,
 }
 
 impl State {
-    /// Reads a state frame; `None` for any other frame. A frame without a voltage is a question that is read back.
+    /// Reads a state frame; `None` for any other frame. A frame without a voltage is a question read back.
     #[must_use]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let [0x9A | 0x9B, temperature, a, b, c, d, state, errors] = *data else { return None };

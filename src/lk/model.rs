@@ -1,4 +1,4 @@
-//! Facts of the models, as a table that a program can extend.
+//! Facts of the models, as a table open to further models.
 
 use crate::error::{ConfigError, check};
 use crate::motor::models;
@@ -36,7 +36,7 @@ impl Series {
 /// |---|---|--:|--:|--:|---|
 /// | [`MF9025_16T`](Self::MF9025_16T) | MF | 1 | 0.32 | 16 bits | offisaac, SCNU |
 /// | [`MF9025_35T`](Self::MF9025_35T) | MF | 1 | 0.81 | 16 bits | offisaac |
-/// | [`MG4005E_I10`](Self::MG4005E_I10) | MG | 10 | 0.6 | 18 bits, of which 16 are sent | the vendor's table of the series, public drivers |
+/// | [`MG4005E_I10`](Self::MG4005E_I10) | MG | 10 | 0.6 | 18 bits, 16 of them sent | the vendor's table of the series, public drivers |
 /// | [`MG5010E_I10`](Self::MG5010E_I10) | MG | 10 | 1.0 | 16 bits | the vendor's table of the series, librmcs |
 ///
 /// The vendor gives the torque constant of some geared motors at the rotor: 0.06 for the MG4005, 0.1 for the MG5010.
@@ -69,14 +69,14 @@ models! {
 }
 
 impl Model {
-    /// Describes a model that the table does not have: its series, the turns of its rotor for one of the output shaft, 1 to 1000, its
-    /// torque constant in Nm/A at the output shaft, 0.001 to 1000, and how many bits of the encoder it sends, 14 to 16.
+    /// Describes a model missing from the table: its series, the turns of its rotor for one of the output shaft, 1 to 1000, its
+    /// torque constant in Nm/A at the output shaft, 0.001 to 1000, and the number of encoder bits sent, 14 to 16.
     ///
     /// A drive with an encoder of 18 bits sends the upper 16. An encoder with fewer bits than are stated here is not noticed, and
-    /// its angles are too small by the power of two; one with more is [malformed](crate::motor::Malformed::Field).
+    /// its angles are too small by the power of two; feedback of an encoder with more is [malformed](crate::motor::Malformed::Field).
     ///
     /// # Errors
-    /// Names the first value that is not allowed.
+    /// Names the first value outside its limits.
     pub const fn new(
         name: &'static str,
         series: Series,
@@ -94,7 +94,7 @@ impl Model {
         Self { name, series, gear, torque_constant: constant, encoder_bits: bits }
     }
 
-    /// Returns the name, as errors print it.
+    /// Returns the name, as printed in errors.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name
@@ -124,7 +124,7 @@ impl Model {
         self.encoder_bits
     }
 
-    /// Returns the torque of the largest current that a frame holds, in Nm. It is that of the protocol, not of the motor: a
+    /// Returns the torque of the largest current in a frame, in Nm: a limit of the protocol, not of the motor. A
     /// program states the limit of the motor with its mode.
     #[must_use]
     pub const fn max_torque_nm(&self) -> f32 {
@@ -136,12 +136,12 @@ impl Model {
         self.series.amperes_per_count() * self.torque_constant
     }
 
-    /// Returns the numbers that the control modes need.
+    /// Returns the numbers for the control modes.
     pub(super) const fn scale(&self) -> Scale {
         Scale::new(self.torque_per_count(), self.max_torque_nm(), self.gear, true)
     }
 
-    /// Returns a share of the speed without load, which is estimated from the torque constant.
+    /// Returns a share of the speed without load, estimated from the torque constant.
     pub(super) const fn speed_share(&self, rad_per_s: f32) -> f32 {
         rad_per_s * self.torque_constant / SUPPLY_V
     }
@@ -149,14 +149,14 @@ impl Model {
 
 pub(crate) const RAD_PER_DEGREE: f32 = core::f32::consts::PI / 180.0;
 
-/// The numbers of a model that the control modes need: those of `rmd` too.
+/// The numbers of a model for the control modes, also of `rmd`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     /// The torque of a count of current, in Nm.
     pub torque_per_count: f32,
     /// The largest torque, in Nm.
     pub max_torque_nm: f32,
-    /// The largest velocity of the output shaft that feedback tells, in rad/s.
+    /// The largest velocity of the output shaft within the range of the feedback, in rad/s.
     pub max_velocity: f32,
     /// The turns on the wire for one of the output shaft.
     pub gear: f32,

@@ -22,7 +22,7 @@ const POLL_S: f32 = 0.005;
 /// Each so many updates without estimates a motor at rest asks for them.
 const POLL_UPDATES: u8 = 5;
 
-/// Five heartbeats at the rate of delivery: without one for longer, the state of the axis is not known.
+/// Five heartbeats at the rate of delivery: after a longer silence the state of the axis is unknown.
 const HEARTBEAT_S: f32 = 0.5;
 
 /// The time from one inquiry to the next.
@@ -31,7 +31,7 @@ const INQUIRY_S: f32 = 0.01;
 /// The limits are sent again after so many commands, and the modes between.
 const LIMITS_EACH: u8 = 100;
 
-/// The frames, 10 ms apart, within which a drive is idle and has answered all that it is asked.
+/// The frames, 10 ms apart, until a drive must be idle and must have answered all questions.
 const MOST_FRAMES: u8 = 200;
 
 /// The code of the first bit of the reason of a disarmed drive.
@@ -138,7 +138,7 @@ impl OwnMotor for Motor {
         Some(stay.unwrap_or_else(|| request(self.node, ESTIMATES)))
     }
 
-    /// Limits that were not sent come before the next command.
+    /// Unsent limits come before the next command.
     fn unsent(&mut self, frame: &CanFrame) {
         if *frame == self.limits_of(self.state.limits.value()) {
             self.state.limits.repeat();
@@ -162,7 +162,7 @@ impl OwnMotor for Motor {
         (self.firmware == Firmware::V0_6).then(|| request(self.node, number))
     }
 
-    /// Heartbeats are answers too: they tell nothing of the shaft.
+    /// Heartbeats are answers too: a heartbeat has no value of the shaft.
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
         let data = frame.bytes();
         let mut numbers = heard(self.firmware).iter().copied();
@@ -186,7 +186,7 @@ impl OwnMotor for Motor {
         true
     }
 
-    /// An axis that calibrates, or whose state is not known, is not armed.
+    /// An axis in calibration or in an unknown state is not armed.
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_known = matches!(self.axis(), Some(Heartbeat::IDLE | Heartbeat::CLOSED_LOOP));
         (self.state.phase == Phase::Off && !is_known).then(|| WrongSetting {
@@ -229,7 +229,7 @@ impl OwnMotor for Motor {
 }
 
 impl Motor {
-    /// Moves the time on. A heartbeat that is too old is none.
+    /// Moves the time on. A heartbeat beyond the limit of age is discarded.
     fn wait(&mut self, time_s: f32) {
         self.state.silence_s += time_s;
         self.state.heartbeat = self.state.heartbeat.filter(|_| self.state.silence_s <= HEARTBEAT_S);

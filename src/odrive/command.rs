@@ -1,4 +1,4 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use super::Firmware;
 use super::config::Endpoint;
@@ -44,7 +44,7 @@ pub(super) const ESTIMATES: u8 = 0x09;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// Disarms the drive, which then has the error that a stop was requested.
+    /// Disarms the drive. The drive then has the error "stop requested".
     Stop,
     /// Requests a state of the axis: 1 idle, 8 closed loop.
     AxisState(u32),
@@ -67,7 +67,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Writes the frame for a node, 0 to 63; the upper bits of a larger one are left out.
+    /// Writes the frame for a node, 0 to 63; the upper bits of a larger number are left out.
     #[must_use]
     pub fn frame(self, node: u8) -> CanFrame {
         let (number, first, second) = match self {
@@ -106,7 +106,7 @@ pub(super) fn request(node: u8, number: u8) -> CanFrame {
     CanFrame::new_remote(id, 8).unwrap_or_else(|| CanFrame::of(id, []))
 }
 
-/// Asks for the value of an endpoint, or writes one of 1 or 4 bytes.
+/// Returns the frame of a question about an endpoint: the value is read, or written in 1 or 4 bytes.
 ///
 /// ```text
 /// byte 0            1 .. 2       3   4 ..
@@ -131,7 +131,7 @@ pub(super) fn id(node: u8, number: u8) -> Id {
 pub(super) const COMMANDS: [u8; 11] =
     [0x02, 0x07, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x11, 0x12, 0x18, ASK_ENDPOINT];
 
-/// Returns the numbers of what a firmware sends a motor that listens: all, then those of 0.6.
+/// Returns the numbers of the messages from a firmware to the motor: estimates and heartbeat, for 0.6 also errors and endpoints.
 pub(super) const fn heard(firmware: Firmware) -> &'static [u8] {
     match firmware {
         Firmware::V0_5 => &[ESTIMATES, HEARTBEAT],

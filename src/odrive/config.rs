@@ -1,10 +1,10 @@
-//! The control mode and the endpoints, with what a user chooses for each.
+//! The control mode and the endpoints, with their parameters.
 
 use crate::error::ConfigError;
 use crate::motor::{ControlMode, Form, ImpedanceControl};
 
-/// A control mode of the drive. An [`ImpedanceControl`] is one too: torque mode, in which the drive follows a torque that our gains or
-/// loops compute for each cycle.
+/// A control mode of the drive. An [`ImpedanceControl`] is also a mode: torque mode, where the drive follows a torque
+/// computed here for each cycle by gains or loops.
 #[derive(Debug, Clone, Copy)]
 pub struct Mode {
     pub(super) control: ControlMode,
@@ -35,7 +35,7 @@ impl Mode {
     }
 
     /// Velocity mode: the drive's own loop follows a velocity, with at most this torque of the output shaft in Nm, above 0: the drive
-    /// gets a current limit for it.
+    /// gets the current limit of this torque.
     #[must_use]
     pub const fn velocity(torque_limit_nm: f32) -> Self {
         Self::of(ControlMode::velocity(VELOCITY, None, Some(torque_limit_nm)), PASSTHROUGH)
@@ -79,7 +79,7 @@ pub(super) type Endpoint = (u16, Form);
 /// The numbers of endpoints of a drive with firmware 0.6, from the `flat_endpoints.json` of exactly its version: the numbers differ from
 /// version to version.
 ///
-/// With them a motor sets the drive's watchdog and reads its modes back before it enables the drive.
+/// With them a motor sets the drive's watchdog and reads its modes back before enabling the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -6,14 +6,14 @@ use crate::frame::CanFrame;
 use crate::motor::{Inquiry, Preparation, Told};
 use core::f32::consts::TAU;
 
-/// The calls, 10 ms apart, that a drive has to follow a request for closed loop.
+/// The calls, 10 ms apart, until a drive must have followed a request for closed loop.
 const PATIENCE: u8 = 50;
 
 /// The parts in which the share of the torque limit is counted.
 pub(super) const PARTS: f32 = 16.0;
 
-/// Error codes beside those of a heartbeat: settings that the drive did not take; and a request that it refused, to which the
-/// procedure result is added.
+/// Error codes beside those of a heartbeat: settings not taken by the drive; and a refused request, with the
+/// procedure result added.
 pub(super) const NOT_SET: u8 = 63;
 const REFUSED: u8 = 64;
 
@@ -22,13 +22,13 @@ const REFUSED: u8 = 64;
 pub(super) enum Phase {
     #[default]
     Off,
-    /// The frame whose turn it is.
+    /// The number of the next frame.
     Starting(u8),
     /// Closed loop was requested, so many calls ago.
     Requested(u8),
 }
 
-/// Frames that several steps send.
+/// Frames of several steps.
 impl Motor {
     pub(super) fn send(&self, command: Command) -> CanFrame {
         command.frame(self.node)
@@ -39,7 +39,7 @@ impl Motor {
         radians * self.gear / TAU
     }
 
-    /// Returns the limits for a share of the torque: never less than one part.
+    /// Returns the limits for a share of the torque: at least one part.
     pub(super) fn limits_of(&self, parts: f32) -> CanFrame {
         let share = parts.max(1.0) / PARTS;
         let limit_nm = self.mode.control.torque_limit_nm().unwrap_or(0.0);
@@ -62,7 +62,7 @@ impl Motor {
         self.send(Command::AxisState(Heartbeat::IDLE.into()))
     }
 
-    /// Returns the state of the axis; `None` where it is not known.
+    /// Returns the state of the axis; `None` if unknown.
     pub(super) fn axis(&self) -> Option<u8> {
         self.state.heartbeat.map(|heartbeat| heartbeat.state)
     }
@@ -70,7 +70,7 @@ impl Motor {
 
 /// How the drive is enabled.
 impl Motor {
-    /// Returns the next frame on the way to closed loop: one of those that need no answer, by its place, then a question, at last the
+    /// Returns the next frame on the way to closed loop: the frames without an answer in their order, then a question, at last the
     /// request.
     pub(super) fn starting(&mut self) -> CanFrame {
         let place = match self.state.phase {
@@ -117,8 +117,8 @@ impl Motor {
         self.send(Command::AxisState(Heartbeat::CLOSED_LOOP.into()))
     }
 
-    /// Waits for a heartbeat. A second request would leave closed loop and begin it anew, so none is sent. Modes and limits are: the drive
-    /// may have missed them.
+    /// Waits for a heartbeat. A second request would leave closed loop and begin anew, so the request is sent once. Modes and
+    /// limits are repeated: the drive may have missed both.
     fn requested(&mut self, calls: u8) -> CanFrame {
         if calls >= PATIENCE {
             let result = self.state.heartbeat.map_or(0, |heartbeat| heartbeat.procedure_result);

@@ -1,8 +1,8 @@
-//! The codec of what a drive sends.
+//! The codec of frames from a drive.
 
 use crate::motor::lowest_bit;
 
-/// The generation of the firmware, which decides what a heartbeat means.
+/// The generation of the firmware, which decides the layout of a heartbeat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -13,9 +13,9 @@ pub enum Firmware {
     V0_6,
 }
 
-/// What a drive reports of its encoder: turns and turns/s of the motor's shaft, since it was switched on.
+/// The encoder estimates of a drive: turns of the motor's shaft since power-on, and turns/s.
 ///
-/// Firmware 0.5 reports zeros for an encoder that has failed; its heartbeat tells that within 100 ms.
+/// Firmware 0.5 reports zeros for a failed encoder; the heartbeat reports the failure within 100 ms.
 ///
 /// # Examples
 /// ```
@@ -36,7 +36,7 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Reads the encoder estimates, message 0x09; `None` if one is not finite.
+    /// Reads the encoder estimates, message 0x09; `None` if a value is not finite.
     #[must_use]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let (turns, turns_per_s) = words(data);
@@ -73,7 +73,7 @@ impl Feedback {
 pub struct Heartbeat {
     /// The errors of the axis, a bit each: other ones in 0.5 than in 0.6.
     pub axis_error: u32,
-    /// The state: [`IDLE`](Self::IDLE), [`CLOSED_LOOP`](Self::CLOSED_LOOP), or that of a calibration.
+    /// The state: [`IDLE`](Self::IDLE), [`CLOSED_LOOP`](Self::CLOSED_LOOP), or the state of a calibration.
     pub state: u8,
     /// 0.5: whether motor, encoder and controller have errors.
     pub has_errors: [bool; 3],
@@ -89,7 +89,7 @@ impl Heartbeat {
     /// The axis follows commands.
     pub const CLOSED_LOOP: u8 = 8;
 
-    /// Reads the heartbeat, message 0x01; `None` if it has a bit that the firmware never sets.
+    /// Reads the heartbeat, message 0x01; `None` for a bit never set by the firmware.
     #[must_use]
     pub const fn decode(data: &[u8; 8], firmware: Firmware) -> Option<Self> {
         let [a, b, c, d, state, x, y, z] = *data;
@@ -102,7 +102,7 @@ impl Heartbeat {
         Some(Self { axis_error, state, has_errors, procedure_result, is_done })
     }
 
-    /// Returns the number of an error, 0 where there is none: 1 to 32 for the lowest bit of the axis error, 33 to 35 for an error of
+    /// Returns the number of an error, 0 without an error: 1 to 32 for the lowest bit of the axis error, 33 to 35 for an error of
     /// motor, encoder or controller alone.
     #[must_use]
     pub const fn error_code(&self) -> u8 {

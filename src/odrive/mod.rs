@@ -11,9 +11,9 @@
 //!            0x03 errors, 0.6 only              active errors u32 | disarm reason u32
 //! endpoints  0x04, answer 0x05, 0.6 only        read or write | number u16 | 0 | value
 //! ```
-//! Turns, torques and currents on the wire are those of the motor; those of [`Motor`] are of the output shaft, by its
-//! [gear](Motor::with_gear) and [direction](Motor::reversed). [`Own`](crate::motor::Own) makes a device of a motor. Its control mode is an
-//! [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
+//! Turns, torques and currents on the wire are of the motor; the values of [`Motor`] are of the output shaft, by its
+//! [gear](Motor::with_gear) and [direction](Motor::reversed). [`Own`](crate::motor::Own) makes a device of the motor. Its control
+//! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | targets | torque is limited by | rest is |
 //! |---|---|---|---|
@@ -21,30 +21,32 @@
 //! | [`Mode::velocity`] | velocity | the drive's current limit | idle |
 //! | [`Mode::position`], [`position_with_filter`](Mode::position_with_filter), [`position_with_trajectory`](Mode::position_with_trajectory) | angle; at once, by the drive's filter, or by its trajectory | the drive's current limit | idle |
 //!
-//! **The link is the encoder estimates.** They alone count as feedback. The heartbeat tells the state of the axis and its errors: a motor
-//! without one for half a second is not armed, and one that is driven trips. Stale estimates beside a fresh heartbeat do not drive.
+//! **The link is the encoder estimates.** Only the estimates count as feedback. The heartbeat tells the state of the axis and its
+//! errors: after half a second without a heartbeat a motor is not armed, and a driven motor trips. Stale estimates beside a fresh
+//! heartbeat do not drive.
 //!
-//! **What has to be set in the drive**, by USB before it is on the bus: node id, bit rate, and a calibrated motor and encoder with the right
-//! torque constant. The heartbeat has to be cyclic (`heartbeat_rate_ms`, in 0.6 `heartbeat_msg_rate_ms`: 100 ms at delivery), as 0.5 sends
-//! it in no other way. The estimates may be cyclic (`encoder_rate_ms`, `encoder_msg_rate_ms`: 10 ms at delivery). Where they are older than
-//! 5 ms a remote frame asks for them, in the place of a command; so set them to 1 ms or 2 ms for a loop on torque. In 0.6 the motor at rest
-//! also asks for heartbeat and errors. All else is set by the motor each time before it enables the drive, and lost with the supply: control
-//! mode, input mode, velocity limit, current limit, and the limits of a trajectory.
-//! `startup_closed_loop_control` has to be off: a drive that resets would run in a mode that nobody set. A motor at rest requests idle,
-//! so no program with it may run while the drive calibrates.
+//! **Settings of the drive**, made by USB before the drive is on the bus: node id, bit rate, and a calibrated motor and encoder with
+//! the right torque constant. The heartbeat has to be cyclic (`heartbeat_rate_ms`, in 0.6 `heartbeat_msg_rate_ms`: 100 ms at
+//! delivery), as 0.5 sends the heartbeat in no other way. The estimates may be cyclic (`encoder_rate_ms`, `encoder_msg_rate_ms`:
+//! 10 ms at delivery). If the estimates are older than 5 ms a remote frame asks for them, in the place of a command; so set them to
+//! 1 ms or 2 ms for a loop on torque. In 0.6 the motor at rest also asks for heartbeat and errors. All else is set by the motor each
+//! time before the drive is enabled, and lost with the supply: control mode, input mode, velocity limit, current limit, and the
+//! limits of a trajectory. `startup_closed_loop_control` has to be off: after a reset the drive would run in a mode that the motor
+//! has not set. A motor at rest requests idle, so no program with this motor may run while the drive calibrates.
 //!
-//! **How the drive is enabled**: while the heartbeat says idle, modes and limits, then a target where the shaft is, then a request for closed
-//! loop, which is sent once: a second one would drop the torque. When the drive stays idle for half a second, the motor has a fault for
-//! a moment. Idle is requested until a heartbeat says so.
+//! **How the drive is enabled**: while the heartbeat says idle, modes and limits, then a target where the shaft is, then a request
+//! for closed loop, sent once: a second request would drop the torque. When the drive stays idle for half a second, the motor has a
+//! fault for a moment. Idle is requested until a heartbeat says so.
 //!
-//! **Modes are read back in 0.6 only**, and there only with [`Endpoints`]: without them, and in 0.5, nothing on the bus tells in which mode
-//! the drive is. So modes and limits are sent again after closed loop was requested, and each 100 commands; the modes not in position
+//! **Modes are read back in 0.6 only**, and there only with [`Endpoints`]: without them, and in 0.5, nothing on the bus tells the mode of
+//! the drive. So modes and limits are sent again after closed loop was requested, and each 100 commands; the modes not in position
 //! mode, where firmware 0.5 would take the angle of the shaft for its target.
 //!
-//! **When the program stops, the drive goes on** with its last command, unless its watchdog is on. Firmware 0.6 has it set over CAN by
-//! [`Motor::with_endpoints`]. In 0.5 it can only be set by USB: `axis.config.watchdog_timeout`, `axis.config.enable_watchdog`. Each frame to
-//! the axis feeds it in 0.5. A drive whose watchdog expired has an error, is idle, and is not armed until its errors are
-//! [cleared](Motor::clear_errors); the first frames after a start of the program find such a drive.
+//! **When the program stops, the drive goes on** with its last command, unless its watchdog is on. For firmware 0.6 the watchdog is
+//! set over CAN by [`Motor::with_endpoints`]. In 0.5 the watchdog is set by USB only: `axis.config.watchdog_timeout`,
+//! `axis.config.enable_watchdog`. Each frame to the axis feeds the watchdog in 0.5. A drive whose watchdog expired has an error, is
+//! idle, and is not armed until its errors are [cleared](Motor::clear_errors); the first frames after a start of the program find
+//! such a drive.
 //!
 //! | error code | what |
 //! |---|---|
@@ -68,11 +70,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Sources: firmware and documentation of ODrive 0.5.1 to 0.5.6 (`can_simple.cpp`, `axis.cpp`, `controller.cpp`, `can-protocol.rst`); for 0.6
-//! the DBC 0.6.10 of odrive-can, the enumerations of odrive 0.6.11, odrive-messages 0.2.2, and public programs, which send modes and limits
-//! with each command. Not known of 0.6: which frames feed its watchdog, and whether it also expires at rest, where it is sent no targets in
-//! velocity and position mode; whether the heartbeat has the disarm reason in the axis error; which length a remote frame has to have: here it
-//! is that of the message. Extended ids are not supported. Never tried on a drive.
+//! Sources: firmware and documentation of ODrive 0.5.1 to 0.5.6 (`can_simple.cpp`, `axis.cpp`, `controller.cpp`, `can-protocol.rst`);
+//! for 0.6 the DBC 0.6.10 of odrive-can, the enumerations of odrive 0.6.11, odrive-messages 0.2.2, and public programs, with modes
+//! and limits sent beside each command. Not known of 0.6: the frames to feed its watchdog; whether the watchdog also expires at rest,
+//! without targets in velocity and position mode; whether the heartbeat has the disarm reason in the axis error; the required length
+//! of a remote frame: here the length of the message. Extended ids are not supported. Never tried on a drive.
 
 mod bus;
 mod command;

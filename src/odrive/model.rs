@@ -1,10 +1,10 @@
-//! Facts of the motors, as a table that a program can extend.
+//! Facts of the motors, as a table open to further models.
 
 use crate::error::{ConfigError, check};
 
 /// A motor at an ODrive: its name and its torque constant.
 ///
-/// The drive takes torques in Nm and currents in A, so the torque constant turns a torque limit into its current limit. It is
+/// The drive takes torques in Nm and currents in A, so the torque constant turns a torque limit into its current limit. The constant is
 /// `8.27 / KV` in Nm/A, as the documentation of ODrive says; the drive's own `torque_constant` has to be the same.
 ///
 /// | model | KV rpm/V | Nm/A | seen in |
@@ -44,13 +44,13 @@ impl Model {
     /// Describes another motor by its velocity constant in rpm/V.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a constant that is not between 0.1 and 100000.
+    /// [`ConfigError::Range`] for a constant not between 0.1 and 100000.
     pub const fn new(name: &'static str, kv: f32) -> Result<Self, ConfigError> {
         check!(ConfigError::check_range("velocity constant in rpm/V", kv, 0.1, 100_000.0));
         Ok(Self { name, kv })
     }
 
-    /// Returns the name, as errors print it.
+    /// Returns the name, as printed in errors.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name

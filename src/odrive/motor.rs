@@ -1,4 +1,4 @@
-//! The motor: what a program configures, and what it may ask and request.
+//! The motor: configuration, reports and requests of a program.
 
 use super::config::{Endpoint, Endpoints, Mode};
 use super::enabling::Phase;
@@ -9,7 +9,7 @@ use crate::motor::{Form, Settings, Told};
 use crate::time::Duration;
 use crate::units::AngularVelocity;
 
-/// A motor of this family in one of the control modes: see the [module](super).
+/// A motor of this family in a control mode: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -30,7 +30,7 @@ pub struct Motor {
     pub(super) firmware: Firmware,
     pub(super) node: u8,
     pub(super) velocity_limit: AngularVelocity,
-    /// Turns of the motor for a turn of the output shaft, negative if they turn against each other.
+    /// Turns of the motor for a turn of the output shaft, negative if motor and shaft turn in opposite directions.
     pub(super) gear: f32,
     pub(super) mode: Mode,
     /// The endpoints, with their expected values.
@@ -39,19 +39,19 @@ pub struct Motor {
     pub(super) state: State,
 }
 
-/// What a motor has heard and sent.
+/// The received and sent values of a motor.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct State {
     /// The last estimates; `None` before the first.
     pub(super) drive: Option<Feedback>,
-    /// The last heartbeat; `None` before the first, and when it is too old.
+    /// The last heartbeat; `None` before the first, and after half a second without another.
     pub(super) heartbeat: Option<Heartbeat>,
     /// 0.6: active errors and disarm reason.
     pub(super) errors: (u32, u32),
     pub(super) phase: Phase,
-    /// The number of the last enabling frame, and that frame.
+    /// The last enabling frame, with its number.
     pub(super) enabling: Option<(u8, CanFrame)>,
-    /// A request that was refused: its code, and the frames to disable the drive until that is forgotten.
+    /// A refused request: its code, and the number of frames to disable the drive until the code is forgotten.
     pub(super) refused: Option<(u8, u8)>,
     /// Since the last estimates, while driven.
     pub(super) age_s: f32,
@@ -71,10 +71,10 @@ pub(super) struct State {
 
 impl Motor {
     /// Takes the model, the firmware and the node id of the drive, 0 to 62, the velocity limit of the output shaft, and the control mode
-    /// with the torque limit. The output shaft is that of the motor.
+    /// with the torque limit. The output shaft is the shaft of the motor.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn new(
         model: Model,
         firmware: Firmware,
@@ -103,7 +103,7 @@ impl Motor {
     /// Sets the turns of the motor for one of the output shaft.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a ratio that is not between 0.001 and 100000.
+    /// [`ConfigError::Range`] for a ratio not between 0.001 and 100000.
     pub fn with_gear(self, ratio: f32) -> Result<Self, ConfigError> {
         ConfigError::check_range("gear ratio", ratio, 0.001, 100_000.0)?;
         Ok(Self { gear: ratio.copysign(self.gear), ..self })
@@ -141,26 +141,26 @@ impl Motor {
         self.state.drive.as_ref()
     }
 
-    /// Returns the last heartbeat; `None` before the first, and if it is older than half a second.
+    /// Returns the last heartbeat; `None` before the first, and after half a second without another.
     #[must_use]
     pub const fn heartbeat(&self) -> Option<&Heartbeat> {
         self.state.heartbeat.as_ref()
     }
 
-    /// Returns the active errors of firmware 0.6 and the reason for which it disarmed last, a bit each, as asked for at rest.
+    /// Returns the active errors of firmware 0.6 and the reason of the last disarming, a bit each, as read at rest.
     #[must_use]
     pub const fn errors(&self) -> (u32, u32) {
         self.state.errors
     }
 
-    /// Has the drive clear its errors, in 0.5 those of both axes, while the motor is disarmed: three times, 10 ms apart. Nothing else
-    /// clears them, for an encoder that failed once may fail again. A motor that is driven forgets the request.
+    /// Has the drive clear its errors, in 0.5 the errors of both axes, while the motor is disarmed: three times, 10 ms apart. Nothing else
+    /// clears errors, as a failed encoder may fail again. A driven motor forgets the request.
     pub const fn clear_errors(&mut self) {
         self.state.clears = 3;
     }
 
-    /// Has the drive disarm with an error, beside the emergency stop of the bus: with each update, until a heartbeat has that error.
-    /// The drive stays disarmed, whatever it is sent, until its errors are [cleared](Self::clear_errors).
+    /// Has the drive disarm with an error, beside the emergency stop of the bus: with each update, until a heartbeat has this error.
+    /// The drive stays disarmed, and follows no command, until its errors are [cleared](Self::clear_errors).
     pub const fn stop(&mut self) {
         self.state.stops = true;
     }

@@ -20,10 +20,10 @@ const IDS: (u16, u16) = (0x140, 0x240);
 /// The places of the question for the angle among 32 commands.
 const ANGLES: [u8; 2] = [8, 24];
 
-/// So often the time-out is written before the drive counts as one that does not take it: its memory wears.
+/// Writes of the time-out until the drive counts as one without this setting: the memory of the drive wears.
 const WRITES: u8 = 8;
 
-/// The first byte of a report that the time-out of the drive has expired.
+/// The first byte of the report of an expired time-out.
 const EXPIRED: u8 = 0xF1;
 
 impl Motor {
@@ -36,7 +36,7 @@ impl Motor {
         if self.is_reversed { -value } else { value }
     }
 
-    /// Returns the command for a goal with a limit; `None` if the drive cannot be told.
+    /// Returns the command for a goal with a limit; `None` if the protocol has no such command.
     fn command(&self, goal: Goal, limit: u16) -> Option<Command> {
         let counts = 100.0 / RAD_PER_DEGREE;
         match goal {
@@ -136,8 +136,8 @@ impl OwnMotor for Motor {
         self.frame_of(self.last)
     }
 
-    /// Some commands give way to questions: the drive goes on with the one before. A new one goes first. After a silence nothing counts
-    /// from the angle until that has been read again.
+    /// Some commands give way to questions: the drive goes on with the command before. A new command goes first. After a silence
+    /// nothing counts from the angle until the angle has been read again.
     fn control(&mut self, order: Order) -> CanFrame {
         if let (Some(track), Some(drive)) = (&mut self.track, &self.drive) {
             let way = 100.0 * f32::from(drive.velocity_dps) * order.step.dt_s();
@@ -163,7 +163,7 @@ impl OwnMotor for Motor {
         (self.questions, self.silent) = (Questions::new(Command::REST), 0);
     }
 
-    /// The question for the state, the time-out if the drive has not confirmed it, and what the mode needs.
+    /// Sends the question for the state, the time-out unless confirmed, and the preparation of the mode.
     fn enable(&mut self, sent: u8) -> Option<CanFrame> {
         if sent == 0 {
             self.doubt();
@@ -185,7 +185,8 @@ impl OwnMotor for Motor {
         Some(self.frame_of(command))
     }
 
-    /// Off, which counts as followed. A reset that was asked for goes after it, and the lock of a brake that was released.
+    /// Switches the drive off; the frame counts as followed. A requested reset goes out afterwards, and so does the lock of a
+    /// released brake.
     fn disable(&mut self) -> Option<CanFrame> {
         let command = match self.enabling.is_off {
             true if core::mem::take(&mut self.resets) => Command::Reset,
@@ -196,7 +197,7 @@ impl OwnMotor for Motor {
         Some(self.frame_of(command))
     }
 
-    /// A reset and a time-out that were not sent are sent again.
+    /// An unsent reset or time-out is sent again.
     fn unsent(&mut self, frame: &CanFrame) {
         let command = *frame.bytes();
         self.resets |= command == Command::Reset.encode();

@@ -1,4 +1,4 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use crate::lk::command::data_of;
 
@@ -18,15 +18,15 @@ use crate::lk::command::data_of;
 pub enum Command {
     /// Switches the output off and leaves each control mode.
     Off,
-    /// Stops the shaft, which the drive then holds: no rest.
+    /// Stops the shaft. The drive then holds the shaft: no rest.
     Stop,
     /// Releases the holding brake.
     ReleaseBrake,
     /// Applies the holding brake.
     LockBrake,
-    /// Starts the program of the drive anew, which takes more than a second. It does not answer.
+    /// Starts the program of the drive anew, which takes more than a second. The drive does not answer.
     Reset,
-    /// A torque current in 0.01 A. It does not release the holding brake.
+    /// A torque current in 0.01 A. A torque does not release the holding brake.
     Torque(i16),
     /// A velocity in 0.01°/s.
     Velocity(i32),
@@ -39,12 +39,12 @@ pub enum Command {
     /// Asks for the [`State`](super::State).
     ReadState,
     /// Sets the time without a frame in ms after which the drive switches itself off and locks its brake; 0 for never. The drive
-    /// keeps it in its flash memory, which wears.
+    /// keeps the time in its flash memory, and flash memory wears.
     SetTimeout(u32),
 }
 
 impl Command {
-    /// The current that gives no torque: what a motor at rest is sent.
+    /// A current without torque: the command of a motor at rest.
     pub const REST: Self = Self::Torque(0);
 
     /// Writes the data of a frame.

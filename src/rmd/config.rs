@@ -1,4 +1,4 @@
-//! The motor and its settings; the control mode is that of `lk`, with the scales of the output shaft.
+//! The motor and its settings; the control mode is shared with `lk`, with the scales of the output shaft.
 
 use super::enabling::Enabling;
 use super::track::Track;
@@ -33,9 +33,9 @@ pub struct Motor {
     pub(super) mode: Mode,
     /// In ms; `None` to leave the drive's as it is.
     pub(super) timeout: Option<u32>,
-    /// The time-out that the drive answered.
+    /// The time-out by the drive's answer.
     pub(super) timeout_found: Option<u32>,
-    /// How often it was written without an answer.
+    /// The number of writes without an answer.
     pub(super) writes: u8,
     pub(super) drive: Option<Feedback>,
     pub(super) track: Option<Track>,
@@ -49,7 +49,7 @@ pub struct Motor {
     /// The last control command or rest.
     pub(super) last: Command,
     pub(super) resets: bool,
-    /// The holding brake may be open: it was released, maybe before this program began, and not confirmed to be locked since.
+    /// The holding brake may be open: released, maybe before this program began, and not confirmed to be locked since.
     pub(super) is_open: bool,
     pub(super) asks_angle: bool,
 }
@@ -58,7 +58,7 @@ impl Motor {
     /// Takes the model, the id of the drive, 1 to 32, and the control mode.
     ///
     /// # Errors
-    /// Names the value that is not allowed: [`ConfigError::Unsupported`] for a velocity with a torque limit.
+    /// Names the value outside its limits: [`ConfigError::Unsupported`] for a velocity with a torque limit.
     pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 32.0)?;
         let mode = mode.into();
@@ -94,7 +94,7 @@ impl Motor {
     /// Sets the time without a frame after which the drive switches itself off and locks its brake: 10 ms to 60 s, 100 ms at first.
     ///
     /// # Errors
-    /// Names the time that is not allowed.
+    /// Names the time outside its limits.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
         let micros =
             ConfigError::check_micros("time-out", timeout.micros_u32(), 10_000, 60_000_000)?;

@@ -1,4 +1,4 @@
-//! What has to be heard before a drive may be driven.
+//! Answers of a drive needed before the motor may be driven.
 
 /// How far a drive is on its way to be driven.
 #[derive(Debug, Clone, Copy, Default)]
@@ -11,7 +11,7 @@ pub(super) struct Enabling {
     pub(super) is_prepared: bool,
     /// All of this has been so, and nothing told otherwise since.
     pub(super) is_on: bool,
-    /// The drive is not to be driven, and has confirmed that it is off.
+    /// The drive is not to be driven, and has confirmed to be off.
     pub(super) is_off: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The codec of what a drive sends.
+//! The codec of frames from a drive.
 
 use super::Model;
 use super::model::AMPERES_PER_COUNT;
@@ -109,12 +109,12 @@ pub struct State {
     pub is_brake_open: bool,
     /// The voltage of the supply in V.
     pub supply_v: f32,
-    /// The errors, a bit each; 0 for none.
+    /// The errors, a bit each; 0 without an error.
     pub errors: u16,
 }
 
 impl State {
-    /// Reads a state frame; `None` for any other frame. A frame of zeros is a question that is sent back.
+    /// Reads a state frame; `None` for any other frame. A frame of zeros is a question sent back.
     #[must_use]
     pub const fn decode(data: &[u8; 8]) -> Option<Self> {
         let [0x9A, temperature, spare, brake, a, b, c, d] = *data else { return None };

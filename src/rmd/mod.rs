@@ -15,12 +15,12 @@
 //! 0xB3    set the time-out       0   0                     ms u32                     the same
 //! 0x76    reset                  0   0                     0                          none
 //! ```
-//! The frames descend from those of [`lk`](crate::lk), with which this family shares its control modes. They are not the same: the
-//! current has another scale, and angles and velocities are those of the output shaft. A drive sends one frame for each that it gets:
+//! The frames descend from those of [`lk`](crate::lk), and the two families share their control modes. The frames differ: the
+//! current has another scale, and angles and velocities are of the output shaft. A drive answers each frame with a frame:
 //! at 1 kHz and 1 Mbit/s the bus is full with three motors.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. The control
-//! mode is its type:
+//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. The
+//! control mode is its type:
 //!
 //! | mode | targets | torque is limited by |
 //! |---|---|---|
@@ -28,34 +28,36 @@
 //! | [`Mode::velocity`] | velocity | the drive alone |
 //! | [`Mode::position_velocity`] | angle | the drive alone |
 //!
-//! **Rest is a torque frame with a current of 0** in each mode, and "off" is sent besides, every 100 ms. `0x81` (stop) is never sent: the
-//! drive holds the shaft then. The protocol has no frame that enables a drive, and none that tells whether it is off: any command runs it.
+//! **Rest is a torque frame with a current of 0** in each mode, and "off" is sent besides, every 100 ms. `0x81` (stop) is never sent:
+//! the drive holds the shaft then. The protocol has no frame to enable a drive, and no answer tells whether a drive is off: any
+//! command runs the drive.
 //!
-//! **Before a motor is armed** its state and its angle are read. **Before it is driven** its state is read again, and the drive has to
-//! confirm its time-out; then a torque motor has its holding brake released, which a torque does not do, and a position motor its angle
-//! read. The brake opens before the output does: a loaded joint sinks for the 0.2 s of [`with_opening`](crate::motor::Own::with_opening).
-//! When the motor is at rest again, the brake that it released is locked 0.1 s after "off". The manual says of torques alone that they do not
-//! release the brake, so with a velocity or a position the drive is left to do it.
+//! **Before a motor is armed** its state and its angle are read. **Before it is driven** its state is read again, and the drive has
+//! to confirm its time-out; then a torque motor has its holding brake released, as torques do not release the brake, and a position
+//! motor its angle read. The brake opens before the output does: a loaded joint sinks for the 0.2 s of
+//! [`with_opening`](crate::motor::Own::with_opening). When the motor is at rest again, the brake released by the motor is locked
+//! 0.1 s after "off". The manual says only of torques that the brake stays locked, so with a velocity or a position the drive is left
+//! to release the brake.
 //!
-//! **When the program stops, the drive does**: after [`Motor::with_timeout`], 100 ms at first, it switches itself off and locks its
-//! brake. The drive keeps this time in its flash memory, and no frame reads it. So it is written when the drive is to be enabled and has been
-//! away since the last time, at most 8 times in a row. A drive that answers with another time, or not at all, is not driven, and `arm` says so
-//! until the drive has been away; [`Motor::without_timeout`] is for such a drive. Seen by a user, not in the manual: a drive whose time has
-//! expired sends a frame that begins with 0xF1, each second, and sends the next command back in the place of an answer, without following it.
-//! Both trip the motor.
+//! **When the program stops, the drive does**: after [`Motor::with_timeout`], 100 ms at first, the drive switches itself off and
+//! locks its brake. The drive keeps this time in its flash memory, and no frame reads it. So the time is written when the drive is to
+//! be enabled and has been away since the last time, at most 8 times in a row. A drive that answers with another time, or not at all,
+//! is not driven, and `arm` says so until the drive has been away; [`Motor::without_timeout`] is for such a drive. Seen by a user,
+//! not in the manual: a drive whose time has expired sends a frame with the first byte 0xF1 each second. The next command is sent
+//! back in the place of an answer, and not followed. Both trip the motor.
 //!
-//! **The angle** of feedback is in whole degrees. Each 16th command gives way to a question for the angle in 0.01°; in between
-//! the angle moves on by the velocity, within a degree of the feedback. A question for the state takes the place of each 32nd. Their answers
-//! are no feedback, so a program with less than 250 updates a second has to give [`Own`](crate::motor::Own) longer
+//! **The angle** of feedback is in whole degrees. Each 16th command gives way to a question for the angle in 0.01°; in between the
+//! angle moves on by the velocity, within a degree of the feedback. A question for the state takes the place of each 32nd. Their
+//! answers are no feedback, so a program with less than 250 updates a second has to give [`Own`](crate::motor::Own) longer
 //! [`Timeouts`](crate::motor::Timeouts).
 //!
 //! **Errors** are in the state. A drive with an error is not armed. Most of them go away with their cause; the others by
-//! [`Motor::reset_drive`] alone, since the protocol has no frame that clears them. The code of an error is the place of its lowest bit,
+//! [`Motor::reset_drive`] alone, since the protocol has no frame to clear errors. The code of an error is the place of its lowest bit,
 //! from 1.
 //!
-//! **A command that is sent back is no feedback.** Feedback with a temperature of exactly 0 °C may read like a command, and is lost then: in torque
-//! mode and at rest that without a current between 0 and 1°, in [`Mode::velocity`] that without a current, in [`Mode::position_velocity`] that with
-//! a small positive current.
+//! **A command sent back is no feedback.** Feedback with a temperature of exactly 0 °C may read like a command, and is lost then: in
+//! torque mode and at rest, feedback without a current between 0 and 1°; in [`Mode::velocity`], feedback without a current; in
+//! [`Mode::position_velocity`], feedback with a small positive current.
 //!
 //! ```
 //! use drivetrain::motor::{Devices, ImpedanceControl, Own};
@@ -69,20 +71,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **Not for drives with protocol V1 or V2**: they answer on 0x140 + id, so that such a drive is never heard; some are those of
-//! [`lk`](crate::lk). The impedance frames on 0x400 + id are not used, since V4.4 changed their ranges, which only the date of a drive's
-//! program tells; nor are replies at fixed times (0xB6) nor the frame for all drives (0x280).
+//! **Not for drives with protocol V1 or V2**: such drives answer on 0x140 + id, and are never heard; some belong to
+//! [`lk`](crate::lk). The impedance frames on 0x400 + id are not used, since V4.4 changed their ranges, and only the date of a drive's
+//! program tells the ranges; nor are replies at fixed times (0xB6) nor the frame for all drives (0x280).
 //!
 //! Sources: "Motor Motion Protocol" V4.2 of the vendor (May 2024): frames, scales, ids, errors, time-out, all examples. The drivers
-//! `myactuator_rmd` (protocol V3.8) and `axol`: ids and frames of V3, bits 0x0800 and 0x4000 of the errors, which errors V4.4 keeps until a reset,
-//! that a reset takes 1.1 s and releasing the brake up to 0.15 s. Behaviour after the time-out: pull request 4 of `myactuator_rmd_ros`. The table
-//! of the models: see [`Model`].
+//! `myactuator_rmd` (protocol V3.8) and `axol`: ids and frames of V3, bits 0x0800 and 0x4000 of the errors, the errors kept by V4.4
+//! until a reset, the duration of a reset (1.1 s) and of releasing the brake (up to 0.15 s). Behaviour after the time-out: pull
+//! request 4 of `myactuator_rmd_ros`. The table of the models: see [`Model`].
 //!
-//! Not known: from which side the manual sees its positive direction: angles and torques have the sign of the drive, and
-//! [`Motor::reversed`] turns it round. Whether off locks the holding brake. Whether a drive goes on with its last command when
-//! frames come again after its time-out. Whether a drive answers while its brake opens: if it does not for 100 ms, the motor trips, and
-//! needs longer [`Timeouts`](crate::motor::Timeouts). How feedback counts beyond 32767°, 91 turns. An example of the manual answers a time-out with
-//! zeros where its text says that the frame is sent back: such a drive is refused.
+//! Not known: the side from which the manual sees its positive direction: angles and torques have the sign of the drive, and
+//! [`Motor::reversed`] reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
+//! come again after its time-out. Whether a drive answers while its brake opens: after 100 ms without an answer the motor trips, and
+//! needs longer [`Timeouts`](crate::motor::Timeouts). How feedback counts beyond 32767°, 91 turns. An example of the manual answers a
+//! time-out with zeros where its text says that the frame is sent back: such a drive is refused.
 
 mod bus;
 mod command;

@@ -1,4 +1,4 @@
-//! Facts of the models, as a table that a program can extend.
+//! Facts of the models, as a table open to further models.
 
 use crate::error::{ConfigError, check};
 use crate::lk::model::Scale;
@@ -7,7 +7,7 @@ use crate::motor::models;
 /// The current of a count, in A (manual, "torque closed loop").
 pub(super) const AMPERES_PER_COUNT: f32 = 0.01;
 
-/// A model of motor: its torque constant and its largest current. All other values of the protocol are those of the output shaft.
+/// A model of motor: its torque constant and its largest current. All other values of the protocol are of the output shaft.
 ///
 /// | model | torque constant Nm/A at the output shaft | largest current A | seen in |
 /// |---|--:|--:|---|
@@ -22,8 +22,8 @@ pub(super) const AMPERES_PER_COUNT: f32 = 0.01;
 /// | [`X8_90`](Self::X8_90) | 2.5 | 10, rated | the same |
 /// | [`X10_100`](Self::X10_100) | 7.46 | 6.7, rated | the same |
 ///
-/// The currents of these tables are effective values of a phase. It is not public whether the current on the wire is one too: if it
-/// is an amplitude, a motor gives 0.71 of the torque that is set.
+/// The currents of these tables are effective values of a phase. Whether the current on the wire is an effective value is not public:
+/// if the current is an amplitude, a motor gives 0.71 of the set torque.
 ///
 /// # Examples
 /// ```
@@ -57,11 +57,11 @@ models! {
 }
 
 impl Model {
-    /// Describes a model that the table does not have: its torque constant in Nm/A at the output shaft, 0.001 to 1000, and its
+    /// Describes a model missing from the table: its torque constant in Nm/A at the output shaft, 0.001 to 1000, and its
     /// largest current in A, 0.01 to 327.
     ///
     /// # Errors
-    /// Names the first value that is not allowed.
+    /// Names the first value outside its limits.
     pub const fn new(
         name: &'static str,
         torque_constant: f32,
@@ -81,7 +81,7 @@ impl Model {
         Self { name, torque_constant, max_current_a }
     }
 
-    /// Returns the name, as errors print it.
+    /// Returns the name, as printed in errors.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name
@@ -105,7 +105,7 @@ impl Model {
         self.max_current_a * self.torque_constant
     }
 
-    /// Returns the numbers that the control modes need.
+    /// Returns the numbers for the control modes.
     pub(super) const fn scale(&self) -> Scale {
         Scale::new(AMPERES_PER_COUNT * self.torque_constant, self.max_torque_nm(), 1.0, false)
     }

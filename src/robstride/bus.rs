@@ -14,15 +14,15 @@ use crate::motor::{
 use crate::time::Duration;
 use crate::units::{Angle, AngularVelocity};
 
-/// The code of a drive that calibrates itself.
+/// The code of a drive in calibration.
 const CALIBRATION_CODE: u8 = 1;
 
-/// The bits of an id that tell the target of a command and its type, some bits of which are left out: 1, 3, 17 and 19; 4 to 7; 18
+/// The bits of an id for the target of a command and for its type. Some bits of the type are left out: 1, 3, 17 and 19; 4 to 7; 18
 /// and 22.
 const COMMANDS: [(u32, u32); 3] =
     [(0x0100_0000, 0x0D00_00FF), (0x0400_0000, 0x1C00_00FF), (0x1200_0000, 0x1B00_00FF)];
 
-/// A motor of this family in one of the run modes: see the [module](super).
+/// A motor of this family in a run mode: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -49,18 +49,18 @@ pub struct Motor {
     mode: Mode,
     /// The last feedback; `None` before the first.
     drive: Option<Feedback>,
-    /// How many times the range of the feedback the shaft is away from the turns that it can report.
+    /// The distance of the shaft from the reported turns, in ranges of the feedback.
     laps: Laps,
     /// The faults of the last report.
     reported: u32,
     /// Faults were cleared since then.
     has_cleared: bool,
     settings: Settings<Register, 3>,
-    /// A command that waits for the drive to rest.
+    /// A command to be sent once at rest.
     once: Option<Command>,
     /// Counts questions.
     questions: u8,
-    /// Counts the frames that disable since the drive reported a fault.
+    /// Counts the disabling frames since the drive reported a fault.
     turn: u8,
 }
 
@@ -70,7 +70,7 @@ impl Motor {
     /// Takes the model, the id of the drive, 1 to 127, and the run mode. The id of the host is 0xFD.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn new(model: Model, id: u8, mode: impl Into<Mode>) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 1.0, 127.0)?;
         let mode = mode.into();
@@ -93,10 +93,10 @@ impl Motor {
         })
     }
 
-    /// Sets the id of the host: any but that of a motor.
+    /// Sets the id of the host: any id but those of motors.
     ///
     /// # Errors
-    /// [`ConfigError::Conflict`] for the id of this motor. That of another one is found where both are attached.
+    /// [`ConfigError::Conflict`] for the id of this motor. A conflict with another motor is found where both are attached.
     pub fn with_host_id(self, host: u8) -> Result<Self, ConfigError> {
         if host == self.id {
             return Err(ConfigError::Conflict("host id"));
@@ -107,7 +107,7 @@ impl Motor {
     /// Sets the time without a command after which the drive disables itself: 1 ms to 5 s, 100 ms at first.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for another time, [`ConfigError::Unsupported`] for a CyberGear, which has none.
+    /// [`ConfigError::Range`] for another time, [`ConfigError::Unsupported`] for a CyberGear, a drive without a time-out.
     pub fn with_timeout(self, timeout: Duration) -> Result<Self, ConfigError> {
         if !self.model.has_timeout() {
             return Err(ConfigError::Unsupported("time-out"));
@@ -121,14 +121,14 @@ impl Motor {
         self.drive.as_ref()
     }
 
-    /// Returns the faults of the drive's last report, as the manual counts their bits; 0 once they are cleared.
+    /// Returns the faults of the drive's last report, as the manual counts their bits; 0 once cleared.
     #[must_use]
     pub const fn reported_faults(&self) -> u32 {
         self.reported
     }
 
     /// Has the drive keep its parameters over a loss of the supply; while the motor is disarmed.
-    /// The frame goes out once, for flash memory wears: it is lost where the bus refuses it.
+    /// The frame goes out once, for flash memory wears: a frame refused by the bus is lost.
     ///
     /// # Errors
     /// [`ConfigError::Unsupported`] for a CyberGear, whose bit rate the frame would change.
@@ -141,16 +141,16 @@ impl Motor {
     }
 
     /// Makes the present position zero; while the motor is disarmed. The frame goes out once. A RobStride keeps the zero over a loss of
-    /// the supply if it is [stored](Self::store), a CyberGear does not.
+    /// the supply if [stored](Self::store), a CyberGear does not.
     pub const fn set_zero(&mut self) {
         self.once = Some(Command::SetZero);
     }
 
     /// Gives the drive another id, 1 to 127, at once; while the motor is disarmed. The frame goes out once. This motor then hears no more
-    /// of it: make another one.
+    /// of the drive: make another motor.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for that of the host.
+    /// [`ConfigError::Range`] for another id, [`ConfigError::Conflict`] for the id of the host.
     pub const fn set_id(&mut self, id: u8) -> Result<(), ConfigError> {
         check!(ConfigError::check_range("id", id as f32, 1.0, 127.0));
         if id == self.host {
@@ -164,7 +164,7 @@ impl Motor {
         command.encode(&self.model, self.host, self.id)
     }
 
-    /// Returns the manual's name of a parameter, and the value that it has to have; of the position the end of its range.
+    /// Returns the manual's name of a parameter, and its configured value; for the position the end of its range.
     fn expected(&self, register: Register) -> (&'static str, f32) {
         match register {
             Register::RunMode => ("run_mode", self.mode.number(&self.model).into()),
@@ -173,7 +173,7 @@ impl Motor {
         }
     }
 
-    /// Tells whether a value in the drive is right. The time-out only has to be there: it is written later.
+    /// Tells whether a value in the drive is right. Of the time-out any value is right: the configured value is written later.
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
             Register::RunMode => found.to_bits() == self.expected(register).1.to_bits(),
@@ -189,7 +189,7 @@ impl Motor {
         self.reported != 0 || self.drive.is_some_and(has_fault)
     }
 
-    /// Disables the drive; where it reports a fault, each second frame since then clears that.
+    /// Disables the drive. If the drive reports a fault, each second frame from then on clears the fault.
     fn off(&mut self) -> CanFrame {
         self.turn = if self.has_fault() { self.turn.wrapping_add(1) } else { 0 };
         let clears = self.turn != 0 && self.turn.is_multiple_of(2);
@@ -203,7 +203,7 @@ impl OwnMotor for Motor {
         MotorName::new(self.model.name(), self.id)
     }
 
-    /// The state of the drive is in the id of its feedback, and the torque in that of the operation mode.
+    /// The state of the drive is in the id of its feedback, and the torque in the id of the operation command.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let (motor, name) = (u32::from(self.id), self.name());
         let claim = move |raw, mask, role| Claim::new(extended_id(raw), role, name).with_mask(mask);
@@ -233,7 +233,7 @@ impl OwnMotor for Motor {
         self.drive.map_or(AngularVelocity::ZERO, |drive| drive.measured.velocity())
     }
 
-    /// Beyond the range of the feedback there is none: a RobStride reports the rest of a lap then.
+    /// Beyond the range of the feedback the angle is unknown: a RobStride reports the rest of a lap then.
     fn angle(&self) -> Option<Angle> {
         self.drive.filter(|_| self.laps.is_none())?.angle()
     }
@@ -254,8 +254,8 @@ impl OwnMotor for Motor {
         self.mode.reset();
     }
 
-    /// First what is not known of the settings, then the preparations, each written and read back, then the frame that enables:
-    /// all of that anew each time, for the drive may have lost its supply since.
+    /// Asks for unknown settings, then makes the preparations, each written and read back, then enables the drive:
+    /// each time anew, for the drive may have lost its supply since.
     fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
         let (timeout, mode) = (self.timeout.value(), self.mode.preparations());
         let timeout = Preparation::exact(Register::Timeout, timeout);
@@ -281,8 +281,8 @@ impl OwnMotor for Motor {
         self.drive.map(|drive| drive.status == Status::Run)
     }
 
-    /// Every fourth time a drive in another run mode is told that of the configuration: it starts in the operation mode. A drive answers
-    /// a write with its feedback, so what the application writes is read back.
+    /// Every fourth time a drive in another run mode gets the configured mode: a drive starts in the operation mode. A drive answers
+    /// a write with its feedback, so a value written by the application is read back.
     fn inquire(&mut self) -> Option<CanFrame> {
         if let Some(command) = self.once.take() {
             self.settings.forget();

@@ -1,4 +1,4 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use super::{Model, Register};
 use crate::frame::{CanFrame, extended_id};
@@ -46,7 +46,7 @@ pub enum Command {
     Read(Register),
     /// Sets a parameter until the supply is lost.
     Write(Register, f32),
-    /// Keeps the parameters over a loss of the supply. **A CyberGear takes it for another bit rate.**
+    /// Keeps the parameters over a loss of the supply. **A CyberGear reads this frame as another bit rate.**
     Store,
 }
 

@@ -1,4 +1,4 @@
-//! The run mode, with what a user chooses for it.
+//! The run mode, with its parameters.
 
 use super::command::Command;
 use super::{Model, Register};
@@ -7,19 +7,19 @@ use crate::motor::{ControlMode, Goal, ImpedanceControl, Order, Preparation, Shaf
 use crate::units::AngularVelocity;
 use crate::wire::mit;
 
-/// A run mode of the drive. An [`ImpedanceControl`] is one too: the operation mode, in which the drive follows an impedance.
+/// A run mode of the drive. An [`ImpedanceControl`] is also a mode: in the operation mode the drive follows an impedance.
 #[derive(Debug, Clone, Copy)]
 pub struct Mode {
     pub(super) control: ControlMode,
     /// The largest current in A, of all modes but the operation mode.
     current_a: f32,
     nm_per_ampere: f32,
-    /// The current limit that the drive was told last: zero when it is enabled. It opens then, and falls with heat, by frames between
+    /// The last current limit sent to the drive: zero at enabling. The limit opens then, and falls with heat, by frames between
     /// the targets.
     told_a: Told,
 }
 
-/// The values of `run_mode`; a drive follows positions in another one than [`POSITION`].
+/// The values of `run_mode`; for positions the mode of the model replaces [`POSITION`].
 const OPERATION: u8 = 0;
 const POSITION: u8 = 1;
 const VELOCITY: u8 = 2;
@@ -39,8 +39,8 @@ impl Mode {
         Self { control, current_a, nm_per_ampere, told_a: Told::new(0.0) }
     }
 
-    /// The position mode that follows a position at once (RobStride: CSP, 5; CyberGear: 1): at most so fast, above 0 and at most the
-    /// range of the model, and with at most this current in A, above 0 and at most that of the model.
+    /// The position mode without a profile (RobStride: CSP, 5; CyberGear: 1): at most so fast, above 0 and at most the
+    /// range of the model, and with at most this current in A, above 0 and at most the current of the model.
     #[must_use]
     pub const fn position(velocity_limit: AngularVelocity, current_limit_a: f32) -> Self {
         Self::of(ControlMode::angle(POSITION, Some(velocity_limit), None), current_limit_a, 1.0)
@@ -52,15 +52,15 @@ impl Mode {
         Self::of(ControlMode::velocity(VELOCITY, Some(velocity_limit), None), current_limit_a, 1.0)
     }
 
-    /// The current mode: the torque is a current of at most so many A, above 0 and at most that of the model. The torque of an ampere at
-    /// the output shaft, in Nm/A, is yours to measure: the manuals give it for effective currents, and do not say of which kind
-    /// `iq_ref` is.
+    /// The current mode: the torque is a current of at most so many A, above 0 and at most the current of the model. The torque of an
+    /// ampere at the output shaft, in Nm/A, is yours to measure: the manuals give values for effective currents, and leave open
+    /// whether `iq_ref` is effective.
     #[must_use]
     pub const fn current(limit_a: f32, nm_per_ampere: f32) -> Self {
         Self::of(ControlMode::torque(CURRENT, limit_a * nm_per_ampere), limit_a, nm_per_ampere)
     }
 
-    /// What the drive reads as rest; `None` for a drive that only rests when it is disabled.
+    /// The command of rest; `None` for a drive that only rests when disabled.
     pub(super) const fn rest(&self) -> Option<Command> {
         match self.control.number {
             OPERATION => Some(Command::Operation(mit::Command::REST)),
@@ -75,7 +75,7 @@ impl Mode {
     }
 
     /// # Errors
-    /// A limit that is not within those of the model.
+    /// A limit beyond the limits of the model.
     pub(super) fn check(&self, model: &Model) -> Result<(), ConfigError> {
         if !(self.nm_per_ampere > 1e-6 && self.nm_per_ampere.is_finite()) {
             return Err(ConfigError::NotPositive("nm_per_ampere"));
@@ -88,7 +88,7 @@ impl Mode {
         self.control.check(model.vmax_rad_per_s(), 0.0, most_nm)
     }
 
-    /// Returns what the drive has to confirm before it is enabled.
+    /// Returns the settings to be confirmed by the drive before enabling.
     pub(super) fn preparations(&self) -> [Option<Preparation<Register>>; 2] {
         let limit = |register, value| Some(Preparation::limit(register, value));
         let current = limit(Register::CurrentLimit, 0.0);
@@ -103,7 +103,7 @@ impl Mode {
         }
     }
 
-    /// Returns what the drive is told within the share of its largest effort; `None` to rest.
+    /// Returns the command to the drive within the share of its largest effort; `None` to rest.
     pub(super) fn command(&mut self, order: Order, shaft: Shaft, model: &Model) -> Option<Command> {
         let goal = self.control.impedance_goal(order, shaft, model.ranges(), 65_535)?;
         Some(match goal {
@@ -132,8 +132,8 @@ impl Mode {
         Command::Write(register, target)
     }
 
-    /// Returns a target where the shaft is, for before the drive is enabled. In the operation mode a drive that is enabled follows the
-    /// last command, which was rest.
+    /// Returns a target where the shaft is, for before the drive is enabled. In the operation mode an enabled drive follows the
+    /// last command, a command of rest.
     pub(super) fn stay(&self, (angle, velocity): Shaft) -> Command {
         match (self.rest(), angle) {
             (Some(rest), _) => rest,

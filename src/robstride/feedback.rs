@@ -1,4 +1,4 @@
-//! The codec of what a drive sends: its feedback, parameters and reports of faults.
+//! The codec of frames from a drive: its feedback, parameters and reports of faults.
 
 use super::command::raw_of;
 use super::{Model, Register};
@@ -7,7 +7,7 @@ use crate::motor::code_from;
 use crate::units::Angle;
 use crate::wire::mit;
 
-/// What a drive reports with each answer.
+/// A report of a drive, part of each answer.
 ///
 /// ```text
 /// id     28 .. 24    23 .. 22    21 .. 16    15 ..  8    7 ..  0
@@ -49,7 +49,7 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Reads a frame of feedback; `None` for any other frame, and for a state that no drive has.
+    /// Reads a frame of feedback; `None` for any other frame, and for an unknown state.
     #[must_use]
     pub fn decode(frame: &CanFrame, model: &Model) -> Option<Self> {
         let raw = raw_of(frame)?;
@@ -87,11 +87,11 @@ impl Feedback {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Status {
-    /// 0: it gives no torque.
+    /// 0: the drive gives no torque.
     Reset = 0,
-    /// 1: it calibrates itself, and turns.
+    /// 1: the drive calibrates itself, and turns.
     Calibration = 1,
-    /// 2: it follows commands.
+    /// 2: the drive follows commands.
     Run = 2,
 }
 
@@ -101,14 +101,14 @@ impl Status {
     }
 }
 
-/// The types of what a drive says: feedback, a parameter, its faults as the manual counts their bits, and its firmware, which
-/// another node has asked for, with the type of feedback.
+/// The types of frames from a drive: feedback, a parameter, its faults as the manual counts their bits, and its firmware on the
+/// question of another node, with the type of feedback.
 const FEEDBACK: u8 = 2;
 pub(super) const VALUE: u8 = 17;
 pub(super) const FAULTS: u8 = 21;
 const VERSION: [u8; 3] = [0x00, 0xC4, 0x56];
 
-/// Reads a frame that is no feedback: its type, whether the drive knows what it was asked for, and the data.
+/// Reads a frame other than feedback: its type, whether the drive knows the parameter in question, and the data.
 pub(super) fn answer(frame: &CanFrame) -> Option<(u8, bool, [u8; 8])> {
     let (raw, data) = (raw_of(frame)?, *frame.bytes());
     let [kind, status, ..] = raw.to_be_bytes();

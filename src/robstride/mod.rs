@@ -1,4 +1,4 @@
-//! RobStride's joint motors RS00 to RS06, and Xiaomi's CyberGear, which speaks the same protocol.
+//! RobStride's joint motors RS00 to RS06, and Xiaomi's CyberGear with the same protocol.
 //!
 //! ```text
 //! id         28 .. 24                 23 ..  8                   7 ..  0
@@ -11,10 +11,10 @@
 //!            17 parameter             failed 8 | motor           host      index 16 | 0 | value 32
 //!            21 faults                motor                      host      faults 32 | warnings 32
 //! ```
-//! Extended frames of 8 bytes at 1 Mbit/s. A drive sends one for each that it gets, so the bus carries two a motor and cycle: at
-//! 1 kHz it is full with three.
+//! Extended frames of 8 bytes at 1 Mbit/s. A drive answers each frame with a frame, so the bus carries two a motor and cycle: at
+//! 1 kHz three motors fill the bus.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its run
+//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its run
 //! mode is an [`ImpedanceControl`](crate::motor::ImpedanceControl) or a [`Mode`]:
 //!
 //! | mode | `run_mode` | targets | torque is limited by | rest is |
@@ -24,18 +24,18 @@
 //! | [`Mode::velocity`] | 2 | velocity | the current limit of the mode | disabled |
 //! | [`Mode::current`] | 3 | torque | the current limit of the mode | no current |
 //!
-//! **Before a motor is armed, `run_mode` is read, and set where it is another one**: a drive forgets it with the supply.
-//! [`arm`](crate::motor::Devices::arm) refuses until the drive has the right one. `mechPos`, the position with its turns, is read as
-//! well: the feedback of a RobStride starts again at the other end of its range, and an angle beyond is none, so that no spring and no
-//! position mode is driven from it. A motor in [`Mode::position`] is not armed there.
+//! **Before a motor is armed, `run_mode` is read, and written if different**: a drive forgets the mode with the supply.
+//! [`arm`](crate::motor::Devices::arm) refuses until the drive has the right mode. `mechPos`, the position with its turns, is read as
+//! well: the feedback of a RobStride starts again at the other end of its range, and an angle beyond the range is unknown, so no
+//! spring and no position mode is driven from such an angle. A motor in [`Mode::position`] is not armed there.
 //!
 //! **Before a drive is enabled**, these are written and read back, each time: `canTimeout`, 100 ms unless configured otherwise; in
-//! the operation mode `limit_torque`; in the position and speed modes `limit_cur` at zero, which opens with the output afterwards, and
+//! the operation mode `limit_torque`; in the position and speed modes `limit_cur` at zero, opened with the output afterwards, and
 //! `limit_spd`. The target is where the shaft is.
 //!
-//! **When the program stops, a RobStride does; a CyberGear does not.** It has no time-out for commands, so it goes on with its last
-//! command when the cable is cut: with its last torque, or to its last position. Only its supply ends that. Keep the torque limit low,
-//! and have a switch for the supply.
+//! **When the program stops, a RobStride does; a CyberGear does not.** A CyberGear has no time-out for commands, and goes on with its
+//! last command when the cable is cut: with its last torque, or to its last position. Only a loss of the supply ends the motion. Keep
+//! the torque limit low, and have a switch for the supply.
 //!
 //! ```
 //! use drivetrain::motor::{Devices, ImpedanceControl, Own};
@@ -49,7 +49,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Every frame to the motor that another node sends counts as that of a second master, also the question of a tool for a parameter.
+//! Every frame of another node to the motor counts as a frame of a second master, also the question of a tool for a parameter.
 //!
 //! A fault is an error of the motor, with a code:
 //!
@@ -60,21 +60,21 @@
 //! | 1 | the drive calibrates itself | feedback |
 //!
 //! Sources: the maker's manuals of RS00 to RS06, 28 April 2026, chapter 4; for the CyberGear its manual as belovictor/cybergear-docs
-//! translates it. Frames of public tests are in `tests/data/robstride`.
+//! translates the text. Frames of public tests are in `tests/data/robstride`.
 //!
 //! Not known:
 //! * Whether all drives truncate to counts, as the manuals' code does, or round: half a count either way.
-//! * To which host a drive answers an operation frame, which names none. So feedback counts whichever host it names.
-//! * Whether a drive that is disabled answers an operation frame. The manuals name the answer without a condition, and
-//!   [`arm`](crate::motor::Devices::arm) finds no feedback where it does not.
-//! * Whether the firmware resets a limit when it is enabled. The current limit goes out again with every 16th command.
-//! * Which position a drive's own loop sees beyond the range of its feedback. So none is sent there.
-//! * What a CyberGear with a firmware before 1.2.1.5 answers for `mechPos`. If it does not, it is never armed.
-//! * The layout of a drive's own reports: chapter 4.1.11 has type 24, chapter 4.2.1 type 2. They are off at delivery, and those of
+//! * The host in the answer to an operation frame, as the frame names no host. So feedback to any host counts.
+//! * Whether a disabled drive answers an operation frame. The manuals name the answer without a condition, and
+//!   [`arm`](crate::motor::Devices::arm) finds no feedback without an answer.
+//! * Whether the firmware resets a limit at enabling. The current limit goes out again with every 16th command.
+//! * The position in a drive's own loop beyond the range of its feedback. So no position is sent there.
+//! * The answer for `mechPos` of a CyberGear with a firmware before 1.2.1.5. Without an answer, the motor is never armed.
+//! * The layout of a drive's own reports: chapter 4.1.11 has type 24, chapter 4.2.1 type 2. The reports are off at delivery, and reports of
 //!   type 24 are not read.
 //!
-//! **The protocol with 11-bit ids** (type 25 or `protocol_1` switch to it) is not here. Its feedback has no state, so nobody sees a drive
-//! that is enabled, or has reset; parameters can be read since firmware 0.0.3.27 only; and the manuals of RS02, RS03 and RS04 give it the
+//! **The protocol with 11-bit ids** (type 25 or `protocol_1` switch to it) is not here. Its feedback has no state, so an enabled drive or
+//! a reset is not seen; parameters can be read since firmware 0.0.3.27 only; and the manuals of RS02, RS03 and RS04 give it the
 //! velocity range of the RS00. Leave the drive in the private protocol, as delivered.
 
 mod bus;

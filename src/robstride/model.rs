@@ -1,4 +1,4 @@
-//! Facts of the models, as a table that a program can extend.
+//! Facts of the models, as a table open to further models.
 
 use crate::error::ConfigError;
 use crate::motor::{mit_model, models};
@@ -17,8 +17,8 @@ use crate::wire::mit::Ranges;
 /// | [`RS06`](Self::RS06) | 4π | 50 | 36 | 5000, 100 | 57 |
 /// | [`CYBERGEAR`](Self::CYBERGEAR) | 4π | 30 | 12 | 500, 5 | 23 |
 ///
-/// Ranges and currents are those of the maker's manuals of 28 April 2026, and of the manual of the CyberGear. **A drive does not tell
-/// its ranges, and not all sources agree**: a torque or a stiffness is wrong by the quotient where they differ, up to tenfold.
+/// Ranges and currents come from the maker's manuals of 28 April 2026, and from the manual of the CyberGear. **A drive does not tell
+/// its ranges, and not all sources agree**: a torque or a stiffness is wrong by the quotient of the ranges, up to tenfold.
 ///
 /// | model | contested | says |
 /// |---|---|---|
@@ -31,7 +31,7 @@ use crate::wire::mit::Ranges;
 ///
 /// [`with_position_range`](Self::with_position_range) and [`with_gain_ranges`](Self::with_gain_ranges) set others, and
 /// [`new`](Self::new) all of them. Before a motor is enabled its torque limit is written to the drive too
-/// (`limit_torque`, in Nm), so that the drive itself limits it whatever the ranges are.
+/// (`limit_torque`, in Nm), so that the drive itself limits the torque for any ranges.
 ///
 /// # Examples
 /// ```
@@ -68,7 +68,7 @@ models! {
 mit_model!(65_535);
 
 impl Model {
-    /// Describes a RobStride that the table does not have: its ranges, and its largest current in A. The ranges of kp and kd are 500 and
+    /// Describes a RobStride missing from the table: its ranges, and its largest current in A. The ranges of kp and kd are 500 and
     /// 5 unless [`Ranges::with_gains`] sets them.
     ///
     /// # Errors
@@ -91,10 +91,10 @@ impl Model {
         Self { name, ranges, current_a: current, is_cybergear }
     }
 
-    /// Sets another range of the position, in rad, and keeps all others: that of another firmware.
+    /// Sets another range of the position, in rad, and keeps all others: for another firmware.
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    /// [`ConfigError::Range`] for a range not between 0.001 and 1000000.
     pub const fn with_position_range(self, pmax_rad: f32) -> Result<Self, ConfigError> {
         let (kp, kd) = self.ranges.gains();
         match Ranges::new(pmax_rad, self.vmax_rad_per_s(), self.tmax_nm()) {
@@ -103,11 +103,11 @@ impl Model {
         }
     }
 
-    /// Sets other ranges of kp and kd, in Nm/rad and Nm s/rad, and keeps all others. **A range that is less than the drive's makes the
+    /// Sets other ranges of kp and kd, in Nm/rad and Nm s/rad, and keeps all others. **A range below the range of the drive makes the
     /// drive stiffer than asked by the quotient.**
     ///
     /// # Errors
-    /// [`ConfigError::Range`] for a range that is not between 0.001 and 1000000.
+    /// [`ConfigError::Range`] for a range not between 0.001 and 1000000.
     pub const fn with_gain_ranges(self, kp: f32, kd: f32) -> Result<Self, ConfigError> {
         match self.ranges.with_gains(kp, kd) {
             Ok(ranges) => Ok(Self { ranges, ..self }),
@@ -121,20 +121,20 @@ impl Model {
         self.current_a
     }
 
-    /// Tells whether the drive has a time-out for commands. A CyberGear has none: it goes on with its last command for ever.
+    /// Tells whether the drive has a time-out for commands. A CyberGear has no time-out, and goes on with its last command for ever.
     #[must_use]
     pub const fn has_timeout(&self) -> bool {
         !self.is_cybergear
     }
 
-    /// Tells whether the drive keeps its parameters over a loss of the supply when told. The frame for that changes the bit rate of a
+    /// Tells whether the drive keeps its parameters over a loss of the supply when told. The frame for storing changes the bit rate of a
     /// CyberGear.
     #[must_use]
     pub const fn can_store(&self) -> bool {
         !self.is_cybergear
     }
 
-    /// Returns the run mode that follows a position at once: 5 (CSP), for a CyberGear 1.
+    /// Returns the run mode for positions without a profile: 5 (CSP), for a CyberGear 1.
     pub(super) const fn position_mode(&self) -> u8 {
         if self.is_cybergear { 1 } else { 5 }
     }

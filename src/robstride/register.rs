@@ -3,8 +3,8 @@
 use crate::motor::registers;
 
 registers! {
-    /// A parameter of a drive. Those above 0x7020 are RobStride's alone, but for those that [`Model::CYBERGEAR`](super::Model)
-    /// has by its manual.
+    /// A parameter of a drive. Parameters above 0x7020 are RobStride's alone, except those of [`Model::CYBERGEAR`](super::Model)
+    /// in its manual.
     ///
     /// # Examples
     /// ```

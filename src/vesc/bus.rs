@@ -19,14 +19,14 @@ const MOTION: u8 = 9;
 const TEMPERATURES: u8 = 16;
 const TACHOMETER: u8 = 27;
 
-/// Blocks of packets: the first, and the bits that differ within the block.
+/// Blocks of packets: the first packet, and the bits that differ within the block.
 const COMMANDS: [(u8, u8); 4] = [(0, 3), (4, 0), (10, 1), (12, 1)];
 const STATUSES: [(u8, u8); 5] = [(MOTION, 0), (14, 1), (TEMPERATURES, 0), (TACHOMETER, 0), (58, 0)];
 
 /// Commands for one question.
 const ORDERS: u8 = 50;
 
-/// A motor on a VESC, in one of the control modes: see the [module](super).
+/// A motor on a VESC, in a control mode: see the [module](super).
 ///
 /// # Examples
 /// ```
@@ -67,7 +67,7 @@ pub struct Motor {
     orders: u8,
     /// Questions since the last answer.
     unanswered: u8,
-    /// The share of the last command; `None` where the drive makes its current by a loop of its own.
+    /// The share of the last command; `None` where the drive controls the current by its own loop.
     effort: Option<f32>,
 }
 
@@ -75,7 +75,7 @@ impl Motor {
     /// Takes the motor, the id of the drive, 0 to 253, and the control mode.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn new(model: Model, id: u8, mode: Mode) -> Result<Self, ConfigError> {
         ConfigError::check_range("id", id.into(), 0.0, f32::from(HOST - 1))?;
         model.check()?;
@@ -96,33 +96,33 @@ impl Motor {
         })
     }
 
-    /// Sets the command of a motor that is not driven: [`Rest::Release`] at first.
+    /// Sets the command of a motor at rest: [`Rest::Release`] at first.
     ///
     /// # Errors
-    /// [`ConfigError::Limit`] for a current that is not above 0 and within the limit of the model.
+    /// [`ConfigError::Limit`] for a current not above 0 or not within the limit of the model.
     pub fn with_rest(self, rest: Rest) -> Result<Self, ConfigError> {
         rest.check(&self.model)?;
         Ok(Self { rest, ..self })
     }
 
     /// Takes the angle from status 4, the position of the drive's encoder, instead of the tachometer in status 5. In the mode
-    /// [`Mode::position`](super::Mode::position) it always does.
+    /// [`Mode::position`](super::Mode::position) the angle always comes from status 4.
     ///
-    /// It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio. Without an encoder,
+    /// This angle is of the output shaft if the position angle division in VESC Tool is the gear ratio. Without an encoder,
     /// status 4 has the electrical angle.
     #[must_use]
     pub const fn with_encoder(self) -> Self {
         Self { has_encoder: true, ..self }
     }
 
-    /// Never asks for the fault code, for firmware that does not answer. A fault is then not seen: after it the drive ignores commands
+    /// Never asks for the fault code, for firmware without an answer. A fault is then not seen: after a fault the drive ignores commands
     /// for a time, and follows them again.
     #[must_use]
     pub const fn without_fault_code(self) -> Self {
         Self { has_fault_code: false, ..self }
     }
 
-    /// Returns the last values that the drive has reported.
+    /// Returns the last values reported by the drive.
     #[must_use]
     pub const fn feedback(&self) -> &Feedback {
         &self.feedback
@@ -144,7 +144,7 @@ impl Motor {
         Claim::new(extended(packet, id), role, self.name()).with_mask(!(u32::from(bits) << 8))
     }
 
-    /// Asks for the fault code, which is no longer known when four questions had no answer.
+    /// Asks for the fault code. After four questions without an answer the code is unknown.
     fn ask(&mut self) -> CanFrame {
         if self.unanswered >= 4 {
             self.feedback.fault = None;
@@ -175,7 +175,7 @@ impl OwnMotor for Motor {
         MotorName::new(self.model.name, self.id)
     }
 
-    /// All commands of the drive are claimed, in whatever mode: another program that sends one is a second master. Tools may ask.
+    /// All commands of the drive are claimed, in each mode: another program with such commands is a second master. Tools may ask.
     fn claims(&self) -> impl IntoIterator<Item = Claim> {
         let own = |block, role| self.claim(self.id, block, role);
         let commands = COMMANDS.map(|block| own(block, Role::Command));
@@ -244,8 +244,8 @@ impl OwnMotor for Motor {
         self.has_fault_code.then(|| self.ask())
     }
 
-    /// Takes all that says nothing of the motion: the other status frames, and fault codes. A motor whose targets need an angle takes
-    /// the motion without one here too, so that feedback is late when either of them is.
+    /// Takes all frames but the motion: the other status frames, and fault codes. A motor whose targets need an angle takes
+    /// the motion without an angle here too, so feedback is late when motion or angle is late.
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
         let (packet, id) = parts(frame.id());
         if packet == SHORT_MESSAGE {
@@ -302,7 +302,7 @@ impl OwnMotor for Motor {
     }
 }
 
-/// Returns packet and id of a drive; for a standard id, or one with more bits, those of none.
+/// Returns packet and id of a drive; for a standard id, or an id with more bits, values of no drive.
 fn parts(id: Id) -> (u8, u8) {
     match id {
         Id::Extended(id) => match id.as_raw().to_be_bytes() {

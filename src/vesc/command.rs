@@ -1,4 +1,4 @@
-//! The codec of what a drive is sent.
+//! The codec of commands to a drive.
 
 use crate::frame::{CanFrame, extended_id};
 use embedded_can::Id;
@@ -6,7 +6,7 @@ use embedded_can::Id;
 /// The packet of a question, and of its answer: a short message of the drive's serial protocol.
 pub(super) const SHORT_MESSAGE: u8 = 8;
 
-/// The id of this program, to which drives answer.
+/// The id of this program, the address of answers.
 pub(super) const HOST: u8 = 254;
 
 /// `COMM_GET_VALUES_SELECTIVE` for value 15, the fault code.
@@ -14,7 +14,7 @@ pub(super) const FAULT_CODE: [u8; 5] = [50, 0, 0, 0x80, 0];
 
 /// A command of a drive, in the drive's own direction and at the rotor.
 ///
-/// A value that is not finite is sent as a current of 0, which lets the shaft go.
+/// Sends a current of 0 for a value that is not finite: the shaft turns freely.
 ///
 /// # Examples
 /// ```
@@ -30,7 +30,7 @@ pub enum Command {
     Duty(f32),
     /// The torque current in A. A current of 0 lets the shaft go.
     Current(f32),
-    /// The current in A that brakes a shaft that turns, whatever its sign.
+    /// A current in A to brake a turning shaft; the sign has no effect.
     Brake(f32),
     /// The speed in electrical rpm. A speed of 0 lets the shaft go.
     Speed(f32),
@@ -40,7 +40,7 @@ pub enum Command {
     CurrentShare(f32),
     /// The brake current as a share of the drive's limit, 0 to 1.
     BrakeShare(f32),
-    /// The current in A that holds the shaft where it is, by a field that stands.
+    /// A current in A to hold the shaft in place, by a standing field.
     Handbrake(f32),
     /// The handbrake current as a share of the drive's limit, 0 to 1.
     HandbrakeShare(f32),

@@ -1,4 +1,4 @@
-//! The control mode, with what a user chooses for it.
+//! The control mode, with its parameters.
 
 use super::Model;
 use super::command::Command;
@@ -30,7 +30,7 @@ pub struct Mode(Kind);
 enum Kind {
     Current(CurrentControl),
     Duty(DutyControl),
-    /// What a target of exactly 0 does.
+    /// The effect of a target of exactly 0.
     Velocity(Rest),
     Position,
 }
@@ -43,17 +43,17 @@ pub(super) struct At<'a> {
     pub(super) duty: f32,
 }
 
-/// Rest: the command of a motor that is not driven. In each mode it is what a disarmed motor gets, and one without a target.
+/// Rest: the command of a motor that is not driven. In each mode a disarmed motor gets this command, and so does a motor without a target.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rest {
     /// A current of 0: the shaft turns freely.
     #[default]
     Release,
-    /// A current in A that brakes the shaft while it turns. It cannot hold a weight.
+    /// A current in A that brakes the shaft while the shaft turns. A brake cannot hold a weight.
     Brake(f32),
-    /// A current in A through phases that stand: the rotor is held in the nearest of its electrical turns, and gets warm. A shaft that
-    /// turns fast is shaken by it, not stopped. Of the kinds of control only FOC has it; others take it for `Brake`.
+    /// A current in A through standing phases: the rotor is held in the nearest of its electrical turns, and gets warm. A fast
+    /// shaft is shaken by the handbrake, not stopped. Of the kinds of control only FOC has a handbrake; others brake as with `Brake`.
     Handbrake(f32),
 }
 
@@ -73,7 +73,7 @@ impl Rest {
     }
 }
 
-/// The loops of current control, which are ours.
+/// The loops of current control, run here.
 #[derive(Debug, Clone, Copy)]
 struct CurrentControl {
     loops: Option<TorqueLoops>,
@@ -97,7 +97,7 @@ impl CurrentControl {
     }
 }
 
-/// The loop of duty control, which is ours, and the largest duty.
+/// The loop of duty control, run here, and the largest duty.
 #[derive(Debug, Clone, Copy)]
 struct DutyControl {
     limit: f32,
@@ -125,7 +125,7 @@ impl Mode {
         Self(Kind::Current(CurrentControl { loops: None, has_angle: false }))
     }
 
-    /// Current control that takes velocities too, by a loop of ours from rad/s to Nm.
+    /// Current control for velocities too, by a loop of ours from rad/s to Nm.
     ///
     /// # Errors
     /// As [`Cascade::new`](crate::control::Cascade::new).
@@ -134,7 +134,7 @@ impl Mode {
         Ok(Self(Kind::Current(CurrentControl { loops: Some(loops), has_angle: false })))
     }
 
-    /// Current control that takes velocities and angles too, by loops of ours from rad to rad/s and from rad/s to Nm. The tachometer has
+    /// Current control for velocities and angles too, by loops of ours from rad to rad/s and from rad/s to Nm. The tachometer has
     /// six steps for an electrical turn, so a fine angle needs [`Motor::with_encoder`](super::Motor::with_encoder).
     ///
     /// # Errors
@@ -147,11 +147,11 @@ impl Mode {
     /// Duty control: our own loop follows a velocity by the share of the supply voltage. Takes the largest duty, above 0 and at most 1,
     /// and a loop from rad/s to duty: 1 is the whole supply.
     ///
-    /// A duty of 0 shorts the phases, so this mode brakes with all that the drive allows. The duty keeps near the one that the drive
-    /// reports: within the share of the order times the limit, so a motor that turns when it is armed is not braked at once.
+    /// A duty of 0 shorts the phases, so this mode brakes with the whole current of the drive. The duty keeps near the duty reported
+    /// by the drive: within the share of the order times the limit, so a motor armed while turning is not braked at once.
     ///
     /// # Errors
-    /// Names the value that is not allowed.
+    /// Names the value outside its limits.
     pub fn duty(limit: f32, speed: PidConfig) -> Result<Self, ConfigError> {
         ConfigError::check_limit("duty limit", limit, 1.0)?;
         Ok(Self(Kind::Duty(DutyControl { limit, speed: Pid::new(speed)? })))
@@ -163,7 +163,7 @@ impl Mode {
         Self(Kind::Velocity(Rest::Release))
     }
 
-    /// As [`velocity`](Self::velocity), with what a target of exactly 0 does.
+    /// As [`velocity`](Self::velocity), with the effect of a target of exactly 0.
     #[must_use]
     pub const fn velocity_with_standstill(standstill: Rest) -> Self {
         Self(Kind::Velocity(standstill))
@@ -171,19 +171,19 @@ impl Mode {
 
     /// Position control by the drive's own loop, which needs an encoder.
     ///
-    /// The angle is that of status 4. It is the angle of the output shaft if the position angle division in VESC Tool is the gear ratio.
+    /// Status 4 has the angle, of the output shaft if the position angle division in VESC Tool is the gear ratio.
     #[must_use]
     pub const fn position() -> Self {
         Self(Kind::Position)
     }
 
-    /// The drive itself controls the position, so its angle is that of status 4.
+    /// The drive itself controls the position, so status 4 has its angle.
     pub(super) const fn has_position(&self) -> bool {
         matches!(self.0, Kind::Position)
     }
 
     /// # Errors
-    /// A value that is not allowed.
+    /// A value outside its limits.
     pub(super) fn check(&self, model: &Model) -> Result<(), ConfigError> {
         if let Kind::Velocity(standstill) = self.0 { standstill.check(model) } else { Ok(()) }
     }
@@ -210,7 +210,7 @@ impl Mode {
         }
     }
 
-    /// Returns the command and its share of the largest effort, where that is not the drive's business; `None` to rest.
+    /// Returns the command and its share of the largest effort, unless controlled by the drive; `None` to rest.
     pub(super) fn command(&mut self, order: Order, at: &At) -> Option<(Command, Option<f32>)> {
         let target = match order.target {
             Target::Velocity(velocity) => {

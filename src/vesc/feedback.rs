@@ -1,8 +1,8 @@
-//! The codec of what a drive sends.
+//! The codec of frames from a drive.
 
 use super::command::FAULT_CODE;
 
-/// The last values that a drive has reported, in its own direction and at the rotor. Each is `None` before the first frame with it.
+/// The last values reported by a drive, in its own direction and at the rotor. Each is `None` before the first such frame.
 ///
 /// # Examples
 /// ```
@@ -22,25 +22,25 @@ pub struct Feedback {
     pub current_a: Option<f32>,
     /// The share of the supply voltage, -1 to 1 (status 1).
     pub duty: Option<f32>,
-    /// The charge that was used and that was fed back, in Ah (status 2).
+    /// The used charge and the charge fed back, in Ah (status 2).
     pub charge_ah: Option<[f32; 2]>,
-    /// The energy that was used and that was fed back, in Wh (status 3).
+    /// The used energy and the energy fed back, in Wh (status 3).
     pub energy_wh: Option<[f32; 2]>,
     /// The temperature of the driver's transistors in °C (status 4).
     pub driver_c: Option<f32>,
-    /// The temperature of the motor in °C (status 4). A drive without a sensor for it reports some number too.
+    /// The temperature of the motor in °C (status 4). A drive without a sensor also reports some number.
     pub motor_c: Option<f32>,
     /// The current from the supply in A (status 4).
     pub input_a: Option<f32>,
     /// The position of the drive's position loop in degrees, 0 to 360 (status 4): of an encoder, else of the electrical angle.
     pub position_deg: Option<f32>,
-    /// Sixths of electrical turns since the drive has started (status 5). It wraps as an `i32`.
+    /// Sixths of electrical turns since the drive has started (status 5). The count wraps as an `i32`.
     pub tachometer: Option<i32>,
     /// The supply in V (status 5).
     pub supply_v: Option<f32>,
     /// Three inputs in V, and the servo input, -1 to 1 (status 6).
     pub inputs: Option<[f32; 4]>,
-    /// The fault code, 0 for none: the answer to a question. `mc_fault_code` in `datatypes.h` of the firmware has the numbers.
+    /// The fault code, 0 without a fault: the answer to a question. `mc_fault_code` in `datatypes.h` of the firmware has the numbers.
     pub fault: Option<u8>,
 }
 

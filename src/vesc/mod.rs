@@ -1,4 +1,4 @@
-//! Motors on VESC drives: any motor on a drive that runs the firmware `bldc`.
+//! Motors on VESC drives: any motor on a drive with the firmware `bldc`.
 //!
 //! ```text
 //! commands   packet << 8 | id   value i32, high byte first
@@ -12,11 +12,11 @@
 //! question   8                  254 | 0 | 50 | 00 00 80 00
 //! answer     8 << 8 | 254       id | 1 | 50 | 00 00 80 00 | fault code
 //! ```
-//! Extended frames, big-endian, at the bit rate that the drive is set to: 500 kbit/s at delivery. The ids are 0 to 253: 254 is the one
+//! Extended frames, big-endian, at the bit rate set in the drive: 500 kbit/s at delivery. The ids are 0 to 253: 254 is the id
 //! of this program, and 255 means every drive.
 //!
-//! [`Motor`] is one of them as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of it. Its control
-//! mode is a [`Mode`]:
+//! [`Motor`] is such a drive as an [`OwnMotor`](crate::motor::OwnMotor); [`Own`](crate::motor::Own) makes a device of the motor. Its
+//! control mode is a [`Mode`]:
 //!
 //! | mode | targets | current is limited by | a value of zero |
 //! |---|---|---|---|
@@ -25,23 +25,23 @@
 //! | [`Mode::velocity`] | velocity, by the loop of the drive | the drive alone | lets the shaft go, as does any speed below the drive's smallest, 900 electrical rpm at delivery |
 //! | [`Mode::position`] | angle, by the loop of the drive | the drive alone | 0° |
 //!
-//! Only [`Mode::current`] has its current scaled by the share of the order, so heat and a stall reduce it there. In the modes of the
-//! drive's own loops the share has no effect once the output range is open; what stops them is rest.
+//! Only [`Mode::current`] has its current scaled by the share of the order, so heat and a stall reduce the current there. In the
+//! modes of the drive's own loops the share has no effect once the output range is open; only rest stops the motor.
 //!
 //! The drive lets the shaft go for currents below its smallest, 0.05 A at delivery.
 //!
-//! **Rest** is a current of 0, which lets the shaft go; [`Motor::with_rest`] chooses another one. There is no frame that enables or
-//! disables a VESC: it follows any command at once.
+//! **Rest** is a current of 0: the shaft turns freely. [`Motor::with_rest`] chooses another rest. There is no frame to enable or
+//! disable a VESC: the drive follows any command at once.
 //!
-//! A command to id 255 moves each drive on the bus: another program that sends one is not seen as a second master.
+//! A command to id 255 moves each drive on the bus: another program with such commands is not seen as a second master.
 //!
 //! **When the program stops, the drive goes on** until its own time-out, then it brakes with its own time-out brake current: 1000 ms
 //! and 0 A at delivery. Neither can be read or written by a short frame, so set them in VESC Tool (App Settings, General): 100 ms is
 //! ten periods of the slowest loop that makes sense. A time-out of 0 means never.
 //!
 //! **The status frames have no fault code.** After a fault the drive ignores commands for 500 ms at delivery, and then follows them
-//! again. So the motor asks for the code: each 10 ms while it rests, and in the place of each 50th command. It is not armed before
-//! the first answer, nor when four questions in a row had none, and a fault trips it.
+//! again. So the motor asks for the code: each 10 ms at rest, and in the place of each 50th command. The motor is not armed before
+//! the first answer, nor after four questions in a row without an answer, and a fault trips the motor.
 //!
 //! **What to set in VESC Tool**: CAN mode "VESC"; status 1 at 200 Hz or more, as feedback counts as late after 10 ms unless the
 //! [time-outs](crate::motor::Timeouts) say otherwise. Status 5 at the same rate where an angle is controlled, or status 4 with
@@ -70,11 +70,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Sources: `comm_can.c`, `commands.c`, `mc_interface.c`, `mcpwm_foc.c`, `foc_math.c`, `timeout.c` and `datatypes.h` of vedderb/bldc as
-//! of August 2026, and its `documentation/comm_can.md`. Where the two differ, the firmware counts: the speed has a scale of 1, not 1000, and
-//! status 6 is packet 58, not 28. A command has four bytes here, never more: the firmware reads a current of six bytes or more as a delay
-//! and the current after it. Not known: how firmware made by others for VESC-compatible drives differs; one that does not answer about
-//! its fault needs [`Motor::without_fault_code`].
+//! Sources: `comm_can.c`, `commands.c`, `mc_interface.c`, `mcpwm_foc.c`, `foc_math.c`, `timeout.c` and `datatypes.h` of vedderb/bldc
+//! as of August 2026, and its `documentation/comm_can.md`. Where the two differ, the firmware counts: the speed has a scale of 1, not
+//! 1000, and status 6 is packet 58, not 28. A command has four bytes here, never more: the firmware reads a current of six bytes or
+//! more as a delay and the current after it. Not known: the differences in firmware of others for VESC-compatible drives; firmware
+//! without an answer to the question for the fault needs [`Motor::without_fault_code`].
 
 mod bus;
 mod command;

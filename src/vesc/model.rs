@@ -1,4 +1,4 @@
-//! Facts of a motor, which a program states: a VESC drives any.
+//! Facts of a motor, stated by the program: a VESC drives any motor.
 
 use crate::encoder::GearRatio;
 use crate::error::ConfigError;

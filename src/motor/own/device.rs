@@ -51,7 +51,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         None
     }
 
-    /// Each update offers the newest command anyway. A frame for the drive's power comes again if it is still wanted.
+    /// Each update offers the newest command anyway. A frame for the drive's power comes again if still wanted.
     fn requeue(&mut self, frame: &CanFrame) -> bool {
         if self.switched == Some(*frame) {
             self.power.give_back();
@@ -91,7 +91,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
         self.watch.is_faulty(&self.guard).then(|| self.motor.name()).into_iter()
     }
 
-    /// A motor that is armed has asked before, and asks again before its drive is enabled.
+    /// An armed motor has asked before, and asks again before its drive is enabled.
     fn wrong_setting(&self) -> Option<WrongSetting> {
         if self.guard.is_armed() { None } else { self.motor.wrong_setting() }
     }
@@ -146,7 +146,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
 /// The update, step by step.
 impl<M: OwnMotor> Own<M> {
-    /// Tells whether the drive is enabled, and no frame but a command is due: that is so in almost each cycle of a motor that is driven.
+    /// Tells whether the drive is enabled, and no frame but a command is due: the case of almost each cycle of a driven motor.
     #[inline]
     fn is_steady(&self) -> bool {
         let waits = self.switched.is_some() || self.switching.is_some() || self.rested.is_some();
@@ -176,7 +176,7 @@ impl<M: OwnMotor> Own<M> {
         self.rested = command.filter(|frame| is_at_rest && !gives_way && !frame.is_remote());
     }
 
-    /// Looks after the motor, which may be relaxed for what is found; returns the share of the output that it is left with.
+    /// Checks the health of the motor and takes the reactions, which may relax the motor; returns the share of the output left.
     fn check(&mut self, now: Instant) -> f32 {
         let share = self.watch.check(&mut self.guard, || self.motor.vitals(), now);
         if share <= 0.0 {
@@ -186,7 +186,7 @@ impl<M: OwnMotor> Own<M> {
     }
 
     /// Returns a question for a setting. The question takes the place of a frame of rest after another one, so an update with a
-    /// question has no more frames. A drive that reports that it is enabled gets rest instead.
+    /// question has no more frames. A drive reported as enabled gets rest instead.
     fn inquire(&mut self, now: Instant) -> Option<CanFrame> {
         // A drive that lost its supply is silent until it runs again.
         let was_online =
@@ -203,7 +203,7 @@ impl<M: OwnMotor> Own<M> {
         self.motor.inquire()
     }
 
-    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until it has no target.
+    /// Enables or disables the drive, if a frame is due: enabled from when the motor may be driven until no target is left.
     fn switch(&mut self, may_drive: bool, now: Instant) {
         if self.power.begin(now) {
             self.disable();
@@ -272,7 +272,7 @@ impl<M: OwnMotor> Own<M> {
         self.start_velocity = None;
     }
 
-    /// Returns the command of this step, or rest. If rest would disable a drive that is being enabled, returns the frame that asks
+    /// Returns the command of this step, or rest. If rest would disable a drive on the way to be enabled, returns the frame that asks
     /// for feedback.
     fn act(&mut self, may_drive: bool, step: TimeStep, left: f32) -> Option<CanFrame> {
         if !may_drive || !self.power.is_ready() {
@@ -362,7 +362,7 @@ impl<M: OwnMotor> Own<M> {
         self.command = command;
     }
 
-    /// Takes back a frame that still waits for the bus.
+    /// Takes back a frame still waiting for the bus.
     fn withdraw(&mut self, place: impl FnOnce(&mut Self) -> &mut Option<CanFrame>) {
         if let Some(frame) = place(self).take() {
             self.leave_out(&frame);

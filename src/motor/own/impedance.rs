@@ -1,4 +1,4 @@
-//! Impedance: a target, and the control of a drive that follows one.
+//! Impedance: a target, and the control of a drive in impedance mode.
 
 use super::{Order, Shaft, Target, TorqueLoops};
 use crate::control::{PidConfig, limited};
@@ -8,7 +8,7 @@ use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::{self, Ranges};
 
-/// A spring and a damper at the output shaft, and a torque beside them: what a joint of an arm or a leg is given.
+/// A spring and a damper at the output shaft, with a torque beside both: the target of a joint of an arm or a leg.
 ///
 /// The torque is `stiffness * (angle - measured angle) + damping * (velocity - measured velocity) + torque`, within the limits
 /// of the motor.
@@ -52,7 +52,7 @@ impl Impedance {
         Self::of(ranges, 1.0, 1.0, 1.0)
     }
 
-    /// Returns the value of a count of each field, which goes to `top`; to 65535 that of the angle.
+    /// Returns the value of a count of each field, for fields up to `top`; the field of the angle goes to 65535.
     pub(crate) const fn count(ranges: &Ranges, top: u16) -> Self {
         let top = top as f32;
         Self::of(ranges, 2.0 / 65_535.0, 2.0 / top, 1.0 / top)
@@ -95,12 +95,12 @@ impl From<Impedance> for mit::Command {
     }
 }
 
-/// The control of a drive that follows an [`Impedance`], as those in MIT mode do: any target becomes one, whose torque keeps
+/// The control of a drive that follows an [`Impedance`], as in MIT mode: any target becomes an impedance with a torque that keeps
 /// within a limit.
 ///
-/// The limit holds at the angle and velocity that the drive reported last: the torque beside is limited first, then the spring,
-/// then the damper. Angle and velocity are sent so near that gains times what is left to go do not ask for more. Until the next
-/// command the drive follows what it measures itself: a shaft that is blocked while it turns at `v` feels up to `damping * v` more.
+/// The limit holds at the last reported angle and velocity: the torque beside is limited first, then the spring,
+/// then the damper. Angle and velocity are sent near enough for gains times the remaining way to keep within the limit. Until the next
+/// command the drive follows its own measurements: a shaft blocked while turning at `v` feels up to `damping * v` more.
 /// Stiffness and damping are scaled by the [share](Order::share) of the order, and lowered where a count of the angle or of the
 /// velocity, times the gain, is more than an eighth of the limit.
 ///
@@ -177,7 +177,7 @@ impl ImpedanceControl {
         self.effort
     }
 
-    /// Returns the targets that it takes.
+    /// Returns the accepted targets.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
         let always = Capabilities::of(&[Capability::Torque, Capability::Impedance]);
@@ -187,8 +187,8 @@ impl ImpedanceControl {
         always.with(Capability::Velocity).with(Capability::Angle)
     }
 
-    /// Returns what the drive is told; `None` to rest: an angle is needed and not known, or the target is none that is
-    /// [taken](Self::capabilities). `most` is the largest value of each field, and `count` the value of a count of it, 0 if it is
+    /// Returns the command to the drive; `None` to rest: an angle is needed and not known, or the target is not
+    /// [accepted](Self::capabilities). `most` is the largest value of each field, and `count` the value of a count of the field, 0 if
     /// exact. Gains are whole counts and a quarter, for a drive that truncates.
     pub fn step(
         &mut self,
@@ -202,7 +202,7 @@ impl ImpedanceControl {
         self.step_within(order, (angle, velocity), gains, || (*most, *count))
     }
 
-    /// As [`step`](Self::step), with the counts of the two gains, and all ends and counts, which a torque alone does not need.
+    /// As [`step`](Self::step), with the counts of the two gains, and all ends and counts, not needed for a torque alone.
     #[inline]
     pub(crate) fn step_within(
         &mut self,
@@ -225,7 +225,7 @@ impl ImpedanceControl {
         self.spring(&Impedance { torque_nm, ..wanted }, shaft, order.share, &most, &count)
     }
 
-    /// Limits a spring and a damper beside a torque, which is limited.
+    /// Limits a spring and a damper beside a limited torque.
     #[inline(never)]
     fn spring(
         &mut self,
@@ -267,7 +267,7 @@ impl ImpedanceControl {
         })
     }
 
-    /// Returns the torque in Nm for a drive that follows torques; `None` to rest. Nothing has an end but the velocity.
+    /// Returns the torque in Nm for a drive that follows torques; `None` to rest. Only the velocity has an end.
     pub(crate) fn torque(&mut self, order: Order, shaft: Shaft, most_velocity: f32) -> Option<f32> {
         let most = Impedance {
             angle: Angle::from_radians(UNLIMITED),
@@ -289,7 +289,7 @@ impl ImpedanceControl {
         }
     }
 
-    /// Returns the impedance that a target stands for.
+    /// Returns the impedance of a target.
     fn wanted(&mut self, order: Order, (angle, velocity): Shaft) -> Option<Impedance> {
         let torque = |torque_nm| Impedance { torque_nm, ..Impedance::FREE };
         if let Some(loops) = &mut self.loops {
@@ -314,10 +314,10 @@ impl ImpedanceControl {
     }
 }
 
-/// The largest angle, stiffness and damping of a torque that is calculated here.
+/// The largest angle, stiffness and damping of a torque calculated here.
 const UNLIMITED: f32 = 1e9;
 
-/// Returns a gain in whole counts, of which a count of what it multiplies makes no more than an eighth of the limit.
+/// Returns a gain in whole counts. A count of the multiplied value times the gain is at most an eighth of the limit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn whole(gain: f32, per_count: f32, limit: f32, count: f32) -> f32 {
     let gain = if per_count > 0.0 { gain.min(limit / (8.0 * per_count)) } else { gain };

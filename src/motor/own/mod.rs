@@ -45,7 +45,7 @@ use route::Route;
 ///
 /// Disarmed at start. Late and lost feedback, an old target, a target that is not finite, a second bad time step, a clock that
 /// does not move on and an emergency stop send the [frame of rest](OwnMotor::rest) in the same cycle: [`Guard`] has the rules.
-/// Each update offers a command or that frame. If the drive is to be enabled or disabled, the frame for that comes first.
+/// Each update offers a command or the frame of rest. If the drive is to be enabled or disabled, the frame for that comes first.
 ///
 /// # Examples
 /// ```
@@ -113,28 +113,28 @@ pub struct Own<M> {
     /// The velocity of the shaft when a velocity target was followed first.
     start_velocity: Option<AngularVelocity>,
     is_resting: bool,
-    /// The last command, which an update without a step may send once more.
+    /// The last command. An update without a step may send this frame once more.
     held: Option<CanFrame>,
-    /// The frames that wait to be sent: one for the drive's power, and the command.
+    /// The frames waiting to be sent: a frame for the drive's power, and the command.
     switching: Option<CanFrame>,
     command: Option<CanFrame>,
     /// This update offers a frame for the drive's power.
     has_posted: bool,
-    /// The frame of rest that the last update offered, unless the driver gave it back.
+    /// The frame of rest offered by the last update, unless the driver gave it back.
     rested: Option<CanFrame>,
     was_online: bool,
     /// The time of the last question.
     inquired: Instant,
-    /// The last frame that was taken, but for the drive's power.
+    /// The last frame taken, but for the drive's power.
     last: Option<CanFrame>,
     /// The last frame for the drive's power, sent or not.
     switched: Option<CanFrame>,
-    /// How many frames were sent to enable the drive since it was to be disabled.
+    /// How many frames were sent to enable the drive since the order to disable the drive.
     enabling: u8,
-    /// The drive has no frame of its own to disable it.
+    /// The drive has no frame of its own for disabling.
     rest_disables: bool,
     superseded: u32,
-    /// The command that another node sent last.
+    /// The last command of another node.
     rival: Option<Claim>,
 }
 
@@ -168,10 +168,10 @@ impl<M: OwnMotor> Own<M> {
         }
     }
 
-    /// Sets what is looked for and what follows, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
+    /// Sets the checks of health and their reactions, as far as the motor's [`vitals`](OwnMotor::vitals) tell.
     ///
     /// # Errors
-    /// Names the parameter that makes no sense.
+    /// Names the parameter without a sensible value.
     pub fn with_health(self, config: &'static HealthConfig) -> Result<Self, &'static str> {
         let watch = self.watch.with_config(config)?;
         Ok(Self { watch, ..self })
@@ -201,14 +201,14 @@ impl<M: OwnMotor> Own<M> {
         &self.motor
     }
 
-    /// Returns the motor, to change its gains or to ask for a setting of its drive. What is sent is unchanged until the next update.
+    /// Returns the motor, to change its gains or to ask for a setting of its drive. Frames to be sent are unchanged until the next update.
     #[must_use]
     pub const fn motor_mut(&mut self) -> &mut M {
         self.route = Route::UNKNOWN;
         &mut self.motor
     }
 
-    /// Returns what decides whether it may be driven.
+    /// Returns the guard, which decides whether the motor may be driven.
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard

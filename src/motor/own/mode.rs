@@ -8,13 +8,13 @@ use crate::motor::{Capabilities, Capability};
 use crate::units::{Angle, AngularVelocity};
 use crate::wire::mit::{self, Ranges};
 
-/// Angle and velocity of the output shaft; no angle where it is not known.
+/// Angle and velocity of the output shaft; no angle if unknown.
 pub(crate) type Shaft = (Option<Angle>, AngularVelocity);
 
 /// A goal of the output shaft for one step, within the limits of the mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Goal {
-    /// What a drive in MIT mode follows.
+    /// The impedance for a drive in MIT mode.
     Impedance(mit::Command),
     /// A torque in Nm.
     Torque(f32),
@@ -24,9 +24,9 @@ pub(crate) enum Goal {
     Way(f32),
 }
 
-/// A control mode: the number of the protocol, what the drive follows, and the limits that a program states.
+/// A control mode: the number of the protocol, the followed quantity, and the limits of the program.
 ///
-/// A family says with `number` what its frames are, and with each limit whether the drive is told of it.
+/// `number` decides the frames of a family; a limit given here is also sent to the drive where the family has a frame for the limit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ControlMode {
     pub(crate) number: u8,
@@ -39,7 +39,7 @@ pub(crate) struct ControlMode {
 #[expect(clippy::large_enum_variant, reason = "a motor has one, and there is no heap")]
 enum Follows {
     Impedance(ImpedanceControl),
-    /// With the share of the limit that the last goal was.
+    /// With the last goal as a share of the limit.
     Torque(f32),
     Velocity,
     Angle,
@@ -52,7 +52,7 @@ impl ControlMode {
         Self { number, follows, velocity_limit: None, torque_limit_nm }
     }
 
-    /// The drive follows torques that nothing computes here.
+    /// The drive follows the torques of the program.
     pub(crate) const fn torque(number: u8, torque_limit_nm: f32) -> Self {
         let torque_limit_nm = Some(torque_limit_nm);
         Self { number, follows: Follows::Torque(0.0), velocity_limit: None, torque_limit_nm }
@@ -84,7 +84,7 @@ impl ControlMode {
         matches!(self.follows, Follows::Angle)
     }
 
-    /// Returns the velocity limit in rad/s; infinite where there is none.
+    /// Returns the velocity limit in rad/s; infinite without a limit.
     pub(crate) const fn most_velocity(&self) -> f32 {
         match self.velocity_limit {
             Some(limit) => limit.as_rad_per_s(),
@@ -117,7 +117,7 @@ impl ControlMode {
         }
     }
 
-    /// Returns the targets that it takes, and that it has feedback.
+    /// Returns the capabilities: the accepted targets, and feedback.
     pub(crate) fn capabilities(&self) -> Capabilities {
         let capabilities = match &self.follows {
             Follows::Impedance(control) => control.capabilities(),
@@ -136,8 +136,8 @@ impl ControlMode {
         }
     }
 
-    /// Returns the goal of a drive that follows an impedance in fields of these ranges, which go to `top`, the position to 65535; `None`
-    /// to rest.
+    /// Returns the goal of a drive that follows an impedance in fields of these ranges, with counts to `top`, of the position to
+    /// 65535; `None` to rest.
     #[inline]
     pub(crate) fn impedance_goal(
         &mut self,
@@ -205,7 +205,7 @@ impl ControlMode {
     }
 }
 
-/// Returns the angle so far away from a position, within the range of a drive. At the very end a position is none any more.
+/// Returns the angle so far away from a position, within the range of a drive. A position at the very end counts as unknown.
 pub(crate) fn inside(position: f32, way: f32, range: f32) -> f32 {
     let end = range * 0.9995;
     limited(position + way, -end, end)

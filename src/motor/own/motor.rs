@@ -1,4 +1,4 @@
-//! The part of a motor of your own that differs from every other motor.
+//! The part of a motor of your own with its ids, frames and loop.
 
 use super::Order;
 use crate::frame::CanFrame;
@@ -7,8 +7,8 @@ use crate::units::{Angle, AngularVelocity};
 
 /// A motor of your own: its ids, its frames and its loop.
 ///
-/// [`Own`](super::Own) makes a device of it, with everything that all motors have in common. The example `custom_motor` is a
-/// whole one. The family [`damiao`](crate::damiao) is one whose drives are enabled and asked for settings first.
+/// [`Own`](super::Own) makes a device of the motor, with everything in common to all motors. The example `custom_motor` is a
+/// whole motor. The family [`damiao`](crate::damiao) has drives to be enabled and asked for settings first.
 pub trait OwnMotor {
     /// Returns how the motor is called in errors.
     fn name(&self) -> MotorName;
@@ -21,109 +21,110 @@ pub trait OwnMotor {
     /// Takes a data frame with an id of the motor's feedback.
     ///
     /// Returns [`Ingest::Unrelated`] if the frame is another motor's or no feedback: other devices are asked then. Returns
-    /// [`Ingest::Malformed`] if the frame is this motor's and damaged. In both cases it must have changed nothing.
+    /// [`Ingest::Malformed`] if the frame is this motor's and damaged. In both cases the call must change nothing.
     fn decode(&mut self, frame: &CanFrame) -> Ingest;
 
     /// Returns the measured velocity of the output shaft.
     fn velocity(&self) -> AngularVelocity;
 
-    /// Returns the measured angle of the output shaft; `None` if it is not known, as is assumed unless said otherwise.
+    /// Returns the measured angle of the output shaft; `None` if unknown, the default.
     fn angle(&self) -> Option<Angle> {
         None
     }
 
-    /// Returns the frame that the drive reads as rest: no torque, whatever the shaft does.
+    /// Returns the frame of rest: no torque, for any motion of the shaft.
     ///
-    /// Each update in which the motor is not driven sends it. The manual of the drive says which frame it is: eight zero bytes
+    /// Each update without a command sends this frame. The manual of the drive names the frame: eight zero bytes
     /// are the full negative torque of a drive in MIT mode, and a velocity of zero is a brake. A drive without such a command
-    /// rests when it is disabled: return that frame here, and `None` from [`disable`](Self::disable).
+    /// rests when disabled: return the disabling frame here, and `None` from [`disable`](Self::disable).
     ///
-    /// A remote frame, which asks for feedback, may take its turn between frames of rest. If no rest was sent before,
+    /// A remote frame, a question for feedback, may take its turn between frames of rest. If no rest was sent before,
     /// [`Own`](super::Own) leaves the question out and calls this again.
     fn rest(&mut self) -> CanFrame;
 
     /// Runs the loop for one step and returns the command: a data frame of up to 8 bytes with an id of its commands.
     ///
-    /// If the order is of a kind that the motor does not offer, return [`rest`](Self::rest).
+    /// If the motor does not offer the kind of order, return [`rest`](Self::rest).
     fn control(&mut self, order: Order) -> CanFrame;
 
-    /// Brings the loop to rest: called before the motor is driven, and when it stops.
+    /// Brings the loop to rest: called before the motor is driven, and on a stop.
     fn reset(&mut self);
 
-    /// Returns the next frame that enables the drive; `None`, unless said otherwise, for a drive that needs none.
+    /// Returns the next frame to enable the drive; `None`, the default, for a drive without such frames.
     ///
     /// [`Own`](super::Own) calls this when the motor may be driven and was not before. If [`is_enabled`](Self::is_enabled)
     /// reports, the call is repeated each 10 ms until the drive is enabled. Until then the drive gets [`rest`](Self::rest)
     /// only, or [`poll`](Self::poll) if `rest` would disable the drive. The output [opens](Order::share) from zero afterwards.
     ///
     /// `sent` is how many of these frames were sent since the drive was to be disabled, up to 255. If a drive needs several frames,
-    /// return the one whose turn it is. If a drive goes on to its last target when enabled, replace that target first. If a drive resets while driven, the motor trips and the drive is not enabled again.
+    /// return the frame next in order. If a drive goes on to its last target when enabled, replace that target first. If a drive
+    /// resets while driven, the motor trips and the drive is not enabled again.
     fn enable(&mut self, sent: u8) -> Option<CanFrame> {
         _ = sent;
         None
     }
 
-    /// Returns the next frame that disables the drive; `None`, unless said otherwise, for a drive that needs none, or that
+    /// Returns the next frame to disable the drive; `None`, the default, for a drive without such frames, or if
     /// [`rest`](Self::rest) disables.
     ///
     /// [`Own`](super::Own) calls this at the start, on disarm, trip and emergency stop, and when the motor has no target. The
-    /// call is repeated each 100 ms, or each 10 ms while the drive reports that it is enabled.
+    /// call is repeated each 100 ms, or each 10 ms while the drive reports the state "enabled".
     fn disable(&mut self) -> Option<CanFrame> {
         None
     }
 
-    /// Returns a frame that asks the drive for its feedback and changes nothing; `None`, unless said otherwise, for a drive that
+    /// Returns a frame that asks the drive for its feedback and changes nothing; `None`, the default, for a drive that
     /// reports by itself. A remote frame has an id of the motor's feedback.
     fn poll(&mut self) -> Option<CanFrame> {
         None
     }
 
-    /// Learns that a frame of this motor was not sent: the driver refused it, gave it back, or a newer one took its place. Nothing
+    /// Takes back a frame of this motor: refused or given back by the driver, or replaced by a newer frame. Nothing
     /// is done unless said otherwise.
     ///
-    /// [`Own`](super::Own) calls this before it asks for the next frame of the same kind. Commands and frames of rest come again
-    /// anyway; a motor that sends a frame only now and then, or frames in an order, takes the turn back here.
+    /// [`Own`](super::Own) calls this before asking for the next frame of the same kind. Commands and frames of rest come again
+    /// anyway; a motor with frames only now and then, or frames in an order, takes the turn back here.
     fn unsent(&mut self, frame: &CanFrame) {
         _ = frame;
     }
 
-    /// Returns whether the drive is enabled, by its last feedback; `None`, unless said otherwise, if it does not say.
+    /// Returns whether the drive is enabled, by its last feedback; `None`, the default, for a drive without this report.
     fn is_enabled(&self) -> Option<bool> {
         None
     }
 
-    /// Returns the next frame that asks the drive for one of its settings, or writes one; `None`, unless said otherwise, for a
+    /// Returns the next frame to read or write a setting of the drive; `None`, the default, for a
     /// drive without settings.
     ///
     /// [`Own`](super::Own) calls this each 10 ms while the drive is disabled, in the place of a frame of [rest](Self::rest) between
-    /// two others, so a setting is read before the motor is armed and again before it is armed next. The answer comes to [`decode_answer`](Self::decode_answer).
+    /// two others, so a setting is read before each arming of the motor. The answer comes to [`decode_answer`](Self::decode_answer).
     fn inquire(&mut self) -> Option<CanFrame> {
         None
     }
 
-    /// Takes the answer to what was [inquired](Self::inquire), a frame with an id of the motor's feedback; `false`, unless said
+    /// Takes the answer to an [inquiry](Self::inquire), a frame with an id of the motor's feedback; `false`, unless said
     /// otherwise, for any other frame. An answer tells nothing of the shaft and does not count as feedback.
     fn decode_answer(&mut self, frame: &CanFrame) -> bool {
         _ = frame;
         false
     }
 
-    /// Returns a setting of the drive that differs from what the motor expects or is not known yet: the motor is not armed then.
+    /// Returns a setting of the drive with another value than expected, or not known yet: the motor is not armed then.
     /// `None` unless said otherwise.
     fn wrong_setting(&self) -> Option<WrongSetting> {
         None
     }
 
-    /// Forgets the settings of the drive: its feedback is late or lost, or it has reset, so it may have lost its supply or be another
-    /// one.
+    /// Forgets the settings of the drive: its feedback is late or lost, or the drive has reset, so the drive may have lost its supply
+    /// or be another drive.
     fn forget_settings(&mut self) {}
 
-    /// Returns what the motor offers: velocities and feedback, unless said otherwise.
+    /// Returns the capabilities of the motor: velocities and feedback, unless said otherwise.
     fn capabilities(&self) -> Capabilities {
         Capabilities::of(&[Capability::Velocity, Capability::Feedback])
     }
 
-    /// Returns what else it knows of itself. Nothing unless said otherwise.
+    /// Returns temperature, errors and efforts as far as known. Nothing unless said otherwise.
     fn vitals(&self) -> Vitals {
         Vitals::default()
     }

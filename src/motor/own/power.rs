@@ -2,16 +2,16 @@
 
 use crate::time::{Duration, Instant};
 
-/// A drive that reports the opposite of what it was told is told again after this time.
+/// The time between frames to a drive that reports the opposite state.
 const INSIST: Duration = Duration::from_millis(10);
 
-/// A drive that was disabled is told again after this time: it may have missed the frame.
+/// The time between frames to a disabled drive, which may have missed a frame.
 const REMIND: Duration = Duration::from_millis(100);
 
 /// For this long after a change, reports of the state before may still arrive.
 const SETTLING: Duration = Duration::from_millis(20);
 
-/// Decides when a frame that enables or disables the drive is due.
+/// Decides when a frame to enable or disable the drive is due.
 ///
 /// | wanted | the drive reports | the frame is sent |
 /// |---|---|---|
@@ -21,15 +21,15 @@ const SETTLING: Duration = Duration::from_millis(20);
 /// | enabled | enabled, or nothing | at once |
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Power {
-    /// The state that is wanted.
+    /// The wanted state.
     on: bool,
-    /// The state that the drive reported since then; the opposite until it reports.
+    /// The state reported by the drive since then; the opposite until the first report.
     seen: Option<bool>,
     /// The drive followed.
     is_confirmed: bool,
-    /// The time at which the state was wanted first.
+    /// The time of the first call with this wanted state.
     since: Instant,
-    /// The time at which the frame was sent last.
+    /// The time of the last frame.
     told: Instant,
     is_due: bool,
     /// The drive was never told.
@@ -39,7 +39,7 @@ pub(super) struct Power {
 }
 
 impl Power {
-    /// Wants a drive of which nothing is known to be disabled.
+    /// Begins with an unknown drive, to be disabled.
     pub(super) const NEW: Self = Self {
         on: false,
         seen: None,
@@ -51,8 +51,8 @@ impl Power {
         now: Instant::START,
     };
 
-    /// Takes the state that the drive reports with a feedback frame; `None` if it reports none. Returns whether the drive has
-    /// reset: it was enabled, and no longer is.
+    /// Takes the state reported by the drive with a feedback frame; `None` without a report. Returns whether the drive has
+    /// reset: enabled before, and disabled now.
     pub(super) fn hear(&mut self, report: Option<bool>, now: Instant) -> bool {
         self.seen = report;
         let has_reset = self.on
@@ -63,7 +63,7 @@ impl Power {
         has_reset
     }
 
-    /// Moves on to the first update; returns whether it is, as the drive is to be disabled then.
+    /// Takes the first update; returns whether this update is the first, as the drive is to be disabled then.
     pub(super) const fn begin(&mut self, now: Instant) -> bool {
         let is_new = self.is_new;
         if is_new {
@@ -73,7 +73,7 @@ impl Power {
         is_new
     }
 
-    /// Moves on to an update and takes the state that is wanted from now on. Returns the state that the drive is to be told,
+    /// Moves on to an update and takes the wanted state. Returns the state to be sent to the drive,
     /// if a frame is due.
     pub(super) fn step(&mut self, on: bool, now: Instant) -> Option<bool> {
         self.now = now;
@@ -89,7 +89,7 @@ impl Power {
         Some(on)
     }
 
-    /// Wants the drive to be disabled; returns whether it is to be told now.
+    /// Wants the drive to be disabled; returns whether a frame is due now.
     pub(super) fn stop(&mut self) -> bool {
         let stops = self.on || self.is_new;
         if stops {
@@ -99,7 +99,7 @@ impl Power {
         stops
     }
 
-    /// The frame was not sent: it is due with the next update.
+    /// The frame was not sent, and is due with the next update.
     pub(super) const fn give_back(&mut self) {
         self.is_due = true;
     }
@@ -109,12 +109,12 @@ impl Power {
         self.on
     }
 
-    /// Tells whether the drive is enabled, as far as it says.
+    /// Tells whether the drive is enabled, by its reports.
     pub(super) fn is_ready(&self) -> bool {
         self.on && self.seen != Some(false)
     }
 
-    /// Tells whether the drive is enabled, as far as it says, and nothing is due.
+    /// Tells whether the drive is enabled, by its reports, and nothing is due.
     pub(super) fn is_steady(&self) -> bool {
         self.is_ready() && !self.is_due
     }
@@ -124,7 +124,7 @@ impl Power {
         self.now = now;
     }
 
-    /// Tells whether the drive says that it is enabled, as it is to be.
+    /// Tells whether the drive is wanted and reported as enabled.
     pub(super) fn is_confirmed(&self) -> bool {
         self.on && self.seen == Some(true)
     }

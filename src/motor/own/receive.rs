@@ -55,7 +55,7 @@ impl<M: OwnMotor> Own<M> {
         outcome
     }
 
-    /// Takes what the drive reports of its power.
+    /// Takes the drive's report of its power.
     fn hear_power(&mut self, now: Instant) {
         if !self.power.hear(self.motor.is_enabled(), now) {
             return;

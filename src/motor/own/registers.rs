@@ -63,7 +63,7 @@ const fn whole(value: f32) -> u32 {
 }
 
 /// Makes the type `Register` of a family: its noun in errors, the name and the type of its number, then for each register its
-/// number, form, whether a program may write it (`Rw` or `Ro`), and text.
+/// number, form, the access of a program (`Rw` or `Ro`), and text.
 macro_rules! registers {
     (
         $(#[$about:meta])*
@@ -106,13 +106,13 @@ macro_rules! registers {
                 self as $width
             }
 
-            /// Tells whether the value is an `f32` on the wire; otherwise it is an integer.
+            /// Tells whether the value is an `f32` on the wire; otherwise an integer.
             #[must_use]
             pub const fn is_float(self) -> bool {
                 matches!(self.form(), $crate::motor::Form::F32)
             }
 
-            /// Tells whether a program may write it.
+            /// Tells whether a program may write the register.
             #[must_use]
             pub const fn is_writable(self) -> bool {
                 match self {
@@ -121,7 +121,7 @@ macro_rules! registers {
             }
 
             /// # Errors
-            /// It is read only, or cannot hold the value.
+            /// The register is read only, or cannot hold the value.
             pub(super) fn check(self, value: f32) -> Result<(), $crate::error::ConfigError> {
                 if !self.is_writable() {
                     Err($crate::error::ConfigError::ReadOnly(self.name()))
@@ -142,13 +142,13 @@ macro_rules! register_questions {
     () => {
         impl Motor {
             /// Asks the drive for a register. While the motor is disarmed the frame goes out within some 10 ms, and again until
-            /// [`register`](Self::register) has the answer. A later request takes the place of one that waits.
+            /// [`register`](Self::register) has the answer. A later request takes the place of a waiting request.
             pub const fn read(&mut self, register: Register) {
                 self.settings.request($crate::motor::Inquiry::Read(register));
             }
 
             /// Writes a register of the drive, until the supply is lost; while the motor is disarmed, as [`read`](Self::read). The
-            /// answer is the value that the drive has then.
+            /// answer is the value in the drive afterwards.
             ///
             /// # Errors
             /// [`ConfigError::ReadOnly`] and [`ConfigError::CannotHold`] name the register.
@@ -159,7 +159,7 @@ macro_rules! register_questions {
             }
 
             /// Returns the answer to the last [`read`](Self::read) or [`write`](Self::write): the register and its value in the
-            /// drive, NaN where the drive says that it does not have it.
+            /// drive, NaN if the drive does not have the register.
             #[must_use]
             pub const fn register(&self) -> Option<(Register, f32)> {
                 self.settings.answer()
@@ -187,7 +187,7 @@ macro_rules! models {
 macro_rules! mit_model {
     ($top:literal) => {
         impl Model {
-            /// Returns the name, as errors print it.
+            /// Returns the name, as printed in errors.
             #[must_use]
             pub const fn name(&self) -> &'static str {
                 self.name

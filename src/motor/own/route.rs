@@ -1,13 +1,13 @@
-//! Which frames may concern an own motor.
+//! The selection of frames for an own motor.
 
 use crate::frame::CanFrame;
 use crate::motor::{Claim, Role};
 
-/// The ids of the feedback and of the commands of one motor, each as one pattern: a frame that fits neither is another's.
+/// The ids of the feedback and of the commands of one motor, each as one pattern: a frame outside of both patterns is another device's.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Route {
     feedback: Pattern,
-    /// Feedback with an id that other motors have too, which need not resemble the ids of this one.
+    /// Feedback with an id shared by several motors. Such an id need not resemble the ids of this motor.
     shared: Pattern,
     command: Pattern,
     /// The first claim of feedback.
@@ -17,7 +17,7 @@ pub(super) struct Route {
 }
 
 impl Route {
-    /// Before the claims are known, only they tell.
+    /// Before the claims are known, each frame is compared with the claims.
     pub(super) const UNKNOWN: Self = Self { feedback: Pattern::ANY, ..Self::NONE };
 
     const NONE: Self = Self {
@@ -32,7 +32,7 @@ impl Route {
         self.feedback.mask == 0
     }
 
-    /// Takes the claims of the motor. A command with a shared id tells nothing: it may be for another drive.
+    /// Takes the claims of the motor. A command with a shared id tells nothing: such a command may be for another drive.
     pub(super) fn of<I: IntoIterator<Item = Claim>>(claims: impl Fn() -> I) -> Self {
         let mut route = Self::NONE;
         for claim in claims() {

@@ -18,8 +18,8 @@ pub enum Inquiry<R> {
 
 /// The known settings of a drive, and the order of questions about them. `N` settings have to be as configured.
 ///
-/// While the application has a question, each second question is that one. A read or a write is repeated until the drive answers; a
-/// store is sent once.
+/// While the application has a question, each second question is the application's. A read or a write is repeated until the drive
+/// answers; a store is sent once.
 ///
 /// # Examples
 /// ```
@@ -40,15 +40,15 @@ pub struct Settings<R, const N: usize> {
     asked: Option<Inquiry<R>>,
     request: Option<Inquiry<R>>,
     answer: Option<(R, f32)>,
-    /// What was written on the way to an enabled drive, and is to be read back.
+    /// The setting written on the way to an enabled drive, still to be read back.
     preparing: Option<Preparation<R>>,
     /// How many preparations the drive has confirmed.
     prepared: u8,
-    /// The next frame about a setting that the application writes reads it.
+    /// The next frame about a setting written by the application is a read.
     is_written: bool,
 }
 
-/// A setting that is written, and read back, each time before a drive is enabled. The drive confirms it by a value from `least` to `value`.
+/// A setting written and read back each time before a drive is enabled. The drive confirms the setting by a value from `least` to `value`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Preparation<R> {
     pub(crate) setting: R,
@@ -62,14 +62,14 @@ impl<R> Preparation<R> {
         Self { setting, value, least: value }
     }
 
-    /// The drive may have a limit of its own that is lower.
+    /// The drive may have a lower limit of its own.
     pub(crate) const fn limit(setting: R, value: f32) -> Self {
         Self { setting, value, least: 0.0 }
     }
 }
 
 impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
-    /// Takes the settings that have to be as configured; none is known.
+    /// Takes the settings to be compared with the configuration; all values are unknown.
     #[must_use]
     pub const fn new(checked: [R; N]) -> Self {
         Self {
@@ -85,20 +85,20 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         }
     }
 
-    /// Forgets all values: the drive was away. What the application asks for stays.
+    /// Forgets all values: the drive was away. Requests of the application stay.
     pub const fn forget(&mut self) {
         self.found = [None; N];
         self.asked = None;
         self.prepare_anew();
     }
 
-    /// Forgets what the drive has confirmed on the way to be enabled.
+    /// Forgets the confirmations of the drive on the way to be enabled.
     pub(crate) const fn prepare_anew(&mut self) {
         (self.preparing, self.prepared, self.is_written) = (None, 0, false);
     }
 
-    /// Returns the next question on the way to an enabled drive: for what is not known, then for each preparation, written and read back.
-    /// `None` when the drive is ready to be enabled; then [`forget`](Self::forget), for it may lose its supply until the next time.
+    /// Returns the next question on the way to an enabled drive: for unknown values, then for each preparation, written and read back.
+    /// `None` when the drive is ready to be enabled; then [`forget`](Self::forget), for the drive may lose its supply until the next time.
     pub(crate) fn prepare(
         &mut self,
         preparations: impl IntoIterator<Item = Preparation<R>>,
@@ -114,14 +114,14 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         Some(self.ask(Inquiry::Write(setting, value)))
     }
 
-    /// Turns each second write of a setting into a question for it: for a drive that answers no write.
+    /// Turns each second write of a setting into a question for the setting: for drives without an answer to a write.
     pub(crate) fn reading_back(&mut self, inquiry: Inquiry<R>) -> Inquiry<R> {
         let Inquiry::Write(setting, _) = inquiry else { return inquiry };
         self.is_written = !self.is_written;
         if self.is_written { inquiry } else { Inquiry::Read(setting) }
     }
 
-    /// Returns the question whose answer is awaited, if it is about this setting.
+    /// Returns the question whose answer is awaited, if about this setting.
     pub(crate) fn awaited(&self, setting: R) -> Option<Inquiry<R>> {
         self.asked.filter(|asked| match asked {
             Inquiry::Read(awaited) | Inquiry::Write(awaited, _) => *awaited == setting,
@@ -129,7 +129,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         })
     }
 
-    /// Takes a question of the application, in the place of one that waits.
+    /// Takes a question of the application, in the place of a waiting question.
     pub const fn request(&mut self, inquiry: Inquiry<R>) {
         self.request = Some(inquiry);
     }
@@ -140,14 +140,14 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         self.answer
     }
 
-    /// Returns a question for a value that is not known, and awaits the answer; `None` when all are.
+    /// Returns a question for an unknown value, and awaits the answer; `None` if all values are known.
     pub fn complete(&mut self) -> Option<Inquiry<R>> {
         let index = self.found.iter().position(Option::is_none)?;
         let setting = *self.checked.get(index)?;
         Some(self.ask(Inquiry::Read(setting)))
     }
 
-    /// Returns the next question: for what is not known, then for each value in turn.
+    /// Returns the next question: for unknown values, then for each value in turn.
     pub fn inquire(&mut self) -> Option<Inquiry<R>> {
         (self.preparing, self.prepared) = (None, 0);
         let turn = usize::from(self.turn);
@@ -166,13 +166,13 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         Some(self.ask(Inquiry::Read(setting)))
     }
 
-    /// Notes a question whose answer is awaited, and returns it.
+    /// Notes and returns a question with an awaited answer.
     pub const fn ask(&mut self, inquiry: Inquiry<R>) -> Inquiry<R> {
         self.asked = Some(inquiry);
         inquiry
     }
 
-    /// Returns the value of a setting that has to be as configured; `None` if it is not known.
+    /// Returns the value of a compared setting; `None` if unknown.
     pub(crate) fn found(&self, setting: R) -> Option<f32> {
         let place = self.checked.iter().position(|checked| *checked == setting)?;
         *self.found.get(place)?
@@ -184,7 +184,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         self.asked
     }
 
-    /// Takes the value that a drive answers to a question; `false` if that one is not awaited.
+    /// Takes the value in the answer to a question; `false` if the answer is not awaited.
     pub fn take(&mut self, inquiry: Inquiry<R>, value: f32) -> bool {
         let (Inquiry::Read(setting) | Inquiry::Write(setting, _)) = inquiry else { return false };
         if self.asked != Some(inquiry) {
@@ -208,7 +208,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         true
     }
 
-    /// Returns the first setting of a motor that is not right or not known. `expected` has the name and the value of each.
+    /// Returns the first wrong or unknown setting of a motor. `expected` has the name and the value of each.
     pub(crate) fn wrong_setting(
         &self,
         motor: MotorName,
@@ -220,7 +220,7 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         Some(WrongSetting { motor, setting, expected, found })
     }
 
-    /// Returns the first setting that is not right or not known, with its value in the drive.
+    /// Returns the first wrong or unknown setting, with its value in the drive.
     pub fn wrong(&self, is_right: impl Fn(R, f32) -> bool) -> Option<(R, Option<f32>)> {
         let settings = self.checked.iter().copied().zip(self.found);
         settings

@@ -1,6 +1,6 @@
-//! Frames that a motor sends between its commands.
+//! Frames of a motor between its commands.
 
-/// A value that a drive is told between commands: when it changes, with every second command at most, and again after so many, for a frame
+/// A value sent to a drive between commands: on a change with every second command at most, and again after so many, for a frame
 /// may be lost.
 #[derive(Debug, Default, Clone, Copy)]
 pub(crate) struct Told {
@@ -35,7 +35,7 @@ impl Told {
         self.since
     }
 
-    /// The frame was not sent: it is due.
+    /// The frame was not sent, and is due.
     pub(crate) const fn repeat(&mut self) {
         self.since = u8::MAX;
     }

@@ -5,7 +5,7 @@ use crate::control::{Cascade, PidConfig};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 
-/// A loop from the way to an angle, in rad, to a velocity, and one from a velocity, in rad/s, to a torque in Nm.
+/// A loop from the way to an angle, in rad, to a velocity, and a loop from a velocity, in rad/s, to a torque in Nm.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TorqueLoops(Cascade);
 
@@ -16,8 +16,8 @@ impl TorqueLoops {
         Ok(Self(Cascade::new(position, speed)?))
     }
 
-    /// Returns the torque for a velocity or an angle, which may be more than the limit; `None` for another target, and for an angle
-    /// where there is none. The integral keeps within the limit.
+    /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
+    /// target without a measured angle. The integral keeps within the limit.
     #[inline]
     pub(crate) fn step(
         &mut self,

@@ -3,12 +3,12 @@
 use crate::encoder;
 use crate::units::Angle;
 
-/// How many times the range of the feedback a shaft is away from the turns that a drive can report.
+/// The distance of a shaft from the turns that a drive can report, in ranges of the feedback.
 #[derive(Debug, Default, Clone, Copy)]
 pub(crate) struct Laps(i32);
 
 impl Laps {
-    /// Takes a position that is not bounded, and the range.
+    /// Takes an unbounded position, and the range.
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub(crate) fn of(position: f32, range: f32) -> Self {
         if position.abs() <= range {
@@ -18,7 +18,7 @@ impl Laps {
         Self(if position > 0.0 { laps } else { -laps })
     }
 
-    /// Takes a reported position and the one before: a way of more than the range leads across its end.
+    /// Takes a reported position and the position before: a way of more than the range leads across its end.
     pub(crate) fn advance(&mut self, before: Option<f32>, position: f32, range: f32) {
         let way = before.map_or(0.0, |before| position - before);
         self.0 = self.0.saturating_add(i32::from(way < -range) - i32::from(way > range));
@@ -41,13 +41,13 @@ pub(crate) struct Tachometer {
 }
 
 impl Tachometer {
-    /// Begins where the count of the drive is 0. Takes the counts for so many turns of the output shaft as the gear's fraction has, negative
-    /// for a shaft that turns the other way: their product is below 2^30.
+    /// Begins where the count of the drive is 0. Takes the counts for so many turns of the output shaft as the gear's fraction has,
+    /// negative for a shaft that turns the other way: their product is below 2^30.
     pub(crate) const fn new(turn: i32, output: i32) -> Self {
         Self { last: 0, turns: 0, phase: 0, turn, output }
     }
 
-    /// Takes a count of the drive, which wraps. After a restart of the drive the angle is that of its new zero.
+    /// Takes a count of the drive; the count wraps. After a restart of the drive the angle begins at its new zero.
     pub(crate) fn take(&mut self, count: i32) {
         let way = count.wrapping_sub(self.last);
         self.last = count;
