@@ -50,7 +50,7 @@ def theirs(rows, axes=1):
     """The durations of Ruckig, in `f64` from the same `f32`; of so many rows together. NaN where Ruckig itself finds no plan.
 
     Ruckig 0.19.4 ends some calculations of axes in step with -101 (a duration beyond its numerical limits), which its Python
-    package does not know as a result.
+    package does not know as a result, or with an error in its second step, of one axis for the duration of another.
     """
     planner, task, motion = ruckig.Ruckig(axes), ruckig.InputParameter(axes), ruckig.Trajectory(axes)
     found = np.empty(len(rows) // axes)
@@ -61,8 +61,9 @@ def theirs(rows, axes=1):
         ) = row
         try:
             result = planner.calculate(task, motion)
-        except ValueError as error:
-            require(axes > 1 and "-101" in str(error), f"Ruckig has no plan for {row}: {error}")
+        except (ValueError, ruckig.RuckigError) as error:
+            is_known = "-101" in str(error) or "error in step 2" in str(error)
+            require(axes > 1 and is_known, f"Ruckig has no plan for {row}: {error}")
             found[place] = np.nan
             continue
         require(result == ruckig.Result.Working, f"Ruckig has no plan for {row}: {result}")

@@ -1,9 +1,18 @@
 //! Shows that a figure does not depend on what a motor has seen.
 
+use crate::meter::instructions;
 use crate::report::row;
-use crate::rows::{decode, tick};
-use crate::wiring::{START, Targets};
-use drivetrain::time::Instant;
+use crate::rows::{row_decode, tick};
+use crate::wiring::{START, Targets, feedback};
+use core::hint::black_box;
+use drivetrain::control::PidConfig;
+use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508, Model};
+use drivetrain::encoder::Position;
+use drivetrain::frame::CanFrame;
+use drivetrain::motor::Ingest;
+use drivetrain::snake::{self, IDS, Joints, PULSES_PER_TURN, Register, Reply};
+use drivetrain::time::{Duration, Instant, Tick};
+use embedded_can::StandardId;
 
 const TURNS: [i64; 3] = [0, 1_000_000, 1_000_000_000_000];
 
@@ -11,19 +20,95 @@ const TURNS: [i64; 3] = [0, 1_000_000, 1_000_000_000_000];
 const UP_TIMES: [Instant; 3] =
     [START, Instant::from_micros((1 << 32) - 500_000), Instant::from_micros(1 << 40)];
 
+const PERIOD: Duration = Duration::from_millis(1);
+
 /// Every id, number of turns and up-time in turn; and ticks for the latter two.
 pub fn show() {
-    let mut figures = [0; 72];
+    decode_of::<M3508>("constant_decode");
+    decode_of::<M2006>("constant_decode_m2006");
+    decode_of::<Gm6020Current>("constant_decode_gm6020");
+    decode_of::<Gm6020Voltage>("constant_decode_gm6020_voltage");
+    joints();
     let mut ticks = [[0; 9]; 2];
-    let cases = TURNS.iter().flat_map(|turns| UP_TIMES.iter().map(move |start| (*turns, *start)));
-    for (case, (turns, start)) in cases.enumerate() {
-        for id in 0..8 {
-            figures[case * 8 + id] = decode(id as u16 + 1, turns, start);
-        }
+    for (case, (turns, start)) in cases(TURNS).enumerate() {
         ticks[0][case] = tick(Targets::Speed, turns, start);
         ticks[1][case] = tick(Targets::Position, turns, start);
     }
-    row("constant_decode", &figures);
     row("constant_tick_speed", &ticks[0]);
     row("constant_tick_cascade", &ticks[1]);
+}
+
+fn cases<T: Copy>(turns: [T; 3]) -> impl Iterator<Item = (T, Instant)> {
+    turns.into_iter().flat_map(|turns| UP_TIMES.into_iter().map(move |start| (turns, start)))
+}
+
+/// One frame of each motor of a full bus of its model.
+fn decode_of<M: Model>(name: &str) {
+    let mut figures = [0; 72];
+    let cases = (1..=M::FACTS.ids).flat_map(|id| cases(TURNS).map(move |case| (id, case)));
+    let mut count = 0;
+    for (figure, (id, (turns, start))) in figures.iter_mut().zip(cases) {
+        *figure = decode::<M>(id, turns, start);
+        count += 1;
+    }
+    row(name, &figures[..count]);
+}
+
+fn decode<M: Model>(id: u8, turns: i64, start: Instant) -> u32 {
+    let of = |id: u8| M::FACTS.feedback_base - 0x200 + u16::from(id);
+    let mut bus = Bus::new();
+    for id in 1..=M::FACTS.ids {
+        let gains = PidConfig::new(0.8, 4.0, 0.0);
+        let motor = bus.attach(Config::<M>::new(black_box(id)).speed_loop(gains)).unwrap();
+        assert_eq!(bus.ingest(&feedback(of(id), 100, 0), start), Ingest::Taken);
+        bus.set_present_position(motor, Position::from_turns(turns)).unwrap();
+    }
+    bus.arm(start).unwrap();
+    bus.update(Tick::new(start + PERIOD, 0.001));
+    let (mut now, mut angle) = (start + PERIOD, 126);
+    instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, _| {
+        angle += 3;
+        now = now + PERIOD;
+        _ = decode(&mut bus, &feedback(of(id), angle % 8192, 191), now);
+    })
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn joints_decode(joints: &mut Joints, frame: &CanFrame, now: Instant) -> Ingest {
+    joints.ingest(frame, now)
+}
+
+/// One position of a joint of a full bus, up to the end of its counter.
+fn joints() {
+    let mut figures = [0; 9 * IDS as usize];
+    let cases = (1..=IDS).flat_map(|id| cases([0, 1_000, 32_000]).map(move |case| (id, case)));
+    for (figure, (id, (turns, start))) in figures.iter_mut().zip(cases) {
+        *figure = decode_joint(id, turns, start);
+    }
+    row("constant_decode_joint", &figures);
+}
+
+fn decode_joint(id: u8, turns: i32, start: Instant) -> u32 {
+    let mut joints = Joints::new();
+    for id in 1..=IDS {
+        joints.attach(snake::Config::new(black_box(id))).unwrap();
+    }
+    let mut now = start;
+    joints.update(Tick::new(now, 0.001));
+    let mut pulses = turns * PULSES_PER_TURN;
+    let mut frame = || {
+        pulses += 3;
+        let data = Reply::new(Register::ActualPosition, pulses).encode();
+        CanFrame::of(StandardId::new(u16::from(id)).unwrap(), data)
+    };
+    for _ in 0..10 {
+        now = now + PERIOD;
+        assert_eq!(joints.ingest(&frame(), now), Ingest::Taken);
+    }
+    let function = joints_decode as fn(&mut Joints, &CanFrame, Instant) -> Ingest;
+    instructions(function, |decode, _| {
+        now = now + PERIOD;
+        _ = decode(&mut joints, &frame(), now);
+    })
 }

@@ -139,7 +139,7 @@ pub fn space() {
 
 /// Feedback, command frames and whole ticks.
 pub fn motors() {
-    row("decode", &core::array::from_fn::<u32, 8, _>(|index| decode(index as u16 + 1, 0, START)));
+    row("decode", &core::array::from_fn::<u32, 8, _>(|index| decode(index as u16 + 1)));
     row("decode_wrap", &[decode_wrap()]);
     let mut bus = Drive::new(Targets::Speed, 0, START).bus;
     let unknown = feedback(0x100, 0, 0);
@@ -160,9 +160,9 @@ pub fn motors() {
     row("tick_cascade_checks", &[dearest_tick(Targets::Position)]);
 }
 
-/// One frame of motor `id`, whose output shaft is at `turns` at the time `start`.
-pub fn decode(id: u16, turns: i64, start: Instant) -> u32 {
-    let Drive { mut bus, mut now, .. } = Drive::new(Targets::Speed, turns, start);
+/// One frame of motor `id`.
+fn decode(id: u16) -> u32 {
+    let Drive { mut bus, mut now, .. } = Drive::new(Targets::Speed, 0, START);
     let mut angle = 126;
     instructions(row_decode as fn(&mut Bus, &CanFrame, Instant) -> Ingest, |decode, _| {
         angle += 3;
