@@ -1,7 +1,8 @@
 //! An arm of three Damiao joints: base, shoulder and elbow, first without and then with its weight compensated.
 //!
 //! Each joint is a spring and a damper of the drive. Without compensation the arm sags until the springs hold its weight; with it
-//! the torque that the weight needs is sent beside them, and the springs have only the motion to do. In between the base moves, and
+//! the torque that the weight needs, from axes and masses (`SerialArm`), is sent beside them, and the springs have only the motion to
+//! do. In between the base moves, and
 //! at the end there is an emergency stop. The drives are those of the simulator, written from the manual.
 //!
 //! `cargo run --release --example arm [FILE.svg]`
@@ -10,6 +11,9 @@ mod arguments;
 mod console;
 
 use drivetrain::damiao::{Model, Motor};
+use drivetrain::error::ConfigError;
+use drivetrain::geometry::Vec3;
+use drivetrain::manipulator::{ArmJoint, SerialArm};
 use drivetrain::motor::{Devices, Impedance, ImpedanceControl, Own, OwnMotor};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
@@ -70,12 +74,17 @@ fn joint(part: Part) -> Result<Joint, Box<dyn Error>> {
     Ok(Own::new(Motor::new(part.model, part.id, mode)?))
 }
 
-/// The torque that holds the weight of the arm at these angles, in Nm.
-fn weight_nm([_, shoulder, elbow]: [f32; 3]) -> [f32; 3] {
+/// Axes and masses in the zero pose: level, stretched along x, shoulder and elbow lift with positive angles.
+fn arm() -> Result<SerialArm<3>, ConfigError> {
     let ((upper_kg, upper_m), (fore_kg, fore_m)) = (UPPER, FOREARM);
-    let at_elbow = fore_kg * GRAVITY * 0.5 * fore_m * (shoulder + elbow).cos();
-    let at_shoulder = (0.5 * upper_kg + fore_kg) * GRAVITY * upper_m * shoulder.cos();
-    [0.0, at_shoulder + at_elbow, at_elbow]
+    let along = |x_m| Vec3::new(x_m, 0.0, 0.0);
+    let lifting = Vec3::new(0.0, -1.0, 0.0);
+    Ok(SerialArm::new([
+        ArmJoint::revolute(Vec3::new(0.0, 0.0, 1.0), Vec3::ZERO)?,
+        ArmJoint::revolute(lifting, Vec3::ZERO)?.with_mass(upper_kg, along(0.5 * upper_m))?,
+        ArmJoint::revolute(lifting, along(upper_m))?
+            .with_mass(fore_kg, along(upper_m + 0.5 * fore_m))?,
+    ]))
 }
 
 /// What a joint is told: to hold its angle, with the weight beside it or not.
@@ -89,7 +98,16 @@ fn target(part: Part, angle_deg: f32, weight_nm: f32, compensates: bool) -> Impe
     }
 }
 
-/// That is all of it for a real arm. From here on: the simulator.
+// That is all of it for a real arm. From here on: the simulator.
+
+/// The torque by which the simulated arm resists gravity at these angles, in Nm: by hand, so that the two can differ.
+fn weight_nm([_, shoulder, elbow]: [f32; 3]) -> [f32; 3] {
+    let ((upper_kg, upper_m), (fore_kg, fore_m)) = (UPPER, FOREARM);
+    let at_elbow = fore_kg * GRAVITY * 0.5 * fore_m * (shoulder + elbow).cos();
+    let at_shoulder = (0.5 * upper_kg + fore_kg) * GRAVITY * upper_m * shoulder.cos();
+    [0.0, at_shoulder + at_elbow, at_elbow]
+}
+
 struct Sample {
     time_s: f32,
     angles_deg: [f32; 3],
@@ -109,6 +127,7 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
     let world = Simulation::new(1);
     let [base, shoulder, elbow] = POSE_DEG;
     let mut drives = [drive(BASE, base), drive(SHOULDER, shoulder), drive(ELBOW, elbow)];
+    let model = arm()?;
     let arm = [joint(BASE)?, joint(SHOULDER)?, joint(ELBOW)?];
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), arm);
     let mut samples = Vec::new();
@@ -137,7 +156,9 @@ fn simulate() -> Result<Vec<Sample>, Box<dyn Error>> {
         let pose = [if ms < TURNED { base } else { BASE_DEG }, shoulder, elbow];
         let joints = runner.device_mut();
         let measured = joints.each_ref().map(|joint| joint.motor().angle());
-        let weights = weight_nm(measured.map(|angle| angle.map_or(0.0, Angle::as_radians)));
+        // An angle that is not known yet gives no torque.
+        let positions = measured.map(|angle| angle.map_or(f32::NAN, Angle::as_radians));
+        let weights = model.holding_efforts(&positions).unwrap_or_default();
         let compensates = ms >= COMPENSATED;
         for (((joint, part), angle), weight) in joints.iter_mut().zip(PARTS).zip(pose).zip(weights)
         {

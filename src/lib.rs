@@ -31,6 +31,7 @@ pub mod units;
 pub mod control;
 pub mod encoder;
 pub mod geometry;
+pub mod manipulator;
 
 // F2: what every motor, every chassis and every shooter has in common; byte protocols
 pub mod chassis;

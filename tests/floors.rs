@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Module and floor, as `DESIGN.md` draws them. Modules of one floor do not know each other.
-const FLOORS: [(&str, u32); 22] = [
+const FLOORS: [(&str, u32); 23] = [
     ("error", 0),
     ("units", 2),
     ("time", 1),
@@ -15,6 +15,7 @@ const FLOORS: [(&str, u32); 22] = [
     ("encoder", 10),
     ("control", 10),
     ("geometry", 10),
+    ("manipulator", 11),
     ("motor", 20),
     ("wire", 19),
     ("chassis", 21),

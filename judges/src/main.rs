@@ -13,12 +13,14 @@
 //! drivetrain-judges odrive VERB           see `odrive`
 //! drivetrain-judges motion ...            plans of `control::Motion`: see `motion`
 //! drivetrain-judges state-space ...       gains and filters of `control::state_space`: see `state_space`
+//! drivetrain-judges manipulator ...       efforts that hold an arm: see `manipulator`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 mod codec;
 mod defect;
 mod lk;
+mod manipulator;
 mod motion;
 mod odrive;
 mod rmd;
@@ -108,6 +110,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["state-space", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         state_space::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["manipulator", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        manipulator::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

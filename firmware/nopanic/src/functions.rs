@@ -35,6 +35,7 @@ pub fn call_all() {
     dji();
     runner();
     crate::geometry::call_all();
+    crate::manipulator::call_all();
     crate::health::call_all();
     crate::chassis::call_all();
     crate::pwm::call_all();

@@ -13,6 +13,7 @@ mod functions;
 mod geometry;
 mod health;
 mod lk;
+mod manipulator;
 mod odrive;
 mod opaque;
 mod pwm;

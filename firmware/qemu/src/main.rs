@@ -6,6 +6,7 @@
 #![no_std]
 #![no_main]
 
+mod arm;
 mod bytes;
 mod calls;
 mod closed_loop;
@@ -39,6 +40,7 @@ fn main() -> ! {
         controllers::rows();
         motion::rows();
         state_space::rows();
+        arm::rows();
         rows::math();
         rows::space();
         bytes::rows();
