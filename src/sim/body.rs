@@ -108,14 +108,11 @@ impl Body {
         for Rolling { contact, velocity, inertia, torque } in wheels {
             let Contact { position, along, reach, holds_across } = *contact;
             let ground = Vec2::new(vx - wz * position.y, vy + wz * position.x);
-            let held_along = held(self.compliance + reach * reach / *inertia, dt_s)
-                * (reach * *velocity - along.dot(ground));
-            let held_across = if holds_across {
-                -held(self.compliance, dt_s) * contact.across().dot(ground)
-            } else {
-                0.0
-            };
-            let force = Vec2::new(held_along, held_across);
+            let slip_along = reach * *velocity - along.dot(ground);
+            let slip_across = if holds_across { -contact.across().dot(ground) } else { 0.0 };
+            // As stiff across as along, where the wheel yields too: so the force is against the slip, in any direction.
+            let force = Vec2::new(slip_along, slip_across)
+                * held(self.compliance + reach * reach / *inertia, dt_s);
             let size = force.norm();
             let force = if size > self.traction { force * (self.traction / size) } else { force };
             *torque = -reach * force.x;
@@ -385,6 +382,26 @@ mod tests {
             let acceleration = cart.twist()[0] / 0.2;
             assert!((acceleration - 0.8 * 9.81 * share).abs() < 0.01, "{acceleration} m/s2");
             assert!(cart.wheels[0].velocity * RADIUS > 2.0 * cart.twist()[0]);
+        }
+    }
+
+    /// Found by `MuJoCo`: the force was turned away from the slip, to twice as much across as along.
+    #[test]
+    fn the_floor_acts_against_the_slip_of_a_tyre_in_any_direction() {
+        for (spin, drift) in [(40.0, 0.5), (-40.0, 2.0), (3.0, -4.0), (0.2, 0.004)] {
+            let mut wheel = [Rolling {
+                contact: contact(Vec2::ZERO, 0.0, RADIUS, true),
+                velocity: spin,
+                inertia: INERTIA,
+                torque: 0.0,
+            }];
+            let mut body = Body::new(wheel.iter().map(|wheel| wheel.contact), 20.0, 0.8, 0.8);
+            body.vy = drift;
+            body.step(&mut wheel, STEP);
+            let force = Vec2::new(body.vx, body.vy - drift) * (20.0 / STEP);
+            let slip = Vec2::new(spin * RADIUS, -drift);
+            assert!(force.cross(slip).abs() < 0.01 * force.norm() * slip.norm(), "{force:?}");
+            assert!(force.dot(slip) > 0.0 && force.norm() < 0.801 * 20.0 * GRAVITY, "{force:?}");
         }
     }
 
