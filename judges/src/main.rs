@@ -14,6 +14,7 @@
 //! drivetrain-judges motion ...            plans of `control::Motion`: see `motion`
 //! drivetrain-judges state-space ...       gains and filters of `control::state_space`: see `state_space`
 //! drivetrain-judges manipulator ...       efforts that hold an arm: see `manipulator`
+//! drivetrain-judges simulator             runs of the simulator: see `simulator`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
@@ -27,6 +28,7 @@ mod rmd;
 mod robstride;
 mod serve;
 mod state_space;
+mod simulator;
 mod vesc;
 
 use defect::Defect;
@@ -115,6 +117,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["manipulator", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         manipulator::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["simulator", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        simulator::run(rest, io::stdin().lock(), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

@@ -59,6 +59,9 @@
 //! A wheel on the ground holds within its friction (estimate 0.8, so about 2 Nm a wheel under 20 kg): at a larger
 //! torque the wheel spins, as on a real floor.
 //!
+//! 18 runs, from a stalled motor to a sliding chassis, are compared with `MuJoCo`: they agree within 1 % of the largest value, but for
+//! the transfer of weight below (`judges/README.md`).
+//!
 //! Not simulated: error frames and error counters, two senders of one id at the same bit, cogging, the supply's sag, the transfer
 //! of weight to other wheels when a chassis accelerates, and the effect of a turning module on the floor, on its wheel's drive
 //! and on the body. Motors move in steps of 100 µs; in between, the feedback continues their angle in a line.
