@@ -209,7 +209,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (single, burst) = (balls_at(3.0), balls_at(5.5));
     let hottest = samples.iter().map(|sample| sample.heat).fold(0.0, f32::max);
-    let slow = 100.0 * (1.0 - slowest_rpm / WHEELS.as_rpm());
+    let slow = (100.0 * (1.0 - slowest_rpm / WHEELS.as_rpm())).max(0.0);
     console::line(format_args!(
         "shots        {} counted, {} left: {single} single, {} in the burst with the jam, then {}",
         last.shots,

@@ -27,8 +27,8 @@ mod odrive;
 mod rmd;
 mod robstride;
 mod serve;
-mod state_space;
 mod simulator;
+mod state_space;
 mod vesc;
 
 use defect::Defect;
