@@ -15,9 +15,11 @@
 //! drivetrain-judges state-space ...       gains and filters of `control::state_space`: see `state_space`
 //! drivetrain-judges manipulator ...       efforts that hold an arm: see `manipulator`
 //! drivetrain-judges simulator             runs of the simulator: see `simulator`
+//! drivetrain-judges balance               the program of a robot that balances: see `balance`
 //! ```
 //! A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
+mod balance;
 mod codec;
 mod defect;
 mod lk;
@@ -122,6 +124,11 @@ fn run(arguments: &[&str]) -> Outcome<()> {
     if let ["simulator", rest @ ..] = arguments {
         let mut output = BufWriter::new(io::stdout().lock());
         simulator::run(rest, io::stdin().lock(), &mut output)?;
+        return Ok(output.flush()?);
+    }
+    if let ["balance", rest @ ..] = arguments {
+        let mut output = BufWriter::new(io::stdout().lock());
+        balance::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
         return Ok(output.flush()?);
     }
     let (arguments, defect) = match arguments {

@@ -27,6 +27,7 @@
 //! | [`Modes`] | relax, follow the gimbal, rotor, independent |
 //! | [`PowerModel`], [`PowerBuffer`], [`PowerFit`] | cut all torques by one factor to keep a power limit |
 //! | [`CapacitorPlan`] | adds the power of a super-capacitor to the limit, down to its reserve |
+//! | [`Balancer`], [`FiveBar`] | beside the layouts: a robot that balances on two wheels with legs |
 //!
 //! References: K. Lynch, F. Park, *Modern Robotics* (2017), chapters 3 and 13.
 //!
@@ -46,6 +47,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod balance;
+mod balance_model;
 mod base;
 mod capacitor;
 mod clock;
@@ -54,6 +57,7 @@ mod drive;
 mod error;
 mod kinematics;
 mod least_squares;
+mod leg;
 mod limits;
 mod mecanum;
 mod mode;
@@ -67,11 +71,14 @@ mod steering;
 mod swerve;
 mod wheels;
 
+pub use balance::{BalancePhase, Balancer};
+pub use balance_model::BalanceModel;
 pub use base::Chassis;
 pub use capacitor::CapacitorPlan;
 pub use differential::Differential;
 pub use drive::{ModuleMotors, WheelDrive};
 pub use kinematics::{Kinematics, WheelSpeed};
+pub use leg::{FiveBar, LegEffort, LegState};
 pub use limits::ChassisLimits;
 pub use mecanum::Mecanum;
 pub use mode::{ChassisMode, ModeConfig, Modes};
