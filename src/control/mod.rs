@@ -20,6 +20,7 @@
 //! | what pushes, brakes or blocks a shaft; a speed with less noise and no lag | [`LoadObserver`] | a bandwidth of 200 rad/s |
 //! | several states at once: a pendulum, a balancing robot, an arm with its load | [`state_space::LinearQuadraticRegulator`], [`state_space::KalmanFilter`] | a model, and the largest error and effort that are acceptable |
 //! | gains for the wheels of a robot | [`WheelTuning`] | its mass, the radius and the number of its wheels |
+//! | kS, kV, kA and delay of a motor on its mechanism, and gains by bandwidth and phase margin | [`Excitation`] and [`Identification`], then [`Plant::speed_loop`] | half of the effort that the mechanism can take, and 60 degrees |
 //! | gains for an unknown plant | [`RelayTuner`], then [`StepResponse`] | [`TuningRule::TyreusLuybenPi`] |
 //!
 //! # Common behaviour
@@ -48,6 +49,7 @@ mod actuator;
 mod differentiator;
 pub(crate) mod error;
 mod filter;
+mod identification;
 mod motion;
 mod number;
 mod observer;
@@ -60,6 +62,7 @@ mod wide;
 pub use actuator::{Cascade, PositionActuator, SpeedActuator};
 pub use differentiator::{Differentiator, fhan};
 pub use filter::{Biquad, LowPass, Window};
+pub use identification::{Excitation, Identification, IdentificationError, Plant};
 pub use motion::{Motion, MotionFollower, MotionTarget, Motions};
 pub(crate) use number::limited;
 pub use observer::LoadObserver;
