@@ -98,6 +98,7 @@ pub fn call_all() {
     SlewLimiter::rejected.call();
     TuningRule::pid.call();
     state_space();
+    identification();
     RelayTuner::pid.call();
     RelayTuner::with_bias.call();
     RelayTuner::with_cycles.call();
@@ -117,6 +118,27 @@ pub fn call_all() {
     StepResponse::settling_time_s.call();
     StepResponse::steady_error.call();
     StepResponse::rejected.call();
+}
+
+fn identification() {
+    Excitation::new.call();
+    Excitation::with_duration.call();
+    Excitation::update.call();
+    Excitation::effort.call();
+    Excitation::is_complete.call();
+    Excitation::failure.call();
+    Identification::new.call();
+    Identification::sample.call();
+    Identification::result.call();
+    Identification::samples.call();
+    Identification::rejected.call();
+    Plant::new.call();
+    Plant::speed_loop.call();
+    Plant::bandwidth.call();
+    Plant::position_loop.call();
+    Plant::feed_forward.call();
+    Plant::inertia_kg_m2.call();
+    Plant::friction_nm.call();
 }
 
 fn state_space() {

@@ -6,9 +6,9 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;
 use drivetrain::control::{
-    Biquad, Cascade, Differentiator, FeedForward, LowPass, MotionLimits, Pid, PidConfig,
-    PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator, StepResponse,
-    Window,
+    Biquad, Cascade, Differentiator, FeedForward, Identification, LowPass, MotionLimits, Pid,
+    PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator,
+    StepResponse, Window,
 };
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist};
@@ -44,6 +44,7 @@ functions! {
     control_plan(limits: &MotionLimits, start, end) -> Result<Profile, ConfigError> = Profile::plan(start, end, limits);
     control_feed_forward(gains: &FeedForward, velocity, acceleration) -> f32 = gains.effort(velocity, acceleration);
     control_relay(tuner: &mut RelayTuner, setpoint, measurement, dt_s) -> f32 = tuner.update(setpoint, measurement, dt_s);
+    control_identification(identification: &mut Identification, effort, velocity, dt_s) -> () = identification.sample(effort, velocity, dt_s);
     control_step_response(response: &mut StepResponse, value, dt_s) -> () = response.record(value, dt_s);
 }
 
@@ -60,6 +61,7 @@ fn control_odometry(odometry: &mut Odometry, twist: &Twist<Body>, dt_s: f32) -> 
 }
 
 type Step<C> = fn(&mut C, f32, f32, f32) -> f32;
+type Sampling = fn(&mut Identification, f32, f32, f32);
 type Filter<C> = fn(&mut C, f32, f32) -> f32;
 type Sampler<C> = fn(&mut C, f32) -> f32;
 
@@ -106,6 +108,19 @@ fn tuning() {
         })],
     );
     assert!(!tuner.is_complete());
+    let mut identification = Identification::new(black_box(10.0), 0.0).unwrap();
+    // Not blind any more: the first of all, and the time after the jump from zero.
+    for _ in 0..50 {
+        identification.sample(3.0, 1.0, DT_S);
+    }
+    let before = identification.samples();
+    row(
+        "identification",
+        &[instructions(control_identification as Sampling, |sample, call| {
+            sample(&mut identification, 3.0, 1.5 + 0.1 * swinging(call), DT_S);
+        })],
+    );
+    assert!(identification.samples() >= before + CALLS);
     let mut response = StepResponse::new(0.0, black_box(1.0), 1.5, 0.02).unwrap();
     let each = |record: fn(&mut StepResponse, f32, f32), call| {
         record(&mut response, swinging(call), DT_S);

@@ -203,9 +203,6 @@ impl Identification {
             return Err(IdentificationError::NotExcited);
         }
         let fit = self.common.fit(&self.lags).ok_or(IdentificationError::NotExcited)?;
-        if fit.delay_ticks >= Self::LAGS as f32 {
-            return Err(IdentificationError::DelayTooLong);
-        }
         let samples = self.samples as f32;
         let ka = 1.0 / fit.gain;
         let variance = fit.rest.max(0.0) / samples;
@@ -215,6 +212,9 @@ impl Identification {
         // Not written the other way round: NaN is noise too.
         if !(relative <= MOST_DEVIATION && ka.is_finite()) {
             return Err(IdentificationError::TooNoisy);
+        }
+        if fit.delay_ticks >= Self::LAGS as f32 {
+            return Err(IdentificationError::DelayTooLong);
         }
         let tick_s = self.time.value() / samples;
         let [kv, ks, bias] = fit.common.map(|coefficient| -coefficient * ka);

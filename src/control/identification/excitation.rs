@@ -18,7 +18,7 @@ use crate::time::TimeStep;
 /// By how much the last swing exceeded its speed (delay), the next one turns earlier. The effort turns too when the way that is
 /// left is as long as the way from the last standstill, since the same effort needs at most this way to stop; and after
 /// [`HOLD_S`](Self::HOLD_S) in one direction, where resistance keeps the speed below its limit. After
-/// [`with_duration`](Self::with_duration), 8 s by default, the shaft is braked, and the effort is zero for ever.
+/// [`with_duration`](Self::with_duration), 10 s by default, the shaft is braked, and the effort is zero for ever.
 ///
 /// # Limits
 /// The effort never exceeds its limit. If the speed exceeds its limit, the way from the start exceeds its limit to either side, or
@@ -125,7 +125,7 @@ impl Excitation {
             effort_limit,
             speed_limit,
             way_limit,
-            duration_s: 8.0,
+            duration_s: 10.0,
             passed: Sum::ZERO,
             held_s: 0.0,
             velocity: 0.0,
@@ -139,7 +139,7 @@ impl Excitation {
         })
     }
 
-    /// Sets the time in s after which the shaft is braked, above zero; 8 by default.
+    /// Sets the time in s after which the shaft is braked, above zero; 10 by default.
     ///
     /// # Errors
     /// Names `duration` when not above zero and finite.

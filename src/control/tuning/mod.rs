@@ -4,7 +4,8 @@
 //! 2. [`RelayTuner::pid`] calculates gains from the response by a [`TuningRule`] with a name and a source.
 //! 3. [`StepResponse`] measures the loop with these gains.
 //!
-//! Where mass and wheels of a robot are known, [`WheelTuning`] reckons gains to begin with.
+//! Where mass and wheels of a robot are known, [`WheelTuning`] reckons gains to begin with. Where the mechanism may be swung
+//! through its range, an [`Identification`](crate::control::Identification) finds the plant, and with it gains of a stated margin.
 
 mod relay;
 mod rules;
