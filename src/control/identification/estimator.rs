@@ -104,6 +104,9 @@ impl Identification {
     /// The time in s after a jump of the effort in which the shaft crosses its backlash: these samples are summed and not fitted.
     pub const SETTLES_S: f32 = 0.03;
 
+    /// Samples between the end of a rest and the first sample of the sums.
+    const STARTS: u8 = 4;
+
     /// All delayed efforts are known, and one sample more.
     const BLIND: u8 = 14;
 
@@ -159,6 +162,10 @@ impl Identification {
             self.blind = Self::BLIND;
         } else if step.is_frozen() {
             self.blind = Self::BLIND;
+        }
+        if was_resting && !is_still {
+            // The sample that ends the rest is one with more noise than others.
+            self.blind = self.blind.max(Self::STARTS);
         }
         if self.blind > 0 || was_resting {
             self.blind = self.blind.saturating_sub(1);
