@@ -315,8 +315,8 @@ fn the_simulated_m3508_is_found_with_its_load_over_the_bus() {
         println!("{inertia:.4} kg m², {friction:.3} Nm: {plant:?}");
         assert!(off(plant.ka, 0.008 + inertia).abs() < 0.05 * (0.008 + inertia) / 0.3);
         assert!(off(plant.ks, 0.12 + friction).abs() < 0.05 * (0.12 + friction) / 0.3);
-        // The resistance is 4 % of the effort at 28 rad/s, the fastest speed: within 0.8 % of the effort there.
-        assert!(28.0 * off(plant.kv, 2.2e-3).abs() < 0.04, "{plant:?}");
+        // The resistance is 4 % of the effort at 28 rad/s, the fastest speed: within 1 % of the effort there.
+        assert!(28.0 * off(plant.kv, 2.2e-3).abs() < 0.05, "{plant:?}");
         assert!((0.000_5..0.003).contains(&plant.delay_s), "{plant:?}");
     }
 }

@@ -1,6 +1,6 @@
 use super::IdentificationError;
 use crate::control::error::{check, positive};
-use crate::control::number::Sum;
+use crate::control::number::{Sum, limited};
 use crate::error::ConfigError;
 use crate::time::TimeStep;
 
@@ -58,6 +58,8 @@ pub struct Excitation {
     peak: f32,
     /// 1 or -1.
     direction: f32,
+    /// The effort has turned since the last standstill: noise at rest begins no swing.
+    has_turned: bool,
     swing: Swing,
     state: State,
 }
@@ -134,6 +136,7 @@ impl Excitation {
             excess: 0.0,
             peak: 0.0,
             direction: 1.0,
+            has_turned: false,
             swing: Swing::Slow,
             state: State::Swinging,
         })
@@ -188,10 +191,11 @@ impl Excitation {
         }
         let (_, share) = self.swing.shares();
         let reversal = share * self.speed_limit;
-        if before * self.velocity < 0.0 && forward > 0.0 {
+        if self.has_turned && before * self.velocity < 0.0 && forward > 0.0 {
             // The shaft stood still, and goes the way it is driven: a new swing.
             self.turned_at = self.position.value();
-            self.excess = (self.peak - reversal).clamp(0.0, 0.5 * reversal);
+            self.excess = limited(self.peak - reversal, 0.0, 0.5 * reversal);
+            self.has_turned = false;
             self.peak = 0.0;
             self.swing = self.swing.next();
             return;
@@ -207,6 +211,7 @@ impl Excitation {
                 self.swing = self.swing.next();
             }
             self.direction = -self.direction;
+            self.has_turned = true;
             self.held_s = 0.0;
         }
     }
