@@ -1,6 +1,13 @@
 //! Identification against motors whose physics is written here in `f64`, and against the simulator.
 
 #![cfg(test)]
+#![cfg(feature = "sim")]
+#![expect(clippy::cast_possible_truncation, reason = "the judge is in `f64`, the crate in `f32`")]
+#![expect(clippy::cast_sign_loss, reason = "a number of parts of a tick, drawn above zero")]
+#![expect(
+    clippy::float_cmp,
+    reason = "an effort that ended is exactly zero, as is a speed at rest"
+)]
 
 use drivetrain::control::{Excitation, Identification, IdentificationError, Pid, PidConfig, Plant};
 use drivetrain::dji::{Bus, Config, M3508};
@@ -15,7 +22,7 @@ const TICK_S: f64 = 0.001;
 const SUBSTEPS: usize = 20;
 const MOTORS: u64 = 200;
 
-/// Uniform numbers by SplitMix64.
+/// Uniform numbers by `SplitMix64`.
 struct Random(u64);
 
 impl Random {
