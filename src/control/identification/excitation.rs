@@ -6,7 +6,7 @@ use crate::time::TimeStep;
 
 /// Efforts for an [`Identification`](super::Identification): steps that swing the shaft within limits of effort, speed and way.
 ///
-/// The shaft is driven one way until it is fast enough, then the other way. Each swing has one of three efforts and speeds, so
+/// The effort drives the shaft up to a speed, then turns. Each swing has one of three efforts and speeds, so
 /// that friction, resistance and inertia can be told apart:
 ///
 /// | swing | effort, of the limit | speed of the reversal, of the limit |

@@ -68,7 +68,7 @@ pub struct Plant {
     pub kv_deviation: f32,
     /// Standard deviation of `ka` in `U s²/M`, for noise that is white.
     pub ka_deviation: f32,
-    /// What the model leaves of the speed, in `M`/s: root of the mean square of the noise.
+    /// The part of the speed that the model leaves, in `M`/s: root of the mean square of the noise.
     pub noise: f32,
 }
 
