@@ -232,6 +232,7 @@ fn motor() {
     (|names: [MotorName; 20]| Missing::collect(names.into_iter())).call();
     (|missing: &Missing| Missing::names(missing).count()).call();
     Missing::total.call();
+    Missing::full_bus.call();
     (|id: Id, role: Role, motor: MotorName| Claim::new(id, role, motor)).call();
     Claim::with_mask.call();
     Claim::clashes_with.call();
