@@ -7,7 +7,9 @@
 //! ```
 //!
 //! The module is independent of bus and motor: from feedback to target speeds ([`ShooterTargets`]). A motor of any family fits, if its
-//! drive has a velocity loop and a position of the shaft over many turns.
+//! drive has a velocity loop and a position of the shaft over many turns. The speed is that of the shaft: friction wheels on M3508 without
+//! their gearbox are attached with [`with_gear(GearRatio::DIRECT)`](crate::dji::Config::with_gear), some 6000 rpm; the example `shooter`
+//! turns geared wheels at 400 rpm.
 //!
 //! | state | wheels | loader | left when |
 //! |---|---|---|---|
