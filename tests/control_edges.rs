@@ -484,7 +484,7 @@ fn the_table_of_the_module_says_when_to_use_each_type() {
             seen += 1;
         }
     }
-    assert_eq!(seen, 19);
+    assert_eq!(seen, 22);
 }
 
 #[test]
