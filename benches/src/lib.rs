@@ -32,12 +32,14 @@ pub struct Eight {
 /// A rotor that turns at 191 rpm moves by 26 counts a ms; the output shaft then turns at 1.04 rad/s.
 const COUNTS: u16 = 26;
 
-/// Returns what a motor says whose rotor is at `angle`.
+/// Returns the feedback of a motor whose rotor is at `angle`.
+///
+/// # Panics
+/// If 0x200 and the id together are no id of 11 bits.
 #[must_use]
 pub fn feedback(id: u16, angle: u16) -> CanFrame {
     let [high, low] = angle.to_be_bytes();
-    CanFrame::standard(0x200 + id, [high, low, 0, 191, 0, 40, 30, 0])
-        .unwrap_or_else(|| unreachable!())
+    CanFrame::standard(0x200 + id, [high, low, 0, 191, 0, 40, 30, 0]).expect("an id of 11 bits")
 }
 
 impl Eight {
