@@ -111,11 +111,6 @@ impl Goal {
     }
 }
 
-/// Returns the time step of an update again, for code without access to its values.
-fn usable(dt_s: f32) -> TimeStep {
-    TimeStep::new(dt_s, TimeStep::MOTOR_MAX_S)
-}
-
 /// Stands for a missing loop: without gains, the output is zero, and no branch is needed.
 const NO_GAINS: PidConfig = PidConfig::new(0.0, 0.0, 0.0);
 
@@ -345,7 +340,7 @@ impl Slot {
     #[cold]
     #[inline(never)]
     fn follow_velocity(&mut self, goal: f32, velocity: f32, dt_s: f32) -> i16 {
-        let output = self.speed.step(goal, velocity, &usable(dt_s));
+        let output = self.speed.step(goal, velocity, &TimeStep::of_motor(dt_s));
         loop_to_raw(output, self.raw_per_unit, self.range)
     }
 }

@@ -263,7 +263,7 @@ impl<P: SetDutyCycle, D: Direction> Brushed<P, D> {
             }
             return 0.0;
         }
-        let step = TimeStep::new(tick.dt_s(), TimeStep::MOTOR_MAX_S);
+        let step = TimeStep::of_motor(tick.dt_s());
         if step.is_hold() {
             return if core::mem::take(&mut self.may_hold) { self.output } else { 0.0 };
         }

@@ -57,6 +57,11 @@ impl TimeStep {
     /// The longest step of a motor's loops in seconds, 20 periods of 1 kHz: above, integrals and derivatives rest.
     pub(crate) const MOTOR_MAX_S: f32 = 0.02;
 
+    /// Takes the seconds since the step before, for a loop of a motor.
+    pub(crate) const fn of_motor(dt_s: f32) -> Self {
+        Self::new(dt_s, Self::MOTOR_MAX_S)
+    }
+
     /// As [`new`](Self::new); `None` for a step that [holds](Self::is_hold).
     #[inline]
     pub(crate) const fn usable(dt_s: f32, dt_max_s: f32) -> Option<Self> {

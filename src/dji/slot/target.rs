@@ -1,12 +1,13 @@
 //! Targets of a new kind, and loops outside the usual path.
 
 use super::duty::{Action, Duty};
-use super::{Goal, Slot, health, needs, usable};
+use super::{Goal, Slot, health, needs};
 use crate::control::Pid;
 use crate::dji::command::{Outbox, saturate, to_raw};
 use crate::dji::range::Range;
 use crate::encoder::Position;
 use crate::motor::{Link, MotorGuard, Rest, TargetError, Timeouts};
+use crate::time::TimeStep;
 use crate::units::Angle;
 
 impl Slot {
@@ -205,7 +206,7 @@ impl Slot {
             Action::Raw => return saturate(self.goal.raw(), self.range),
             Action::Rest => return 0,
         };
-        let goal = self.position.advance(way, velocity, &usable(dt_s));
+        let goal = self.position.advance(way, velocity, &TimeStep::of_motor(dt_s));
         self.follow_velocity(goal * self.opened_part(), velocity, dt_s)
     }
 

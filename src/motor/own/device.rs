@@ -26,7 +26,7 @@ impl<M: OwnMotor> CanDevice for Own<M> {
 
     #[inline]
     fn update(&mut self, tick: Tick) {
-        let step = TimeStep::new(tick.dt_s(), TimeStep::MOTOR_MAX_S);
+        let step = TimeStep::of_motor(tick.dt_s());
         let left = self.check(tick.now());
         let drives = self.guard.drives(tick.now());
         if drives && !step.is_hold() && self.is_steady() {
