@@ -116,6 +116,17 @@ const SLIP: (f32, f32) = (1.2, 50.0);
 /// Trim in Nm for a metre and a second, and its limit. Wheels that drive on bring the body back: the sign is that of the gain.
 const TRIM: (f32, f32) = (3.0, 5.0);
 
+/// Shares of half the weight: lifted, landed.
+const LIFTED: f32 = 0.2;
+const LANDED: f32 = 0.4;
+
+/// Errors that cost as much as the largest torques: lean, its rate, place, velocity, pitch, its rate.
+const LARGEST: [f32; 6] = [0.3, 10.0, 0.5, 1.0, 0.2, 10.0];
+/// Efforts that cost as much, as shares of the largest torques: wheels, hips. With these the fastest pole is at 25 1/s.
+const SHARES: [f32; 2] = [0.4, 0.2];
+/// Roll or pitch of a fall in rad: 40°.
+const FALL: f32 = 0.7;
+
 impl Balancer {
     /// Calculates the gains for leg lengths from the least to the largest, in m, of which the least is that of rising.
     ///
@@ -363,17 +374,6 @@ impl Balancer {
         self.trim_nm = within(self.trim_nm + TRIM.0 * self.place_m * self.dt_s, TRIM.1);
     }
 }
-
-/// Shares of half the weight: lifted, landed.
-const LIFTED: f32 = 0.2;
-const LANDED: f32 = 0.4;
-
-/// Errors that cost as much as the largest torques: lean, its rate, place, velocity, pitch, its rate.
-const LARGEST: [f32; 6] = [0.3, 10.0, 0.5, 1.0, 0.2, 10.0];
-/// Efforts that cost as much, as shares of the largest torques: wheels, hips. With these the fastest pole is at 25 1/s.
-const SHARES: [f32; 2] = [0.4, 0.2];
-/// Roll or pitch of a fall in rad: 40°.
-const FALL: f32 = 0.7;
 
 #[cfg(test)]
 mod tests {

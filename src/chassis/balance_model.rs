@@ -1,3 +1,4 @@
+use crate::control::solved;
 use crate::control::state_space::LinearSystem;
 use crate::error::ConfigError;
 
@@ -82,7 +83,8 @@ impl BalanceModel {
             [GRAVITY * by_lean, 0.0, -1.0, 1.0],
             [0.0, GRAVITY * body * height, 0.0, -1.0],
         ];
-        let [place, lean, pitch] = solved(mass, forces);
+        // Without a solution, the plant is not finite, and refused.
+        let [place, lean, pitch] = solved(&mass, &forces).unwrap_or([[f32::NAN; 4]; 3]);
         let states = |[lean, pitch, ..]: [f32; 4]| [lean, 0.0, 0.0, 0.0, pitch, 0.0];
         let inputs = |[.., wheel, hip]: [f32; 4]| [wheel, hip];
         let a = [
@@ -96,26 +98,4 @@ impl BalanceModel {
         let b = [[0.0; 2], inputs(lean), [0.0; 2], inputs(place), [0.0; 2], inputs(pitch)];
         LinearSystem::discretized(&a, &b, dt_s)
     }
-}
-
-/// Solves `m x = f` for a positive definite `m`, by elimination.
-fn solved(mut m: [[f32; 3]; 3], mut f: [[f32; 4]; 3]) -> [[f32; 4]; 3] {
-    for pivot in 0..3 {
-        let (Some(row), Some(right)) = (m.get(pivot).copied(), f.get(pivot).copied()) else {
-            continue;
-        };
-        let Some(divisor) = row.get(pivot).copied() else { continue };
-        for (other, (entries, results)) in m.iter_mut().zip(&mut f).enumerate() {
-            let Some(entry) = entries.get(pivot).copied() else { continue };
-            if other == pivot {
-                entries.iter_mut().for_each(|entry| *entry /= divisor);
-                results.iter_mut().for_each(|entry| *entry /= divisor);
-            } else {
-                let factor = entry / divisor;
-                entries.iter_mut().zip(row).for_each(|(entry, of)| *entry -= factor * of);
-                results.iter_mut().zip(right).for_each(|(entry, of)| *entry -= factor * of);
-            }
-        }
-    }
-    f
 }

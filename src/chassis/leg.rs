@@ -1,5 +1,5 @@
 use super::error::positive;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, check};
 use crate::math::{atan2, sin_cos, sqrt};
 use crate::units::{Angle, AngularVelocity};
 
@@ -78,17 +78,9 @@ impl FiveBar {
     /// Names the length that is not above zero and finite. [`ConfigError::Conflict`] with `lower_m`: the upper bars cannot point
     /// outward, since `lower_m` is not longer than `upper_m` and `hip_m` together.
     pub const fn new(hip_m: f32, upper_m: f32, lower_m: f32) -> Result<Self, ConfigError> {
-        let lengths = [(hip_m, "hip_m"), (upper_m, "upper_m"), (lower_m, "lower_m")];
-        let [hip, upper, lower] = lengths;
-        if let Err(error) = positive(hip.0, hip.1) {
-            return Err(error);
-        }
-        if let Err(error) = positive(upper.0, upper.1) {
-            return Err(error);
-        }
-        if let Err(error) = positive(lower.0, lower.1) {
-            return Err(error);
-        }
+        check!(positive(hip_m, "hip_m"));
+        check!(positive(upper_m, "upper_m"));
+        check!(positive(lower_m, "lower_m"));
         if lower_m <= upper_m + hip_m {
             return Err(ConfigError::Conflict("lower_m"));
         }

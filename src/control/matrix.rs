@@ -1,12 +1,14 @@
-use crate::control::wide::Wide;
+//! Small matrices as arrays of rows.
+
+use super::wide::Wide;
 use crate::error::ConfigError;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// A matrix with `R` rows and `C` columns of the numbers in which it is calculated.
-pub(super) type Grid<T, const R: usize, const C: usize> = [[T; C]; R];
+pub(crate) type Grid<T, const R: usize, const C: usize> = [[T; C]; R];
 
 /// `f32` in the loop, [`Wide`] at start.
-pub(super) trait Number:
+pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     const ZERO: Self;
@@ -63,6 +65,19 @@ pub(super) fn apply<T: Number, const R: usize, const C: usize>(
         *place = dot(row, vector);
     }
     product
+}
+
+/// Returns `a x + b u`.
+#[inline]
+pub(super) fn stepped<T: Number, const N: usize, const M: usize>(
+    (a, x): (&Grid<T, N, N>, &[T; N]),
+    (b, u): (&Grid<T, N, M>, &[T; M]),
+) -> [T; N] {
+    let mut next = apply(a, x);
+    for (state, change) in next.iter_mut().zip(apply(b, u)) {
+        *state = *state + change;
+    }
+    next
 }
 
 /// Returns `a bᵀ`.
@@ -162,21 +177,23 @@ pub(super) fn identity<T: Number, const N: usize>() -> Grid<T, N, N> {
 
 /// Returns the largest absolute value; NaN if there is one.
 pub(super) fn largest<T: Number, const R: usize, const C: usize>(matrix: &Grid<T, R, C>) -> f32 {
-    let larger = |most: f32, size: f32| if size > most || size.is_nan() { size } else { most };
     matrix.iter().flatten().map(|entry| entry.size()).fold(0.0, larger)
+}
+
+const fn larger(most: f32, size: f32) -> f32 {
+    if size > most || size.is_nan() { size } else { most }
 }
 
 /// Returns the largest sum of a row, which bounds each eigenvalue; infinite or NaN if an entry is.
 pub(super) fn row_sum<T: Number, const R: usize, const C: usize>(matrix: &Grid<T, R, C>) -> f32 {
     let sum = |row: &[T; C]| row.iter().map(|entry| entry.size()).sum::<f32>();
-    let larger = |most: f32, size: f32| if size > most || size.is_nan() { size } else { most };
     matrix.iter().map(sum).fold(0.0, larger)
 }
 
 /// Returns the solution `x` of `left x = right`; `None` if a pivot is zero or not finite. By Gauss and Jordan with the largest
 /// pivot of each column.
 #[inline(never)]
-pub(super) fn solved<T: Number, const N: usize, const C: usize>(
+pub(crate) fn solved<T: Number, const N: usize, const C: usize>(
     left: &Grid<T, N, N>,
     right: &Grid<T, N, C>,
 ) -> Option<Grid<T, N, C>> {
@@ -244,7 +261,7 @@ pub(super) fn finite<const R: usize, const C: usize>(
     if is_finite(matrix) { Ok(()) } else { Err(ConfigError::NotFinite(parameter)) }
 }
 
-/// What rounding a symmetric matrix to `f32` may change, as a share of its largest entry.
+/// Change of a symmetric matrix by rounding to `f32`, as a share of its largest entry.
 const ROUNDING: f32 = 1e-6;
 
 /// Refuses a matrix that is not symmetric, or that has a negative eigenvalue beyond rounding.

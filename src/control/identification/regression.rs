@@ -1,5 +1,6 @@
 //! The least squares of a run: sums of products, and their solution for each delay.
 
+use crate::control::matrix::dot;
 use crate::control::number::Sum;
 use crate::control::wide::Wide;
 
@@ -74,18 +75,18 @@ impl Common {
         let root = Factors::of(self.products.map(exact))?;
         let of_change = self.with_change.map(exact);
         let of_common = root.solve(of_change);
-        let rest_of_change = exact(self.square_of_change) - dot(of_change, of_common);
+        let rest_of_change = exact(self.square_of_change) - dot(&of_change, &of_common);
         let mut best: Option<Fit> = None;
         let mut whole_ticks = 0.0;
         for pair in lags.windows(2) {
             let [first, second] = pair else { continue };
             let (a, b) = (first.with_common.map(exact), second.with_common.map(exact));
             let (from_a, from_b) = (root.solve(a), root.solve(b));
-            let aa = exact(first.square) - dot(a, from_a);
-            let bb = exact(second.square) - dot(b, from_b);
-            let ab = exact(second.with_former) - dot(b, from_a);
-            let ra = exact(first.with_change) - dot(of_change, from_a);
-            let rb = exact(second.with_change) - dot(of_change, from_b);
+            let aa = exact(first.square) - dot(&a, &from_a);
+            let bb = exact(second.square) - dot(&b, &from_b);
+            let ab = exact(second.with_former) - dot(&b, &from_a);
+            let ra = exact(first.with_change) - dot(&of_change, &from_a);
+            let rb = exact(second.with_change) - dot(&of_change, &from_b);
             // Two neighbouring lags, weighted: a delay between two ticks.
             let (of_first, of_second) = (ra * bb - rb * ab, rb * aa - ra * ab);
             let share = (of_second / (of_first + of_second)).narrow();
@@ -186,10 +187,6 @@ impl Factors {
 
 fn exact(sum: Sum) -> Wide {
     Wide::of(sum.value()) + sum.above(sum.value())
-}
-
-fn dot([a, b, c]: [Wide; 3], [x, y, z]: [Wide; 3]) -> Wide {
-    a * x + b * y + c * z
 }
 
 fn blend([a, b, c]: [Wide; 3], of: Wide, [x, y, z]: [Wide; 3], with: Wide) -> [Wide; 3] {

@@ -1,6 +1,9 @@
-use super::matrix::{Grid, apply, largest, narrow, solved, times, transposed, wide};
 use super::system::LinearSystem;
+use crate::control::matrix::{
+    Grid, apply, identity, largest, narrow, solved, times, transposed, wide,
+};
 use crate::control::number;
+use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// Returns the inputs that bring a plant from one reference to the next: feed-forward by inversion of the plant.
@@ -60,17 +63,16 @@ fn inverse<const N: usize, const M: usize>(b: &Grid<f32, N, M>) -> Option<Grid<f
     let mut sizes = [0.0; M];
     for (column, size) in columns.iter_mut().zip(&mut sizes) {
         *size = largest(&[*column]);
-        let scale = crate::control::wide::Wide::reciprocal(*size);
+        let scale = Wide::reciprocal(*size);
         *column = column.map(|entry| entry * scale);
     }
-    let normal = times(&columns, &transposed(&columns));
-    let mut result = solved(&normal, &columns)?;
+    let unit = solved(&times(&columns, &transposed(&columns)), &identity())?;
+    // The inverse of a matrix that is nearly singular is large.
+    let is_regular = largest(&unit) < 1.0 / LEAST;
+    let mut result = times(&unit, &columns);
     for (row, size) in result.iter_mut().zip(sizes) {
-        let scale = crate::control::wide::Wide::reciprocal(size);
+        let scale = Wide::reciprocal(size);
         *row = row.map(|entry| entry * scale);
     }
-    // The inverse of a matrix that is nearly singular is large.
-    let result = narrow(&result)?;
-    let unit = solved(&normal, &super::matrix::identity())?;
-    (largest(&unit) < 1.0 / LEAST).then_some(result)
+    narrow(&result).filter(|_| is_regular)
 }

@@ -1,9 +1,10 @@
-use super::matrix::{
-    Grid, apply, difference, finite, identity, is_finite, not_negative, solved, sum, symmetric,
-    times, times_transposed, transposed, wide,
-};
+use super::estimate::Estimate;
 use super::riccati;
 use super::system::LinearSystem;
+use crate::control::matrix::{
+    Grid, difference, finite, identity, is_finite, not_negative, solved, sum, symmetric, times,
+    times_transposed, transposed, wide,
+};
 use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
@@ -51,9 +52,8 @@ pub struct KalmanFilter<const N: usize, const M: usize, const P: usize> {
     c: Grid<Wide, P, N>,
     q: Grid<Wide, N, N>,
     r: Grid<Wide, P, P>,
-    state: [Wide; N],
+    estimate: Estimate<N>,
     covariance: Grid<Wide, N, N>,
-    rejected: u16,
 }
 
 impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
@@ -73,7 +73,7 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     ) -> Result<Self, ConfigError> {
         let (covariance, _) = riccati::filter(plant, c, q, r)?;
         let (c, q, r) = (wide(c), wide(&symmetric(q)), wide(&symmetric(r)));
-        Ok(Self { plant: *plant, c, q, r, state: [Wide::ZERO; N], covariance, rejected: 0 })
+        Ok(Self { plant: *plant, c, q, r, estimate: Estimate::ZERO, covariance })
     }
 
     /// Begins with another state and the covariance of its error.
@@ -88,7 +88,7 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     ) -> Result<Self, ConfigError> {
         finite("state", &[*state])?;
         not_negative("covariance", covariance)?;
-        self.state = state.map(Wide::of);
+        self.estimate.set(state);
         self.covariance = wide(&symmetric(covariance));
         Ok(self)
     }
@@ -96,44 +96,41 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     /// Goes one time step ahead with the inputs of the plant.
     pub fn predict(&mut self, u: &[f32; M]) {
         let a = self.plant.exact_a();
-        let state = self.plant.predict_exactly(&self.state, u);
+        let states = self.estimate.predicted(&self.plant, u);
         let moved = times_transposed(&times(a, &self.covariance), a);
-        self.take(state, &sum(&moved, &self.q));
+        self.take(Some((states, sum(&moved, &self.q))));
     }
 
     /// Corrects the state with one measurement of each output.
     pub fn correct(&mut self, y: &[f32; P]) {
-        let corrected = self.corrected(y);
-        match corrected {
-            Some((state, covariance)) => self.take(state, &covariance),
-            None => self.rejected = self.rejected.saturating_add(1),
-        }
+        self.take(self.corrected(y));
     }
 
     fn corrected(&self, y: &[f32; P]) -> Option<([Wide; N], Grid<Wide, N, N>)> {
         let of_output = times(&self.c, &self.covariance);
         let innovation = sum(&times_transposed(&of_output, &self.c), &self.r);
         let gain = transposed(&solved(&innovation, &of_output)?);
-        let state = moved(&self.state, &self.c, &gain, y);
+        let states = self.estimate.corrected(&self.c, &gain, y);
         let left = difference(&identity(), &times(&gain, &self.c));
         let kept = times_transposed(&times(&left, &self.covariance), &left);
         let added = times_transposed(&times(&gain, &self.r), &gain);
-        Some((state, sum(&kept, &added)))
+        Some((states, sum(&kept, &added)))
     }
 
-    fn take(&mut self, state: [Wide; N], covariance: &Grid<Wide, N, N>) {
-        let covariance = symmetric(covariance);
-        if is_finite(&[state]) && is_finite(&covariance) {
-            (self.state, self.covariance) = (state, covariance);
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
+    fn take(&mut self, found: Option<([Wide; N], Grid<Wide, N, N>)>) {
+        let found = found.map(|(states, covariance)| (states, symmetric(&covariance)));
+        let found = found.filter(|(_, covariance)| is_finite(covariance));
+        if self.estimate.take(found.map(|(states, _)| states))
+            && let Some((_, covariance)) = found
+        {
+            self.covariance = covariance;
         }
     }
 
     /// Returns the estimated states.
     #[must_use]
     pub fn state(&self) -> [f32; N] {
-        self.state.map(Wide::narrow)
+        self.estimate.states()
     }
 
     /// Returns the covariance of the error of the states.
@@ -145,25 +142,6 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     /// Returns the number of predictions and corrections that were refused; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.estimate.rejected()
     }
-}
-
-/// Returns the state, moved by the gain towards a measurement.
-#[inline]
-pub(super) fn moved<const N: usize, const P: usize>(
-    state: &[Wide; N],
-    c: &Grid<Wide, P, N>,
-    gain: &Grid<Wide, N, P>,
-    y: &[f32; P],
-) -> [Wide; N] {
-    let mut residual = y.map(Wide::of);
-    for (residual, expected) in residual.iter_mut().zip(apply(c, state)) {
-        *residual = *residual - expected;
-    }
-    let mut result = *state;
-    for (state, change) in result.iter_mut().zip(apply(gain, &residual)) {
-        *state = *state + change;
-    }
-    result
 }

@@ -1,7 +1,7 @@
-use super::kalman::moved;
-use super::matrix::{Grid, difference, finite, identity, is_finite, times, wide};
+use super::estimate::Estimate;
 use super::riccati;
 use super::system::LinearSystem;
+use crate::control::matrix::{Grid, difference, finite, identity, times, wide};
 use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
@@ -41,9 +41,8 @@ pub struct LuenbergerObserver<const N: usize, const M: usize, const P: usize> {
     /// Not `f32`: where a measurement sees little of a state, the gains of two states nearly cancel in the loop, and a gain of 24 bits was
     /// seen to move a state by 1 in 20 000.
     gain: Grid<Wide, N, P>,
-    /// A slow observer adds up what 10 000 steps round, so it is not `f32`.
-    state: [Wide; N],
-    rejected: u16,
+    /// Not `f32` either: a slow observer sums the rounding of 10 000 steps.
+    estimate: Estimate<N>,
 }
 
 impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P> {
@@ -62,7 +61,7 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
         if !riccati::decays(&times(&left, plant.a())) {
             return Err(ConfigError::Unstable("gain"));
         }
-        Ok(Self { plant: *plant, c: *c, gain: wide(gain), state: [Wide::ZERO; N], rejected: 0 })
+        Ok(Self { plant: *plant, c: *c, gain: wide(gain), estimate: Estimate::ZERO })
     }
 
     /// Calculates the gain that a [`KalmanFilter`](super::KalmanFilter) of the same arguments has in the steady state, in twice the precision
@@ -89,7 +88,7 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
         r: &[[f32; P]; P],
     ) -> Result<Self, ConfigError> {
         let (_, gain) = riccati::filter(plant, c, q, r)?;
-        Ok(Self { plant: *plant, c: *c, gain, state: [Wide::ZERO; N], rejected: 0 })
+        Ok(Self { plant: *plant, c: *c, gain, estimate: Estimate::ZERO })
     }
 
     /// Begins with another state.
@@ -98,32 +97,24 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
     /// Names `state` when an entry is NaN or infinite.
     pub fn with_state(mut self, state: &[f32; N]) -> Result<Self, ConfigError> {
         finite("state", &[*state])?;
-        self.state = state.map(Wide::of);
+        self.estimate.set(state);
         Ok(self)
     }
 
     /// Goes one time step ahead with the inputs of the plant.
     pub fn predict(&mut self, u: &[f32; M]) {
-        self.take(self.plant.predict_exactly(&self.state, u));
+        self.estimate.take(Some(self.estimate.predicted(&self.plant, u)));
     }
 
     /// Corrects the state with one measurement of each output.
     pub fn correct(&mut self, y: &[f32; P]) {
-        self.take(moved(&self.state, &wide(&self.c), &self.gain, y));
-    }
-
-    fn take(&mut self, state: [Wide; N]) {
-        if is_finite(&[state]) {
-            self.state = state;
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
-        }
+        self.estimate.take(Some(self.estimate.corrected(&wide(&self.c), &self.gain, y)));
     }
 
     /// Returns the estimated states.
     #[must_use]
     pub fn state(&self) -> [f32; N] {
-        self.state.map(Wide::narrow)
+        self.estimate.states()
     }
 
     /// Returns the gain: a row for each state, a column for each measurement.
@@ -135,6 +126,6 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
     /// Returns the number of predictions and corrections that were refused; stays at 65535.
     #[must_use]
     pub const fn rejected(&self) -> u16 {
-        self.rejected
+        self.estimate.rejected()
     }
 }

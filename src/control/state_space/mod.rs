@@ -55,10 +55,10 @@
 //! ```
 //! Reference: G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd edition, chapters 8 and 9.
 
+mod estimate;
 mod inversion;
 mod kalman;
 mod luenberger;
-mod matrix;
 mod regulator;
 mod riccati;
 mod schedule;

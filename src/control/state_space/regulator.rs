@@ -1,7 +1,7 @@
-use super::matrix::{apply, finite, is_finite, narrow};
 use super::riccati;
 use super::system::LinearSystem;
 use crate::control::error::positive;
+use crate::control::matrix::{apply, finite, is_finite, narrow};
 use crate::control::number::{self, limited};
 use crate::error::ConfigError;
 

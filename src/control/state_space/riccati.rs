@@ -1,8 +1,8 @@
-use super::matrix::{
-    Grid, Number, difference, is_finite, largest, not_negative, positive, row_sum, solved, sum,
-    symmetric, times, times_transposed, transposed, wide, with_diagonal,
-};
 use super::system::LinearSystem;
+use crate::control::matrix::{
+    Grid, Number, difference, finite, is_finite, largest, not_negative, positive, row_sum, solved,
+    sum, symmetric, times, times_transposed, transposed, wide, with_diagonal,
+};
 use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
@@ -141,7 +141,7 @@ pub(super) fn filter<const N: usize, const M: usize, const P: usize>(
     q: &Grid<f32, N, N>,
     r: &Grid<f32, P, P>,
 ) -> Result<(Grid<Wide, N, N>, Grid<Wide, N, P>), ConfigError> {
-    super::matrix::finite("c", c)?;
+    finite("c", c)?;
     not_negative("q", q)?;
     positive("r", r)?;
     let (a, c) = (transposed(system.exact_a()), transposed(&wide(c)));

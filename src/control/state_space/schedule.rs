@@ -1,5 +1,5 @@
-use super::matrix::{finite, paired};
 use crate::control::error;
+use crate::control::matrix::{finite, paired};
 use crate::error::ConfigError;
 
 /// Gains of `N` states and `M` inputs over one parameter, from a table of `K` rows: a gain schedule.

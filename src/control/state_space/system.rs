@@ -1,14 +1,14 @@
-use super::matrix::{
-    Grid, Number, apply, finite, identity, narrow, row_sum, sum, times, wide, with_diagonal,
-};
 use crate::control::error;
+use crate::control::matrix::{
+    Grid, Number, finite, identity, narrow, row_sum, stepped, sum, times, wide, with_diagonal,
+};
 use crate::control::wide::Wide;
 use crate::error::ConfigError;
 
 /// A linear plant of `N` states and `M` inputs, in steps of constant duration: `x[k + 1] = A x[k] + B u[k]`.
 ///
-/// `A` and `B` are arrays of rows. States and inputs have the units of the caller: `A[i][j]` is that of state `i` over that of
-/// state `j`, `B[i][j]` that of state `i` over that of input `j`.
+/// `A` and `B` are arrays of rows. States and inputs have the units of the caller: `A[i][j]` has the unit of state `i` over the unit
+/// of state `j`, `B[i][j]` the unit of state `i` over the unit of input `j`.
 ///
 /// At 1 kHz a slow pole is 0.9999: rounded to `f32`, its rate changes by 6e-4. A plant that is made from continuous matrices therefore
 /// keeps `A` in twice the precision too, for gains and observers.
@@ -89,22 +89,14 @@ impl<const N: usize, const M: usize> LinearSystem<N, M> {
 
     /// Returns the states after one time step, in the precision of the observers.
     pub(super) fn predict_exactly(&self, x: &[Wide; N], u: &[f32; M]) -> [Wide; N] {
-        let mut next = apply(&self.exact_a, x);
-        for (state, change) in next.iter_mut().zip(apply(&wide(&self.b), &u.map(Wide::of))) {
-            *state = *state + change;
-        }
-        next
+        stepped((&self.exact_a, x), (&wide(&self.b), &u.map(Wide::of)))
     }
 
     /// Returns the states after one time step with the input `u`. NaN and infinity in the arguments show in the result.
     #[must_use]
     #[inline]
     pub fn predict(&self, x: &[f32; N], u: &[f32; M]) -> [f32; N] {
-        let mut next = apply(&self.a, x);
-        for (state, change) in next.iter_mut().zip(apply(&self.b, u)) {
-            *state += change;
-        }
-        next
+        stepped((&self.a, x), (&self.b, u))
     }
 }
 

@@ -1,8 +1,9 @@
-use super::matrix::{
+use super::*;
+use crate::control::matrix;
+use crate::control::matrix::{
     apply, difference, dot, identity, largest, narrow, row_sum, solved, times, times_transposed,
     transposed, wide,
 };
-use super::*;
 use crate::error::ConfigError;
 use proptest::prelude::*;
 
