@@ -9,6 +9,7 @@
 //! IMU. Phases: 0 fallen, 1 rising, 2 standing, 3 airborne. The controller knows the nominal robot, whatever stands outside.
 
 use crate::Outcome;
+use crate::defect::defects;
 use drivetrain::chassis::{BalanceModel, BalancePhase, Balancer, FiveBar, LegEffort, LegState};
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::dji::{self, Bus, Handle, M3508};
@@ -45,14 +46,11 @@ const NM_PER_A: f32 = 0.3;
 /// The time after arming in which a guard opens its outputs.
 const OPENING: u32 = 250;
 
-/// A mistake that the judge has to find.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Defect {
-    None,
+defects! {
     /// A fall disarms the motors after 50 ms.
-    Late,
+    Late = "late",
     /// The wheels drive the wrong way.
-    Reversed,
+    Reversed = "reversed",
 }
 
 type Leg = [Own<Motor>; 2];
@@ -215,12 +213,10 @@ impl Robot {
 
 pub fn run(arguments: &[&str], input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
     let mut robot = Robot::new()?;
-    robot.defect = match arguments {
-        [] => Defect::None,
-        ["--plant", "late"] => Defect::Late,
-        ["--plant", "reversed"] => Defect::Reversed,
-        _ => return Err("see the head of judges/src/balance.rs for the arguments".into()),
+    let ([], defect) = Defect::split(arguments)? else {
+        return Err("see the head of judges/src/balance.rs for the arguments".into());
     };
+    robot.defect = defect;
     let mut answer = String::new();
     for line in input.lines() {
         let line = line?;

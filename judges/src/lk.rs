@@ -16,8 +16,12 @@ use drivetrain::units::{Angle, AngularVelocity};
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
 
-pub fn run(arguments: &[&str], defect: Defect, output: &mut impl Write) -> Outcome<()> {
-    let input = std::io::stdin().lock();
+pub fn run(
+    arguments: &[&str],
+    defect: Defect,
+    input: impl BufRead,
+    output: &mut impl Write,
+) -> Outcome<()> {
     match arguments {
         ["encode"] => encode(data_of, defect, input, output),
         ["decode"] => decode(values_of, defect, input, output),

@@ -22,6 +22,7 @@
 mod balance;
 mod codec;
 mod defect;
+mod floats;
 mod lk;
 mod manipulator;
 mod motion;
@@ -35,7 +36,7 @@ mod vesc;
 
 use defect::Defect;
 use drivetrain::damiao::{Model, Register};
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{self, BufRead, BufWriter, Write};
 use std::process::ExitCode;
 
 /// What goes wrong, as a text for a person.
@@ -96,46 +97,24 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[&str]) -> Outcome<()> {
-    if let ["vesc", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        vesc::run(rest, io::stdin().lock(), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["odrive", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        odrive::run(rest, io::stdin().lock(), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["motion", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        motion::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["state-space", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        state_space::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["manipulator", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        manipulator::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["simulator", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        simulator::run(rest, io::stdin().lock(), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    if let ["balance", rest @ ..] = arguments {
-        let mut output = BufWriter::new(io::stdout().lock());
-        balance::run(rest, BufReader::new(io::stdin().lock()), &mut output)?;
-        return Ok(output.flush()?);
-    }
-    let (arguments, defect) = match arguments {
-        [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
-        _ => (arguments, Defect::None),
-    };
     let mut output = BufWriter::new(io::stdout().lock());
+    let input = io::stdin().lock();
+    match arguments {
+        ["vesc", rest @ ..] => vesc::run(rest, input, &mut output)?,
+        ["odrive", rest @ ..] => odrive::run(rest, input, &mut output)?,
+        ["motion", rest @ ..] => motion::run(rest, input, &mut output)?,
+        ["state-space", rest @ ..] => state_space::run(rest, input, &mut output)?,
+        ["manipulator", rest @ ..] => manipulator::run(rest, input, &mut output)?,
+        ["simulator", rest @ ..] => simulator::run(rest, input, &mut output)?,
+        ["balance", rest @ ..] => balance::run(rest, input, &mut output)?,
+        _ => planted(arguments, input, &mut output)?,
+    }
+    Ok(output.flush()?)
+}
+
+/// The verbs whose mistakes are those of [`Defect`].
+fn planted(arguments: &[&str], input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
+    let (arguments, defect) = Defect::split(arguments)?;
     match arguments {
         ["models"] => {
             for model in Model::ALL {
@@ -152,20 +131,20 @@ fn run(arguments: &[&str]) -> Outcome<()> {
             }
         }
         ["encode", model, mode] => {
-            codec::encode(model_named(model)?, mode, defect, io::stdin().lock(), &mut output)?;
+            codec::encode(model_named(model)?, mode, defect, input, output)?;
         }
         ["decode", model] => {
-            codec::decode(model_named(model)?, defect, io::stdin().lock(), &mut output)?;
+            codec::decode(model_named(model)?, defect, input, output)?;
         }
-        ["lk", rest @ ..] => lk::run(rest, defect, &mut output)?,
-        ["rmd", rest @ ..] => rmd::run(rest, defect, &mut output)?,
+        ["lk", rest @ ..] => lk::run(rest, defect, input, output)?,
+        ["rmd", rest @ ..] => rmd::run(rest, defect, input, output)?,
         ["robstride", rest @ ..] => {
-            robstride::run(rest, defect, io::stdin().lock(), &mut output)?;
+            robstride::run(rest, defect, input, output)?;
         }
-        ["serve"] => serve::serve(defect, io::stdin().lock(), &mut output)?,
+        ["serve"] => serve::serve(defect, input, output)?,
         _ => return Err("see the head of judges/src/main.rs for the arguments".into()),
     }
-    Ok(output.flush()?)
+    Ok(())
 }
 
 fn model_named(name: &str) -> Outcome<&'static Model> {

@@ -6,61 +6,38 @@
 //!                                        POSES times the positions of all joints. Out: POSES times the efforts
 //! ```
 
-use crate::Outcome;
+use crate::defect::defects;
+use crate::{Outcome, floats};
 use drivetrain::geometry::Vec3;
 use drivetrain::manipulator::{ArmJoint, SerialArm};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 
-/// A mistake that the judge has to find.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Defect {
-    None,
+defects! {
     /// The first axis points the other way.
-    Sign,
+    Sign = "sign",
     /// The last link weighs nothing.
-    Link,
+    Link = "link",
     /// The last axis is off by a millimetre.
-    Place,
-    Payload,
+    Place = "place",
+    Payload = "payload",
     /// The base counts as upright.
-    Gravity,
-}
-
-impl Defect {
-    fn named(name: &str) -> Outcome<Self> {
-        Ok(match name {
-            "sign" => Self::Sign,
-            "link" => Self::Link,
-            "place" => Self::Place,
-            "payload" => Self::Payload,
-            "gravity" => Self::Gravity,
-            _ => return Err(format!("no defect {name}").into()),
-        })
-    }
+    Gravity = "gravity",
 }
 
 pub fn run(arguments: &[&str], mut input: impl Read, output: &mut impl Write) -> Outcome<()> {
-    let (arguments, defect) = match arguments {
-        [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
-        _ => (arguments, Defect::None),
-    };
+    let (arguments, defect) = Defect::split(arguments)?;
     let [poses] = arguments else {
         return Err("see the head of judges/src/manipulator.rs for the arguments".into());
     };
     let poses = poses.parse()?;
-    loop {
-        let mut first = [0; 4];
-        match input.read_exact(&mut first) {
-            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(()),
-            read => read?,
-        }
-        let joints = f32::from_le_bytes(first);
+    while let Some([joints]) = floats::next(&mut input)? {
         let hold = [hold::<1>, hold::<2>, hold::<3>, hold::<4>, hold::<5>, hold::<6>]
             .into_iter()
             .zip(1_u8..)
             .find_map(|(hold, count)| (f32::from(count) == joints).then_some(hold));
         hold.ok_or("1 to 6 joints")?(poses, defect, &mut input, output)?;
     }
+    Ok(())
 }
 
 fn hold<const N: usize>(
@@ -70,13 +47,13 @@ fn hold<const N: usize>(
     output: &mut dyn Write,
 ) -> Outcome<()> {
     let gravity = vector(input)?;
-    let [payload_kg] = numbers(input)?;
+    let [payload_kg] = floats::read(input)?;
     let payload_m = vector(input)?;
     let mut joints = Vec::new();
     for index in 0..N {
-        let [turns] = numbers(input)?;
+        let [turns] = floats::read(input)?;
         let (mut axis, mut through) = (vector(input)?, vector(input)?);
-        let ([mut mass], centre) = (numbers(input)?, vector(input)?);
+        let ([mut mass], centre) = (floats::read(input)?, vector(input)?);
         match defect {
             Defect::Sign if index == 0 => axis = -axis,
             Defect::Link if index == N - 1 => mass = 0.0,
@@ -98,25 +75,14 @@ fn hold<const N: usize>(
         arm.set_gravity(gravity)?;
     }
     for _ in 0..poses {
-        let efforts = arm.holding_efforts(&numbers(input)?).ok_or("a position is not finite")?;
-        for effort in efforts {
-            output.write_all(&effort.to_le_bytes())?;
-        }
+        let efforts =
+            arm.holding_efforts(&floats::read(input)?).ok_or("a position is not finite")?;
+        floats::write(efforts, output)?;
     }
     Ok(())
 }
 
 fn vector(input: &mut dyn Read) -> Outcome<Vec3> {
-    let [x, y, z] = numbers(input)?;
+    let [x, y, z] = floats::read(input)?;
     Ok(Vec3::new(x, y, z))
-}
-
-fn numbers<const N: usize>(input: &mut dyn Read) -> Outcome<[f32; N]> {
-    let mut numbers = [0.0; N];
-    for number in &mut numbers {
-        let mut bytes = [0; 4];
-        input.read_exact(&mut bytes)?;
-        *number = f32::from_le_bytes(bytes);
-    }
-    Ok(numbers)
 }

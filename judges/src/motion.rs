@@ -7,9 +7,9 @@
 //! drivetrain-judges motion step SAMPLES    the same of three motions after each other in step, without the jerk: NaN
 //! ```
 
-use crate::Outcome;
+use crate::{Outcome, floats};
 use drivetrain::control::{Motion, MotionLimits, MotionTarget, Motions, ProfileState};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 
 /// A mistake that the judge has to find.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,15 +97,7 @@ type Case = (ProfileState, MotionTarget, MotionLimits);
 
 /// Reads a motion; `None` at the end of the input.
 fn read(defect: Defect, input: &mut impl Read) -> Outcome<Option<Case>> {
-    let mut bytes = [0; 32];
-    match input.read_exact(&mut bytes) {
-        Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
-        read => read?,
-    }
-    let mut case = [0.0; 8];
-    for (value, part) in case.iter_mut().zip(bytes.as_chunks().0) {
-        *value = f32::from_le_bytes(*part);
-    }
+    let Some(mut case) = floats::next(input)? else { return Ok(None) };
     defect.plant(&mut case);
     let [position, velocity, acceleration, target, target_velocity, top, steep, jerk] = case;
     let limits = MotionLimits::new(top, steep).with_jerk(jerk);
@@ -122,11 +114,8 @@ fn write(
     states: impl Iterator<Item = (f32, ProfileState, f32)>,
     output: &mut impl Write,
 ) -> Outcome<()> {
-    output.write_all(&duration_s.to_le_bytes())?;
-    for (time_s, ProfileState { position, velocity, acceleration }, jerk) in states {
-        for value in [time_s, position, velocity, acceleration, jerk] {
-            output.write_all(&value.to_le_bytes())?;
-        }
-    }
-    Ok(())
+    let rows = states.flat_map(|(time_s, state, jerk)| {
+        [time_s, state.position, state.velocity, state.acceleration, jerk]
+    });
+    floats::write(std::iter::once(duration_s).chain(rows), output)
 }

@@ -14,6 +14,7 @@
 //! Numbers in a frame are hexadecimal. A last argument `--plant DEFECT` makes a mistake that a judge has to find.
 
 use crate::Outcome;
+use crate::defect::defects;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{AngleDrive, Devices, ImpedanceControl, Own, VelocityDrive};
 use drivetrain::odrive::{Command, Feedback, Firmware, Heartbeat, Mode, Model, Motor};
@@ -24,51 +25,31 @@ use embedded_can::{Frame, StandardId};
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
 
-/// A mistake of the kind that codecs have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Defect {
-    None,
+defects! {
     /// The two halves of the data are exchanged.
-    Halves,
+    Halves = "halves",
     /// Thousandths are truncated.
-    Truncated,
+    Truncated = "truncated",
     /// Frames have the next node.
-    Node,
+    Node = "node",
     /// Firmware 0.5 is read as 0.6, and the other way round.
-    Firmware,
+    Firmware = "firmware",
     /// The last frames of a session command a torque.
-    Rest,
+    Rest = "rest",
     /// The simulated axis answers with the halves of its data exchanged.
-    Drive,
+    Drive = "drive",
     /// The simulated axis reads commands with the halves exchanged.
-    Ear,
+    Ear = "ear",
 }
 
 pub fn run(arguments: &[&str], input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
-    let (verb, defect) = match arguments {
-        [verb, "--plant", name] => (verb, named(name)?),
-        [verb] => (verb, Defect::None),
-        _ => return Err("see the head of judges/src/odrive.rs for the arguments".into()),
-    };
-    match *verb {
-        "encode" => encode(defect, input, output),
-        "decode" => decode(defect, input, output),
-        "serve" => serve(defect, input, output),
-        _ => Err(format!("no verb {verb}").into()),
+    let (arguments, defect) = Defect::split(arguments)?;
+    match arguments {
+        ["encode"] => encode(defect, input, output),
+        ["decode"] => decode(defect, input, output),
+        ["serve"] => serve(defect, input, output),
+        _ => Err("see the head of judges/src/odrive.rs for the arguments".into()),
     }
-}
-
-fn named(name: &str) -> Outcome<Defect> {
-    Ok(match name {
-        "halves" => Defect::Halves,
-        "truncated" => Defect::Truncated,
-        "node" => Defect::Node,
-        "firmware" => Defect::Firmware,
-        "rest" => Defect::Rest,
-        "drive" => Defect::Drive,
-        "ear" => Defect::Ear,
-        _ => return Err(format!("no defect {name}").into()),
-    })
 }
 
 fn firmware(digit: u8, defect: Defect) -> Firmware {

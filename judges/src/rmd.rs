@@ -7,12 +7,16 @@ use drivetrain::motor::ImpedanceControl;
 use drivetrain::rmd::{Command, Feedback, Mode, Model, Motor, State};
 use drivetrain::sim::{DriveShaft, RmdDrive};
 use drivetrain::units::AngularVelocity;
-use std::io::Write;
+use std::io::{BufRead, Write};
 
 const MODEL: Model = Model::X8_120;
 
-pub fn run(arguments: &[&str], defect: Defect, output: &mut impl Write) -> Outcome<()> {
-    let input = std::io::stdin().lock();
+pub fn run(
+    arguments: &[&str],
+    defect: Defect,
+    input: impl BufRead,
+    output: &mut impl Write,
+) -> Outcome<()> {
     match arguments {
         ["encode"] => encode(data_of, defect, input, output),
         ["decode"] => decode(values_of, defect, input, output),

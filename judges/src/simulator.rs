@@ -17,6 +17,7 @@
 //! ```
 
 use crate::Outcome;
+use crate::defect::{defects, factor};
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::Vec2;
 use drivetrain::sim::{ChassisConfig, MotorConfig, MotorKey, Simulation, Wheel};
@@ -26,44 +27,21 @@ use embedded_can::nb::Can;
 use std::io::{BufRead, Write};
 use std::str::FromStr;
 
-/// A mistake that the judge has to find.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Defect {
-    None,
+defects! {
     /// The chassis is heavier by a twentieth.
-    Mass,
+    Mass = "mass",
     /// The chassis is harder to turn by a tenth.
-    Inertia,
+    Inertia = "inertia",
     /// The floor holds less by a twentieth.
-    Grip,
+    Grip = "grip",
     /// Wheels are larger by a twentieth.
-    Radius,
+    Radius = "radius",
     /// Loads of motors have 0.02 Nm more friction.
-    Friction,
+    Friction = "friction",
     /// Rollers of mecanum wheels lie as in an X.
-    Rollers,
+    Rollers = "rollers",
     /// Commands are smaller by a twentieth.
-    Command,
-}
-
-impl Defect {
-    fn named(name: &str) -> Outcome<Self> {
-        Ok(match name {
-            "mass" => Self::Mass,
-            "inertia" => Self::Inertia,
-            "grip" => Self::Grip,
-            "radius" => Self::Radius,
-            "friction" => Self::Friction,
-            "rollers" => Self::Rollers,
-            "command" => Self::Command,
-            _ => return Err(format!("no defect {name}").into()),
-        })
-    }
-
-    /// Returns a factor that only this defect changes.
-    fn factor(self, of: Self, factor: f32) -> f32 {
-        if self == of { factor } else { 1.0 }
-    }
+    Command = "command",
 }
 
 /// A line that waits for its time.
@@ -73,10 +51,8 @@ struct Order {
 }
 
 pub fn run(arguments: &[&str], input: impl BufRead, output: &mut impl Write) -> Outcome<()> {
-    let defect = match arguments {
-        [] => Defect::None,
-        ["--plant", name] => Defect::named(name)?,
-        _ => return Err("see the head of judges/src/simulator.rs for the arguments".into()),
+    let ([], defect) = Defect::split(arguments)? else {
+        return Err("see the head of judges/src/simulator.rs for the arguments".into());
     };
     let world = Simulation::new(1);
     let (mut motors, mut wheels, mut orders) = (Vec::new(), Vec::new(), Vec::new());
@@ -103,9 +79,9 @@ pub fn run(arguments: &[&str], input: impl BufRead, output: &mut impl Write) -> 
             ["wheel", kind, rest @ ..] => wheels.push(wheel(kind, rest, &motors, defect)?),
             ["chassis", mass, inertia, friction] => {
                 let config = ChassisConfig::new(&wheels)
-                    .with_mass_kg(number(mass)? * defect.factor(Defect::Mass, 1.05))
-                    .with_yaw_inertia_kg_m2(number(inertia)? * defect.factor(Defect::Inertia, 1.1))
-                    .with_friction(number(friction)? * defect.factor(Defect::Grip, 0.95));
+                    .with_mass_kg(number(mass)? * factor(defect, Defect::Mass, 1.05))
+                    .with_yaw_inertia_kg_m2(number(inertia)? * factor(defect, Defect::Inertia, 1.1))
+                    .with_friction(number(friction)? * factor(defect, Defect::Grip, 0.95));
                 world.attach_chassis(config)?;
             }
             ["at", ms, words @ ..] => {
@@ -154,7 +130,7 @@ fn wheel(kind: &str, words: &[&str], motors: &[MotorKey], defect: Defect) -> Out
     };
     let [motor, radius, x, y, sign, rest @ ..] = words else { return Err("a short wheel".into()) };
     let motor = key(motor)?;
-    let radius = number(radius)? * defect.factor(Defect::Radius, 1.05);
+    let radius = number(radius)? * factor(defect, Defect::Radius, 1.05);
     let place = Vec2::new(number(x)?, number(y)?);
     let wheel = match (kind, rest) {
         ("plain", []) => Wheel::plain(motor, radius, place),
@@ -178,7 +154,7 @@ fn follow(order: &Order, world: &Simulation, motors: &[MotorKey], defect: Defect
         ["frame", id, words @ ..] => {
             let mut data = [0; 8];
             for (place, word) in data.chunks_mut(2).zip(words) {
-                let word = parse::<f32>(word)? * defect.factor(Defect::Command, 0.95);
+                let word = parse::<f32>(word)? * factor(defect, Defect::Command, 0.95);
                 place.copy_from_slice(&(word as i16).to_be_bytes());
             }
             let frame = CanFrame::standard(u16::from_str_radix(id, 16)?, data).ok_or("no id")?;

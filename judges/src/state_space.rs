@@ -12,47 +12,26 @@
 //! ```
 //! `N` states, 1 to 6; `M` inputs and as many measurements, 1 or 2. Matrices are written by rows.
 
-use crate::Outcome;
+use crate::defect::{defects, factor};
+use crate::{Outcome, floats};
 use drivetrain::control::state_space::{
     KalmanFilter, LinearQuadraticRegulator, LinearSystem, LuenbergerObserver, PlantInversion,
 };
-use std::io::{ErrorKind, Read, Write};
+use std::io::{Read, Write};
 
-/// A mistake that the judge has to find.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Defect {
-    None,
+defects! {
     /// An input for half of the step only.
-    Hold,
+    Hold = "hold",
     /// Effort costs more by 1 in 1000.
-    Cost,
+    Cost = "cost",
     /// The measurements have more noise by 1 in 1000.
-    Noise,
+    Noise = "noise",
     /// The covariance of the start is larger by 1 in 100.
-    Start,
-}
-
-impl Defect {
-    fn named(name: &str) -> Outcome<Self> {
-        Ok(match name {
-            "hold" => Self::Hold,
-            "cost" => Self::Cost,
-            "noise" => Self::Noise,
-            "start" => Self::Start,
-            _ => return Err(format!("no defect {name}").into()),
-        })
-    }
-
-    fn factor(self, of: Self, factor: f32) -> f32 {
-        if self == of { factor } else { 1.0 }
-    }
+    Start = "start",
 }
 
 pub fn run(arguments: &[&str], mut input: impl Read, output: &mut impl Write) -> Outcome<()> {
-    let (arguments, defect) = match arguments {
-        [rest @ .., "--plant", name] => (rest, Defect::named(name)?),
-        _ => (arguments, Defect::None),
-    };
+    let (arguments, defect) = Defect::split(arguments)?;
     let [verb, states, inputs, rest @ ..] = arguments else {
         return Err("see the head of judges/src/state_space.rs for the arguments".into());
     };
@@ -92,7 +71,7 @@ fn of_size<const N: usize, const M: usize>(
     output: &mut impl Write,
 ) -> Outcome<()> {
     // The first number of a system, or the end.
-    while let Some(first) = number(input)? {
+    while let Some([first]) = floats::next(input)? {
         match steps {
             None => design::<N, M>(first, defect, input, output)?,
             Some(steps) => filter::<N, M>(first, steps, defect, input, output)?,
@@ -107,17 +86,15 @@ fn design<const N: usize, const M: usize>(
     input: &mut impl Read,
     output: &mut impl Write,
 ) -> Outcome<()> {
-    let a = matrix::<N, N>(Some(first), input)?;
-    let (b, c) = (matrix::<N, M>(None, input)?, matrix::<M, N>(None, input)?);
-    let (q, mut r) = (matrix::<N, N>(None, input)?, matrix::<M, M>(None, input)?);
+    let (a, b, c, q, mut r) = system::<N, M>(first, input)?;
     let (noise, mut of_output) = (matrix::<N, N>(None, input)?, matrix::<M, M>(None, input)?);
-    let dt_s = number(input)?.ok_or("no time step")?;
-    scale(&mut r, defect.factor(Defect::Cost, 1.001));
-    scale(&mut of_output, defect.factor(Defect::Noise, 1.001));
+    let dt_s = number(input)?;
+    scale(&mut r, factor(defect, Defect::Cost, 1.001));
+    scale(&mut of_output, factor(defect, Defect::Noise, 1.001));
 
     let plant = LinearSystem::discretized(&a, &b, dt_s).ok();
     let mut of_input = plant.map_or([[f32::NAN; M]; N], |plant| *plant.b());
-    scale(&mut of_input, defect.factor(Defect::Hold, 0.5));
+    scale(&mut of_input, factor(defect, Defect::Hold, 0.5));
     write(&plant.map_or([[f32::NAN; N]; N], |plant| *plant.a()), output)?;
     write(&of_input, output)?;
 
@@ -138,13 +115,11 @@ fn filter<const N: usize, const M: usize>(
     input: &mut impl Read,
     output: &mut impl Write,
 ) -> Outcome<()> {
-    let a = matrix::<N, N>(Some(first), input)?;
-    let (b, c) = (matrix::<N, M>(None, input)?, matrix::<M, N>(None, input)?);
-    let (q, mut r) = (matrix::<N, N>(None, input)?, matrix::<M, M>(None, input)?);
+    let (a, b, c, q, mut r) = system::<N, M>(first, input)?;
     let mut start = matrix::<N, N>(None, input)?;
-    scale(&mut r, defect.factor(Defect::Noise, 1.001));
-    scale(&mut start, defect.factor(Defect::Start, 1.01));
-    let dt_s = number(input)?.ok_or("no time step")?;
+    scale(&mut r, factor(defect, Defect::Noise, 1.001));
+    scale(&mut start, factor(defect, Defect::Start, 1.01));
+    let dt_s = number(input)?;
     let plant = if dt_s > 0.0 {
         LinearSystem::discretized(&a, &b, dt_s)?
     } else {
@@ -171,15 +146,6 @@ fn scale<const R: usize, const C: usize>(matrix: &mut [[f32; C]; R], factor: f32
     matrix.iter_mut().flatten().for_each(|entry| *entry *= factor);
 }
 
-/// Reads a number; `None` at the end of the input.
-fn number(input: &mut impl Read) -> Outcome<Option<f32>> {
-    let mut bytes = [0; 4];
-    match input.read_exact(&mut bytes) {
-        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
-        read => Ok(read.map(|()| Some(f32::from_le_bytes(bytes)))?),
-    }
-}
-
 fn matrix<const R: usize, const C: usize>(
     mut first: Option<f32>,
     input: &mut impl Read,
@@ -188,18 +154,37 @@ fn matrix<const R: usize, const C: usize>(
     for entry in matrix.iter_mut().flatten() {
         *entry = match first.take() {
             Some(first) => first,
-            None => number(input)?.ok_or("a system ends too early")?,
+            None => number(input)?,
         };
     }
     Ok(matrix)
+}
+
+fn number(input: &mut impl Read) -> Outcome<f32> {
+    let [number] = floats::read(input)?;
+    Ok(number)
 }
 
 fn write<const R: usize, const C: usize>(
     matrix: &[[f32; C]; R],
     output: &mut impl Write,
 ) -> Outcome<()> {
-    for entry in matrix.iter().flatten() {
-        output.write_all(&entry.to_le_bytes())?;
-    }
-    Ok(())
+    floats::write(matrix.iter().flatten().copied(), output)
+}
+
+/// A, B, C and two costs or covariances of a system.
+type System<const N: usize, const M: usize> =
+    ([[f32; N]; N], [[f32; M]; N], [[f32; N]; M], [[f32; N]; N], [[f32; M]; M]);
+
+fn system<const N: usize, const M: usize>(
+    first: f32,
+    input: &mut impl Read,
+) -> Outcome<System<N, M>> {
+    Ok((
+        matrix(Some(first), input)?,
+        matrix(None, input)?,
+        matrix(None, input)?,
+        matrix(None, input)?,
+        matrix(None, input)?,
+    ))
 }
