@@ -26,7 +26,7 @@ const GRAVITY: f32 = 9.81;
 /// Upper arm and forearm: mass in kg, length in m, with the mass in the middle.
 const UPPER: (f32, f32) = (0.6, 0.25);
 const FOREARM: (f32, f32) = (0.4, 0.20);
-/// What a joint is made of.
+/// Motor, load and gains of a joint.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     id: u8,

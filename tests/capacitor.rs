@@ -22,9 +22,8 @@ fn a_burst_takes_from_the_capacitor_and_neither_reserve_is_touched() {
     let samples = run(true, Lost::default()).unwrap();
     let buffer_j = least(&samples, |sample| sample.buffer_j);
     assert!(buffer_j >= BUFFER_RESERVE_J, "{buffer_j} J");
-    // One part of 255 of a full capacitor is 8 J.
     let capacitor_j = least(&samples, |sample| sample.capacitor_j);
-    assert!(capacitor_j >= RESERVE_J - 10.0, "{capacitor_j} J");
+    assert!(capacitor_j >= RESERVE_J, "{capacitor_j} J");
     assert!(capacitor_j <= RESERVE_J + 100.0, "the burst is not used: {capacitor_j} J");
 
     let first = (BURST_S.0, BURST_S.0 + 3.0);
@@ -32,9 +31,13 @@ fn a_burst_takes_from_the_capacitor_and_neither_reserve_is_touched() {
     assert!(before < limit_w, "{before} W before the burst");
     assert!(mean(&samples, first, chassis_w) > before + 20.0);
     assert!(samples.iter().all(|sample| sample.allowed_w <= limit_w + BURST_W));
-    // Over any second the supply gives what the referee allows, and what the buffer has.
-    let supplied = mean(&samples, (0.0, END_S), |sample| sample.supply_w);
-    assert!(supplied <= limit_w + (60.0 - BUFFER_RESERVE_J) / END_S, "{supplied} W");
+    // Over any second, and over all, the supply gives what the referee allows, and what the buffer has.
+    let spans = (0_u8..).map(f32::from).take_while(|from_s| from_s + 1.0 <= END_S);
+    for (from_s, to_s) in spans.map(|from_s| (from_s, from_s + 1.0)).chain([(0.0, END_S)]) {
+        let supplied = mean(&samples, (from_s, to_s), |sample| sample.supply_w);
+        let most = limit_w + (60.0 - BUFFER_RESERVE_J) / (to_s - from_s);
+        assert!(supplied <= most, "{supplied} W from {from_s} to {to_s} s");
+    }
 
     // While it stands, the capacitor charges.
     let at =
@@ -42,8 +45,8 @@ fn a_burst_takes_from_the_capacitor_and_neither_reserve_is_touched() {
     assert!(at(END_S - 0.01) > at(STANDS_S + 1.0) + 50.0);
 
     let without = run(false, Lost::default()).unwrap();
-    let speed = |samples| mean(samples, first, |sample| sample.speed_m_s);
-    assert!(speed(&samples) > 1.05 * speed(&without), "{} m/s", speed(&samples));
+    let speed = |samples| mean(samples, first, |sample| sample.speed_m_s.abs());
+    assert!(speed(&samples) > 1.2 * speed(&without), "{} m/s", speed(&samples));
 }
 
 #[test]

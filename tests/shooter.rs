@@ -282,7 +282,7 @@ fn a_wheel_that_is_lost_stops_wheels_and_loader_and_comes_back_only_after_rest()
         let balls = range.balls;
         range.run(ShooterOrder::Fire(50), 1_000, true); // it is heard again since long
         assert_eq!((range.balls, range.targets), (balls, ShooterTargets::REST));
-        assert!(range.wheels_rpm().iter().any(|rpm| *rpm < 40.0) && range.loader_rpm() == 0.0);
+        assert!(range.wheels_rpm().iter().all(|rpm| *rpm < 40.0) && range.loader_rpm() == 0.0);
         range.run(ShooterOrder::Rest, 100, true);
         range.run(ShooterOrder::Spin, 2_000, true);
         assert_eq!(range.shooter.state(), ShooterState::Ready);

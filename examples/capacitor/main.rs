@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ));
     console::line(format_args!("{path}"));
     if buffer < BUFFER_RESERVE_J
-        || capacitor < RESERVE_J - 10.0
+        || capacitor < RESERVE_J
         || burst < without + 20.0
         || fast < 1.2 * slow
     {

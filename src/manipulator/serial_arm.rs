@@ -164,7 +164,7 @@ mod tests {
 
     type Place = [f64; 3];
 
-    /// What a joint is, in `f64`: axis (any length), place on it if it turns, mass, centre.
+    /// A joint in `f64`: axis (any length), place on it if it turns, mass, centre.
     #[derive(Debug, Clone, Copy)]
     struct Data {
         axis: Vec3,

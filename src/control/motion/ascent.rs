@@ -66,8 +66,8 @@ pub(super) struct Curve {
 /// A first root below zero stands for a velocity that falls from the start on, first less steeply: the first slope is then taken
 /// off instead of added, and the same formulas hold.
 ///
-/// For a duration, this is the motion with the longest way: those with a way between it and that of the motion that first goes down
-/// form an interval. The fastest motion is therefore the first with the wanted way. The way falls at first if both velocities are
+/// Of all motions of one duration, this one has the longest way, the motion that first goes down has the shortest, and each way
+/// between both is possible. The fastest motion is therefore the first with the wanted way. The way falls at first if both velocities are
 /// negative, then rises for ever: it passes that of a target beyond the direct motion's once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ascent {

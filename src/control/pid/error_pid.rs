@@ -19,7 +19,7 @@ pub(crate) struct ErrorPid {
     pub(super) integral: f32,
     /// Of the integral; closed unless the controller is plain.
     pub(super) integral_gate: u32,
-    /// Of the output; that of the integral unless the controller is plain.
+    /// Of the output; equal to the gate of the integral unless the controller is plain.
     pub(super) output_gate: u32,
     pub(super) parameters: Parameters,
     pub(super) options: u16,
@@ -50,7 +50,7 @@ impl ErrorPid {
         config.options() & OF_SETPOINT == 0
     }
 
-    /// Steps as [`Pid::step_error`], whatever the options and the arguments.
+    /// Steps as [`Pid::step_error`], with any options and any arguments.
     pub(crate) fn advance(&mut self, error: f32, rate: f32, step: &TimeStep) -> f32 {
         let mut whole = Pid::of_error(*self);
         let output = whole.step_error(error, rate, step);

@@ -164,9 +164,14 @@ impl Pilot {
     /// Returns what the remote control asks for; to be called once a tick.
     pub fn wish(&mut self, now: Instant) -> Wish {
         let wish = self.gesture.wish(&self.dbus.remote(now));
-        if wish == Wish::Arm {
-            self.chassis.restart();
+        if wish != Wish::Arm {
+            return wish;
         }
+        // A turn of the PC is a stick that is held: arming moves nothing.
+        if self.turn_of_pc(now) != 0.0 {
+            return Wish::Rest;
+        }
+        self.chassis.restart();
         wish
     }
 
@@ -176,9 +181,14 @@ impl Pilot {
         self.chassis.drive(bus, self.wheels, tick);
     }
 
+    /// Returns the turn that a PC asked for within the last 500 ms, in rad/s.
+    fn turn_of_pc(&self, now: Instant) -> f32 {
+        self.parameters.value(TURN, now).unwrap_or(0.0)
+    }
+
     fn steer(&mut self, remote: &Remote, now: Instant) {
-        let of_pc = self.parameters.value(TURN, now).unwrap_or(0.0);
-        let turn = of_pc - remote.left_x * FASTEST_RAD_S;
+        let turn = self.turn_of_pc(now) - remote.left_x * FASTEST_RAD_S;
+        let turn = turn.clamp(-FASTEST_RAD_S, FASTEST_RAD_S);
         let (vx, vy) = (remote.right_y * FASTEST_M_S, -remote.right_x * FASTEST_M_S);
         let yaw = self.imu.latest(now).map(|imu| {
             let (_, _, yaw) = imu.euler_roll_x();
@@ -232,7 +242,14 @@ mod tests {
     }
 
     fn wishes(frames: &[[u8; 18]]) -> Wish {
-        let mut pilot = Pilot::new(&mut Bus::new()).unwrap();
+        wishes_after(b"", frames)
+    }
+
+    /// The last wish, after lines of a PC at 1 ms.
+    fn wishes_after(lines: &[u8], frames: &[[u8; 18]]) -> Wish {
+        let mut bus = Bus::new();
+        let mut pilot = Pilot::new(&mut bus).unwrap();
+        pilot.hear_debug_port(&mut bus, lines, Instant::START + Duration::from_millis(1));
         let mut wish = Wish::Rest;
         for (frame, ms) in frames.iter().zip((14..).step_by(14)) {
             let now = Instant::START + Duration::from_millis(ms);
@@ -258,6 +275,13 @@ mod tests {
         assert_eq!(wishes(&[frame(1024, MIDDLE), frame(1684, UP)]), Wish::Rest);
         assert_eq!(wishes(&[frame(1024, UP)]), Wish::Rest, "at power-on");
         assert_eq!(wishes(&[frame(1024, UP), frame(1024, MIDDLE)]), Wish::Rest);
+    }
+
+    #[test]
+    fn a_turn_of_the_pc_prevents_arming_as_a_stick_that_is_held_does() {
+        let turned_up = [frame(1024, 3), frame(1024, 1)];
+        assert_eq!(wishes_after(b"turn=0.5\n", &turned_up), Wish::Rest);
+        assert_eq!(wishes_after(b"turn=0\nwheel_kp=1\n", &turned_up), Wish::Arm);
     }
 
     /// The first word that a wheel at rest is sent for a target of 1 rad/s.
