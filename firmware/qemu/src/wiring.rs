@@ -75,13 +75,13 @@ impl Drive {
         ask(&mut self.bus, motors, targets);
     }
 
-    /// As [`advance`](Self::advance), with the bus somewhere else.
-    pub fn advance_on(&mut self, bus: &mut Bus) {
-        self.pass();
+    /// Sets the targets on a bus that stands somewhere else.
+    pub fn ask_on(&self, bus: &mut Bus) {
         ask(bus, self.motors, self.targets);
     }
 
-    fn pass(&mut self) {
+    /// Lets a period pass, without targets.
+    pub fn pass(&mut self) {
         self.now = self.now + PERIOD;
         self.angle = (self.angle + COUNTS) % 8192;
         for (id, frame) in (1..).zip(&mut self.frames) {

@@ -13,7 +13,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::Link;
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Clock, Duration, Instant, Tick};
-use drivetrain::units::AngularVelocity;
+use drivetrain::units::{AngularVelocity, Current};
 use embedded_can::nb::Can;
 
 struct Time<'c>(&'c Cell<Instant>);
@@ -121,7 +121,13 @@ impl<'c> Robot<'c> {
 
     /// A ms later: eight frames wait, and the targets are set.
     fn advance(&mut self) {
-        self.drive.advance_on(self.runner.device_mut());
+        self.pass();
+        self.drive.ask_on(self.runner.device_mut());
+    }
+
+    /// A ms later: eight frames wait.
+    fn pass(&mut self) {
+        self.drive.pass();
         self.now.set(self.drive.now);
         let driver = &mut self.runner.port_mut().0;
         driver.next = 0;
@@ -143,9 +149,15 @@ impl<'c> Robot<'c> {
         whole - alone(&mut self.runner, 0, sent)
     }
 
-    /// One and the same cycle again and again: without a frame, and `passed` after the one before.
-    fn silent(mut self, passed: Duration) -> u32 {
-        self.now.set(self.now.get() + passed);
+    /// A time later, without a frame.
+    fn stay_silent(&mut self, passed: Duration) {
+        self.drive.now = self.drive.now + passed;
+        self.now.set(self.drive.now);
+    }
+
+    /// One and the same cycle again and again.
+    fn once(mut self) -> u32 {
+        let next = self.runner.port_mut().0.next;
         let mut once = copy(&self.runner);
         let before = once.statistics().sent;
         runner_cycle(&mut once);
@@ -153,7 +165,7 @@ impl<'c> Robot<'c> {
         let whole = instructions(runner_cycle as fn(&mut Loop<'_>), |cycle, _| {
             cycle(&mut copy(&self.runner));
         });
-        whole - alone(&mut self.runner, 8, sent)
+        whole - alone(&mut self.runner, next, sent)
     }
 }
 
@@ -189,19 +201,50 @@ fn disarmed() -> u32 {
     robot.cycles()
 }
 
-/// The cycle in which the feedback of all motors gets late, and one of those after it.
-fn late() -> [u32; 2] {
+/// Cycles of motors that were driven: in which the feedback of all gets late, one of those after it, and in which all are heard again.
+fn late() -> [u32; 3] {
+    [0, 3, 4].map(|cycles| {
+        let now = Cell::new(START);
+        let mut robot = Robot::new(Targets::Speed, &now, 0);
+        let wheel = robot.drive.motors()[0];
+        robot.stay_silent(Duration::from_micros(10_001));
+        for _ in 0..cycles {
+            runner_cycle(&mut robot.runner);
+            robot.stay_silent(Duration::from_millis(1));
+        }
+        let is_late = robot.runner.device().link(wheel) == Some(Link::Late);
+        assert_eq!(is_late, cycles > 0);
+        if cycles == 4 {
+            robot.advance();
+        }
+        robot.once()
+    })
+}
+
+/// The cycle in which the targets of all motors expire: the first without a current.
+fn expires() -> u32 {
     let now = Cell::new(START);
-    let robot = Robot::new(Targets::Speed, &now, 0);
-    let gets_late = robot.silent(Duration::from_micros(10_001));
     let mut robot = Robot::new(Targets::Speed, &now, 0);
     let wheel = robot.drive.motors()[0];
-    for passed in [10_001, 1_000, 1_000] {
-        now.set(now.get() + Duration::from_micros(passed));
+    for _ in 0..200 {
+        robot.pass();
+        let mut once = copy(&robot.runner);
+        runner_cycle(&mut once);
+        if once.device().commanded_current(wheel) == Some(Current::ZERO) {
+            return robot.once();
+        }
         runner_cycle(&mut robot.runner);
     }
-    assert_eq!(robot.runner.device().link(wheel), Some(Link::Late));
-    [gets_late, robot.silent(Duration::from_millis(1))]
+    panic!("no target expires")
+}
+
+/// The cycle in which the drives of all motors report a fault.
+fn fails() -> u32 {
+    let now = Cell::new(START);
+    let mut robot = Robot::new(Targets::Speed, &now, 0);
+    robot.error = 2;
+    robot.advance();
+    robot.once()
 }
 
 /// The three parts of a cycle, each alone: `poll`, `due` when a step is due and when none is, `tick`.
@@ -260,9 +303,12 @@ pub fn rows() {
     row("cycle_speed_limit", &[cycles(Targets::HighSpeed, 0)]);
     row("cycle_cascade_limit", &[cycles(Targets::FarPosition, 0)]);
     row("cycle_disarmed", &[disarmed()]);
-    let [gets_late, late] = late();
+    let [gets_late, late, recovers] = late();
     row("cycle_late", &[late]);
     row("cycle_gets_late", &[gets_late]);
+    row("cycle_recovers", &[recovers]);
+    row("cycle_expires", &[expires()]);
+    row("cycle_fails", &[fails()]);
     // A warning, with which the motors run on.
     row("cycle_error", &[cycles(Targets::Speed, 8)]);
     row("foreign_runner", &[foreign()]);
