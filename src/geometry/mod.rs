@@ -28,6 +28,19 @@
 //! A frame of your own is any type: `#[derive(Debug, PartialEq)] enum Camera {}`. The names cost nothing at run time.
 //! The types do not distinguish two robots whose frames have the same name, nor numbers of the wrong unit.
 //!
+//! With the feature `mint`, vectors, points and rotations convert to and from those of `glam`, `nalgebra` and others:
+//!
+#![cfg_attr(feature = "mint", doc = "```")]
+#![cfg_attr(not(feature = "mint"), doc = "```ignore")]
+//! use drivetrain::geometry::{Body, Point3, Vec2};
+//!
+//! let point = Point3::<Body>::new(0.1, 0.0, 0.35);
+//! let theirs: glam::Vec3 = mint::Point3::<f32>::from(point).into();
+//! assert_eq!(theirs.z, 0.35);
+//! let way = Vec2::from(mint::Vector2::from(glam::Vec2::new(3.0, 4.0)));
+//! assert_eq!(way.norm(), 5.0);
+//! ```
+//!
 //! The types catch a twist of the wrong frame:
 //!
 //! ```compile_fail
@@ -39,6 +52,8 @@
 mod arc;
 mod attitude;
 mod error;
+#[cfg(feature = "mint")]
+mod foreign;
 mod frame;
 mod point;
 mod pose;
