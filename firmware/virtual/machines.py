@@ -38,8 +38,8 @@ class Machine(Board):
         return [frame for frame in self.driven(since) if frame.us - frame.born > self.FRESH_US]
 
     def jitter_us(self, since, until, identifier):
-        """The largest difference between the distance of two commands of this id and a cycle."""
-        born = [frame.born for frame in self.commands(since, until) if frame.id == identifier]
+        """The largest difference between the distance of two commands of this id on the first line and a cycle."""
+        born = [frame.born for frame in self.sent(since, until) if frame.id == identifier]
         return max(abs(after - before - CYCLE_US) for before, after in zip(born, born[1:]))
 
 

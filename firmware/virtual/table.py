@@ -18,23 +18,26 @@ drivers of embassy-stm32, stm32f4xx-hal and bxcan come up unchanged, and the pro
 as their examples do: CAN in loop-back, a serial port by DMA in both directions, DMA from memory to memory.
 
 Not modelled: wait states and caches, the clock before the PLL runs, the receive error counter, retransmission by the motors,
-dominant bits of an error-passive node, the FIFO and the bursts of the DMA controller. A command reaches the motors up to 0.1 ms
-late.
+dominant bits of an error-passive node, extended and remote frames, the FIFO and the bursts of the DMA controller. A command reaches the
+motors up to 0.1 ms late. An FDCAN has one interrupt for both directions: where it is not served, no frame of zeros leaves, so the DM-MC02
+has no row `receive starved`.
 
-A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row a program is also run from
-power-on, and its trace has to be the same, bit for bit.
+A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row of each robot is also run
+from power-on, and its trace has to be the same, bit for bit.
 
 * Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
   other frame follows. For power-on it is the time from reset to the first frame. A dash: the robot goes on. A joint of the snake
-  robot rests when its "disable" was sent: the time is that of the last joint.
-* Stale: frames on the wire that are not zero and that the program had made more than a cycle before.
+  robot rests when its "disable" was sent: the time is that of the last joint. Without IMU, a chassis is stopped by its wheels: the time
+  is that until they stand.
+* Stale: frames on the wire that are not zero and that waited in the controller for more than a cycle. The age in a queue before it is
+  not seen, except by the words in the row `transmit starved`.
 
 | program | fault | in [Faults](faults.md) | zeros after, ms | stale | then |
 |---|---|---|--:|--:|---|
 """
 MIDDLE = """
-At rest there is no fault: the program drives for 50 ms. The jitter is the largest difference between the distance of two commands
-and 1 ms. The stack is the deepest one over all rows.
+Without a fault, over 50 ms of driving. The jitter is the largest difference between the distance of two commands and 1 ms; the snake
+robot sends to its joints before the frame that is looked at. The stack is the deepest one over all rows.
 
 | program | jitter, us | instructions a cycle, mean | busiest | in interrupts, mean | deepest stack, B |
 |---|--:|--:|--:|--:|--:|

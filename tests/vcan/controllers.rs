@@ -10,6 +10,7 @@ use drivetrain::sim::{MotorConfig, MotorKey, Simulation};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, StandardId};
 use std::fs;
 use std::io::{BufRead, Write};
+use std::process::Command;
 
 /// The interface of the bench.
 const NEAR: &str = "can0";
@@ -214,4 +215,30 @@ fn an_interface_that_goes_down_stops_all_and_no_stale_command_follows() {
         assert_eq!(bus.is_left_at_zero(), comes_back);
         print!("{}", said());
     }
+}
+
+/// As a person starts it, by the clock.
+#[test]
+#[ignore = "needs can0 and can1 on one bus: tests/vcan/run starts a Linux that has them"]
+fn the_example_socketcan_turns_a_motor_and_leaves_it_at_zero() {
+    let world = Simulation::new(6);
+    let motor = world.attach(MotorConfig::m3508(1)).unwrap();
+    let mut robot = Robot::on(FAR, world);
+    let mut example =
+        Command::new(std::env::var("VCAN_EXAMPLE").unwrap()).arg(NEAR).spawn().unwrap();
+    let mut millisecond = || {
+        robot.feed_back();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+        robot.world.motor(motor).unwrap().velocity.as_rpm()
+    };
+    wait_until("a motor that turns", || millisecond() > 27.0);
+    output("busybox", &["kill", "-TERM", &example.id().to_string()]);
+    wait_until("the end of the example", || {
+        millisecond();
+        example.try_wait().unwrap().is_some()
+    });
+    assert!(example.wait().unwrap().success());
+    robot.mark(&Witness::on(NEAR), END, 0);
+    robot.receive();
+    end_with_zeros(&robot.received, &["200"]);
 }

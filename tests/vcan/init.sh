@@ -20,6 +20,6 @@ $bb stty -F /dev/ttyS1 -opost
         /bin/ip link set $interface up type can bitrate 1000000 || echo "no $interface"
     done
     PYTHONHOME=$($bb cat /python-home) PYTHONPATH=/opt/masters/python MOTORBRIDGE_TX_GAP_US=0 MOTORBRIDGE_BULK_OP_GAP_MS=0 \
-    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
+    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench VCAN_EXAMPLE=/bin/socketcan vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
 } >/dev/ttyS1 2>&1
 $bb poweroff -f

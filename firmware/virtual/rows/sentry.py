@@ -55,11 +55,12 @@ def closed_loop(robot):
     off = abs(heading - robot.attitude()["yaw_deg"])
     must(off < 12, f"the chassis is {off:.1f} degrees off its gimbal")
     must(not robot.stale() and not robot.resets, "stale frames, or a reset")
-    last = busy[-1]
+    last, jitter_us = busy[-1], robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, YAW_COMMAND)
+    must(jitter_us < CYCLE_US / 4, f"the cycle is {jitter_us:.0f} us off")
     return {
         "zero_us": first, "stale": 0, "note": "drives, follows its gimbal, shoots",
         "figures": {
-            "jitter_us": robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, YAW_COMMAND),
+            "jitter_us": jitter_us,
             "mean": (last[0] - busy[0][0]) / 50,
             "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
             "interrupts": (last[1] - busy[0][1]) / 50,

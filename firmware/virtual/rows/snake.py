@@ -72,11 +72,12 @@ def gait(robot):
     must(robot.servo.answers > 20, f"{robot.servo.answers} answers of the servo")
     must(robot.wire.collisions == 0, f"{robot.wire.collisions} collisions of a joint's id")
     must(not robot.resets and not robot.stale(), "a reset, or stale frames")
-    last = busy[-1]
+    last, jitter_us = busy[-1], robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, 0x1FF)
+    must(jitter_us < CYCLE_US / 2, f"the cycle is {jitter_us:.0f} us off")
     return {
         "zero_us": first, "stale": 0, "note": f"follows a gait, {rms:.1f} degrees off",
         "figures": {
-            "jitter_us": robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, 0x1FF),
+            "jitter_us": jitter_us,
             "mean": (last[0] - busy[0][0]) / 50,
             "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
             "interrupts": (last[1] - busy[0][1]) / 50,
