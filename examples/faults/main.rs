@@ -104,7 +104,7 @@ fn drive(row: &Row<'_>) -> Result<Seen, String> {
         let case = find(name).ok_or(format!("{name} is missing"))?;
         case::take_seen();
         catch_unwind(case).map_err(|panic| message(panic.as_ref()))?;
-        let Seen { what, ticks_to_safe } = case::take_seen();
+        let Seen { what, ticks_to_safe, .. } = case::take_seen();
         seen.what.extend(what);
         seen.ticks_to_safe = seen.ticks_to_safe.max(ticks_to_safe);
     }
@@ -124,7 +124,7 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
 fn print_row(row: &Row<'_>, outcome: Result<Seen, String>) {
     let Row { id, fault, required, .. } = row;
     match outcome {
-        Ok(Seen { what, ticks_to_safe }) => {
+        Ok(Seen { what, ticks_to_safe, .. }) => {
             let ticks = ticks_to_safe.map_or("-".to_owned(), |ticks| ticks.to_string());
             console::line(format_args!(
                 "{id} | ok | {ticks} | {fault} | {required} | {}",

@@ -1,6 +1,9 @@
 //! What a row of the catalogue is as a program: a function that fails, and what it saw.
 
+use drivetrain::motor::{Own, OwnMotor};
+use std::any::type_name;
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fmt::Display;
 
 /// The name of a case, which begins with its id, and the function that drives it.
@@ -16,6 +19,8 @@ pub(crate) use cases;
 pub(crate) struct Seen {
     pub(crate) what: Vec<String>,
     pub(crate) ticks_to_safe: Option<u64>,
+    /// The families whose motors were driven.
+    pub(crate) families: BTreeSet<&'static str>,
 }
 
 thread_local! {
@@ -35,4 +40,10 @@ pub(crate) fn safe_after(ticks: u64) {
 /// Returns what was noted on this thread since the last call.
 pub(crate) fn take_seen() -> Seen {
     SEEN.take()
+}
+
+/// Notes the family of a motor that the case drives, by the module of its type.
+pub(crate) fn drives<M: OwnMotor>(_motor: &Own<M>) {
+    let family = type_name::<M>().split("::").nth(1).unwrap_or_default();
+    SEEN.with_borrow_mut(|seen| seen.families.insert(family));
 }

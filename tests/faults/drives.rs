@@ -1,7 +1,7 @@
 //! F72 to F80: drives that are set up, enabled and watched by frames, of several families.
 
 use crate::bench::{Bench, mit};
-use crate::case::{Case, cases, saw};
+use crate::case::{Case, cases, drives, saw};
 use crate::lk_bench;
 use crate::vesc_bench::{self, drive, looped};
 use drivetrain::damiao::{Register, Status};
@@ -180,6 +180,7 @@ fn f76_an_echo_or_a_command_that_is_read_back_is_no_feedback() {
 #[cfg_attr(test, test)]
 fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
     let mut bench = lk_bench::Bench::armed(lk::Model::MG5010E_I10, lk_bench::torque());
+    drives(&bench.own);
     let drive = |bench: &mut lk_bench::Bench| {
         _ = bench.own.set_velocity((), AngularVelocity::from_rad_per_s(3.0));
     };
@@ -202,6 +203,7 @@ fn f77_an_error_that_no_feedback_tells_is_asked_for_while_the_motor_drives() {
 #[cfg_attr(test, test)]
 fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
     let mut bench = vesc_bench::Bench::armed(Mode::velocity());
+    drives(&bench.own);
     let wheel = AngularVelocity::from_rad_per_s(60.0);
     bench.steps(500, |bench| bench.own.set_velocity((), wheel).unwrap());
     bench.drive.fail(4);
@@ -225,6 +227,7 @@ fn f78_a_fault_that_no_status_frame_tells_is_asked_for_and_trips() {
 #[cfg_attr(test, test)]
 fn f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
     let mut bench = vesc_bench::Bench::armed(looped());
+    drives(&bench.own);
     let turn = |bench: &mut vesc_bench::Bench| {
         _ = bench.own.set_angle((), Angle::from_radians(3.0));
     };
@@ -243,6 +246,7 @@ fn f79_a_lost_angle_frame_is_lost_feedback_although_the_motion_goes_on() {
 #[cfg_attr(test, test)]
 fn f80_a_count_of_turns_that_wraps_or_begins_anew_moves_nothing() {
     let mut bench = vesc_bench::Bench::new(looped());
+    drives(&bench.own);
     bench.drive = drive(23);
     bench.drive.set_tachometer(i32::MAX);
     bench.arm();

@@ -1,7 +1,7 @@
 //! F81 to F84: drives whose state comes apart from their feedback, by the example of ODrive's.
 
 use crate::axle::{Bench, torque};
-use crate::case::{Case, cases, saw};
+use crate::case::{Case, cases, drives, saw};
 use drivetrain::motor::{Devices, OwnMotor, VelocityDrive};
 use drivetrain::odrive::{Firmware, Heartbeat, Mode};
 use drivetrain::units::AngularVelocity;
@@ -22,6 +22,7 @@ fn drive(bench: &mut Bench) {
 fn f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_that_stops_trips_it() {
     for firmware in [Firmware::V0_5, Firmware::V0_6] {
         let mut bench = Bench::armed(torque(), firmware);
+        drives(&bench.own);
         bench.drive = bench.drive.with_periods(0.002, 0.002);
         bench.steps(400, |bench| bench.own.set_torque(1.0).unwrap());
         assert!(bench.drive.shaft().torque_nm() > 0.99);
@@ -45,6 +46,7 @@ fn f81_estimates_that_stop_beside_a_heartbeat_rest_the_motor_and_a_heartbeat_tha
 #[cfg_attr(test, test)]
 fn f82_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
     let mut bench = Bench::armed(Mode::velocity(3.0), Firmware::V0_6);
+    drives(&bench.own);
     bench.drive.refuse(14);
     let (mut codes, mut requests) = (Vec::new(), 0);
     bench.steps(900, |bench| {
@@ -61,6 +63,7 @@ fn f82_a_refused_closed_loop_is_a_fault_with_its_reason_and_requested_once() {
 #[cfg_attr(test, test)]
 fn f83_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
     let mut bench = Bench::new(torque(), Firmware::V0_6);
+    drives(&bench.own);
     bench.drive.set_state(Heartbeat::CLOSED_LOOP);
     bench.arm();
     let mut was_idle = false;
@@ -77,6 +80,7 @@ fn f83_an_axis_that_runs_in_another_mode_is_idle_before_it_is_set_up() {
 #[cfg_attr(test, test)]
 fn f84_the_watchdog_of_the_drive_stops_it_and_its_error_is_cleared_by_the_program_alone() {
     let mut bench = Bench::new(Mode::velocity(3.0), Firmware::V0_5);
+    drives(&bench.own);
     bench.drive = bench.drive.with_watchdog(0.1);
     bench.arm();
     bench.steps(400, drive);

@@ -1,6 +1,6 @@
 //! F89 to F91: drives whose time-out, echoes and holding brake are their own, by the example of MyActuator's.
 
-use crate::case::{Case, cases, saw};
+use crate::case::{Case, cases, drives, saw};
 use crate::rmd_bench::{Bench, torque};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, Own, VelocityDrive};
@@ -22,6 +22,7 @@ fn rad_s(value: f32) -> AngularVelocity {
 #[cfg_attr(test, test)]
 fn f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_trips() {
     let mut bench = Bench::armed(Model::X8_120, Mode::velocity(rad_s(20.0)));
+    drives(&bench.own);
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     let before = *bench.own.motor().feedback().unwrap();
     bench.own.set_velocity((), rad_s(6.0)).unwrap();
@@ -50,6 +51,7 @@ fn f89_a_command_that_a_drive_sends_back_after_its_timeout_is_no_feedback_and_tr
 #[cfg_attr(test, test)]
 fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
     let mut bench = Bench::new(Model::X8_120, Mode::velocity(rad_s(20.0)));
+    drives(&bench.own);
     bench.drive = bench.drive.refusing_timeouts();
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();
@@ -72,6 +74,7 @@ fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
 #[cfg_attr(test, test)]
 fn f91_no_torque_is_sent_against_a_holding_brake() {
     let mut bench = Bench::new(Model::X8_120, torque());
+    drives(&bench.own);
     bench.drive = bench.drive.with_brake();
     bench.steps(100, |_| {});
     bench.own.arm(bench.now()).unwrap();

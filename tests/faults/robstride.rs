@@ -1,6 +1,7 @@
 //! F85 to F88: drives whose run mode, angle and faults come apart from their feedback, by the example of RobStride's.
 
-use crate::case::{Case, cases, saw};
+use crate::bench as damiao;
+use crate::case::{Case, cases, drives, saw};
 use crate::robstride_bench as robstride;
 use drivetrain::motor::{AngleDrive, ArmError, Devices, Impedance, ImpedanceControl};
 use drivetrain::robstride::{Mode, Model};
@@ -20,6 +21,7 @@ fn f85_a_drive_that_forgets_its_run_mode_gets_it_before_arming_and_is_refused_if
  {
     let slow = AngularVelocity::from_rad_per_s(10.0);
     let mut bench = robstride::Bench::new(Mode::velocity(slow, 8.0));
+    drives(&bench.own);
     for _ in 0..2 {
         bench.steps(150, |_| {});
         assert_eq!(bench.drive.parameter(0x7005), Some(2.0));
@@ -42,6 +44,7 @@ fn f86_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_ne
     for model in [Model::RS02, Model::CYBERGEAR] {
         let spring = ImpedanceControl::new(3.0).unwrap();
         let mut bench = robstride::Bench::of(model, spring);
+        drives(&bench.own);
         bench.drive.shaft_mut().set_angle(12.4);
         bench.steps(150, |_| {});
         bench.own.arm(bench.now()).unwrap();
@@ -60,12 +63,31 @@ fn f86_beyond_the_range_of_the_feedback_there_is_no_angle_and_no_command_that_ne
         }
         assert_eq!(bench.own.angle(()), None);
     }
-    saw("rest from the first feedback beyond 12.57 rad");
+    let mut bench = damiao::Bench::new(ImpedanceControl::new(3.0).unwrap(), 1.0);
+    drives(&bench.own);
+    bench.drive.shaft_mut().set_angle(12.3);
+    bench.steps(150, |_| {});
+    bench.own.arm(bench.now()).unwrap();
+    let angle = Angle::from_radians(12.3);
+    let hold = Impedance { angle, stiffness: 20.0, damping: 0.5, ..Impedance::FREE };
+    bench.steps(400, |bench| _ = bench.own.set_impedance(hold));
+    assert!(bench.drive.is_enabled() && bench.own.angle(()).is_some());
+    for step in 0_u16..100 {
+        bench.drive.shaft_mut().set_angle(12.3 + 0.01 * f32::from(step));
+        _ = bench.own.set_impedance(hold);
+        bench.step();
+        let is_beyond = bench.drive.shaft().angle_rad() > 12.52;
+        assert!(!is_beyond || bench.own.angle(()).is_none(), "{step}");
+        assert!(!is_beyond || bench.drive.shaft().torque_nm().abs() < 0.003, "{step}");
+    }
+    assert_eq!(bench.own.angle(()), None);
+    saw("rest from the first feedback beyond 12.57 rad, of Damiao 12.5 rad");
 }
 
 #[cfg_attr(test, test)]
 fn f87_a_fault_that_only_a_report_tells_trips_and_is_cleared() {
     let mut bench = robstride::Bench::armed(robstride::operation());
+    drives(&bench.own);
     bench.steps(300, |bench| _ = bench.own.set_torque(0.5));
     // Over-voltage, and the drive goes on.
     let mut failed = bench.drive;
@@ -88,6 +110,7 @@ fn f88_a_drive_is_enabled_without_current_and_does_not_go_on_to_its_old_target()
     for model in [Model::RS02, Model::CYBERGEAR] {
         let mode = Mode::position(AngularVelocity::from_rad_per_s(10.0), 8.0);
         let mut bench = robstride::Bench::of(model, mode);
+        drives(&bench.own);
         bench.drive.shaft_mut().set_angle(3.0);
         bench.steps(150, |_| {});
         bench.own.arm(bench.now()).unwrap();

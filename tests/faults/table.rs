@@ -1,7 +1,9 @@
 //! Holds the table, the lists of cases and the tests together.
 
+use crate::case::take_seen;
 use crate::catalogue::CATALOGUE;
 use crate::rows::{Row, TABLE, rows};
+use crate::{drives, odrive, rmd, robstride};
 use std::collections::BTreeSet;
 
 /// The files of [`CATALOGUE`], in its order.
@@ -71,6 +73,36 @@ fn every_test_is_in_the_list_of_its_file() {
         assert_eq!(tests, listed);
         assert!(!source.contains("#[test]"), "the example would not run it");
     }
+}
+
+/// The lines F77 to F91 of the table of faults and families: `tests/families` holds the others.
+#[test]
+fn the_families_that_a_case_drives_are_those_of_its_line() {
+    let head = "| id | damiao | robstride | vesc | lk | rmd | odrive |";
+    let (_, table) = TABLE.split_once(head).unwrap();
+    let lines = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let lines: Vec<Vec<&str>> =
+        lines.map(|line| line.trim_matches('|').split('|').map(str::trim).collect()).collect();
+    let families: Vec<&str> = head.trim_matches('|').split('|').map(str::trim).skip(1).collect();
+    let cases = [drives::CASES, odrive::CASES, robstride::CASES, rmd::CASES];
+    let mut checked = 0;
+    for (name, case) in cases.into_iter().flatten().filter(|(name, _)| *name > "f77") {
+        _ = take_seen();
+        case();
+        let seen = take_seen().families;
+        let id = name[..3].to_uppercase();
+        let line = lines.iter().find(|line| line[0] == id).unwrap_or_else(|| panic!("no {id}"));
+        for (family, cell) in families.iter().zip(&line[1..]) {
+            let is_driven = seen.contains(family);
+            assert!(
+                if is_driven { *cell == "held" } else { cell.starts_with("n/a: ") },
+                "{id} {family}: {cell}, driven: {seen:?}"
+            );
+        }
+        assert_eq!(line.len(), 1 + families.len(), "{id}");
+        checked += 1;
+    }
+    assert_eq!(checked, 15);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What could hurt: frames that drive after the motor was told to rest, at every moment of its life, and frames that are drawn.
+//! What could hurt: frames that are drawn. `tests/families` has the frames after the motor was told to rest, at every moment.
 
 use super::*;
 
@@ -6,78 +6,6 @@ use super::*;
 fn is_rest(frame: &CanFrame) -> bool {
     let [code, rest @ ..] = *frame.bytes();
     [0x78, 0x80, 0x92, 0x9A, 0x9C, 0xA1].contains(&code) && rest == [0; 7]
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Event {
-    Disarm,
-    EmergencyStop,
-    NoTarget,
-    NoFeedback,
-    BadSteps,
-    ClockBack,
-}
-
-const EVENTS: [Event; 6] = [
-    Event::Disarm,
-    Event::EmergencyStop,
-    Event::NoTarget,
-    Event::NoFeedback,
-    Event::BadSteps,
-    Event::ClockBack,
-];
-
-/// Lets an event come at a moment after arming; each frame from then on, or from its limit on, is one of rest.
-fn rests_after(mode: impl Into<Mode>, set: fn(&mut Own<Motor>), event: Event, moment_ms: u32) {
-    let mode = mode.into();
-    let mut bench = Bench::armed(MODEL, mode);
-    bench.steps(moment_ms, |bench| set(&mut bench.own));
-    let allowed_ms = match event {
-        Event::NoTarget => 101,
-        Event::NoFeedback => 11,
-        Event::BadSteps => 1,
-        _ => 0,
-    };
-    match event {
-        Event::Disarm => bench.own.disarm(),
-        Event::EmergencyStop => bench.own.emergency_stop(),
-        Event::NoFeedback => bench.is_cut = true,
-        Event::ClockBack => bench.now_us -= 5_000,
-        Event::NoTarget | Event::BadSteps => {}
-    }
-    for ms in 0..150 {
-        if event != Event::NoTarget {
-            set(&mut bench.own);
-        }
-        let dt_s = if event == Event::BadSteps { f32::NAN } else { 0.001 };
-        // The clock goes back once, and on from there.
-        bench.now_us += if event == Event::ClockBack && ms == 0 { 0 } else { 1_000 };
-        let now = bench.now();
-        bench.own.update(Tick::new(now, dt_s));
-        while let Some(frame) = bench.own.next_frame(0) {
-            let is_safe = is_rest(&frame) || ms < allowed_ms;
-            assert!(is_safe, "{mode:?}, {event:?} after {moment_ms} ms, {ms} ms later: {frame:?}");
-            if !bench.is_cut
-                && let Some(answer) = bench.drive.hear(&frame)
-            {
-                _ = Devices::ingest(&mut bench.own, &answer, now);
-            }
-        }
-    }
-}
-
-#[test]
-fn every_frame_after_an_event_is_one_of_rest_at_every_moment() {
-    for event in EVENTS {
-        // Through the state, the time-out, the brake or the angle, opening, and the places of the questions.
-        for moment_ms in (0..80).chain([150, 223, 301]) {
-            rests_after(torque(), |own| _ = own.set_torque(1.0), event, moment_ms);
-            let velocity = Mode::velocity(rad_s(20.0));
-            rests_after(velocity, |own| _ = own.set_velocity((), rad_s(6.0)), event, moment_ms);
-            let position = Mode::position_velocity(rad_s(8.0));
-            rests_after(position, |own| _ = own.set_angle((), rad(2.0)), event, moment_ms);
-        }
-    }
 }
 
 /// Frames that are drawn, on the id of the drive, while it drives and while it rests: a disarmed motor sends frames of rest alone, and

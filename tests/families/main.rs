@@ -1,0 +1,10 @@
+//! All families side by side: rest after whatever ends the driving, and the table of faults and families in `docs/faults.md`.
+
+#![cfg(test)]
+
+mod drives;
+mod faults;
+mod motors;
+mod rest;
+mod station;
+mod table;
