@@ -133,9 +133,18 @@ impl BusLoad {
     /// ```
     #[must_use]
     pub const fn with_frames_of(self, length: u8, frames: u32, rate_hz: u32) -> Self {
-        let more = rate_hz.saturating_mul(frames);
-        let nominal = more as u64 * Self::nominal_bits(length) as u64;
-        let worst = more as u64 * Self::worst_bits(length) as u64;
+        let bits = (Self::nominal_bits(length), Self::worst_bits(length));
+        self.with_bits(bits, rate_hz.saturating_mul(frames))
+    }
+
+    /// Adds frames like this one.
+    pub(super) const fn with_each(self, frame: &CanFrame, rate_hz: u32) -> Self {
+        self.with_bits(Self::frame_bits(frame), rate_hz)
+    }
+
+    const fn with_bits(self, (nominal, worst): (u32, u32), more: u32) -> Self {
+        let nominal = more as u64 * nominal as u64;
+        let worst = more as u64 * worst as u64;
         Self {
             frames_per_s: self.frames_per_s.saturating_add(more),
             nominal_bits_per_s: self.nominal_bits_per_s.saturating_add(nominal),

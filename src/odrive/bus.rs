@@ -199,9 +199,12 @@ impl OwnMotor for Motor {
 
     fn forget_settings(&mut self) {
         self.settings.forget();
-        if self.state.phase == Phase::Off {
-            self.state.heartbeat = None;
-        }
+        let is_off = self.state.phase == Phase::Off;
+        self.state.heartbeat.take_if(|_| is_off);
+    }
+
+    fn frames_per_answer(&self) -> u32 {
+        2
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -41,9 +41,8 @@ impl Motor {
 
     /// Returns the limits for a share of the torque: at least one part.
     pub(super) fn limits_of(&self, parts: f32) -> CanFrame {
-        let share = parts.max(1.0) / PARTS;
         let limit_nm = self.mode.control.torque_limit_nm().unwrap_or(0.0);
-        let torque_nm = limit_nm * share / self.gear.abs();
+        let torque_nm = limit_nm * parts.max(1.0) / PARTS / self.gear.abs();
         self.send(Command::Limits(self.most_turns(), torque_nm / self.model.torque_constant()))
     }
 
@@ -54,8 +53,7 @@ impl Motor {
 
     /// Sets control mode and input mode.
     pub(super) fn modes(&self) -> CanFrame {
-        let (control, input) = (self.mode.control.number, self.mode.input);
-        self.send(Command::ControllerMode(control.into(), input.into()))
+        self.send(Command::ControllerMode(self.mode.control.number.into(), self.mode.input.into()))
     }
 
     pub(super) fn idle(&self) -> CanFrame {

@@ -273,6 +273,10 @@ impl OwnMotor for Motor {
         self.angle_age = u8::MAX;
     }
 
+    fn frames_per_answer(&self) -> u32 {
+        2
+    }
+
     fn capabilities(&self) -> Capabilities {
         let mut capabilities =
             self.mode.capabilities().with(Capability::Feedback).with(Capability::Temperature);

@@ -1,9 +1,10 @@
-//! All families side by side: rest after whatever ends the driving, and the table of faults and families in `docs/faults.md`.
+//! All families side by side: rest after whatever ends the driving, the load of the bus, and the table of faults and families in `docs/faults.md`.
 
 #![cfg(test)]
 
 mod drives;
 mod faults;
+mod load;
 mod motors;
 mod rest;
 mod station;

@@ -2,7 +2,7 @@
 
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
-    ArmError, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor, TargetError,
+    ArmError, BusLoad, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor, TargetError,
 };
 use drivetrain::sim::DriveShaft;
 use drivetrain::time::{Instant, Tick};
@@ -24,6 +24,8 @@ pub(crate) trait Device {
     fn claims(&self) -> Vec<Claim>;
     fn has_rival(&self) -> bool;
     fn error_code(&self) -> u8;
+    /// Of a bus of 1 Mbit/s at 1 kHz.
+    fn load(&self) -> BusLoad;
 }
 
 pub(crate) type Set<M> = fn(&mut Own<M>, f32) -> Result<(), TargetError>;
@@ -73,6 +75,9 @@ impl<M: OwnMotor> Device for Driven<M> {
     }
     fn error_code(&self) -> u8 {
         self.0.health().error_code
+    }
+    fn load(&self) -> BusLoad {
+        self.0.load(1_000_000, 1_000)
     }
 }
 
@@ -129,6 +134,8 @@ pub(crate) struct Station {
     pub(crate) bend: Option<Bend>,
     /// The driver gives each frame back.
     pub(crate) is_full: bool,
+    /// The answers of the drive to the frames of the last update.
+    pub(crate) answers: Vec<CanFrame>,
     /// The frames of the drive in the last update.
     pub(crate) heard: Vec<CanFrame>,
 }
@@ -156,6 +163,7 @@ impl Station {
             bend: None,
             is_full: false,
             heard: Vec::new(),
+            answers: Vec::new(),
         }
     }
 
@@ -192,6 +200,7 @@ impl Station {
         }
         self.device.update(Tick::new(self.now(), self.dt_s));
         self.frames.clear();
+        self.answers.clear();
         while let Some(frame) = self.device.next_frame() {
             self.frames.push(frame);
             if self.is_full {
@@ -201,6 +210,7 @@ impl Station {
                 continue;
             }
             if let Some(answer) = self.drive.hear(&frame) {
+                self.answers.push(answer);
                 self.deliver(&answer);
             }
         }

@@ -307,6 +307,7 @@ fn motor() {
     Own::<AnyMotor>::set_torque.call();
     Own::<AnyMotor>::set_impedance.call();
     Own::<AnyMotor>::motor_mut.call();
+    Own::<AnyMotor>::load.call();
     (|own: &mut Own<AnyMotor>, target| own.set_velocity((), target)).call();
     (|own: &mut Own<AnyMotor>, target| own.set_angle((), target)).call();
     (|own: &Own<AnyMotor>| (own.velocity(()), own.angle(()))).call();
