@@ -9,10 +9,12 @@ use drivetrain::motor::{
     AngleDrive, CanDevice, Devices, Impedance, ImpedanceControl, Ingest, Own, OwnMotor, Role,
     VelocityDrive,
 };
-use drivetrain::sim::{DamiaoDrive, LkDrive, OdriveDrive, RobStrideDrive, VescDrive, VescMotor};
+use drivetrain::sim::{
+    DamiaoDrive, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
-use drivetrain::{damiao, lk, odrive, robstride, vesc};
+use drivetrain::{damiao, lk, odrive, rmd, robstride, vesc};
 use drivetrain_fuzz::{Clock, Drive, Input};
 use embedded_can::{ExtendedId, Frame, StandardId};
 use libfuzzer_sys::fuzz_target;
@@ -24,12 +26,13 @@ const OLD_MS: u32 = 201;
 
 fuzz_target!(|data: &[u8]| {
     let mut input = Input(data);
-    match input.byte() % 20 {
-        kind @ 0..=3 => damiao_of(kind, &mut input),
+    match input.byte() % 25 {
+        kind @ (0..=3 | 24) => damiao_of(kind, &mut input),
         kind @ 4..=7 => lk_of(kind, &mut input),
         kind @ 8..=11 => vesc_of(kind, &mut input),
         kind @ 12..=15 => odrive_of(kind, &mut input),
-        kind => robstride_of(kind, &mut input),
+        kind @ 16..=19 => robstride_of(kind, &mut input),
+        kind => rmd_of(kind, &mut input),
     }
 });
 
@@ -56,10 +59,12 @@ struct Limits {
     rest_nm: f32,
     /// When driven; infinite where the torque is the business of the drive alone, or is reckoned from what feedback says.
     most_nm: f32,
+    /// Updates until it has to be at rest after a frame that the driver gave back.
+    respite: u32,
 }
 
 impl Limits {
-    const REST: Self = Self { rest_nm: 0.0, most_nm: f32::INFINITY };
+    const REST: Self = Self { rest_nm: 0.0, most_nm: f32::INFINITY, respite: 1 };
 
     fn most(self, most_nm: f32) -> Self {
         Self { most_nm: most_nm * 1.001, ..self }
@@ -88,11 +93,12 @@ fn damiao_of(kind: u8, input: &mut Input) {
             }
         })(input);
     }
-    match kind % 4 {
+    match kind {
         0 => bench(torque(), 1.0, input),
         1 => bench(gains(), 1.0, input),
         2 => bench(damiao::Mode::position_velocity(speed()), 2.0, input),
-        _ => bench(damiao::Mode::velocity(speed()), 3.0, input),
+        3 => bench(damiao::Mode::velocity(speed()), 3.0, input),
+        _ => bench(damiao::Mode::force_position(speed(), 2.0), 4.0, input),
     }
 }
 
@@ -111,6 +117,24 @@ fn lk_of(kind: u8, input: &mut Input) {
         1 => bench(gains(), rest.most(3.0), input),
         2 => bench(lk::Mode::velocity_with_torque_limit(speed(), 2.0), rest.most(2.0), input),
         _ => bench(lk::Mode::position_velocity(speed()), rest, input),
+    }
+}
+
+fn rmd_of(kind: u8, input: &mut Input) {
+    fn bench(mode: impl Into<rmd::Mode>, limits: Limits, input: &mut Input) {
+        let model = rmd::Model::X8_120;
+        let drive = RmdDrive::new(1, model.torque_constant());
+        let motor = rmd::Motor::new(model, 1, mode).unwrap();
+        let drive = if input.coin() { drive.with_brake() } else { drive };
+        run(motor, drive, limits, |motor, _, _| motor.reset_drive())(input);
+    }
+    // The first frame after the time-out of the drive is sent back, and its command before may hold until the next frame of rest.
+    let rest = Limits { respite: 3, ..Limits::REST };
+    match kind % 4 {
+        0 => bench(torque(), rest.most(3.0), input),
+        1 => bench(gains(), rest.most(3.0), input),
+        2 => bench(rmd::Mode::velocity(speed()), rest, input),
+        _ => bench(rmd::Mode::position_velocity(speed()), rest, input),
     }
 }
 
@@ -438,7 +462,7 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
             assert!(is_claimed || frame.is_remote_frame(), "{frame:?}");
             if refused & 1 << turn != 0 {
                 assert!(Devices::requeue(&mut self.own, &frame), "{frame:?}");
-                self.owed = 1;
+                self.owed = self.limits.respite;
                 continue;
             }
             self.answers.extend(self.drive.hear(&frame));

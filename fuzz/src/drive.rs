@@ -1,7 +1,9 @@
 //! The simulated drives that judge own motors.
 
 use drivetrain::frame::CanFrame;
-use drivetrain::sim::{DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive};
+use drivetrain::sim::{
+    DamiaoDrive, DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive,
+};
 
 /// A simulated drive.
 pub trait Drive {
@@ -54,6 +56,29 @@ impl Drive for LkDrive {
         match kind % 4 {
             0 => self.fail(kind >> 2),
             1 => self.set_reasons(kind >> 2),
+            2 => self.set_temperature(kind.cast_signed()),
+            _ => self.lose_supply(),
+        }
+    }
+}
+
+impl Drive for RmdDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn report(&mut self, frames: &mut Vec<CanFrame>) {
+        frames.extend(Self::report(self));
+    }
+    fn shaft_mut(&mut self) -> &mut DriveShaft {
+        Self::shaft_mut(self)
+    }
+    fn suffer(&mut self, kind: u8) {
+        match kind % 4 {
+            0 => self.fail(1 << (kind >> 4)),
+            1 => self.set_reasons(1 << (kind >> 4)),
             2 => self.set_temperature(kind.cast_signed()),
             _ => self.lose_supply(),
         }
