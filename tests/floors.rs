@@ -300,7 +300,14 @@ fn each_family_has_the_files_of_the_guide_and_is_named_around_its_folder() {
         sections.find(|section| section.starts_with(title)).unwrap().to_owned()
     };
     let (inside, around) = (section("The folder"), section("Around the folder"));
+    let beside = section("Beside an own motor");
     assert!(paths(&inside).count() == 7 && paths(&around).count() == 10);
+    assert_eq!(paths(&beside).count(), 4);
+    for (family, _) in SIZES {
+        for path in paths(&beside) {
+            assert!(text_of(&root.join(path)).contains(family), "{path} does not name {family}");
+        }
+    }
     for family in FAMILIES {
         for path in paths(&inside).map(|path| path.replace("FAMILY", family)) {
             assert!(root.join(&path).exists(), "{path} is not there");
