@@ -21,7 +21,6 @@ COARSE = "angles that the judge reads in hundredths of a degree"
 class NekoRmd(lk.NekoRmd):
     """NekoRMD: the frames of protocol V3, with answers on the id that it is given. It has no torque but that of its test."""
 
-    share = 5
     codes = [VELOCITY, POSITION]
     feedback = [VELOCITY]
     #: Its largest value and limit: it writes integers.
@@ -88,7 +87,6 @@ class Motorbridge:
     """motorbridge, in Rust as a shared library, over its CAN socket: `socketcan.c` has the other end."""
 
     name = "motorbridge"
-    share = 2
     codes = [VELOCITY, POSITION]
     feedback = [READ, TORQUE, VELOCITY, POSITION]
     #: Its commands are in rad, in single precision.
@@ -204,7 +202,7 @@ class Trial(lk.Trial):
 
     def encode(self):
         random, judge = self.random, self.judge
-        count = self.count // judge.share
+        count = self.count
         rows = np.zeros(count, np.dtype([("code", "u1"), ("pad", "u1"), ("limit", "<u2"), ("value", "<i4")]))
         rows["code"] = random.choice(np.array(judge.codes, np.uint8), count)
         values = random.integers(-judge.most, judge.most + 1, count)
@@ -226,7 +224,7 @@ class Trial(lk.Trial):
 
     def decode(self):
         judge = self.judge
-        count = self.count // judge.share
+        count = self.count
         frames = self.random.integers(0, 256, (count, 8), np.uint8)
         frames[:, 0] = self.random.choice(np.array(judge.feedback, np.uint8), count)
         found = np.frombuffer(self.program.run("rmd", "decode", data=frames.tobytes()), FOUND)

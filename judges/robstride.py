@@ -43,6 +43,7 @@ OTHER_RANGES = {
     "RS03": (None, 50.0, 60.0, 5000.0, 100.0),
     "RS05": (None, 33.0, 17.0, 500.0, 5.0),
     "RS06": (None, 20.0, 60.0, 5000.0, 100.0),
+    "CyberGear": (None, 30.0, 12.0, 500.0, 5.0),
 }
 
 RANGES = "model(s) with other ranges"
@@ -59,6 +60,10 @@ EXPLAINED = {
     ("robstride-dynamics", "feedback"): {RANGES, SPAN, STATE, COLD},
     ("motorbridge", "operation"): {SPAN, GAINS, PROVED},
     ("motorbridge", "feedback"): {SPAN, STATE, COLD},
+    ("cybergeardriver", "operation"): {RANGES, GAINS, PROVED},
+    ("cybergeardriver", "feedback"): {RANGES, STATE, COLD},
+    ("python-cybergear", "operation"): {RANGES, GAINS, PROVED},
+    ("python-cybergear", "feedback"): {RANGES, STATE, COLD},
 }
 
 
@@ -71,18 +76,206 @@ def require(condition, what):
         raise Difference(what)
 
 
-def fields_of(ranges, is_judge=False):
-    """Position, velocity, kp, kd and torque. Signed fields of the judges span twice 0x7FFF."""
+def fields_of(ranges, top=65_535):
+    """Position, velocity, kp, kd and torque. Signed fields of two judges span twice 0x7FFF."""
     p, v, t, kp, kd = ranges
-    top = 65_534 if is_judge else 65_535
     signed = [Field(-end, end, top) for end in (p, v)]
     return [*signed, Field(0.0, kp, 65_535), Field(0.0, kd, 65_535), Field(-t, t, top)]
+
+
+class Message:
+    """A frame as python-can has it."""
+
+    def __init__(self, arbitration_id, data, is_extended_id=True):
+        self.arbitration_id, self.data = arbitration_id, data
+
+
+class CyberGear:
+    """A judge for the CyberGear alone, in Python: its bus is an object with `send`."""
+
+    models = ["CyberGear"]
+    parameters = [row for row in PARAMETERS if row[0] != 0x7028]
+    top = 65_535
+    #: One command and frame in so many: a frame takes it some microseconds.
+    share = 1
+    rule = Rule(False, DOUBLE)
+
+    def __init__(self):
+        self.sent, self.respond = [], None
+        self.motor = self.new(1)
+
+    def ranges(self, _model):
+        owner = self.constants
+        return tuple(float(getattr(owner, f"{name}_MAX")) for name in ("P", "V", "T", "KP", "KD"))
+
+    def take(self, frame):
+        """A frame is sent."""
+        self.sent.append(frame)
+        if self.respond:
+            for answer in self.respond(*frame):
+                self.receive(*answer)
+
+    def encode(self, _model, values):
+        self.sent, control = [], self.control
+        for p, v, kp, kd, t in values.tolist():
+            control(p, v, kp, kd, t)
+        return np.array([(i, *data) for i, data in self.sent], np.uint32)
+
+    def decode(self, _model, frames):
+        found = []
+        for identifier, data in frames:
+            self.receive(identifier & 0xFFFF_FF00 | self.host, data)
+            found.append(self.seen())
+        return np.array(found)
+
+    def frames(self, identifier):
+        self.motor = self.new(identifier)
+        for words, action in (("enable", "enable"), ("disable", "disable"), ("zero", "zero")):
+            self.sent = []
+            self.switch(action)
+            yield [words], self.sent[-1]
+        for index, kind, value in self.parameters:
+            self.sent = []
+            self.write(index, kind, value)
+            yield ["write", str(index), str(value)], self.sent[-1]
+            self.sent = []
+            self.ask(index)
+            yield ["read", str(index)], self.sent[-1]
+        self.motor = self.new(1)
+
+    # The simulated drive
+
+    def start(self, respond):
+        self.respond = respond
+
+    def command(self, values):
+        p, v, kp, kd, t = values
+        self.control(p, v, kp, kd, t)
+
+    def read(self, index, _kind):
+        self.ask(index)
+        return self.found(index)
+
+    def state(self):
+        """Disabling answers with feedback, and so does enabling."""
+        self.switch("enable")
+        return self.seen()[:3]
+
+    def close(self):
+        self.respond, self.sent = None, []
+
+
+class CyberGearDriver(CyberGear):
+    name = "cybergeardriver"
+    share = 2
+    #: Enabling names no host, which is host 0.
+    host = 0
+    #: By their names it writes the limits of the parameter table, with a frame of the maker's tool.
+    parameters = [row for row in CyberGear.parameters if row[0] not in (0x700B, 0x7017, 0x7018)]
+    NAMES = {
+        0x7005: "run_mode",
+        0x7006: "iq_ref",
+        0x700A: "spd_ref",
+        0x7016: "loc_ref",
+    }
+
+    def __init__(self):
+        from CyberGearDriver import constants, motor_controller
+
+        self.constants = constants
+        # It waits after each frame.
+        motor_controller.time = type("Time", (), {"sleep": staticmethod(lambda seconds: None)})
+        self.Motor = motor_controller.CyberGearMotor
+        super().__init__()
+
+    def new(self, identifier):
+        return self.Motor(identifier, lambda m: self.take((m.arbitration_id, bytes(m.data))), self.host)
+
+    def control(self, p, v, kp, kd, t):
+        self.motor.control(p, v, t, kp, kd)
+
+    def receive(self, identifier, data):
+        self.motor.message_received(Message(identifier, data))
+
+    def seen(self):
+        state = self.motor.state
+        return state["position"], state["velocity"], state["torque"], state["temperature"]
+
+    def switch(self, verb):
+        {"enable": self.motor.enable, "disable": self.motor.stop, "zero": self.motor.set_zero_position}[verb]()
+
+    def write(self, index, _kind, value):
+        self.motor.set_parameter(self.NAMES[index], value)
+
+    def ask(self, index):
+        self.motor.request_parameter(self.NAMES[index])
+
+    def found(self, index):
+        return self.motor.params[self.NAMES[index]]
+
+
+class PythonCyberGear(CyberGear):
+    name = "python-cybergear"
+    host = HOST
+    share = 5
+
+    def __init__(self):
+        from cybergear import cybergear
+
+        # A message of python-can takes most of the time.
+        cybergear.logger.disabled = True
+        cybergear.can = type("Can", (), {"Message": Message})
+        self.module, self.Motor = cybergear, cybergear.CyberGearMotor
+        self.constants = self.Motor
+        super().__init__()
+
+    def new(self, identifier):
+        motor = object.__new__(self.Motor)
+        motor.can_id, motor.host_can_id, motor._send_timeout = identifier, self.host, 0
+        motor._bus, motor._feedback = self, self.module.MotorFeedback()
+        motor._parameters, motor._commanded = {}, {}
+        motor._feedback_listeners = motor._parameter_listeners = motor._fault_listeners = []
+        return motor
+
+    def send(self, message, timeout):
+        self.take((message.arbitration_id, bytes(message.data)))
+
+    def control(self, p, v, kp, kd, t):
+        self.motor.motor_control(t, p, v, kp, kd)
+
+    def receive(self, identifier, data):
+        self.motor._on_message_received(Message(identifier, data))
+
+    def seen(self):
+        feedback = self.motor._feedback
+        return feedback.position, feedback.velocity, feedback.torque, feedback.temperature
+
+    def switch(self, verb):
+        motor = self.motor
+        {"enable": motor.enable, "disable": motor.disable, "zero": motor.reset_zero_position}[verb]()
+
+    def write(self, index, _kind, value):
+        name = self.module.ParameterIndex(index).name
+        setattr(self.motor, name, self.module.RunMode(value).name if name == "run_mode" else value)
+
+    def ask(self, index):
+        """It asks for all at once."""
+        self.sent, kept = [], self.sent
+        self.motor._fetch_parameter_list()
+        self.sent = kept + [frame for frame in self.sent if struct.unpack_from("<H", frame[1])[0] == index]
+
+    def found(self, index):
+        return self.motor._parameters[self.module.ParameterIndex(index).name]
 
 
 class RobstrideDynamics:
     """robstride-dynamics, the SDK of the maker, in Python. Its bus is an object with `send` and `recv`."""
 
     name = "robstride-dynamics"
+    share = 1
+    models = [f"RS0{number}" for number in range(7)]
+    parameters = PARAMETERS
+    top = 65_534
     host = 0xFF
     rule = Rule(False, DOUBLE)
 
@@ -210,6 +403,10 @@ class Motorbridge:
     """motorbridge, in Rust as a shared library, over its CAN socket: `socketcan.c` has the other end."""
 
     name = "motorbridge"
+    share = 1
+    models = [f"RS0{number}" for number in range(7)]
+    parameters = PARAMETERS
+    top = 65_534
     host = HOST
     rule = Rule(False, SINGLE)
 
@@ -370,20 +567,22 @@ class Motorbridge:
         self.receive(("RS02", 1))
 
 
-MASTERS = {judge.name: judge for judge in (RobstrideDynamics, Motorbridge)}
+MASTERS = {
+    judge.name: judge for judge in (RobstrideDynamics, Motorbridge, CyberGearDriver, PythonCyberGear)
+}
 
 
 class Trial:
     """A judge and the program."""
 
     def __init__(self, judge, path, defect=None, count=1_000_000, seed=1):
-        self.judge, self.count = judge, count
+        self.judge, self.count, self.is_whole = judge, count // judge.share, count >= 1_000_000
         self.program = Program(path, defect)
         self.random = np.random.default_rng(seed)
         self.models = {
             name: tuple(map(float, ranges[:5]))
             for name, *ranges in self.program.lines("robstride", "models")
-            if name != "CyberGear"
+            if name in judge.models
         }
         self.our_rule = Rule(False, SINGLE)
         self.notes = {}
@@ -414,7 +613,7 @@ class Trial:
 
     def operation(self):
         for place, (model, ranges, exact) in enumerate(self.all_ranges()):
-            ours, theirs = fields_of(ranges), fields_of(exact, True)
+            ours, theirs = fields_of(ranges), fields_of(exact, self.judge.top)
             values = self.values(ours, self.share(place))
             words = [repr(end) for end in ranges]
             data = self.program.run("robstride", "encode", *words, data=values.tobytes())
@@ -434,13 +633,14 @@ class Trial:
                 apart = np.abs(found[:, column].astype(int) - other[:, column])
                 # Truncated, fields of one count less are at most one count apart; so are two precisions.
                 require((apart <= 2).all(), f"{model}: {apart.max()} counts apart")
-                self.note(SPAN if field.lower < 0 else GAINS, (apart > 0).sum())
+                is_short = field.lower < 0 and self.judge.top < 65_535
+                self.note(SPAN if is_short else GAINS, (apart > 0).sum())
         self.nan()
         self.finish("operation", "operation commands")
 
     def nan(self):
         """A command with a field that is no number is rest here."""
-        words = [repr(end) for end in self.models["RS02"]]
+        words = [repr(end) for end in next(iter(self.models.values()))]
         for place in range(5):
             values = np.ones((1, 5), np.float32)
             values[0, place] = np.nan
@@ -458,7 +658,7 @@ class Trial:
         seen = {note for note, times in self.notes.items() if times}
         explained = EXPLAINED[self.judge.name, part]
         require(seen <= explained, f"not explained: {seen - explained}")
-        require(self.count < 1_000_000 or seen == explained, f"no longer there: {explained - seen}")
+        require(not self.is_whole or seen == explained, f"no longer there: {explained - seen}")
         self.note(what, self.count)
 
     def values(self, fields, count):
@@ -525,10 +725,10 @@ class Trial:
             counts = counts[:, ::2] << 8 | counts[:, 1::2]
             for column, end in enumerate(ranges[:3]):
                 # A count of theirs is a 65534th of the range, of ours a 65535th.
-                apart = end * counts[:, column] / (32_767 * 65_535)
+                apart = end * counts[:, column] * (65_535 - self.judge.top) / (32_767 * 65_535)
                 error = np.abs(theirs[:, column] - ours[:, column] - apart)[kept]
                 require((error <= 6e-7 * end).all(), f"{model}: {error.max()} of {end}")
-            self.note(SPAN, 3 * kept.sum())
+            self.note(SPAN, 3 * kept.sum() * (65_535 - self.judge.top))
             cold = data[:, 6] >= 0x80
             shift = np.where(cold & (theirs[:, 3] > 3_276.7), 6_553.6, 0.0)
             error = np.abs(theirs[:, 3] - shift - ours[:, 3])[kept]
@@ -550,7 +750,7 @@ class Trial:
 
     def drive(self):
         """The judge drives the simulated drive."""
-        ranges = self.judge.ranges("RS02")
+        ranges = self.judge.ranges("RS02")  # those of a CyberGear, where the judge has no other
         p, v, t, most_kp, most_kd = ranges
         with self.program.serve("robstride") as wire:
             for drive in (1, 2):
@@ -581,20 +781,25 @@ class Trial:
                 self.judge.switch("disable")
                 wire.ask("step 0.01")
                 require(shaft(wire)[2:4] == [0.0, 0.0], "the drive is disabled")
-                self.judge.write(0x7028, "u32", 2_000)
-                self.judge.switch("enable")
-                wire.ask("step 0.09")
-                require(shaft(wire)[3] == 1, "90 ms after the last command")
-                wire.ask("step 0.02")
-                require(shaft(wire)[3] == 0, "110 ms after the last command")
+                if self.judge.parameters == PARAMETERS:
+                    self.times_out(wire)
                 require(shaft(wire, 2)[:4] == [0.0, 0.0, 0.0, 0.0], "the other drive")
             except (RuntimeError, AssertionError) as error:
                 raise Difference(f"{error!r}") from error
             finally:
                 self.judge.close()
 
+    def times_out(self, wire):
+        """A CyberGear has no time-out."""
+        self.judge.write(0x7028, "u32", 2_000)
+        self.judge.switch("enable")
+        wire.ask("step 0.09")
+        require(shaft(wire)[3] == 1, "90 ms after the last command")
+        wire.ask("step 0.02")
+        require(shaft(wire)[3] == 0, "110 ms after the last command")
+
     def parameters(self, wire):
-        for index, kind, value in PARAMETERS:
+        for index, kind, value in self.judge.parameters:
             self.judge.write(index, kind, value)
             found = self.judge.read(index, kind)
             require(found == value, f"parameter {index:X}: {found}, written {value}")

@@ -35,7 +35,8 @@
 //!
 //! **When the program stops, a RobStride does; a CyberGear does not.** A CyberGear has no time-out for commands, and goes on with its
 //! last command when the cable is cut: with its last torque, or to its last position. Only a loss of the supply ends the motion. Keep
-//! the torque limit low, and have a switch for the supply.
+//! the torque limit low, and have a switch for the supply. The maker's tool lists a time-out (`CAN_TIMEOUT`, 0x200C), but no documented
+//! frame writes it, and a CyberGear did not take the frame for other parameters (python-cybergear 0.1.2).
 //!
 //! ```
 //! use drivetrain::motor::{Devices, ImpedanceControl, Own};
