@@ -8,10 +8,12 @@ use drivetrain::control::PidConfig;
 use drivetrain::encoder::GearRatio;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Devices, ImpedanceControl, Ingest, Own, OwnMotor, VelocityDrive};
-use drivetrain::sim::{DriveShaft, LkDrive, OdriveDrive, RobStrideDrive, VescDrive, VescMotor};
+use drivetrain::sim::{
+    DriveShaft, LkDrive, OdriveDrive, RmdDrive, RobStrideDrive, VescDrive, VescMotor,
+};
 use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::AngularVelocity;
-use drivetrain::{lk, odrive, robstride, vesc};
+use drivetrain::{lk, odrive, rmd, robstride, vesc};
 
 const MOTORS: usize = 8;
 const SPEED: AngularVelocity = AngularVelocity::from_rad_per_s(1.0);
@@ -31,6 +33,21 @@ trait Drive {
 }
 
 impl Drive for LkDrive {
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        Self::hear(self, frame)
+    }
+    fn step(&mut self, dt_s: f32) {
+        Self::step(self, dt_s);
+    }
+    fn shaft(&self) -> &DriveShaft {
+        Self::shaft(self)
+    }
+    fn is_feedback(frame: &CanFrame) -> bool {
+        frame.bytes()[0] == 0xA1
+    }
+}
+
+impl Drive for RmdDrive {
     fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         Self::hear(self, frame)
     }
@@ -218,6 +235,11 @@ pub fn rows() {
     let motors = ids().map(|id| lk::Motor::new(model, id, torque()).unwrap());
     let drives = ids().map(|id| LkDrive::new(id, amperes, model.torque_constant(), 1.0, 16));
     measure(["lk_tick", "lk_ingest"], Group::new(motors, drives));
+
+    let model = rmd::Model::X8_120;
+    let motors = ids().map(|id| rmd::Motor::new(model, id, torque()).unwrap());
+    let drives = ids().map(|id| RmdDrive::new(id, model.torque_constant()));
+    measure(["rmd_tick", "rmd_ingest"], Group::new(motors, drives));
 
     let model = robstride::Model::RS02;
     let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm(), 500.0, 5.0];
