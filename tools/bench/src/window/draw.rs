@@ -206,7 +206,7 @@ fn draw_log(frame: &mut Frame<'_>, area: Rect, view: &View) {
 fn draw_keys(frame: &mut Frame<'_>, area: Rect, ui: &Ui) {
     let (text, style) = match (&ui.input, &ui.hint) {
         (Some(input), hint) => {
-            let hint = hint.as_deref().unwrap_or("Enter sets, Esc leaves");
+            let hint = hint.as_deref().unwrap_or("Enter sets; Space and Esc stop everything");
             (format!("kp,ki,kd: {input}_   {hint}"), Style::new().add_modifier(Modifier::BOLD))
         }
         (None, Some(hint)) => (hint.clone(), Style::new().fg(Color::Yellow)),

@@ -47,7 +47,7 @@ impl Ui {
         self.hint = None;
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
         // From anywhere, also while gains are typed.
-        if key.code == KeyCode::Char(' ') {
+        if matches!(key.code, KeyCode::Char(' ') | KeyCode::Esc) {
             self.input = None;
             return Some(Action::Stop);
         }
@@ -66,8 +66,6 @@ impl Ui {
         let jog =
             |rpm: f32| Some(Action::Jog(motor, AngularVelocity::from_rpm(rpm).as_rad_per_s()));
         match key.code {
-            KeyCode::Esc if self.page == Page::Help => self.page = Page::Motors,
-            KeyCode::Esc => return Some(Action::Stop),
             KeyCode::Char('q') => return Some(Action::Quit),
             KeyCode::Char('A') => return Some(Action::Arm),
             KeyCode::Char('a') => self.hint = Some("Shift-A arms: lift the wheels first".into()),
@@ -90,6 +88,7 @@ impl Ui {
             KeyCode::Char(':') => return Some(Action::Advance(1_000)),
             KeyCode::Char('b') if self.page == Page::Bus => self.page = Page::Motors,
             KeyCode::Char('b') => self.page = Page::Bus,
+            KeyCode::Char('?') if self.page == Page::Help => self.page = Page::Motors,
             KeyCode::Char('?') => self.page = Page::Help,
             KeyCode::Char('g') => {
                 let gains = view.and_then(|view| Some(view.snapshot.motors.get(motor)?.gains));
@@ -105,7 +104,6 @@ impl Ui {
         match code {
             KeyCode::Char(sign) if input.len() < 60 => input.push(sign),
             KeyCode::Backspace => _ = input.pop(),
-            KeyCode::Esc => self.input = None,
             KeyCode::Enter => {
                 let numbers: Result<Vec<f32>, _> =
                     input.split(',').map(|part| part.trim().parse()).collect();
@@ -131,15 +129,18 @@ mod tests {
     }
 
     #[test]
-    fn space_stops_from_anywhere_and_a_small_a_does_not_arm() {
+    fn space_and_esc_stop_from_anywhere_and_a_small_a_does_not_arm() {
         for (page, input) in [
             (Page::Motors, None),
             (Page::Bus, None),
             (Page::Help, None),
             (Page::Motors, Some("1,2,3".to_owned())),
         ] {
-            let mut ui = Ui { page, input, ..Ui::default() };
-            assert_eq!(press(&mut ui, KeyCode::Char(' ')), Some(Action::Stop));
+            for key in [KeyCode::Char(' '), KeyCode::Esc] {
+                let mut ui = Ui { page, input: input.clone(), ..Ui::default() };
+                assert_eq!(press(&mut ui, key), Some(Action::Stop), "{page:?} {key}");
+                assert_eq!((ui.page, ui.input), (page, None), "{key}");
+            }
         }
         let mut ui = Ui::default();
         assert_eq!(press(&mut ui, KeyCode::Char('a')), None);
@@ -157,6 +158,17 @@ mod tests {
         ",0".chars().for_each(|sign| _ = press(&mut ui, KeyCode::Char(sign)));
         assert_eq!(press(&mut ui, KeyCode::Enter), Some(Action::Gains(2, (1.5, 2.0, 0.0))));
         assert_eq!(ui.input, None);
+    }
+
+    #[test]
+    fn a_page_is_left_by_the_key_that_opened_it() {
+        for (key, page) in [('?', Page::Help), ('b', Page::Bus)] {
+            let mut ui = Ui::default();
+            for expected in [page, Page::Motors] {
+                assert_eq!(press(&mut ui, KeyCode::Char(key)), None);
+                assert_eq!(ui.page, expected);
+            }
+        }
     }
 
     #[test]
