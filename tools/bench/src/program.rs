@@ -47,6 +47,13 @@ impl Program {
         }
     }
 
+    /// The speed of this program and `by` rad/s more; from any other program, `by` from a standstill.
+    pub(crate) fn jogged(&self, by: f32) -> Self {
+        let speed = by + if let Self::Speed(speed) = self { *speed } else { 0.0 };
+        // The sum of 10 rpm up and down leaves a rest of rounding.
+        if speed.abs() < 1e-3 { Self::Still } else { Self::Speed(speed) }
+    }
+
     /// Moves on by `dt_s`; takes the measured speed in rad/s and the effort that the motor reports.
     pub(crate) fn step(&mut self, speed: f32, effort: Option<f32>, dt_s: f32) -> Asks {
         let dt_s = if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };

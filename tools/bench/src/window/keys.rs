@@ -61,10 +61,7 @@ impl Ui {
         let motor = self.selected;
         let swing = AngularVelocity::from_rpm(SWING_RPM).as_rad_per_s();
         let factor = if key.modifiers.contains(KeyModifiers::SHIFT) { 10.0 } else { 1.0 };
-        let target =
-            view.and_then(|view| view.snapshot.motors.get(motor)?.target_rpm).unwrap_or(0.0);
-        let jog =
-            |rpm: f32| Some(Action::Jog(motor, AngularVelocity::from_rpm(rpm).as_rad_per_s()));
+        let jog = AngularVelocity::from_rpm(factor * JOG_RPM).as_rad_per_s();
         match key.code {
             KeyCode::Char('q') => return Some(Action::Quit),
             KeyCode::Char('A') => return Some(Action::Arm),
@@ -75,9 +72,9 @@ impl Ui {
             KeyCode::Up | KeyCode::Char('k') => {
                 self.selected = (motor + motors.saturating_sub(1)).checked_rem(motors).unwrap_or(0);
             }
-            KeyCode::Right => return jog(target + factor * JOG_RPM),
-            KeyCode::Left => return jog(target - factor * JOG_RPM),
-            KeyCode::Char('0') => return jog(0.0),
+            KeyCode::Right => return Some(Action::Jog(motor, jog)),
+            KeyCode::Left => return Some(Action::Jog(motor, -jog)),
+            KeyCode::Char('0') => return Some(Action::Still(motor)),
             KeyCode::Char('s') => return Some(Action::Sine(motor, swing)),
             KeyCode::Char('e') => return Some(Action::Steps(motor, swing)),
             KeyCode::Char('t') => return Some(Action::Tune { motor, only_identifies: false }),
@@ -169,6 +166,18 @@ mod tests {
                 assert_eq!(ui.page, expected);
             }
         }
+    }
+
+    // The sum is the session's: a picture is up to 50 ms old, and a press is not.
+    #[test]
+    fn an_arrow_asks_for_a_change_and_not_for_a_speed() {
+        let rpm = |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s();
+        let mut ui = Ui { selected: 1, ..Ui::default() };
+        assert_eq!(press(&mut ui, KeyCode::Right), Some(Action::Jog(1, rpm(10.0))));
+        assert_eq!(press(&mut ui, KeyCode::Left), Some(Action::Jog(1, rpm(-10.0))));
+        let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
+        assert_eq!(ui.press(shifted, None), Some(Action::Jog(1, rpm(100.0))));
+        assert_eq!(press(&mut ui, KeyCode::Char('0')), Some(Action::Still(1)));
     }
 
     #[test]

@@ -29,7 +29,9 @@ pub(crate) enum Action {
     Arm,
     Stop,
     Quit,
+    /// A change of the speed.
     Jog(usize, f32),
+    Still(usize),
     Sine(usize, f32),
     Steps(usize, f32),
     Gains(usize, (f32, f32, f32)),
@@ -90,11 +92,17 @@ impl Remote {
             Action::Alive | Action::Quit => {}
             Action::Arm => session.arm(Some(ARMING)),
             Action::Stop => session.stop(),
-            Action::Jog(motor, rad_per_s) => {
-                let program =
-                    if rad_per_s == 0.0 { Program::Still } else { Program::Speed(rad_per_s) };
+            // A program that waits for the arming would move the motor with it.
+            Action::Jog(..) | Action::Sine(..) | Action::Steps(..) | Action::Tune { .. }
+                if session.stage() != Stage::Armed =>
+            {
+                self.say(session, "arm first: Shift-A".into());
+            }
+            Action::Jog(motor, by) => {
+                let program = session.program(motor).map_or(Program::Still, |now| now.jogged(by));
                 session.start_program(motor, program);
             }
+            Action::Still(motor) => session.start_program(motor, Program::Still),
             Action::Sine(motor, amplitude) => {
                 session.start_program(
                     motor,
@@ -111,9 +119,6 @@ impl Remote {
                     session,
                     set.map_or_else(|error| error, |()| format!("gains: kp {kp} ki {ki} kd {kd}")),
                 );
-            }
-            Action::Tune { .. } if session.stage() != Stage::Armed => {
-                self.say(session, "arm first: the motor moves while it is tuned".into());
             }
             Action::Tune { motor, only_identifies } => {
                 let plan = plan(session, motor, None, only_identifies);
@@ -253,5 +258,89 @@ impl Pilot for Remote {
             self.say(session, message);
         }
         self.picture(session);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::end::End;
+    use crate::link::Simulated;
+    use crate::motors;
+    use crate::pace::Pace;
+    use crate::robot::{Robot, Target};
+    use crate::time::Time;
+    use std::sync::mpsc;
+
+    /// Leads by actions that stand at their ticks; keeps the target of the first motor.
+    struct Script(Remote, u64, Vec<(u64, Action)>, Vec<Option<Target>>);
+
+    impl Pilot for Script {
+        fn goes_on(&mut self, session: &mut Session) -> bool {
+            self.0.goes_on(session)
+        }
+
+        fn ticked(&mut self, session: &mut Session) -> bool {
+            self.1 += 1;
+            for (_, action) in self.2.iter().filter(|(at, _)| *at == self.1) {
+                self.0.act(session, action.clone());
+            }
+            self.3.push(session.target(0));
+            self.0.ticked(session) && self.1 < 2_000
+        }
+
+        fn take_messages(&mut self, session: &mut Session) {
+            self.0.take_messages(session);
+        }
+    }
+
+    /// The targets in rad/s at each tick, and the log.
+    fn run(script: Vec<(u64, Action)>) -> (Vec<Option<f32>>, String) {
+        let specs = motors::parse("m3508:1").unwrap();
+        let link = Link::Simulated(Simulated::new(&specs, 1).unwrap());
+        let robot = Robot::new(&specs, false).unwrap();
+        let mut session = Session::new(robot, link, Pace::Fast(Time::manual()), Vec::new());
+        let (_sender, actions) = mpsc::channel();
+        let remote = Remote::new(&session, actions, Shared::default(), false);
+        let mut script = Script(remote, 0, script, Vec::new());
+        session.run(&End::none(), &mut script);
+        let targets = script.3.into_iter().map(|target| match target? {
+            Target::Velocity(rad_per_s) => Some(rad_per_s),
+            Target::Effort(_) => None,
+        });
+        (targets.collect(), Vec::from(script.0.log).join("\n"))
+    }
+
+    // Each press added to the target of the last picture: of two within 50 ms one was lost.
+    #[test]
+    fn two_presses_between_two_pictures_both_count() {
+        let jogs = [1_000, 1_001, 1_002].map(|at| (at, Action::Jog(0, 1.0)));
+        let (targets, log) = run([(1, Action::Arm)].into_iter().chain(jogs).collect());
+        assert_eq!(targets[998], Some(0.0), "{log}");
+        assert_eq!(targets[1_010], Some(3.0), "{log}");
+    }
+
+    #[test]
+    fn a_jog_after_a_sine_begins_from_a_standstill_and_zero_stops_it() {
+        let (targets, log) = run(vec![
+            (1, Action::Arm),
+            (500, Action::Sine(0, 6.0)),
+            (1_000, Action::Jog(0, 1.0)),
+            (1_500, Action::Still(0)),
+        ]);
+        assert!(targets[900].is_some_and(|target| target > 5.0), "{log}");
+        assert_eq!((targets[1_010], targets[1_510]), (Some(1.0), Some(0.0)), "{log}");
+    }
+
+    #[test]
+    fn nothing_that_is_pressed_before_the_arming_moves_the_motor_with_it() {
+        let (targets, log) = run(vec![
+            (1, Action::Jog(0, 1.0)),
+            (2, Action::Sine(0, 1.0)),
+            (3, Action::Steps(0, 1.0)),
+            (100, Action::Arm),
+        ]);
+        assert!(targets.iter().all(|target| matches!(target, None | Some(0.0))), "{targets:?}");
+        assert_eq!(log.matches("arm first: Shift-A").count(), 3, "{log}");
     }
 }
