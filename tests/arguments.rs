@@ -1,4 +1,4 @@
-//! What a shell does to the examples: arguments that make no sense, and an output that nobody reads.
+//! What a shell does to the examples: arguments that make no sense, an output that nobody reads, and one that a page shows.
 
 #![cfg(test)]
 #![cfg(unix)]
@@ -163,6 +163,26 @@ fn each_example_whose_output_nobody_reads_ends_quietly() {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
         assert!(known.iter().any(|known| known == name), "{name} prints");
     }
+}
+
+/// The first block of text below a heading of a page.
+fn block<'a>(page: &'a str, heading: &str) -> &'a str {
+    let (_, below) = page.split_once(&format!("\n{heading}\n")).unwrap();
+    let (_, begun) = below.split_once("```text\n").unwrap();
+    begun.split_once("```").unwrap().0
+}
+
+// The gains of the page had changed with the simulator, and nobody saw it.
+#[test]
+fn the_page_shows_what_tune_prints() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tools.md");
+    let page = fs::read_to_string(page).unwrap();
+    let plot = std::env::temp_dir().join(format!("tune-{}.svg", std::process::id()));
+    let output = program("tune").arg(&plot).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    fs::remove_file(&plot).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert_eq!(format!("{}plot: {}\n", block(&page, "## Tune"), plot.display()), said);
 }
 
 #[test]
