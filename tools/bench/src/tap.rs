@@ -50,7 +50,7 @@ impl embedded_can::nb::Can for Tap {
         match self.link.send(frame) {
             Taken::Yes => {
                 self.ledger.taken(frame, self.is_driving);
-                self.traffic.note(frame, self.time.read());
+                self.traffic.note(frame, self.time.read(), true);
                 self.record(&text::of(frame), true);
                 Ok(None)
             }
@@ -68,7 +68,7 @@ impl embedded_can::nb::Can for Tap {
                     self.confirmed += 1;
                 }
                 Some(Heard::Frame(frame)) => {
-                    self.traffic.note(&frame, self.time.read());
+                    self.traffic.note(&frame, self.time.read(), false);
                     self.record(&text::of(&frame), false);
                     // The commands in a recording are those of a program like this one, and no second master.
                     if self.link.sends() || !self.traffic.is_command(&frame) {

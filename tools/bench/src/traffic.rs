@@ -15,7 +15,7 @@ const WINDOW: Duration = Duration::from_millis(500);
 /// The bit rate that the load refers to.
 pub(crate) const BITS_PER_S: f32 = 1e6;
 
-/// The frames of one id.
+/// The frames of one id, and of one side: this program, or all others.
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
     pub(crate) frames: u64,
@@ -24,6 +24,8 @@ pub(crate) struct Row {
     /// The motor with this id, or a guess in parentheses.
     pub(crate) owner: String,
     pub(crate) is_known: bool,
+    /// This program sends these frames.
+    pub(crate) is_ours: bool,
     in_window: u32,
 }
 
@@ -31,7 +33,7 @@ pub(crate) struct Row {
 #[derive(Debug)]
 pub(crate) struct Traffic {
     claims: Vec<Claim>,
-    rows: BTreeMap<(bool, u32), Row>,
+    rows: BTreeMap<(bool, u32, bool), Row>,
     window: Option<Instant>,
     bits: u64,
     load: f32,
@@ -42,12 +44,17 @@ impl Traffic {
         Self { claims: claims.collect(), rows: BTreeMap::new(), window: None, bits: 0, load: 0.0 }
     }
 
-    pub(crate) fn note(&mut self, frame: &CanFrame, at: Instant) {
+    pub(crate) fn note(&mut self, frame: &CanFrame, at: Instant, is_ours: bool) {
         self.turn(at);
         self.bits += u64::from(frame_bits(frame));
         let claims = &self.claims;
-        let row = self.rows.entry(key(frame)).or_insert_with(|| {
-            let claim = claims.iter().find(|claim| claim.covers(frame.id()));
+        let (is_extended, id) = key(frame);
+        let row = self.rows.entry((is_extended, id, is_ours)).or_insert_with(|| {
+            // LK and RMD answer with the id of their commands.
+            let likely = if is_ours { Role::Command } else { Role::Feedback };
+            let covers = |claim: &&Claim| claim.covers(frame.id());
+            let mut both = claims.iter().filter(covers);
+            let claim = both.clone().find(|claim| claim.role() == likely).or(both.next());
             let owner = match (claim, guess::of(frame)) {
                 (Some(claim), _) if claim.role() == Role::Command => {
                     format!("commands, {}", claim.motor())
@@ -57,7 +64,7 @@ impl Traffic {
                 (None, None) => "(unknown)".into(),
             };
             let is_known = claim.is_some();
-            Row { frames: 0, rate_hz: 0.0, last: *frame, owner, is_known, in_window: 0 }
+            Row { frames: 0, rate_hz: 0.0, last: *frame, owner, is_known, is_ours, in_window: 0 }
         });
         row.frames += 1;
         row.in_window += 1;
@@ -110,15 +117,19 @@ mod tests {
         let frame = |id| CanFrame::standard(id, [0x55; 8]).unwrap();
         for ms in 0..=1_000 {
             let at = Instant::from_micros(1_000 * ms);
-            traffic.note(&frame(0x201), at);
+            traffic.note(&frame(0x201), at, false);
             if ms % 2 == 0 {
-                traffic.note(&frame(0x7F0), at);
+                traffic.note(&frame(0x7F0), at, ms % 4 == 0);
             }
         }
         let rows: Vec<_> = traffic.rows().collect();
         let owners: Vec<_> = rows.iter().map(|row| row.owner.as_str()).collect();
-        assert_eq!(owners, ["M3508 #1", "(unknown)"]);
-        assert!((rows[0].rate_hz - 1_000.0).abs() < 3.0 && (rows[1].rate_hz - 500.0).abs() < 3.0);
+        assert_eq!(owners, ["M3508 #1", "(unknown)", "(unknown)"]);
+        let sides: Vec<_> = rows.iter().map(|row| row.is_ours).collect();
+        assert_eq!(sides, [false, false, true]);
+        for (row, rate_hz) in rows.iter().zip([1_000.0, 250.0, 250.0]) {
+            assert!((row.rate_hz - rate_hz).abs() < 3.0, "{row:?}");
+        }
         // 1500 frames in a second of 111 bits, without stuff bits, and 3 of the pause.
         assert!((traffic.load() - 0.17).abs() < 0.02, "{}", traffic.load());
     }
