@@ -40,6 +40,7 @@ options
   --seconds S       how long (default: 5); Ctrl-C, Ctrl-Z and a terminal that is gone end it as well, with zeros
   --log FILE        every frame: MCAP if the name ends in .mcap, otherwise the form of candump -L
   --json            a line of JSON for each report
+  --held            the simulator of the window stands, and moves on by the keys . and :
 
 Lift the wheels first, and keep the switch of the battery at hand: nobody sends zeros where this program is killed or halted
 by force, the PC hangs, the adapter is pulled out, or the bus takes no frames. Keep the interface's txqueuelen at 10.
