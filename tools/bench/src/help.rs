@@ -13,7 +13,8 @@ commands
   watch             what the motors report; nothing is sent
   spin              a speed for all motors, or a motion of a mecanum chassis; needs --arm
   tune              gains of the speed loop of each motor, by a relay and a step; needs --arm
-  identify          the same without a change of gains; needs --arm
+  identify          friction, resistance, inertia and delay of each motor by ten seconds of swings, and the gains
+                    that follow; changes none; needs --arm
   record            every frame to --output FILE
   replay FILE       what the motors in a recording reported; --output FILE converts it
   get REGISTER      reads a register of the first motor (Damiao, RobStride)
@@ -31,12 +32,15 @@ options
                     gm6020-current (1 A, once it is switched on in the motor), others at 30 % of their torque; a list of
                     all models is below. All of them have to be there to be armed, and when one is lost all stop
   --arm             send commands; without it nothing is sent
-  --rpm N           speed of every output shaft (default: 0, they hold still); for tune the one about which it swings
+  --rpm N           speed of every output shaft (default: 0, they hold still); for tune the one about which it swings, for
+                    identify the limit (default: 286; of a GM6020 by voltage 134)
   --mecanum X,Y,W   m/s ahead, m/s to the left, rad/s counter-clockwise; needs m3508:1-4 as front right,
                     front left, rear left and rear right
   --geometry R,L,B  radius of the wheels, half of the wheelbase and half of the track in m (default: 0.076,0.2,0.18)
-  --amplitude N     of the relay, in A, V or Nm (default: half of the limit)
+  --amplitude N     of relay and swings, in A, V or Nm (default: half of the limit; of a GM6020 by voltage 0.4, to
+                    identify 0.8)
   --hysteresis N    of the relay, in rad/s (default: 0.5; of a GM6020 by voltage 4)
+  --turns N         the way of identify to either side (default: 16); a joint between stops needs less
   --seconds S       how long (default: 5); Ctrl-C, Ctrl-Z and a terminal that is gone end it as well, with zeros
   --log FILE        every frame: MCAP if the name ends in .mcap, otherwise the form of candump -L
   --json            a line of JSON for each report

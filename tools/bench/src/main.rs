@@ -8,11 +8,13 @@ mod drive;
 mod end;
 mod guess;
 mod help;
+mod identifying;
 mod ledger;
 mod link;
 #[path = "../../../examples/motors/mod.rs"]
 mod motors;
 mod options;
+mod outcome;
 mod outlet;
 mod pace;
 mod program;

@@ -47,6 +47,8 @@ pub(crate) struct Options {
     pub(crate) output: Option<String>,
     pub(crate) amplitude: Option<f32>,
     pub(crate) hysteresis: Option<f32>,
+    /// The way of `identify` to either side.
+    pub(crate) turns: Option<f32>,
     pub(crate) seed: u64,
     /// For tests: a millisecond for each line on standard input, answered by a line.
     pub(crate) lock_step: bool,
@@ -87,6 +89,7 @@ pub(crate) fn parse(arguments: Vec<std::ffi::OsString>) -> Result<Asked, String>
         output: None,
         amplitude: None,
         hysteresis: None,
+        turns: None,
         seed: 1,
         lock_step: false,
         held: false,
@@ -112,6 +115,7 @@ pub(crate) fn parse(arguments: Vec<std::ffi::OsString>) -> Result<Asked, String>
             Long("hysteresis") => {
                 options.hysteresis = Some(above_zero("--hysteresis", &value(&mut parser)?)?);
             }
+            Long("turns") => options.turns = Some(above_zero("--turns", &value(&mut parser)?)?),
             Long("seconds") => {
                 options.seconds = Some(above_zero("--seconds", &value(&mut parser)?)?)
             }
@@ -247,6 +251,7 @@ mod tests {
             ("spin --geometry 1,1,1", "--geometry needs --mecanum"),
             ("spin --rpm NaN", "--rpm NaN: not finite"),
             ("spin --seconds 0", "--seconds 0: not above zero"),
+            ("identify --turns 0", "--turns 0: not above zero"),
             ("spin --mecanum 1,0", "--mecanum takes three numbers"),
             ("spin --motors servo:1", "no model servo"),
             ("dance", "no command dance"),

@@ -1,7 +1,9 @@
-//! What a motor does while it is armed: a speed, a sine, steps, or being tuned.
+//! What a motor does while it is armed: a speed, a sine, steps, or being tuned or identified.
 
+use crate::identifying::Identifying;
+use crate::outcome::{Next, Outcome};
 use crate::robot::Target;
-use crate::tuning::{Next, Outcome, Tuning};
+use crate::tuning::Tuning;
 use std::f32::consts::TAU;
 
 /// What a motor does.
@@ -25,6 +27,7 @@ pub(crate) enum Program {
         passed_s: f32,
     },
     Tune(Box<Tuning>),
+    Identify(Box<Identifying>),
 }
 
 /// What a program asks for in a tick.
@@ -44,6 +47,7 @@ impl Program {
             Self::Sine { .. } => "sine".into(),
             Self::Steps { .. } => "steps".into(),
             Self::Tune(tuning) => format!("tune: {}", tuning.stage()),
+            Self::Identify(identifying) => format!("identify: {}", identifying.stage()),
         }
     }
 
@@ -69,14 +73,25 @@ impl Program {
                 *passed_s = (*passed_s + dt_s) % (2.0 * *half_s);
                 velocity(if *passed_s < *half_s { *height } else { 0.0 })
             }
-            Self::Tune(tuning) => match tuning.step(speed, effort, dt_s) {
-                Next::Ask(target) => Asks::Target(target),
-                Next::Set(gains) => Asks::Gains(gains),
-                Next::Done(outcome) => {
-                    *self = Self::Still;
-                    Asks::Done(outcome)
-                }
-            },
+            Self::Tune(tuning) => {
+                let next = tuning.step(speed, effort, dt_s);
+                self.go_on(next)
+            }
+            Self::Identify(identifying) => {
+                let next = identifying.step(speed, dt_s);
+                self.go_on(next)
+            }
+        }
+    }
+
+    fn go_on(&mut self, next: Next) -> Asks {
+        match next {
+            Next::Ask(target) => Asks::Target(target),
+            Next::Set(gains) => Asks::Gains(gains),
+            Next::Done(outcome) => {
+                *self = Self::Still;
+                Asks::Done(outcome)
+            }
         }
     }
 }

@@ -184,6 +184,15 @@ impl Robot {
         }
     }
 
+    /// The torque in Nm for a unit of effort; `None` for a voltage.
+    pub(crate) fn torque_constant_nm(&self, motor: usize) -> Option<f32> {
+        match self.place(motor)? {
+            Place::Dji(_) if self.unit(motor) == "V" => None,
+            Place::Dji(dji) => Some(dji.facts.torque_constant_nm_per_a),
+            Place::Own(_) => Some(1.0),
+        }
+    }
+
     /// The unit of [`Reading::effort`].
     pub(crate) fn measured_unit(&self, motor: usize) -> &'static str {
         if self.drive(motor).is_some() { "Nm" } else { "A" }

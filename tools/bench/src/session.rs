@@ -5,11 +5,13 @@
 //! link <── tap <────────────────────────── runner <── robot
 //! ```
 
+mod measure;
 mod rest;
 
 use crate::end::End;
 use crate::ledger::Ledger;
 use crate::link::Link;
+use crate::outcome::Outcome;
 use crate::pace::Pace;
 use crate::program::{Asks, Program};
 use crate::record::Recorder;
@@ -17,7 +19,6 @@ use crate::robot::{Robot, Target};
 use crate::tap::Tap;
 use crate::time::Time;
 use crate::traffic::Traffic;
-use crate::tuning::{Outcome, Plan, Tuning};
 use drivetrain::motor::{ArmError, Condition, Devices};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::time::{Duration, Instant, Tick, Ticker};
@@ -155,19 +156,6 @@ impl Session {
         }
     }
 
-    /// Begins to tune a motor, at gentle values.
-    ///
-    /// # Errors
-    /// Names the value that is none.
-    pub(crate) fn start_tuning(&mut self, motor: usize, plan: Plan) -> Result<(), String> {
-        let robot = self.robot();
-        let name = robot.names().nth(motor).map(|name| name.to_string()).unwrap_or_default();
-        let (unit, limit, gains) = (robot.unit(motor), robot.limit(motor), robot.gains(motor));
-        let tuning = Tuning::new(plan, name, unit, limit, gains)?;
-        self.start_program(motor, Program::Tune(Box::new(tuning)));
-        Ok(())
-    }
-
     /// Takes what was said since the last call.
     pub(crate) fn messages(&mut self) -> Vec<String> {
         std::mem::take(&mut self.messages)
@@ -178,7 +166,7 @@ impl Session {
         std::mem::take(&mut self.edges)
     }
 
-    /// Takes what tuning came to.
+    /// Takes the results of tuning and identification.
     pub(crate) fn outcomes(&mut self) -> Vec<Result<Outcome, String>> {
         std::mem::take(&mut self.outcomes)
     }

@@ -1,8 +1,9 @@
 //! Finds gains: a relay makes the motor swing, a rule turns the swing into gains, a step shows what they are worth.
 
+use crate::outcome::{Next, Outcome, TomlRow};
 use crate::robot::Target;
 use drivetrain::control::{PidConfig, RelayTuner, StepResponse, TuningRule};
-use std::fmt::Write;
+use serde_json::{Value, json};
 
 /// The rule that turns a swing into gains.
 const RULE: TuningRule = TuningRule::TyreusLuybenPi;
@@ -26,8 +27,6 @@ pub(crate) struct Plan {
     pub(crate) amplitude: f32,
     /// How far the speed must pass in rad/s before the relay switches: more than its noise.
     pub(crate) hysteresis: f32,
-    /// Leaves the gains as they are, and measures only.
-    pub(crate) only_identifies: bool,
 }
 
 /// What a step showed.
@@ -42,14 +41,14 @@ pub(crate) struct Step {
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Outcome {
+pub(crate) struct Tuned {
     pub(crate) motor: String,
     pub(crate) unit: &'static str,
     pub(crate) limit: f32,
     pub(crate) ultimate_gain: f32,
     pub(crate) ultimate_period_s: f32,
     pub(crate) before: Step,
-    pub(crate) after: Option<Step>,
+    pub(crate) after: Step,
 }
 
 #[derive(Debug)]
@@ -76,18 +75,7 @@ enum Stage {
 pub(crate) struct Tuning {
     plan: Plan,
     stage: Stage,
-    outcome: Outcome,
-    /// The gains by the rule, for whoever runs the loop.
-    found: Option<(f32, f32, f32)>,
-}
-
-/// What comes next.
-#[derive(Debug)]
-pub(crate) enum Next {
-    Ask(Target),
-    /// Set these gains, and go on.
-    Set((f32, f32, f32)),
-    Done(Result<Outcome, String>),
+    outcome: Tuned,
 }
 
 impl Tuning {
@@ -105,17 +93,11 @@ impl Tuning {
         RelayTuner::new(plan.amplitude, plan.hysteresis).map_err(|error| error.to_string())?;
         let before =
             Step { gains, rise_s: None, overshoot: 0.0, settled_s: None, steady_error: 0.0 };
-        let outcome = Outcome {
-            motor,
-            unit,
-            limit,
-            ultimate_gain: 0.0,
-            ultimate_period_s: 0.0,
-            before,
-            after: None,
-        };
+        let after = before;
+        let (ultimate_gain, ultimate_period_s) = (0.0, 0.0);
+        let outcome = Tuned { motor, unit, limit, ultimate_gain, ultimate_period_s, before, after };
         response(&plan)?;
-        Ok(Self { plan, stage: Stage::Rest { left_s: PAUSE_S }, outcome, found: None })
+        Ok(Self { plan, stage: Stage::Rest { left_s: PAUSE_S }, outcome })
     }
 
     /// What is being done, for a person who waits.
@@ -179,12 +161,9 @@ impl Tuning {
                     return Next::Ask(Target::Effort(effort));
                 };
                 (self.outcome.ultimate_gain, self.outcome.ultimate_period_s) = (gain, period_s);
-                if self.plan.only_identifies {
-                    return Next::Done(Ok(self.outcome.clone()));
-                }
-                self.found = Some(RULE.pid(gain, period_s).gains());
+                self.outcome.after.gains = RULE.pid(gain, period_s).gains();
                 self.stage = Stage::Pause { left_s: PAUSE_S };
-                self.found.map_or(Next::Ask(Target::Velocity(0.0)), Next::Set)
+                Next::Set(self.outcome.after.gains)
             }
             Stage::Pause { left_s } => {
                 *left_s -= dt_s;
@@ -199,9 +178,8 @@ impl Tuning {
             Stage::After(response) => {
                 response.record(speed, dt_s);
                 if response.is_complete() {
-                    let gains = self.found.unwrap_or(self.outcome.before.gains);
-                    self.outcome.after = Some(measured(gains, response));
-                    return Next::Done(Ok(self.outcome.clone()));
+                    self.outcome.after = measured(self.outcome.after.gains, response);
+                    return Next::Done(Ok(Outcome::Tuned(self.outcome.clone())));
                 }
                 Next::Ask(Target::Velocity(about))
             }
@@ -223,39 +201,34 @@ fn measured(gains: (f32, f32, f32), response: &StepResponse) -> Step {
     }
 }
 
-impl Outcome {
-    /// The gains that are worth to be kept: those found, or the present ones.
-    fn best(&self) -> &Step {
-        self.after.as_ref().unwrap_or(&self.before)
+impl Tuned {
+    /// The loop with the gains found.
+    pub(crate) fn config(&self) -> PidConfig {
+        let (kp, ki, kd) = self.after.gains;
+        PidConfig::new(kp, ki, kd).with_output_limit(self.limit)
     }
 
-    /// The loop as a line of Rust.
-    pub(crate) fn rust(&self) -> String {
-        let (kp, ki, kd) = self.best().gains;
-        let config = PidConfig::new(kp, ki, kd).with_output_limit(self.limit);
-        let (kp, ki, kd) = config.gains();
-        format!("PidConfig::new({kp:?}, {ki:?}, {kd:?}).with_output_limit({:?})", self.limit)
+    pub(crate) fn rows(&self) -> Vec<TomlRow> {
+        let ((kp, ki, kd), unit) = (self.after.gains, self.unit);
+        vec![
+            ("kp", kp, format!("{unit} per rad/s")),
+            ("ki", ki, format!("{unit} per rad")),
+            ("kd", kd, format!("{unit} per rad/s²")),
+            ("output_limit", self.limit, unit.to_owned()),
+            ("ultimate_gain", self.ultimate_gain, format!("{unit} per rad/s")),
+            ("ultimate_period_s", self.ultimate_period_s, String::new()),
+        ]
     }
 
-    /// All of it as TOML.
-    pub(crate) fn toml(&self) -> String {
-        let mut text = format!("[\"{}\"]\n", self.motor);
-        let (kp, ki, kd) = self.best().gains;
-        let number = |value: f32| format!("{value:?}");
-        let unit = self.unit;
-        let rows = [
-            ("kp", number(kp), format!("{unit} per rad/s")),
-            ("ki", number(ki), format!("{unit} per rad")),
-            ("kd", number(kd), format!("{unit} per rad/s²")),
-            ("output_limit", number(self.limit), unit.to_owned()),
-            ("ultimate_gain", number(self.ultimate_gain), format!("{unit} per rad/s")),
-            ("ultimate_period_s", number(self.ultimate_period_s), String::new()),
-        ];
-        for (key, value, unit) in rows {
-            let comment = if unit.is_empty() { unit } else { format!(" # {unit}") };
-            _ = writeln!(text, "{key} = {value}{comment}");
-        }
-        text
+    pub(crate) fn json(&self) -> Value {
+        json!({
+            "motor": self.motor,
+            "unit": self.unit,
+            "ultimate_gain": self.ultimate_gain,
+            "ultimate_period_s": self.ultimate_period_s,
+            "before": self.before.json(),
+            "after": self.after.json(),
+        })
     }
 
     /// What both steps showed, a line for each.
@@ -268,12 +241,20 @@ impl Outcome {
             1e3 * self.ultimate_period_s
         )];
         lines.push(format!("  before {}", self.before.text()));
-        lines.extend(self.after.map(|after| format!("  after  {}", after.text())));
+        lines.push(format!("  after  {}", self.after.text()));
         lines
     }
 }
 
 impl Step {
+    fn json(&self) -> Value {
+        let (kp, ki, kd) = self.gains;
+        json!({
+            "kp": kp, "ki": ki, "kd": kd, "rise_s": self.rise_s, "overshoot": self.overshoot,
+            "settled_s": self.settled_s, "steady_error_rad_per_s": self.steady_error,
+        })
+    }
+
     fn text(&self) -> String {
         let ms =
             |time_s: Option<f32>| time_s.map_or("never".into(), |s| format!("{:.0} ms", 1e3 * s));

@@ -134,12 +134,19 @@ fn gains_are_a_line_of_rust_and_toml() {
     assert_eq!(bench("tune --motors m3508:1").status.code(), Some(1), "without --arm");
     let said = lines("tune --motors m3508:1 --arm").join("\n");
     assert!(said.contains("PidConfig::new(") && said.contains("[\"M3508 #1\"]\nkp = "), "{said}");
-    let objects = objects("identify --motors damiao4310:1 --arm --json");
-    let outcome = objects.first().unwrap();
-    assert!(
-        outcome["ultimate_gain"].as_f64().unwrap() > 0.0 && outcome["after"].is_null(),
-        "{outcome}"
-    );
+    let found = objects("identify --motors m3508:1 --arm --json").swap_remove(0);
+    let rust = found["rust"].as_str().unwrap();
+    assert!(rust.contains(").with_feed_forward(") && rust.contains(").with_output_limit(6.0)"));
+    let toml = found["toml"].as_str().unwrap();
+    assert!(toml.starts_with("[\"M3508 #1\"]\nkp = "), "{toml}");
+    for row in
+        ["\nks = ", "\nkv = ", "\nka = ", "\ndelay_s = ", "\ninertia_kg_m2 = ", "\nfriction_nm = "]
+    {
+        assert!(toml.contains(row), "{row} is not in {toml}");
+    }
+    assert!(found["delay_s"].as_f64().is_some_and(|delay_s| (0.0..0.005).contains(&delay_s)));
+    // A limit that the motor meets is a failure.
+    assert_eq!(bench("identify --motors m3508:1 --arm --turns 0.001").status.code(), Some(1));
 }
 
 #[test]

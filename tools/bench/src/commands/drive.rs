@@ -1,15 +1,18 @@
 //! Speeds for the motors, and their gains.
 
 use super::{Out, Task};
+use crate::identifying::Limits;
 use crate::options::{Command, Options};
+use crate::outcome::Outcome;
 use crate::program::Program;
 use crate::session::Session;
 use crate::snapshot;
-use crate::tuning::{Outcome, Plan};
+use crate::tuning::Plan;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
 use drivetrain::geometry::Twist;
 use drivetrain::units::AngularVelocity;
 use serde_json::json;
+use std::f32::consts::TAU;
 
 /// How often the state is said, in ticks.
 const REPORT: u64 = 500;
@@ -117,13 +120,8 @@ impl Tune {
     }
 }
 
-/// Gentle values for a motor, where the options name none.
-pub(crate) fn plan(
-    session: &Session,
-    motor: usize,
-    options: Option<&Options>,
-    only_identifies: bool,
-) -> Plan {
+/// Gentle values for a motor that is tuned, where the options name none.
+pub(crate) fn plan(session: &Session, motor: usize, options: Option<&Options>) -> Plan {
     let robot = session.robot();
     let (about, hysteresis, share) =
         if robot.unit(motor) == "V" { (8.0, 4.0, 0.4) } else { (15.0, 0.5, 0.5) };
@@ -134,7 +132,19 @@ pub(crate) fn plan(
             .and_then(|options| options.amplitude)
             .unwrap_or(share * robot.limit(motor)),
         hysteresis: options.and_then(|options| options.hysteresis).unwrap_or(hysteresis),
-        only_identifies,
+    }
+}
+
+/// Gentle limits for a motor that is identified, where the options name none.
+pub(crate) fn limits(session: &Session, motor: usize, options: Option<&Options>) -> Limits {
+    let robot = session.robot();
+    // A voltage of 0.8 of the limit turns a GM6020 without load at some 10 rad/s.
+    let (speed, share) = if robot.unit(motor) == "V" { (14.0, 0.8) } else { (30.0, 0.5) };
+    let rpm = options.and_then(|options| options.rpm);
+    Limits {
+        effort: options.and_then(|options| options.amplitude).unwrap_or(share * robot.limit(motor)),
+        speed: rpm.map_or(speed, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),
+        way: TAU * options.and_then(|options| options.turns).unwrap_or(16.0),
     }
 }
 
@@ -147,7 +157,8 @@ impl Task for Tune {
         for outcome in session.outcomes() {
             match outcome {
                 Ok(outcome) => {
-                    let text = if out.is_json { json(&outcome) } else { text(&outcome) };
+                    let text =
+                        if out.is_json { format!("{}\n", outcome.json()) } else { text(&outcome) };
                     out.say(text);
                     self.outcomes.push(outcome);
                 }
@@ -158,9 +169,14 @@ impl Task for Tune {
         let is_armed = session.stage() == crate::session::Stage::Armed;
         if is_armed && !self.is_busy && self.motor < session.robot().len() {
             self.is_busy = true;
-            let only_identifies = self.options.command == Command::Identify;
-            let plan = plan(session, self.motor, Some(&self.options), only_identifies);
-            if let Err(error) = session.start_tuning(self.motor, plan) {
+            let begun = if self.options.command == Command::Identify {
+                let limits = limits(session, self.motor, Some(&self.options));
+                session.start_identifying(self.motor, limits)
+            } else {
+                let plan = plan(session, self.motor, Some(&self.options));
+                session.start_tuning(self.motor, plan)
+            };
+            if let Err(error) = begun {
                 self.failures.push(error);
                 return false;
             }
@@ -192,25 +208,4 @@ impl Task for Tune {
 fn text(outcome: &Outcome) -> String {
     let lines = outcome.lines().join("\n");
     format!("{lines}\n{}\n\n{}", outcome.rust(), outcome.toml())
-}
-
-fn json(outcome: &Outcome) -> String {
-    let step = |step: &crate::tuning::Step| {
-        let (kp, ki, kd) = step.gains;
-        json!({
-            "kp": kp, "ki": ki, "kd": kd, "rise_s": step.rise_s, "overshoot": step.overshoot,
-            "settled_s": step.settled_s, "steady_error_rad_per_s": step.steady_error,
-        })
-    };
-    let value = json!({
-        "motor": outcome.motor,
-        "unit": outcome.unit,
-        "ultimate_gain": outcome.ultimate_gain,
-        "ultimate_period_s": outcome.ultimate_period_s,
-        "before": step(&outcome.before),
-        "after": outcome.after.as_ref().map(step),
-        "rust": outcome.rust(),
-        "toml": outcome.toml(),
-    });
-    format!("{value}\n")
 }

@@ -1,7 +1,7 @@
 //! The commands without a window.
 
 mod drive;
-pub(crate) use drive::plan;
+pub(crate) use drive::{limits, plan};
 mod look;
 mod setup;
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::identifying::{Identified, Limits};
 use crate::link::Simulated;
 use crate::motors;
 
@@ -180,40 +181,108 @@ fn motors_that_are_not_there_are_named_and_nothing_is_left_behind() {
     assert_eq!(session.messages(), ["not armed: no feedback from M3508 #2"]);
 }
 
+/// Runs a program that measures the first motor until its result.
+fn measured(
+    session: &mut Session,
+    mut begin: impl FnMut(&mut Session) -> Result<(), String>,
+) -> Result<Outcome, String> {
+    let mut outcome = None;
+    driven(session, 1, |session| {
+        if session.stage() == Stage::Armed && matches!(session.program(0), Some(Program::Speed(_)))
+        {
+            begin(session).unwrap();
+        }
+        outcome = session.outcomes().pop();
+        let is_late = session.elapsed() > Duration::from_secs(20);
+        outcome.is_none() && !session.has_failed() && !is_late
+    });
+    outcome.unwrap_or(Err("no outcome".into()))
+}
+
 #[test]
 fn tuning_finds_gains_that_settle_faster() {
     for list in ["m3508:1", "gm6020:1", "damiao4310:1"] {
         let mut session = session(list);
-        let mut outcome = None;
-        driven(&mut session, 1, |session| {
-            if session.stage() == Stage::Armed
-                && matches!(session.program(0), Some(Program::Speed(_)))
-            {
-                let plan = crate::commands::plan(session, 0, None, false);
-                session.start_tuning(0, plan).unwrap();
-            }
-            outcome = session.outcomes().pop();
-            outcome.is_none()
-                && !session.has_failed()
-                && session.elapsed() < Duration::from_secs(20)
+        let outcome = measured(&mut session, |session| {
+            let plan = crate::commands::plan(session, 0, None);
+            session.start_tuning(0, plan)
         });
-        let outcome = outcome
-            .unwrap_or(Err("no outcome".into()))
-            .unwrap_or_else(|error| panic!("{list}: {error}"));
-        let after = outcome.after.unwrap();
-        assert!(
-            outcome.ultimate_period_s > 0.005 && outcome.ultimate_period_s < 0.2,
-            "{outcome:?}"
-        );
-        assert!(after.settled_s.is_some_and(|s| s < 0.6), "{list}: {outcome:?}");
-        assert!(after.overshoot < 0.3 && after.steady_error.abs() < 0.5, "{list}: {outcome:?}");
+        let outcome = outcome.unwrap_or_else(|error| panic!("{list}: {error}"));
+        let (rust, toml) = (outcome.rust(), outcome.toml());
+        assert!(rust.starts_with("PidConfig::new(") && rust.contains(".with_output_limit("));
+        assert!(toml.contains("\nkp = ") && toml.contains("\nultimate_gain = "), "{toml}");
+        let Outcome::Tuned(tuned) = outcome else { panic!("{outcome:?}") };
+        let period_s = tuned.ultimate_period_s;
+        assert!(period_s > 0.005 && period_s < 0.2, "{list}: {tuned:?}");
+        let after = tuned.after;
+        assert!(after.settled_s.is_some_and(|s| s < 0.6), "{list}: {tuned:?}");
+        assert!(after.overshoot < 0.3 && after.steady_error.abs() < 0.5, "{list}: {tuned:?}");
         assert_eq!(session.robot().gains(0), after.gains);
-        let rust = outcome.rust();
-        assert!(
-            rust.starts_with("PidConfig::new(") && rust.contains("with_output_limit("),
-            "{rust}"
-        );
-        assert!(outcome.toml().contains("kp = "));
         assert!(is_at_rest(&mut session));
     }
+}
+
+fn identified(list: &str, change: impl Fn(&mut Limits)) -> (Session, Result<Identified, String>) {
+    let mut session = session(list);
+    let outcome = measured(&mut session, |session| {
+        let mut limits = crate::commands::limits(session, 0, None);
+        change(&mut limits);
+        session.start_identifying(0, limits)
+    });
+    assert!(is_at_rest(&mut session), "{list}");
+    let identified = outcome.map(|outcome| match outcome {
+        Outcome::Identified(identified) => identified,
+        Outcome::Tuned(_) => panic!("{outcome:?}"),
+    });
+    (session, identified)
+}
+
+/// Inertia in kg m² and dry friction in Nm of the simulated shaft, and the resistance in Nm s/rad where it is known.
+#[test]
+fn identification_finds_the_shaft_of_the_simulator_and_a_loop_for_it() {
+    // 3 Nm, 30 % of 10 Nm, bring the shaft of a DM-J4310 to 30 rad/s in half a second.
+    for (list, inertia, friction, resistance) in
+        [("m3508:1", 0.008, 0.12, None), ("damiao4310:1", 3.0 / 60.0, 0.0, Some(3.0 / 300.0))]
+    {
+        let (mut session, identified) = identified(list, |_| {});
+        let identified = identified.unwrap_or_else(|error| panic!("{list}: {error}"));
+        let (found_inertia, found_friction) = identified.mechanism().unwrap();
+        assert!((found_inertia / inertia - 1.0).abs() < 0.05, "{list}: {identified:?}");
+        assert!((found_friction - friction).abs() < 0.01, "{list}: {identified:?}");
+        if let Some(resistance) = resistance {
+            assert!((identified.plant.kv / resistance - 1.0).abs() < 0.1, "{identified:?}");
+        }
+        // The gains stay, and those that were found hold a speed.
+        assert_eq!(session.robot().gains(0), self::session(list).robot().gains(0));
+        session.robot_mut().set_gains(0, identified.speed.gains()).unwrap();
+        let mut reached = 0.0;
+        driven(&mut session, 1_500, |session| {
+            reached = simulated(session).velocity(0);
+            false
+        });
+        assert!((reached - 10.0).abs() < 0.1, "{list}: {reached} rad/s");
+    }
+}
+
+#[test]
+fn identification_that_meets_a_limit_stops_and_says_which() {
+    let (_, fast) = identified("damiao4310:1", |limits| limits.speed = 0.05);
+    assert_eq!(fast.unwrap_err(), "stopped: the speed is beyond its limit");
+    let (_, far) = identified("m3508:1", |limits| limits.way = 0.01);
+    assert_eq!(far.unwrap_err(), "stopped: the way is beyond its limit");
+    let mut session = session("m3508:1");
+    let limits = Limits { effort: 0.0, ..crate::commands::limits(&session, 0, None) };
+    assert!(session.start_identifying(0, limits).unwrap_err().contains("effort_limit"));
+}
+
+#[test]
+fn a_motor_that_is_lost_ends_its_identification() {
+    let mut session = session("m3508:1");
+    let outcome = measured(&mut session, |session| {
+        simulated(session).silence(0, Duration::from_millis(400));
+        let limits = crate::commands::limits(session, 0, None);
+        session.start_identifying(0, limits)
+    });
+    assert_eq!(outcome, Err("no outcome".to_owned()));
+    assert!(session.has_failed() && is_at_rest(&mut session));
 }

@@ -22,7 +22,7 @@ const HELP: [&str; 21] = [
     "e             steps of 60 rpm, each second",
     "g             its gains: kp,ki,kd and Enter; they count at once",
     "t             tune: a step, a relay, gains by a rule, a step",
-    "i             identify: the same without a change of gains",
+    "i             identify: friction, inertia and delay by ten seconds of swings; the gains stay",
     "r             record to session-N.mcap and session-N.log, or end that",
     "b             the ids on the bus, with a guess of those that are unknown",
     "x             the motor falls silent for 1 s (simulator)",

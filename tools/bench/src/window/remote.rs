@@ -2,7 +2,7 @@
 
 use super::Shared;
 use super::view::{LINES, Strip, View};
-use crate::commands::plan;
+use crate::commands::{limits, plan};
 use crate::link::Link;
 use crate::program::Program;
 use crate::record::Recorder;
@@ -35,10 +35,8 @@ pub(crate) enum Action {
     Sine(usize, f32),
     Steps(usize, f32),
     Gains(usize, (f32, f32, f32)),
-    Tune {
-        motor: usize,
-        only_identifies: bool,
-    },
+    Tune(usize),
+    Identify(usize),
     Record,
     /// A fault of the simulator: a motor falls silent.
     Silence(usize),
@@ -93,7 +91,11 @@ impl Remote {
             Action::Arm => session.arm(Some(ARMING)),
             Action::Stop => session.stop(),
             // A program that waits for the arming would move the motor with it.
-            Action::Jog(..) | Action::Sine(..) | Action::Steps(..) | Action::Tune { .. }
+            Action::Jog(..)
+            | Action::Sine(..)
+            | Action::Steps(..)
+            | Action::Tune(_)
+            | Action::Identify(_)
                 if session.stage() != Stage::Armed =>
             {
                 self.say(session, "arm first: Shift-A".into());
@@ -120,11 +122,15 @@ impl Remote {
                     set.map_or_else(|error| error, |()| format!("gains: kp {kp} ki {ki} kd {kd}")),
                 );
             }
-            Action::Tune { motor, only_identifies } => {
-                let plan = plan(session, motor, None, only_identifies);
-                if let Err(error) = session.start_tuning(motor, plan) {
-                    self.say(session, error);
-                }
+            Action::Tune(motor) => {
+                let plan = plan(session, motor, None);
+                let begun = session.start_tuning(motor, plan);
+                self.say_refusal(session, begun);
+            }
+            Action::Identify(motor) => {
+                let limits = limits(session, motor, None);
+                let begun = session.start_identifying(motor, limits);
+                self.say_refusal(session, begun);
             }
             Action::Record => self.record(session),
             Action::Silence(motor) => match &mut session.tap().link {
@@ -173,6 +179,12 @@ impl Remote {
         }
     }
 
+    fn say_refusal(&mut self, session: &Session, outcome: Result<(), String>) {
+        if let Err(error) = outcome {
+            self.say(session, error);
+        }
+    }
+
     /// Takes what the session said.
     fn listen(&mut self, session: &mut Session) {
         for (_, edge) in session.edges() {
@@ -188,7 +200,7 @@ impl Remote {
                     self.say(session, outcome.rust());
                     self.results.push(format!("{}\n{}", outcome.rust(), outcome.toml()));
                 }
-                Err(error) => self.say(session, format!("not tuned: {error}")),
+                Err(error) => self.say(session, format!("not measured: {error}")),
             }
         }
     }
