@@ -7,8 +7,7 @@
 //!
 //! `cargo run --release --example arm [FILE.svg]`
 
-mod arguments;
-mod console;
+mod output;
 
 use drivetrain::damiao::{Model, Motor};
 use drivetrain::error::ConfigError;
@@ -19,6 +18,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::Angle;
+use output::console;
 use plotters::prelude::*;
 use std::error::Error;
 
@@ -186,16 +186,7 @@ fn at(samples: &[Sample], ms: u64) -> Result<&Sample, Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    const USAGE: &str = "usage: arm [FILE.svg]";
-    let mut arguments = arguments::of("arm");
-    let path = arguments.next().unwrap_or_else(|| "arm.svg".into());
-    if ["-h", "--help"].contains(&path.as_str()) {
-        console::line(format_args!("{USAGE}"));
-        return Ok(());
-    }
-    if path.starts_with('-') || arguments.next().is_some() {
-        arguments::refuse("arm", USAGE);
-    }
+    let path = output::path("arm");
     let samples = simulate()?;
     for (what, ms) in [
         ("without compensation", COMPENSATED),

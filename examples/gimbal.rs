@@ -20,6 +20,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Line, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::{Angle, AngularVelocity};
+use lexopt::Arg::{Long, Short, Value};
 use plotters::prelude::*;
 use std::error::Error;
 use std::f32::consts::TAU;
@@ -194,15 +195,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     const USAGE: &str = "usage: gimbal [--fault dead-imu] [FILE.svg]";
     let (mut imu_dies, mut path) = (false, String::from("gimbal.svg"));
     let mut options = arguments::of("gimbal");
-    while let Some(option) = options.next() {
-        match option.as_str() {
-            "--fault" if options.next().as_deref() == Some("dead-imu") => imu_dies = true,
-            file if !file.starts_with('-') => file.clone_into(&mut path),
-            "-h" | "--help" => {
+    loop {
+        match options.next() {
+            Ok(Some(Long("fault"))) => match options.value() {
+                Ok(name) if name == "dead-imu" => imu_dies = true,
+                _ => arguments::refuse("gimbal", USAGE),
+            },
+            Ok(Some(Value(file))) => path = file.to_string_lossy().into_owned(),
+            Ok(Some(Short('h') | Long("help"))) => {
                 console::line(format_args!("{USAGE}"));
                 return Ok(());
             }
-            _ => arguments::refuse("gimbal", USAGE),
+            Ok(None) => break,
+            Ok(Some(_)) | Err(_) => arguments::refuse("gimbal", USAGE),
         }
     }
     let (samples, stale) = drive(imu_dies)?;

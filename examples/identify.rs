@@ -17,7 +17,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity, Current};
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::error::Error;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -44,7 +44,7 @@ struct Sample {
 }
 
 fn main() -> Outcome<()> {
-    let path = picture::path("identify");
+    let path = output::path("identify");
     let mut excitation = Excitation::new(EFFORT, SPEED, WAY)?;
     let mut identification = Identification::new(20.0, 0.2)?;
     let mut samples = Vec::new();

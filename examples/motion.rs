@@ -6,8 +6,7 @@
 //!
 //! `cargo run --release --example motion [FILE.svg]`
 
-mod arguments;
-mod console;
+mod output;
 
 use drivetrain::control::{MotionFollower, MotionLimits, MotionTarget, Motions, ProfileState};
 use drivetrain::damiao::{Model, Motor};
@@ -17,6 +16,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{DamiaoDrive, DriveShaft, Line, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{Angle, AngularVelocity};
+use output::console;
 use plotters::prelude::*;
 use std::error::Error;
 
@@ -173,16 +173,7 @@ fn chassis() -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    const USAGE: &str = "usage: motion [FILE.svg]";
-    let mut arguments = arguments::of("motion");
-    let path = arguments.next().unwrap_or_else(|| "motion.svg".into());
-    if ["-h", "--help"].contains(&path.as_str()) {
-        console::line(format_args!("{USAGE}"));
-        return Ok(());
-    }
-    if path.starts_with('-') || arguments.next().is_some() {
-        arguments::refuse("motion", USAGE);
-    }
+    let path = output::path("motion");
     let samples = simulate()?;
     judge(&samples)?;
     chassis()?;

@@ -15,7 +15,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::error::Error;
 
 /// A per rad/s and A per rad.
@@ -43,7 +43,7 @@ struct Sample {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = picture::path("observer");
+    let path = output::path("observer");
     let samples = drive()?;
     plot(&path, &samples)?;
     judge(&samples)?;

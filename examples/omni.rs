@@ -26,7 +26,7 @@ const DISTANCE_M: f32 = 0.22;
 const SPEED: PidConfig = PidConfig::new(4.0, 10.0, 0.0).with_output_limit(8.0);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = course::output("omni");
+    let path = course::output::path("omni");
     let world = Simulation::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear"], &samples)?;

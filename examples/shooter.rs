@@ -20,7 +20,7 @@ use drivetrain::sim::{Fault, MotorConfig, MotorKey, Simulation};
 use drivetrain::time::{Duration, Instant};
 use drivetrain::units::AngularVelocity;
 use drivetrain::wire::referee::{Referee, encode};
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::error::Error;
 
 const WHEELS: AngularVelocity = AngularVelocity::from_rpm(400.0);
@@ -205,7 +205,7 @@ fn shoot() -> Result<(Vec<Sample>, f32), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = picture::path("shooter");
+    let path = output::path("shooter");
     let (samples, off) = shoot()?;
     let last = samples.last().ok_or("no sample")?;
     let balls_at = |time_s: f32| {

@@ -13,7 +13,7 @@ mod picture;
 use drivetrain::control::state_space::{
     KalmanFilter, LinearQuadraticRegulator, LinearSystem, bryson, diagonal,
 };
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::error::Error;
 
 /// kg, kg, m, m/s².
@@ -63,7 +63,7 @@ fn moved([place, angle, speed, rate]: [f32; 4], force: f32, dt_s: f32) -> [f32; 
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = picture::path("state_space");
+    let path = output::path("state_space");
     let samples = drive()?;
     plot(&path, &samples)?;
     judge(&samples)?;

@@ -48,7 +48,7 @@ type Modules = [ModuleMotors<Motor>; 4];
 type Robot<'w> = Runner<Nb<Controller<'w>>, &'w Simulation, Bus>;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = course::output("swerve");
+    let path = course::output::path("swerve");
     let world = Simulation::new(1);
     let samples = drive(&world)?;
     course::plot(&path, ["front left", "front right", "rear left", "rear right"], &samples)?;

@@ -7,8 +7,7 @@
 //! On a real robot the three steps are the same; lift the wheels off the ground first. The motors here are simulated, and some
 //! of their inertia and friction is an estimate: take the procedure home, not the gains.
 
-mod arguments;
-mod console;
+mod output;
 
 use drivetrain::control::{PidConfig, RelayTuner, StepResponse, TuningRule};
 use drivetrain::dji::{Bus, Config, Gm6020Voltage, Handle, M3508, Model};
@@ -16,6 +15,7 @@ use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::Duration;
 use drivetrain::units::{AngularVelocity, Current, Voltage};
+use output::console;
 use plotters::prelude::*;
 use std::error::Error;
 
@@ -189,16 +189,7 @@ fn plot(path: &str, motors: &[Tuned]) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    const USAGE: &str = "usage: tune [FILE.svg]";
-    let mut arguments = arguments::of("tune");
-    let path = arguments.next().unwrap_or_else(|| "tune.svg".into());
-    if ["-h", "--help"].contains(&path.as_str()) {
-        console::line(format_args!("{USAGE}"));
-        return Ok(());
-    }
-    if path.starts_with('-') || arguments.next().is_some() {
-        arguments::refuse("tune", USAGE);
-    }
+    let path = output::path("tune");
     plot(&path, &[tune(&WHEEL)?, tune(&YAW)?])?;
     console::line(format_args!("plot: {path}"));
     Ok(())

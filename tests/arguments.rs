@@ -33,8 +33,8 @@ fn with_arguments() -> Vec<String> {
     let examples = fs::read_dir(examples()).unwrap().map(|entry| entry.unwrap().path());
     let takes_some = |path: &PathBuf| {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
-        let asks = ["arguments::of", "course::output", "picture::path"]
-            .map(|function| format!("{function}(\"{name}\")"));
+        let asks =
+            ["arguments::of", "output::path"].map(|function| format!("{function}(\"{name}\")"));
         let found = texts(path).iter().any(|text| asks.iter().any(|ask| text.contains(ask)));
         found.then(|| name.to_owned())
     };
@@ -128,6 +128,36 @@ fn a_usage_error_is_said_and_ends_each_example_with_code_2() {
     }
 }
 
+// `--seconds=5` was an unknown option.
+#[test]
+fn an_option_takes_its_value_behind_an_equals_sign_too() {
+    for (name, option, value, said) in [
+        // The range is looked at, and nothing runs.
+        ("chassis", "--seconds", "1", "--seconds 1: not a number from 2 to 600"),
+        ("chassis", "--power-limit", "5", "--power-limit 5: not a number from 10 to 500"),
+        ("snake", "--seconds", "9", "--seconds 9: not from 10 to 600"),
+        ("candump", "--gap", "0", "--gap 0: not a number of milliseconds above 0"),
+        ("candump", "--motors", "m3508:9", "1..=8"),
+        ("gimbal", "--fault", "tired-imu", "usage: "),
+    ] {
+        for arguments in [vec![format!("{option}={value}")], vec![option.into(), value.into()]] {
+            let output = program(name).args(&arguments).output().unwrap();
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{name} {arguments:?}: {error}");
+            assert!(error.contains(said), "{name} {arguments:?}: {error}");
+        }
+    }
+    let plot = std::env::temp_dir().join(format!("seconds-{}.svg", std::process::id()));
+    let run = |seconds: &[&str]| {
+        let output = program("chassis").args(seconds).arg("--output").arg(&plot).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        fs::read_to_string(&plot).unwrap()
+    };
+    let (apart, together) = (run(&["--seconds", "3"]), run(&["--seconds=3"]));
+    fs::remove_file(&plot).unwrap();
+    assert_eq!(apart, together);
+}
+
 #[test]
 fn each_example_with_arguments_says_how_it_is_called() {
     for name in with_arguments() {
@@ -158,7 +188,7 @@ fn each_example_whose_output_nobody_reads_ends_quietly() {
     let rest = fs::read_dir(examples()).unwrap().map(|entry| entry.unwrap().path());
     let prints = rest.filter(|path| texts(path).iter().any(|text| text.contains("console::line")));
     let mut known: Vec<_> = names.map(str::to_owned).into_iter().chain(with_arguments()).collect();
-    known.extend(["arguments", "course", "picture"].map(str::to_owned));
+    known.extend(["arguments", "course", "output", "picture"].map(str::to_owned));
     for path in prints {
         let name = path.file_stem().and_then(OsStr::to_str).unwrap();
         assert!(known.iter().any(|known| known == name), "{name} prints");

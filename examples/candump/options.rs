@@ -1,6 +1,8 @@
 //! What was asked for on the command line.
 
 use drivetrain::time::Duration;
+use lexopt::prelude::*;
+use std::error::Error;
 
 use super::motor::{self, Listener};
 use super::motors;
@@ -39,7 +41,7 @@ pub(crate) enum Asked {
     Help,
 }
 
-pub(crate) fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
+pub(crate) fn parse(mut arguments: lexopt::Parser) -> Result<Asked, Box<dyn Error>> {
     let mut options = Options {
         motors: listeners("m3508:1-8")?,
         show_silent: false,
@@ -48,27 +50,26 @@ pub(crate) fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked
         csv: false,
         file: None,
     };
-    while let Some(argument) = arguments.next() {
-        let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
-        match argument.as_str() {
-            "-h" | "--help" => return Ok(Asked::Help),
-            "--csv" => options.csv = true,
-            "--interface" => options.interface = Some(value()?),
-            "--gap" => {
-                let text = value()?;
+    while let Some(argument) = arguments.next()? {
+        match argument {
+            Short('h') | Long("help") => return Ok(Asked::Help),
+            Long("csv") => options.csv = true,
+            Long("interface") => options.interface = Some(arguments.value()?.string()?),
+            Long("gap") => {
+                let text = arguments.value()?.string()?;
                 let ms = text.parse().ok().filter(|ms| *ms > 0);
                 let ms = ms.ok_or(format!("--gap {text}: not a number of milliseconds above 0"))?;
                 options.gap = Duration::from_millis(ms);
             }
-            "--motors" => {
-                options.motors = listeners(&value()?)?;
+            Long("motors") => {
+                options.motors = listeners(&arguments.value()?.string()?)?;
                 options.show_silent = true;
             }
-            option if option.starts_with('-') && option != "-" => {
-                return Err(format!("no option {option}"));
+            Value(file) if options.file.is_none() => options.file = Some(file.string()?),
+            Value(file) => {
+                return Err(format!("one file at a time: what is {}?", file.string()?).into());
             }
-            file if options.file.is_none() => options.file = Some(file.to_owned()),
-            file => return Err(format!("one file at a time: what is {file}?")),
+            other => return Err(other.unexpected().into()),
         }
     }
     Ok(Asked::Run(options))

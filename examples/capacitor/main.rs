@@ -14,12 +14,12 @@ mod picture;
 mod supply;
 
 use drive::{BUFFER_RESERVE_J, BURST_S, BURST_W, Lost, RESERVE_J, Sample, least, mean};
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::error::Error;
 use supply::{CAPACITOR_J, LIMIT_W};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = picture::path("capacitor");
+    let path = output::path("capacitor");
     let samples = drive::run(true, Lost::default())?;
     plot(&path, &samples)?;
     let calm = drive::run(false, Lost::default())?;

@@ -2,6 +2,9 @@
 
 use super::scenario::Trouble;
 use drivetrain::chassis::ChassisMode;
+use lexopt::prelude::*;
+use std::error::Error;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 pub(crate) const USAGE: &str = "usage: chassis [options]
@@ -45,7 +48,7 @@ pub(crate) enum Request {
 }
 
 impl Options {
-    pub(crate) fn parse(arguments: impl IntoIterator<Item = String>) -> Result<Request, String> {
+    pub(crate) fn parse(mut arguments: lexopt::Parser) -> Result<Request, Box<dyn Error>> {
         let mut options = Self {
             seconds: 10.0,
             output: PathBuf::from("chassis.svg"),
@@ -58,48 +61,40 @@ impl Options {
             mode: None,
             power_limit_w: None,
         };
-        let mut arguments = arguments.into_iter();
-        while let Some(name) = arguments.next() {
-            let mut value = || arguments.next().ok_or_else(|| format!("{name} needs a value"));
-            match name.as_str() {
-                "--help" | "-h" => return Ok(Request::Help),
-                "--seconds" => {
-                    let text = value()?;
-                    let seconds = text.parse::<f32>().ok().filter(|s| (2.0..=600.0).contains(s));
-                    options.seconds = seconds
-                        .ok_or_else(|| format!("--seconds {text}: not a number from 2 to 600"))?;
+        while let Some(argument) = arguments.next()? {
+            match argument {
+                Short('h') | Long("help") => return Ok(Request::Help),
+                Long("seconds") => {
+                    options.seconds = within("--seconds", &mut arguments, 2.0..=600.0)?;
                 }
-                "--output" => options.output = value()?.into(),
-                "--csv" => options.csv = Some(value()?.into()),
-                "--justfloat" => options.justfloat = Some(value()?.into()),
-                "--serial" => options.serial = Some(value()?.into()),
-                "--candump" => options.candump = Some(value()?.into()),
-                "--seed" => {
-                    let text = value()?;
+                Long("output") => options.output = arguments.value()?.into(),
+                Long("csv") => options.csv = Some(arguments.value()?.into()),
+                Long("justfloat") => options.justfloat = Some(arguments.value()?.into()),
+                Long("serial") => options.serial = Some(arguments.value()?.into()),
+                Long("candump") => options.candump = Some(arguments.value()?.into()),
+                Long("seed") => {
+                    let text = arguments.value()?.string()?;
                     options.seed =
                         text.parse().map_err(|_| format!("--seed {text}: not a whole number"))?;
                 }
-                "--fault" => {
-                    let text = value()?;
+                Long("fault") => {
+                    let text = arguments.value()?.string()?;
                     let fault = Trouble::ALL.into_iter().find(|trouble| trouble.name() == text);
                     options.fault =
                         Some(fault.ok_or_else(|| format!("--fault {text}: no such fault"))?);
                 }
-                "--mode" => {
-                    let text = value()?;
+                Long("mode") => {
+                    let text = arguments.value()?.string()?;
                     let mode = MODES.into_iter().find(|(name, _)| *name == text);
                     let (_, mode) = mode.ok_or_else(|| format!("--mode {text}: no such mode"))?;
                     options.mode = Some(mode);
                 }
-                "--power-limit" => {
-                    let text = value()?;
-                    let watts = text.parse::<f32>().ok().filter(|w| (10.0..=500.0).contains(w));
-                    options.power_limit_w = Some(watts.ok_or_else(|| {
-                        format!("--power-limit {text}: not a number from 10 to 500")
-                    })?);
+                Long("power-limit") => {
+                    let watts = within("--power-limit", &mut arguments, 10.0..=500.0)?;
+                    options.power_limit_w = Some(watts);
                     options.mode = options.mode.or(Some(ChassisMode::Independent));
                 }
-                other => return Err(format!("unknown option {other}")),
+                other => return Err(other.unexpected().into()),
             }
         }
         let of_the_square = options.fault.is_some()
@@ -113,4 +108,16 @@ impl Options {
         }
         Ok(Request::Run(options))
     }
+}
+
+/// Reads a number within a range.
+fn within(
+    option: &str,
+    arguments: &mut lexopt::Parser,
+    range: RangeInclusive<f32>,
+) -> Result<f32, Box<dyn Error>> {
+    let text = arguments.value()?.string()?;
+    let value = text.parse().ok().filter(|value| range.contains(value));
+    let (least, most) = (range.start(), range.end());
+    Ok(value.ok_or_else(|| format!("{option} {text}: not a number from {least} to {most}"))?)
 }

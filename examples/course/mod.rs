@@ -1,9 +1,9 @@
 //! What the examples `omni` and `swerve` share: a course to drive, what came of it, and its picture.
 
-#[path = "../arguments/mod.rs"]
-mod arguments;
-#[path = "../console/mod.rs"]
-pub(crate) mod console;
+#[path = "../output/mod.rs"]
+pub(crate) mod output;
+
+pub(crate) use output::console;
 
 use drivetrain::chassis::{Chassis, Kinematics};
 use drivetrain::geometry::{Heading, Pose2, Twist, Vec2, World};
@@ -12,7 +12,6 @@ use drivetrain::units::Angle;
 use plotters::prelude::*;
 use std::error::Error;
 use std::f32::consts::TAU;
-use std::path::Path;
 
 /// A square of 1.5 m, with a turn of the body all the while; ends where it began.
 const SIDE_M: f32 = 1.5;
@@ -130,12 +129,12 @@ const COLORS: [RGBColor; 4] =
 
 /// Draws target (pale) and speed of every wheel, and the path.
 pub(crate) fn plot<const WHEELS: usize>(
-    path: &Path,
+    path: &str,
     names: [&str; WHEELS],
     samples: &[Sample<WHEELS>],
 ) -> Result<(), Box<dyn Error>> {
     // Created first: a path that cannot be written is an error of the file, not of the drawing.
-    std::fs::File::create(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    std::fs::File::create(path).map_err(|error| format!("{path}: {error}"))?;
     let root = SVGBackend::new(path, (1200, 560)).into_drawing_area();
     root.fill(&WHITE)?;
     let (speeds, map) = root.split_horizontally(680);
@@ -184,21 +183,6 @@ pub(crate) fn plot<const WHEELS: usize>(
         chart.draw_series(LineSeries::new(points, color))?;
     }
     root.present()?;
-    console::line(format_args!("plot         {}", path.display()));
+    console::line(format_args!("plot         {path}"));
     Ok(())
-}
-
-/// The only argument: where the picture goes. If there is anything else, says how the example is called, and ends it.
-pub(crate) fn output(example: &str) -> std::path::PathBuf {
-    let mut arguments = arguments::of(example);
-    let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
-    let usage = format!("usage: {example} [FILE.svg]");
-    if ["-h", "--help"].contains(&path.as_str()) {
-        console::line(format_args!("{usage}"));
-        std::process::exit(0);
-    }
-    if path.starts_with('-') || arguments.next().is_some() {
-        arguments::refuse(example, usage);
-    }
-    path.into()
 }

@@ -61,6 +61,7 @@ mod transmit;
 mod vesc_bench;
 
 use case::{Case, Seen};
+use lexopt::Arg::{Long, Short, Value};
 use rows::{Row, TABLE};
 use std::panic::{catch_unwind, set_hook};
 use std::process::ExitCode;
@@ -68,14 +69,25 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     // What fails is told in its row.
     set_hook(Box::new(|_| {}));
-    let wanted: Vec<String> = arguments::of("faults").map(|id| id.to_uppercase()).collect();
-    if wanted.iter().any(|id| ["-H", "--HELP"].contains(&id.as_str())) {
-        console::line(format_args!("usage: faults [ID...]"));
-        return ExitCode::SUCCESS;
+    const USAGE: &str = "usage: faults [ID...]";
+    let (mut arguments, mut wanted) = (arguments::of("faults"), Vec::new());
+    loop {
+        match arguments.next() {
+            Ok(Some(Value(id))) => wanted.push(id.to_string_lossy().to_uppercase()),
+            Ok(Some(Short('h') | Long("help"))) => {
+                console::line(format_args!("{USAGE}"));
+                return ExitCode::SUCCESS;
+            }
+            Ok(None) => break,
+            Ok(Some(other)) => {
+                arguments::refuse("faults", format_args!("{}; {USAGE}", other.unexpected()))
+            }
+            Err(error) => arguments::refuse("faults", format_args!("{error}; {USAGE}")),
+        }
     }
     let rows = rows::rows(TABLE);
     if let Some(id) = wanted.iter().find(|id| rows.iter().all(|row| row.id != **id)) {
-        arguments::refuse("faults", format_args!("no row {id}; usage: faults [ID...]"));
+        arguments::refuse("faults", format_args!("no row {id}; {USAGE}"));
     }
     let (mut held, mut wrong) = (0, 0);
     console::line(format_args!("id  | outcome | ticks to safe | fault | required | observed"));

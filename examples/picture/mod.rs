@@ -1,9 +1,9 @@
 //! Curves over time, one chart below the other, and where the picture goes.
 
-#[path = "../arguments/mod.rs"]
-mod arguments;
-#[path = "../console/mod.rs"]
-pub(crate) mod console;
+#[path = "../output/mod.rs"]
+pub(crate) mod output;
+
+pub(crate) use output::console;
 
 use plotters::prelude::*;
 use std::error::Error;
@@ -11,21 +11,6 @@ use std::error::Error;
 pub(crate) const BLUE: RGBColor = RGBColor(30, 80, 180);
 pub(crate) const RED: RGBColor = RGBColor(200, 60, 40);
 pub(crate) const GREY: RGBColor = RGBColor(160, 160, 160);
-
-/// The only argument: where the picture goes. If there is anything else, says how the example is called, and ends it.
-pub(crate) fn path(example: &str) -> String {
-    let mut arguments = arguments::of(example);
-    let path = arguments.next().unwrap_or_else(|| format!("{example}.svg"));
-    let usage = format!("usage: {example} [FILE.svg]");
-    if ["-h", "--help"].contains(&path.as_str()) {
-        console::line(format_args!("{usage}"));
-        std::process::exit(0);
-    }
-    if path.starts_with('-') || arguments.next().is_some() {
-        arguments::refuse(example, usage);
-    }
-    path
-}
 
 /// A curve: its colour, and its value of a sample.
 pub(crate) type Curve<S> = (RGBColor, fn(&S) -> f32);

@@ -1,7 +1,10 @@
 //! The command line.
 
 use super::system::simulation::{Setup, Trouble};
+use lexopt::prelude::*;
+use std::error::Error;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 pub(crate) const USAGE: &str = "usage: snake [options]
   --seconds S       seconds, 10 to 600 (default 10); with --host and --robot 3 to 600
@@ -34,42 +37,41 @@ impl Options {
         Setup { seconds: self.seconds, seed: self.seed, trouble: self.fault }
     }
 
-    pub(crate) fn parse(arguments: impl IntoIterator<Item = String>) -> Result<Request, String> {
+    pub(crate) fn parse(mut arguments: lexopt::Parser) -> Result<Request, Box<dyn Error>> {
         let mut options =
             Self { seconds: 10.0, output: PathBuf::from("snake.svg"), seed: 1, fault: None };
         let (mut robot, mut host) = (None, None);
-        let mut arguments = arguments.into_iter();
-        while let Some(name) = arguments.next() {
-            let mut value = || arguments.next().ok_or_else(|| format!("{name} needs a value"));
-            match name.as_str() {
-                "--help" | "-h" => return Ok(Request::Help),
-                "--seconds" => options.seconds = number(&name, &value()?)?,
-                "--seed" => options.seed = number(&name, &value()?)?,
-                "--robot" => robot = Some(number(&name, &value()?)?),
-                "--host" => host = Some(number(&name, &value()?)?),
-                "--output" => options.output = value()?.into(),
-                "--fault" => {
-                    let text = value()?;
+        while let Some(argument) = arguments.next()? {
+            match argument {
+                Short('h') | Long("help") => return Ok(Request::Help),
+                Long("seconds") => options.seconds = number("--seconds", &mut arguments)?,
+                Long("seed") => options.seed = number("--seed", &mut arguments)?,
+                Long("robot") => robot = Some(number("--robot", &mut arguments)?),
+                Long("host") => host = Some(number("--host", &mut arguments)?),
+                Long("output") => options.output = arguments.value()?.into(),
+                Long("fault") => {
+                    let text = arguments.value()?.string()?;
                     let fault = Trouble::ALL.into_iter().find(|trouble| trouble.name() == text);
                     options.fault =
                         Some(fault.ok_or_else(|| format!("--fault {text}: no such fault"))?);
                 }
-                other => return Err(format!("unknown option {other}")),
+                other => return Err(other.unexpected().into()),
             }
         }
         let shortest = if robot.or(host).is_some() { 3.0 } else { 10.0 };
         if !(shortest..=600.0).contains(&options.seconds) {
-            return Err(format!("--seconds {}: not from {shortest} to 600", options.seconds));
+            return Err(format!("--seconds {}: not from {shortest} to 600", options.seconds).into());
         }
         match (robot, host) {
             (None, None) => Ok(Request::Run(options)),
             (Some(port), None) => Ok(Request::Robot(port, options)),
             (None, Some(port)) => Ok(Request::Host(port, options)),
-            (Some(_), Some(_)) => Err("--robot and --host are two processes".to_owned()),
+            (Some(_), Some(_)) => Err("--robot and --host are two processes".into()),
         }
     }
 }
 
-fn number<N: std::str::FromStr>(name: &str, text: &str) -> Result<N, String> {
-    text.parse().map_err(|_| format!("{name} {text}: not such a number"))
+fn number<N: FromStr>(option: &str, arguments: &mut lexopt::Parser) -> Result<N, Box<dyn Error>> {
+    let text = arguments.value()?.string()?;
+    Ok(text.parse().map_err(|_| format!("{option} {text}: not such a number"))?)
 }

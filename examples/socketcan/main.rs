@@ -27,17 +27,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     use drivetrain::runner::{Nb, Runner};
     use drivetrain::time::{Duration, Instant};
     use drivetrain::units::AngularVelocity;
+    use lexopt::Arg::{Long, Short, Value};
     use socketcan::{CanSocket, Socket};
 
     const USAGE: &str = "usage: socketcan INTERFACE";
-    let interface = match arguments::of("socketcan").collect::<Vec<_>>().as_slice() {
-        [help] if help == "-h" || help == "--help" => {
+    let mut arguments = arguments::of("socketcan");
+    let interface = match arguments.next() {
+        Ok(Some(Value(interface))) => interface.to_string_lossy().into_owned(),
+        Ok(Some(Short('h') | Long("help"))) => {
             console::line(format_args!("{USAGE}"));
             return Ok(());
         }
-        [interface] if !interface.starts_with('-') => interface.clone(),
         _ => arguments::refuse("socketcan", USAGE),
     };
+    if !matches!(arguments.next(), Ok(None)) {
+        arguments::refuse("socketcan", USAGE);
+    }
     let end = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     for signal in
         [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP]
