@@ -1,13 +1,13 @@
 const KNOBS = ["switch", "ahead", "left", "turn", "kp", "ki", "delay", "loss"];
 const TROUBLES = ["plug", "silence", "second-master", "bus-off", "block"];
-const LAYOUTS = ["mecanum", "omni", "differential"];
+const LAYOUTS = ["mecanum", "omni", "differential"], WATCHDOGS = ["program", "both"];
 const SLICE_MS = 10;
 const $ = (id) => document.getElementById(id);
 const bytes = Uint8Array.from(atob(WASM), (c) => c.charCodeAt(0));
 const compiled = WebAssembly.compile(bytes);
 let language = (navigator.language || "en").startsWith("zh") ? "zh" : "en";
 let robot, samples, trail, wasArmed, clock;
-const setup = { layout: "mecanum", mass: 20, seed: 1 }, live = { kp: 4, ki: 24, delay: 0, loss: 0, speed: 1 };
+const setup = { layout: "mecanum", mass: 20, seed: 1, watchdogs: "program" }, live = { kp: 4, ki: 24, delay: 0, loss: 0, speed: 1 };
 const held = new Map();
 
 // A robot is a copy of the module: a new one has a memory of its own.
@@ -16,7 +16,7 @@ async function newRobot() {
   const text = (place) => place ? new TextDecoder().decode(new Uint8Array(exports.memory.buffer, place, exports.text_length())) : "";
   return {
     ...exports,
-    why: text(exports.start(setup.seed, LAYOUTS.indexOf(setup.layout), setup.mass, live.kp, live.ki)),
+    why: text(exports.start(setup.seed, LAYOUTS.indexOf(setup.layout), setup.mass, live.kp, live.ki, WATCHDOGS.indexOf(setup.watchdogs))),
     set: (knob, value) => exports.set(KNOBS.indexOf(knob), value),
     log: () => text(exports.take_log()), frames: () => text(exports.frames()), script: () => text(exports.script()),
     hash: () => BigInt.asUintN(64, exports.hash()).toString(16).padStart(16, "0"),
@@ -91,11 +91,16 @@ function show() {
   drawChart($("currents"), samples, t.current, [{ name: "current" }]);
 }
 
-// How fast this machine is: one second of a robot that nobody drives, in a copy of its own.
+// How fast this machine is: the best fifth of a second of a robot that nobody drives, in a copy of its own.
 async function pace() {
-  const other = await newRobot(), start = performance.now();
-  other.advance(1000);
-  const times = Math.round(1000 / (performance.now() - start));
+  const other = await newRobot();
+  let least = Infinity;
+  for (let i = 0; i < 5; i++) {
+    const start = performance.now();
+    other.advance(200);
+    least = Math.min(least, performance.now() - start);
+  }
+  const times = Math.round(200 / least);
   document.body.dataset.pace = times;
   $("pace").textContent = TEXTS[language].pace(times);
 }
@@ -110,11 +115,21 @@ function slider(parent, name, values, object, [least, most, by], change) {
   parent.append(label);
 }
 
+// A choice starts a new robot.
+function choice(parent, name, values) {
+  const label = document.createElement("label"), text = document.createElement("span"), select = document.createElement("select");
+  text.dataset.text = name; select.id = name;
+  for (const value of values) select.append(Object.assign(document.createElement("option"), { value }));
+  select.addEventListener("change", () => { setup[name] = select.value; restart(); });
+  label.append(text, select);
+  parent.append(label);
+}
+
 function translate() {
   document.documentElement.lang = language;
   for (const element of document.querySelectorAll("[data-text]")) element.textContent = TEXTS[language][element.dataset.text];
   for (const element of document.querySelectorAll("[data-trouble]")) element.textContent = TEXTS[language].trouble[element.dataset.trouble];
-  for (const option of document.querySelectorAll("#layout option")) option.textContent = TEXTS[language].layouts[option.value];
+  for (const option of document.querySelectorAll("option")) option.textContent = TEXTS[language].choices[option.value];
   $("language").textContent = TEXTS[language].language;
   $("switch").textContent = TEXTS[language][$("switch").getAttribute("aria-pressed") === "true" ? "switch_on" : "switch_off"];
   if (document.body.dataset.pace) $("pace").textContent = TEXTS[language].pace(document.body.dataset.pace);
@@ -138,12 +153,8 @@ function build() {
   slider(knobs, "ki", "ki", live, [0, 60, 1], () => robot?.set("ki", live.ki));
   slider(knobs, "delay", "delay", live, [0, 12, 1], () => robot?.set("delay", live.delay));
   slider(knobs, "loss", "loss", live, [0, 60, 1], () => robot?.set("loss", live.loss / 100));
-  const label = document.createElement("label"), text = document.createElement("span"), select = document.createElement("select");
-  text.dataset.text = "layout"; select.id = "layout";
-  for (const layout of LAYOUTS) select.append(Object.assign(document.createElement("option"), { value: layout }));
-  select.addEventListener("change", () => { setup.layout = select.value; restart(); });
-  label.append(text, select);
-  $("setup").append(label);
+  choice($("troubles"), "watchdogs", WATCHDOGS);
+  choice($("setup"), "layout", LAYOUTS);
   slider($("setup"), "mass", "mass", setup, [5, 40, 1], restart);
   slider($("setup"), "seed", "seed", setup, [1, 100, 1], restart);
   $("switch").addEventListener("click", () => setSwitch($("switch").getAttribute("aria-pressed") !== "true"));

@@ -16,5 +16,5 @@ mod session;
 mod snapshot;
 pub mod tour;
 
-pub use robot::Layout;
+pub use robot::{Layout, Watchdogs};
 pub use session::{Knob, Session, Setup, Trouble};

@@ -7,7 +7,7 @@
     reason = "`unsafe(no_mangle)` gives a function the name that JavaScript calls"
 )]
 
-use crate::{Knob, Layout, Session, Setup, Trouble, tour};
+use crate::{Knob, Layout, Session, Setup, Trouble, Watchdogs, tour};
 use std::cell::RefCell;
 
 thread_local! {
@@ -29,9 +29,17 @@ fn leave(text: String) -> *const u8 {
 
 /// Starts a robot; 0, or the reason why it does not start, as a text.
 #[unsafe(no_mangle)]
-extern "C" fn start(seed: u32, layout: usize, mass_kg: f32, kp: f32, ki: f32) -> *const u8 {
+extern "C" fn start(
+    seed: u32,
+    layout: usize,
+    mass_kg: f32,
+    kp: f32,
+    ki: f32,
+    watchdogs: usize,
+) -> *const u8 {
     let layout = Layout::ALL.get(layout).map_or(Layout::Mecanum, |(_, layout)| *layout);
-    match Session::new(Setup { seed, layout, mass_kg, kp, ki }) {
+    let watchdogs = Watchdogs::ALL.get(watchdogs).map_or(Watchdogs::Program, |(_, one)| *one);
+    match Session::new(Setup { seed, layout, mass_kg, kp, ki, watchdogs }) {
         Ok(session) => {
             SESSION.set(Some(session));
             std::ptr::null()

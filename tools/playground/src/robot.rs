@@ -11,7 +11,7 @@ use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::motor::{ArmError, Edge, Link};
 use drivetrain::runner::{Nb, Runner};
 use drivetrain::sim::{ChassisConfig, MotorConfig, MotorKey, Simulation, Wheel};
-use drivetrain::time::{Instant, Tick};
+use drivetrain::time::{Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use std::error::Error;
 
@@ -42,6 +42,31 @@ impl Layout {
 
     pub(crate) fn of_word(word: &str) -> Option<Self> {
         Self::ALL.iter().find(|(one, _)| *one == word).map(|(_, layout)| *layout)
+    }
+
+    pub(crate) fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, one)| *one == self).map_or("", |(word, _)| word)
+    }
+}
+
+/// Age of the last command at which the motors of [`Watchdogs::Both`] stop.
+const MOTOR_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// What stops the motors when frames do not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Watchdogs {
+    /// The program stops them 10 ms after their last feedback; a motor stops 50 ms after its last command.
+    Both,
+    /// The program alone: a motor keeps its last command. DJI does not say what its ESCs do; this is the worst case.
+    Program,
+}
+
+impl Watchdogs {
+    /// All of them, with the word of a script for each.
+    pub const ALL: [(&'static str, Self); 2] = [("program", Self::Program), ("both", Self::Both)];
+
+    pub(crate) fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(one, _)| *one == word).map(|(_, watchdogs)| *watchdogs)
     }
 
     pub(crate) fn word(self) -> &'static str {
@@ -92,8 +117,10 @@ pub(crate) fn build(
     can: Delayed,
     mass_kg: f32,
     speed: PidConfig,
+    watchdogs: Watchdogs,
 ) -> Result<Built, Box<dyn Error>> {
-    let mut parts = Parts { world, bus: Bus::new(), floor: Vec::new(), keys: Vec::new(), speed };
+    let bus = Bus::new();
+    let mut parts = Parts { world, bus, floor: Vec::new(), keys: Vec::new(), speed, watchdogs };
     let robot: Box<dyn Robot> = match layout {
         Layout::Mecanum => {
             let place = |x: f32, y: f32| Vec2::new(x * CORNER.x, y * CORNER.y);
@@ -136,6 +163,7 @@ struct Parts {
     floor: Vec<Wheel>,
     keys: Vec<MotorKey>,
     speed: PidConfig,
+    watchdogs: Watchdogs,
 }
 
 impl Parts {
@@ -146,7 +174,12 @@ impl Parts {
         reversed: bool,
         stand: impl FnOnce(MotorKey) -> Wheel,
     ) -> Result<Handle<M3508>, Box<dyn Error>> {
-        let key = self.world.attach(MotorConfig::m3508(id))?;
+        let motor = MotorConfig::m3508(id);
+        let motor = match self.watchdogs {
+            Watchdogs::Both => motor.with_command_timeout(MOTOR_TIMEOUT),
+            Watchdogs::Program => motor,
+        };
+        let key = self.world.attach(motor)?;
         let wheel = stand(key);
         self.floor.push(if reversed { wheel.reversed() } else { wheel });
         self.keys.push(key);

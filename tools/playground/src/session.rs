@@ -1,7 +1,7 @@
 //! One robot in its world: knobs, faults, time.
 
 use crate::delay::Delayed;
-use crate::robot::{self, Layout, Pilot, Robot};
+use crate::robot::{self, Layout, Pilot, Robot, Watchdogs};
 use crate::snapshot::{self, Frames};
 use drivetrain::control::PidConfig;
 use drivetrain::frame::CanFrame;
@@ -33,6 +33,8 @@ pub struct Setup {
     pub kp: f32,
     /// Integral gain of each wheel in A per rad.
     pub ki: f32,
+    /// What stops the motors when frames do not come.
+    pub watchdogs: Watchdogs,
 }
 
 /// What a hand may turn while the robot runs.
@@ -122,7 +124,8 @@ impl Session {
         let delay = Rc::new(Cell::new(Duration::ZERO));
         let can = Delayed::new(world.controller(), world, Rc::clone(&delay));
         let speed = PidConfig::new(setup.kp, setup.ki, 0.0);
-        let (robot, keys) = robot::build(setup.layout, world, can, setup.mass_kg, speed)?;
+        let (robot, keys) =
+            robot::build(setup.layout, world, can, setup.mass_kg, speed, setup.watchdogs)?;
         Ok(Self {
             world,
             robot,
@@ -280,10 +283,11 @@ impl Session {
 
     /// Returns what was done so far, as a script that [`tour`](crate::tour) reads.
     pub fn script(&self) -> String {
-        let Setup { seed, layout, mass_kg, kp, ki } = self.setup;
+        let Setup { seed, layout, mass_kg, kp, ki, watchdogs } = self.setup;
         format!(
-            "start {seed} {} {mass_kg} {kp} {ki}\n{}{} end\n",
+            "start {seed} {} {mass_kg} {kp} {ki} {}\n{}{} end\n",
             layout.word(),
+            watchdogs.word(),
             self.script,
             self.millis()
         )
@@ -309,4 +313,64 @@ impl Session {
 
 const fn phase(began: bool) -> &'static str {
     if began { "began" } else { "ended" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn driving(watchdogs: Watchdogs) -> Session {
+        let setup =
+            Setup { seed: 1, layout: Layout::Mecanum, mass_kg: 20.0, kp: 4.0, ki: 24.0, watchdogs };
+        let mut session = Session::new(setup).unwrap();
+        session.advance(20);
+        session.set(Knob::Switch, 1.0);
+        session.advance(20);
+        session.set(Knob::Ahead, 1.0);
+        session.advance(1_500);
+        assert!(session.is_armed() && speed(&mut session) > 0.95);
+        session
+    }
+
+    /// Of the robot, in m/s.
+    fn speed(session: &mut Session) -> f32 {
+        let x = |session: &Session| session.numbers().get(1).copied().unwrap();
+        let before = x(session);
+        session.advance(100);
+        (x(session) - before) / 0.1
+    }
+
+    #[test]
+    fn without_a_plug_only_motors_with_a_watchdog_let_the_robot_stop() {
+        for (watchdogs, stops) in [(Watchdogs::Both, true), (Watchdogs::Program, false)] {
+            let mut session = driving(watchdogs);
+            session.trouble(Trouble::Plug, true);
+            session.set(Knob::Ahead, 0.0);
+            session.advance(5_000);
+            let speed = speed(&mut session);
+            assert_eq!(speed < 0.01, stops, "{watchdogs:?}: {speed} m/s");
+        }
+    }
+
+    #[test]
+    fn with_its_plug_back_the_robot_stops_and_waits_for_the_switch() {
+        for (_, watchdogs) in Watchdogs::ALL {
+            let mut session = driving(watchdogs);
+            session.trouble(Trouble::Plug, true);
+            session.advance(500);
+            session.trouble(Trouble::Plug, false);
+            session.advance(6_000);
+            assert!(!session.is_armed() && speed(&mut session) < 0.01, "{watchdogs:?}");
+        }
+    }
+
+    #[test]
+    fn the_script_of_a_run_gives_its_frames() {
+        let mut session = driving(Watchdogs::Both);
+        session.trouble(Trouble::Silence, true);
+        session.advance(300);
+        let again = crate::tour::run(&session.script()).unwrap();
+        assert_eq!((again.hash(), again.millis()), (session.hash(), session.millis()));
+        assert!(crate::tour::run("start 7 mecanum 20 4 24 some\n").is_err());
+    }
 }

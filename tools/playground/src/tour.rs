@@ -1,12 +1,12 @@
 //! A run that is written down: what a hand does, and when.
 //!
 //! ```text
-//! start SEED LAYOUT MASS_KG KP KI
+//! start SEED LAYOUT MASS_KG KP KI WATCHDOGS
 //! MS WORD VALUE        a knob or a trouble, in the order of time
 //! MS end
 //! ```
 
-use crate::robot::Layout;
+use crate::robot::{Layout, Watchdogs};
 use crate::session::{Knob, Session, Setup, Trouble};
 
 /// The run whose hash page and native program compare: drives, turns gains, and goes through every trouble.
@@ -37,7 +37,8 @@ fn setup(line: &str) -> Option<Setup> {
     let layout = Layout::of_word(words.next()?)?;
     let [mass_kg, kp, ki] =
         [words.next()?, words.next()?, words.next()?].map(|word| word.parse().ok());
-    is_start.then_some(Setup { seed, layout, mass_kg: mass_kg?, kp: kp?, ki: ki? })
+    let watchdogs = Watchdogs::of_word(words.next()?)?;
+    is_start.then_some(Setup { seed, layout, mass_kg: mass_kg?, kp: kp?, ki: ki?, watchdogs })
 }
 
 fn act(session: &mut Session, line: &str) -> Option<()> {
