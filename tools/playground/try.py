@@ -53,6 +53,19 @@ class Browser:
         keys = [{"type": kind, "value": value} for kind, value in actions]
         self.call("POST", "/actions", {"actions": [{"type": "key", "id": "keyboard", "actions": keys}]})
 
+    def pointer(self, *actions):
+        """Moves go to a place in px from the middle of an element, or of the last one; buttons are the first."""
+        mouse = [{"button": 0, "duration": 50, **action} for action in actions]
+        self.call("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": mouse}]})
+
+    def over(self, selector, x=0):
+        element = self.call("POST", "/element", {"using": "css selector", "value": selector})
+        return {"type": "pointerMove", "origin": element, "x": x, "y": 0}
+
+    def choose(self, selector, value):
+        self.run(f"window.before = robot; const choice = document.querySelector({json.dumps(selector)}); choice.value = {json.dumps(value)}; choice.dispatchEvent(new Event('change'))")
+        self.until(f"a new robot, {value}", lambda: self.run("return robot !== window.before"))
+
     def until(self, what, holds):
         end = time.monotonic() + PATIENCE_S
         while not holds():
@@ -108,7 +121,9 @@ def browse(browser, url, native, picture):
     browser.until("a second master in the log", lambda: "second master" in browser.text("#log"))
     browser.click("[data-trouble=second-master]")
 
-    browser.run("const layout = document.querySelector('#layout'); layout.value = 'omni'; layout.dispatchEvent(new Event('change'))")
+    hands(browser)
+    watchdogs(browser)
+    browser.choose("#layout", "omni")
     browser.until("three omni wheels", lambda: browser.run("return samples.length > 5 && samples.at(-1).wheels.length === 3"))
 
     browser.click("#tour")
@@ -122,10 +137,56 @@ def browse(browser, url, native, picture):
     browser.click("#language")
     browser.until("Chinese", lambda: browser.text("#switch").startswith("开关"))
     browser.until("how fast it is", lambda: browser.run("return Boolean(document.body.dataset.pace)"))
-    print(f"pace: {browser.run('return document.body.dataset.pace')} times real time")
+    print(f"pace: {browser.run('return document.body.dataset.pace')} times real time in this browser")
     errors = [entry["message"] for entry in browser.call("POST", "/se/log", {"type": "browser"}) if entry["level"] == "SEVERE"]
     if errors:
         raise SystemExit("playground: the browser reports\n" + "\n".join(errors))
+
+
+def hands(browser):
+    """A slider is drawn, and a button is held, by a pointer."""
+    down, up = {"type": "pointerDown"}, {"type": "pointerUp"}
+    width = browser.run("return document.querySelector('#knob-speed').clientWidth")
+    browser.pointer(browser.over("#knob-speed"), down, browser.over("#knob-speed", -width // 2 + 12), up)
+    slow = float(browser.run("return document.querySelector('#knob-speed').value"))
+    if not 0.1 <= slow <= 0.4:
+        raise SystemExit(f"playground: the slider was drawn to its left end, and says {slow} m/s")
+    browser.choose("#layout", "differential")
+    arm(browser)
+    target = lambda: browser.run("return samples.length ? samples.at(-1).wheels[0].target * 0.076 : 0")
+    browser.pointer(browser.over("[data-drive='ahead:1']"), down)
+    browser.until(f"a robot that a pointer drives at {slow} m/s", lambda: abs(target() - slow) < 0.02)
+    browser.pointer(up)
+    browser.until("a robot that stops when the pointer lets go", lambda: target() == 0)
+    browser.pointer(browser.over("#knob-speed"), down, up)
+    browser.choose("#layout", "mecanum")
+
+
+def arm(browser):
+    browser.until("feedback", lambda: browser.run("return samples.length > 5"))
+    browser.click("#switch")
+    browser.until("an armed robot", lambda: browser.text("#status").startswith("armed"))
+
+
+def watchdogs(browser):
+    """A plug is pulled while the robot drives, and the keys are let go: only motors with a watchdog let the robot stop."""
+    moved = "const [a, b] = [samples.at(-51), samples.at(-1)]; return a ? Math.hypot(b.x - a.x, b.y - a.y) / (b.time - a.time) : -1"
+    for choice in ("program", "both"):
+        browser.choose("#watchdogs", choice)
+        arm(browser)
+        browser.keys(("keyDown", "w"))
+        browser.until("a robot that drives", lambda: browser.run(moved) > 0.8)
+        browser.click("[data-trouble=plug]")
+        browser.until("a robot that is relaxed", lambda: browser.text("#status").startswith("relaxed"))
+        browser.keys(("keyUp", "w"))
+        pulled = browser.run("return samples.at(-1).time")
+        browser.until("5 s without a plug", lambda: browser.run("return samples.at(-1).time") > pulled + 5)
+        speed = browser.run(moved)
+        if (speed < 0.02) != (choice == "both"):
+            raise SystemExit(f"playground: watchdogs: {choice}, and the robot drives at {speed} m/s")
+        print(f"seen: watchdogs: {choice}: {speed:.2f} m/s 5 s after the plug was pulled")
+        browser.click("[data-trouble=plug]")
+    browser.choose("#watchdogs", "program")
 
 
 def replay(browser, native):
