@@ -6,6 +6,7 @@ bb=/bin/busybox
 $bb mount -t devtmpfs none /dev
 $bb mount -t proc none /proc
 $bb mount -t sysfs none /sys
+$bb mkdir -p /dev/pts /tmp && $bb mount -t devpts none /dev/pts
 $bb stty -F /dev/ttyS1 -opost
 {
     for module in $(echo "$MODULES" | $bb tr , " "); do
@@ -20,6 +21,7 @@ $bb stty -F /dev/ttyS1 -opost
         /bin/ip link set $interface up type can bitrate 1000000 || echo "no $interface"
     done
     PYTHONHOME=$($bb cat /python-home) PYTHONPATH=/opt/masters/python MOTORBRIDGE_TX_GAP_US=0 MOTORBRIDGE_BULK_OP_GAP_MS=0 \
-    VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench VCAN_EXAMPLE=/bin/socketcan vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
+    LC_ALL=C.UTF-8 SHELL=/bin/sh VCAN_RESULTS=/results VCAN_BENCH=/bin/drivetrain-bench VCAN_EXAMPLE=/bin/socketcan \
+        vcan --ignored --nocapture --test-threads 1 $ONLY </dev/null
 } >/dev/ttyS1 2>&1
 $bb poweroff -f

@@ -7,7 +7,7 @@
 //! And a chassis has to move as the bench is asked to.
 //!
 //! Two CAN controllers with drivers carry the same bench in [`controllers`]. In [`foreign`] a master that others wrote drives simulated
-//! drives.
+//! drives. In [`window`] tmux types the keys of a session.
 
 #![cfg(test)]
 #![cfg(target_os = "linux")]
@@ -16,6 +16,7 @@ mod controllers;
 mod ends;
 mod foreign;
 mod judge;
+mod window;
 
 use drivetrain::frame::CanFrame;
 use drivetrain::geometry::Vec2;
