@@ -103,7 +103,9 @@ fn run(
     let config = MotorConfig::m3508(1).with_load_inertia_kg_m2(LOAD_KG_M2);
     world.attach(config.with_load_friction_nm(LOAD_NM).with_speed_noise_rpm(10.0))?;
     let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M3508>::new(1).speed_loop(speed))?;
+    // An output that opens after arming is not the recorded effort.
+    let motor =
+        bus.attach(Config::<M3508>::new(1).with_opening(Duration::ZERO).speed_loop(speed))?;
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
     let (mut armed, mut done) = (false, 0);
     while done < ticks {

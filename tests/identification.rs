@@ -281,16 +281,17 @@ fn two_hundred_motors_are_identified_tuned_and_faster_than_by_hand() {
     assert!(faster >= 190);
 }
 
-/// An M3508 of the simulator with this load inertia in kg m² and load friction in Nm.
-fn identify_m3508(inertia: f32, friction: f32, seed: u64) -> Plant {
+/// An M3508 of the simulator with this load inertia in kg m², load friction in Nm, and noise of its speed in rpm of the rotor.
+fn identify_m3508(inertia: f32, friction: f32, noise_rpm: f32, seed: u64) -> Plant {
     let world = Simulation::new(seed);
     let config = MotorConfig::m3508(1).with_load_inertia_kg_m2(inertia);
-    let config = config.with_load_friction_nm(friction).with_speed_noise_rpm(10.0);
+    let config = config.with_load_friction_nm(friction).with_speed_noise_rpm(noise_rpm);
     world.attach(config).unwrap();
     let mut bus = Bus::new();
-    let motor = bus.attach(Config::<M3508>::new(1)).unwrap();
+    // An output that opens after arming is not the recorded effort.
+    let motor = bus.attach(Config::<M3508>::new(1).with_opening(Duration::ZERO)).unwrap();
     let mut runner = Runner::new(Nb(world.controller()), world.clock(), bus);
-    let mut excitation = Excitation::new(5.0, 40.0, 200.0).unwrap();
+    let mut excitation = Excitation::new(10.0, 40.0, 200.0).unwrap().with_duration(20.0).unwrap();
     let mut identification = Identification::new(20.0, 0.2).unwrap();
     let mut armed = false;
     while !excitation.is_complete() {
@@ -311,20 +312,26 @@ fn identify_m3508(inertia: f32, friction: f32, seed: u64) -> Plant {
 }
 
 /// Facts and estimates of the simulated M3508: 0.008 kg m², 0.12 Nm, 2.2 mNm s/rad and 0.3 Nm/A at the output shaft.
+///
+/// The resistance takes 2 % of the effort at 28 rad/s, the fastest speed. With noise of 10 rpm, the moment at which a shaft reverses
+/// is known too coarsely for more than 0.3 % of the effort.
 #[test]
 fn the_simulated_m3508_is_found_with_its_load_over_the_bus() {
-    let mut random = Random(27);
-    for seed in 0..6 {
-        let inertia = random.between(0.0, 0.05);
-        let friction = random.between(0.0, 0.5);
-        let plant = identify_m3508(inertia as f32, friction as f32, seed);
-        let off = |found: f32, real: f64| f64::from(found) - real / 0.3;
-        println!("{inertia:.4} kg m², {friction:.3} Nm: {plant:?}");
-        assert!(off(plant.ka, 0.008 + inertia).abs() < 0.05 * (0.008 + inertia) / 0.3);
-        assert!(off(plant.ks, 0.12 + friction).abs() < 0.05 * (0.12 + friction) / 0.3);
-        // The resistance is 4 % of the effort at 28 rad/s, the fastest speed: within 1 % of the effort there.
-        assert!(28.0 * off(plant.kv, 2.2e-3).abs() < 0.05, "{plant:?}");
-        assert!((0.000_5..0.003).contains(&plant.delay_s), "{plant:?}");
+    for (noise_rpm, most) in [(3.0, [0.05; 3]), (10.0, [0.05, 0.12, 0.05])] {
+        let mut random = Random(27);
+        let mut worst = [0.0_f64; 3];
+        for seed in 0..30 {
+            let inertia = random.between(0.0, 0.05);
+            let friction = random.between(0.0, 0.5);
+            let plant = identify_m3508(inertia as f32, friction as f32, noise_rpm, seed);
+            let off = |found: f32, real: f64| (f64::from(found) / (real / 0.3) - 1.0).abs();
+            let (ks, ka) = (off(plant.ks, 0.12 + friction), off(plant.ka, 0.008 + inertia));
+            let errors = [ks, off(plant.kv, 2.2e-3), ka];
+            worst = core::array::from_fn(|index| worst[index].max(errors[index]));
+            assert!((0.000_5..0.003).contains(&plant.delay_s), "{plant:?}");
+        }
+        println!("M3508, {noise_rpm} rpm: kS, kV, kA within {worst:.4?}");
+        assert!(worst.iter().zip(most).all(|(error, most)| *error < most), "{worst:?}");
     }
 }
 
