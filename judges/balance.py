@@ -3,11 +3,13 @@
 balance.py PROGRAM mujoco [--count N] [--all] [--seed N] [--only balance] [--picture FILE.svg]
 
 The program has the whole controller, and hears and says only frames: of two M3508 wheels, of four DM-J8009P joints, of a HiPNUC IMU.
+Robots run together, a program each: while one calculates, the physics of the others goes on.
 """
 
 import argparse
 import binascii
 import collections
+import itertools
 import math
 import struct
 import subprocess
@@ -17,8 +19,10 @@ import time
 import mujoco
 import numpy as np
 
-#: Seconds that it has to stand, after which it is pushed over; the pilot asks at the start.
+#: Seconds that it has to stand, once it stands; after which it is pushed over. The pilot asks at the start.
 STAND_S, FALL_S = 20.0, 3.0
+#: Seeds of `--all`, and of a run: another tenth in each turn of the stage, which has a turn in three days.
+SEEDS, SHARE, TURN_S = 100, 10, 3 * 86_400
 #: When it is pushed, by how much: s, m/s of the whole robot.
 PUSHES = ((8.0, 0.5), (14.0, 0.5))
 #: When it is thrown up, in s; by how much in m/s; the time in which both changes are to be noticed, in s.
@@ -131,11 +135,12 @@ class Joint:
             self.switch(data[7])
         else:
             bits = int.from_bytes(data, "big")
-            spans = ((48, 16, RANGES[0], 1), (36, 12, RANGES[1], 1), (24, 12, 500, 0), (12, 12, 5, 0), (0, 12, RANGES[2], 1))
-            counts = [(bits >> low & (1 << width) - 1, (1 << width) - 1) for low, width, *_ in spans]
-            self.command = tuple(
-                (2 * count / top - 1) * most if signed else count / top * most
-                for (count, top), (*_, most, signed) in zip(counts, spans)
+            self.command = (
+                (2 * (bits >> 48) / 0xFFFF - 1) * RANGES[0],
+                (2 * (bits >> 36 & 0xFFF) / 0xFFF - 1) * RANGES[1],
+                (bits >> 24 & 0xFFF) / 0xFFF * 500,
+                (bits >> 12 & 0xFFF) / 0xFFF * 5,
+                (2 * (bits & 0xFFF) / 0xFFF - 1) * RANGES[2],
             )
         return self.feedback(angle, rate)
 
@@ -193,9 +198,11 @@ class Robot:
         self.data = mujoco.MjData(self.model)
         self.body = body
         self.tyres = {self.model.geom(side + "tyre").id for side in "lr"}
+        self.gyro, self.acc = (self.data.sensor(name).data for name in ("gyro", "acc"))
         self.place = [self.model.joint(name).qposadr[0] for name, *_ in JOINTS + WHEELS]
         self.rate = [self.model.joint(name).dofadr[0] for name, *_ in JOINTS + WHEELS]
         self.joints = [Joint(id) for _, _, id in JOINTS]
+        self.legs = {bus: [at for at, joint in enumerate(JOINTS) if joint[1] == bus] for bus in (1, 2)}
         self.current = [0.0, 0.0]
         self.bias = np.radians(random.uniform(-0.3, 0.3, 2))
         self.put_down()
@@ -223,33 +230,39 @@ class Robot:
         mujoco.mj_forward(self.model, self.data)
 
     def tilt(self):
-        w, x, y, z = self.data.qpos[3:7]
+        w, x, y, z = self.data.qpos[3:7].tolist()
         return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.asin(max(-1, min(1, 2 * (w * y - z * x))))
 
     def imu(self):
         noise = self.random.normal(0, 1, 5)
-        turned = np.zeros(4)
-        axis = np.array([self.bias[0] + 5e-4 * noise[0], self.bias[1] + 5e-4 * noise[1], 0.0])
-        mujoco.mju_mulQuat(turned, self.data.qpos[3:7], np.array([1.0, *axis / 2]))
-        turned /= np.linalg.norm(turned)
-        gyro = np.degrees(self.data.sensor("gyro").data + 0.005 * noise[2:])
-        acc = self.data.sensor("acc").data / 9.80665
+        # The attitude, and a small turn after it.
+        w, x, y, z = self.data.qpos[3:7].tolist()
+        i, j = ((self.bias + 5e-4 * noise[:2]) / 2).tolist()
+        turned = w - x * i - y * j, w * i + x - z * j, w * j + y + z * i, z + x * j - y * i
+        size = math.hypot(*turned)
+        turned = [part / size for part in turned]
+        gyro = np.degrees(self.gyro + 0.005 * noise[2:]).tolist()
+        acc = (self.acc / 9.80665).tolist()
         roll, pitch = self.tilt()
         fields = [*acc, *gyro, 0, 0, 0, math.degrees(roll), math.degrees(pitch), 0.0, *turned]
         payload = struct.pack("<BHbfI16f", 0x91, 0, 30, 101_325.0, self.ticks, *fields)
         head = b"\x5a\xa5" + struct.pack("<H", len(payload))
         return head + struct.pack("<H", binascii.crc_hqx(head + payload, 0)) + payload
 
+    def shafts(self):
+        """Angles and rates of joints and wheels."""
+        return self.data.qpos[self.place].tolist(), self.data.qvel[self.rate].tolist()
+
     def is_off(self):
         """Whether no motor gets a torque."""
-        angle, rate = self.data.qpos[self.place], self.data.qvel[self.rate]
+        angle, rate = self.shafts()
         torques = [joint.torque(angle[at], rate[at]) for at, joint in enumerate(self.joints)]
         # Half a count of a Damiao is its zero.
         return all(abs(torque) < 0.03 for torque in torques) and not any(self.current)
 
     def tick(self, *orders):
-        """A millisecond: frames of before reach the program and the motors, then the physics goes on."""
-        angle, rate = self.data.qpos[self.place], self.data.qvel[self.rate]
+        """A millisecond: frames of before reach the program and the motors, then the physics goes on. Yields while the program works."""
+        angle, rate = self.shafts()
         words = []
         for bus, id, data in self.commands.popleft():
             if bus == 0:
@@ -257,8 +270,8 @@ class Robot:
                     raw = struct.unpack(">4h", data)
                     self.current = [raw[id - 1] * 20 / 16384 for _, id, _ in WHEELS]
                 continue
-            for at, (_, of_bus, _) in enumerate(JOINTS):
-                if of_bus == bus and (answer := self.joints[at].hear(id, data, angle[at], rate[at])):
+            for at in self.legs[bus]:
+                if answer := self.joints[at].hear(id, data, angle[at], rate[at]):
                     words.append(f"{bus}:{self.joints[at].registers[7]:X}#{answer.hex()}")
         for number, (_, id, sign) in enumerate(WHEELS):
             turned, rpm = sign * angle[4 + number] * GEAR, sign * rate[4 + number] * GEAR * 30 / math.pi
@@ -271,6 +284,7 @@ class Robot:
         line = [str(1000 * (self.ticks + 1)), *self.words.popleft(), *orders]
         self.program.stdin.write(" ".join(line) + "\n")
         self.program.stdin.flush()
+        yield
         answer = self.program.stdout.readline().split()
         if not answer:
             fail("the program ended")
@@ -294,7 +308,7 @@ class Robot:
         for joint in self.joints:
             joint.tick()
         for _ in range(SUBSTEPS):
-            angle, rate = data.qpos[self.place], data.qvel[self.rate]
+            angle, rate = self.shafts()
             torque = [joint.torque(angle[at], rate[at]) for at, joint in enumerate(self.joints)]
             for number, (_, _, sign) in enumerate(WHEELS):
                 # A driven M3508 has no torque left at its no-load speed.
@@ -313,7 +327,7 @@ class Robot:
 
     def flies(self):
         """Whether no wheel touches the floor."""
-        return not any({contact.geom1, contact.geom2} & self.tyres for contact in self.data.contact)
+        return self.tyres.isdisjoint(self.data.contact.geom.ravel().tolist())
 
     def sample(self):
         q = self.data.qpos
@@ -327,12 +341,27 @@ class Robot:
         self.program.wait()
 
 
-def stand(program, seed, *plant, seconds=STAND_S, picture=False):
-    """Returns what went wrong, or None; the largest lean, the way, the time until the motors were off."""
+def together(runs):
+    """Steps runs in turn, and returns their results."""
+    runs = dict(enumerate(runs))
+    results = [None] * len(runs)
+    while runs:
+        for place, run in list(runs.items()):
+            try:
+                next(run)
+            except StopIteration as end:
+                results[place] = end.value
+                del runs[place]
+    return results
+
+
+def stand(program, seed, *plant, seconds=None, picture=False):
+    """Returns what went wrong, or None; the largest lean, the way, the time until the motors were off. Falls after so many seconds."""
     robot = Robot(program, seed, *plant)
     figures = {"mass": robot.mass, "toward": math.degrees(robot.toward), "lean": 0.0, "slips": 0, "flight": 0}
     try:
-        return watched(robot, seconds, picture, figures), figures, robot.samples
+        text = yield from watched(robot, seconds, picture, figures)
+        return text, figures, robot.samples
     finally:
         robot.close()
 
@@ -340,14 +369,16 @@ def stand(program, seed, *plant, seconds=STAND_S, picture=False):
 def watched(robot, seconds, picture, figures):
     stood, start, flown, landed = None, None, 0, 0
     pushes = [(at, speed, robot.random.uniform(-math.pi, math.pi)) for at, speed in PUSHES]
-    for tick in range(int(seconds / TICK_S)):
+    for tick in itertools.count():
         now = tick * TICK_S
+        if now >= (seconds or (math.inf if stood is None else stood + STAND_S)):
+            break
         for at, speed, direction in pushes:
             if abs(now - at) < TICK_S / 2:
                 robot.shove(speed, direction)
         if abs(now - HOP[0]) < TICK_S / 2:
             robot.shove(HOP[1])
-        robot.tick(*(["start"] if tick == 300 else []))
+        yield from robot.tick(*(["start"] if tick == 300 else []))
         if picture and tick % 20 == 0:
             robot.sample()
         roll, pitch = robot.tilt()
@@ -376,13 +407,13 @@ def watched(robot, seconds, picture, figures):
     for name in ("lift-off", "landing"):
         if figures.get(name, 0) * TICK_S > NOTICE_S:
             return f"the {name} was noticed after {figures[name]} ms"
-    if seconds > HOP[0] and figures["flight"] * TICK_S < 2 * NOTICE_S:
+    if not seconds and figures["flight"] * TICK_S < 2 * NOTICE_S:
         return "was not thrown up"
     if figures["way"] > FAR:
         return f"moved by {figures['way']:.2f} m"
     if figures["speed"] > SPEED:
         return f"moves with {figures['speed']:.2f} m/s at the end"
-    return fallen(robot, picture, figures)
+    return (yield from fallen(robot, picture, figures))
 
 
 def fallen(robot, picture, figures):
@@ -391,7 +422,7 @@ def fallen(robot, picture, figures):
     robot.shove(OVER, yaw + robot.random.choice([0, math.pi]))
     fell = None
     for tick in range(int(FALL_S / TICK_S)):
-        robot.tick()
+        yield from robot.tick()
         if picture and tick % 20 == 0:
             robot.sample()
         if fell is None and max(map(abs, robot.tilt())) > FALL:
@@ -414,25 +445,32 @@ def main():
     options = parser.parse_args()
     if options.only not in (None, "balance"):
         return
-    count = 100 if options.all else min(options.count or 3, 100)
+    first, count = options.seed, options.count or SHARE
+    if options.all:
+        count = SEEDS
+    elif not options.count:
+        first += int(time.time() // TURN_S) % (SEEDS // SHARE) * SHARE
     start = time.monotonic()
     print(f"balance: MuJoCo {mujoco.__version__}")
-    for defect in DEFECTS:
-        text, *_ = stand(options.program, options.seed, "--plant", defect, seconds=5.0)
+    runs = together(stand(options.program, options.seed, "--plant", defect, seconds=5.0) for defect in DEFECTS)
+    for defect, (text, *_) in zip(DEFECTS, runs):
         if not text:
             fail(f"the defect {defect} was not found")
     print("  found the planted defects")
     wrong, worst = [], collections.defaultdict(float)
-    for seed in range(options.seed, options.seed + count):
-        text, figures, samples = stand(options.program, seed, picture=bool(options.picture) and seed == options.seed)
-        if samples:
-            draw(options.picture, samples)
-        for name, value in figures.items():
-            worst[name] = max(worst[name], value)
-        if text or count < 7:
-            print(f"  seed {seed}: {text or 'stands'}: " + ", ".join(f"{name} {value:.3g}" for name, value in figures.items()), flush=True)
-        if text:
-            wrong.append(seed)
+    seeds = range(first, first + count)
+    for begin in range(0, count, SHARE):
+        part = seeds[begin : begin + SHARE]
+        runs = together(stand(options.program, seed, picture=bool(options.picture) and seed == first) for seed in part)
+        for seed, (text, figures, samples) in zip(part, runs):
+            if samples:
+                draw(options.picture, samples)
+            for name, value in figures.items():
+                worst[name] = max(worst[name], value)
+            if text or count <= SHARE:
+                print(f"  seed {seed}: {text or 'stands'}: " + ", ".join(f"{name} {value:.3g}" for name, value in figures.items()))
+            if text:
+                wrong.append(seed)
     print(f"  {count - len(wrong)} of {count} stand {STAND_S:.0f} s; most: " + ", ".join(f"{name} {value:.3g}" for name, value in worst.items()))
     print(f"  {time.monotonic() - start:.0f} s")
     if wrong:

@@ -7,6 +7,7 @@
 #![no_main]
 
 mod arm;
+mod balance;
 mod bytes;
 mod calls;
 mod closed_loop;
@@ -41,6 +42,7 @@ fn main() -> ! {
         motion::rows();
         state_space::rows();
         arm::rows();
+        balance::rows();
         rows::math();
         rows::space();
         bytes::rows();

@@ -23,22 +23,27 @@ pub fn start(timer: &mut SYST) {
 
 /// Returns the instructions of one call of `function`, a function pointer: `each` calls what it is given, once with
 /// `function` and once with one that returns at once, and the difference is the figure.
-pub fn instructions<F: Copy>(function: F, mut each: impl FnMut(F, u32)) -> u32 {
+pub fn instructions<F: Copy>(function: F, each: impl FnMut(F, u32)) -> u32 {
+    instructions_of(CALLS, function, each)
+}
+
+/// The same of fewer calls: exact to half of `INSTRUCTIONS_A_TICK / calls`.
+pub fn instructions_of<F: Copy>(calls: u32, function: F, mut each: impl FnMut(F, u32)) -> u32 {
     const { assert!(size_of::<F>() == size_of::<extern "C" fn()>()) };
     // SAFETY: `F` is a function pointer; the callee touches nothing, and no caller looks at its result.
     let nothing: F = unsafe {
         core::mem::transmute_copy::<extern "C" fn(), F>(&(returns_at_once as extern "C" fn()))
     };
-    let taken = ticks(function, &mut each);
-    let overhead = ticks(nothing, &mut each);
-    (taken.saturating_sub(overhead) * INSTRUCTIONS_A_TICK + CALLS / 2) / CALLS
+    let taken = ticks(calls, function, &mut each);
+    let overhead = ticks(calls, nothing, &mut each);
+    (taken.saturating_sub(overhead) * INSTRUCTIONS_A_TICK + calls / 2) / calls
 }
 
 #[inline(never)]
-fn ticks<F: Copy>(function: F, each: &mut impl FnMut(F, u32)) -> u32 {
+fn ticks<F: Copy>(calls: u32, function: F, each: &mut impl FnMut(F, u32)) -> u32 {
     let function = black_box(function);
     let start = SYST::get_current();
-    for call in 0..CALLS {
+    for call in 0..calls {
         each(function, call);
     }
     start.wrapping_sub(SYST::get_current()) & 0xFF_FFFF

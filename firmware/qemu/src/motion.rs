@@ -1,6 +1,6 @@
-//! The rows of motions from any state: planning one axis, its mean and its most over states of each kind, and sampling.
+//! The rows of motions from any state: planning one axis, its mean and its most over many states, and sampling.
 
-use crate::meter::{CALLS, instructions};
+use crate::meter::{CALLS, instructions, instructions_of};
 use crate::report::row;
 use core::hint::black_box;
 use drivetrain::control::{Motion, MotionLimits, MotionTarget, ProfileState};
@@ -46,23 +46,57 @@ impl Random {
         let to = MotionTarget { position: position + way, velocity: moving };
         (from, to, MotionLimits::new(top, steep).with_jerk(jerk + 14.0 * self.number()))
     }
+
+    /// About normal, with a deviation of 1.
+    fn normal(&mut self) -> f32 {
+        0.866 * [(); 4].map(|()| self.number()).iter().sum::<f32>()
+    }
+
+    /// Between 1/8 and 16.
+    fn limit(&mut self) -> f32 {
+        let exponent = 3.5 * (self.number() + 1.0);
+        f32::from_bits((124 + exponent as u32) << 23) * (1.0 + exponent % 1.0)
+    }
+
+    /// States as those of `judges/motion.py`.
+    fn judged(&mut self, call: u32) -> Case {
+        let limits = [(); 3].map(|()| self.limit());
+        let [top, steep, jerk] = limits;
+        let position = 4.0 * self.normal();
+        let target = if call.is_multiple_of(5) {
+            position + 0.05 * self.normal()
+        } else {
+            4.0 * self.normal()
+        };
+        let moving = if call.is_multiple_of(2) { 0.0 } else { top * self.number() };
+        let [velocity, acceleration] = [(); 2].map(|()| 0.8 * self.normal());
+        let from = ProfileState { position, velocity, acceleration };
+        let to = MotionTarget { position: target, velocity: moving };
+        (from, to, MotionLimits::new(top, steep).with_jerk(jerk))
+    }
 }
 
-/// States of which the most is taken.
+/// States of the mean, and of the most.
 const STATES: u32 = 200;
+const JUDGED: u32 = 10_000;
 
 pub fn rows() {
     let mut random = Random(1);
-    let mut most = 0;
     let mut sum = 0;
     for call in 0..STATES {
         let (from, to, limits) = black_box(random.case(call));
         let figure = instructions(control_motion_plan as Plan, |plan, _| {
             _ = black_box(plan(&from, &to, &limits));
         });
-        most = most.max(figure);
         sum += figure;
     }
+    let most = (0..JUDGED).map(|call| {
+        let (from, to, limits) = black_box(random.judged(call));
+        instructions_of(20, control_motion_plan as Plan, |plan, _| {
+            _ = black_box(plan(&from, &to, &limits));
+        })
+    });
+    let most = most.max().unwrap_or(0);
     row("motion_plan", &[(sum + STATES / 2) / STATES]);
     row("motion_plan_most", &[most]);
 

@@ -8,6 +8,9 @@ use crate::math;
 /// and more where the way hardly depends on the roots. The bracket halves where a step would leave it.
 const ROUGH_STEPS: u32 = 7;
 const EXACT_STEPS: u32 = 16;
+/// Shares of the last step. That of a rough one leaves a deviation near the rounding of `f32`, which the exact step takes away.
+const ROUGH: f32 = 1e-3;
+const EXACT: f32 = 3e-5;
 
 /// The fastest change of velocity with an acceleration of zero at both ends takes `root` of jerk twice, and `hold` between them.
 ///
@@ -223,10 +226,10 @@ impl Ascent {
             guess = lesser(by_slope, lesser(by_cube, guess));
         }
         let (way, end) = (self.way.narrow(), rest.narrow());
-        let guess = root::<ROUGH_STEPS>(lowest, highest, guess, |s| {
+        let guess = root::<ROUGH_STEPS>([lowest, highest], guess, ROUGH, |s| {
             ((s * (0.25 * s * s + sum) - way) * s + end, s * slope_at(s))
         });
-        let s = root::<EXACT_STEPS>(lowest, highest, guess, |s| {
+        let s = root::<EXACT_STEPS>([lowest, highest], guess, EXACT, |s| {
             let value = Wide::of(s).squared().scaled(0.25) + velocities;
             let value = (value * s - self.way) * s + rest;
             (value.narrow(), s * slope_at(s))
@@ -272,10 +275,10 @@ impl Ascent {
         let to = limited(top, from, to);
         let slope_at = |r: f32| (r + 1.0) * (2.0 * r * r + r + 2.0 * low);
         let end = fixed.narrow();
-        let guess = root::<ROUGH_STEPS>(from, to, to, |r| {
+        let guess = root::<ROUGH_STEPS>([from, to], to, ROUGH, |r| {
             ((((0.5 * r + 1.0) * r + low + 0.5) * r + 2.0 * low) * r + end, slope_at(r))
         });
-        let r = root::<EXACT_STEPS>(from, to, guess, |r| {
+        let r = root::<EXACT_STEPS>([from, to], guess, EXACT, |r| {
             let value = ((Wide::of(0.5 * r) + 1.0) * r + (small + 0.5)) * r + double;
             ((value * r + fixed).narrow(), slope_at(r))
         });

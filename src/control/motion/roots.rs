@@ -1,9 +1,6 @@
 use crate::control::number::limited;
 use crate::math;
 
-/// A step of this share is the last but one: the next one would be of its square.
-const CLOSE: f32 = 3e-5;
-
 /// Returns the square root, and zero of a negative number.
 pub(super) fn root_of(x: f32) -> f32 {
     if x > 0.0 { math::sqrt(x) } else { 0.0 }
@@ -15,10 +12,12 @@ pub(super) const fn lesser(a: f32, b: f32) -> f32 {
 }
 
 /// Finds where a function passes zero upward, which it does once between `low` and `high`.
+///
+/// A step of the share `close` is the last one: the next one would be of its square.
 pub(super) fn root<const STEPS: u32>(
-    low: f32,
-    high: f32,
+    [low, high]: [f32; 2],
     guess: f32,
+    close: f32,
     function: impl Fn(f32) -> (f32, f32),
 ) -> f32 {
     let (mut low, mut high, mut x) = (low, high, guess);
@@ -31,7 +30,7 @@ pub(super) fn root<const STEPS: u32>(
         }
         let step = value / slope;
         let next = x - step;
-        if step.abs() <= CLOSE * x.abs() {
+        if step.abs() <= close * x.abs() {
             return limited(next, low, high);
         }
         x = if next >= low && next <= high { next } else { 0.5 * (low + high) };
