@@ -1,6 +1,6 @@
 """Lets a robot that balances stand in MuJoCo, which runs the physics: see README.md.
 
-balance.py PROGRAM mujoco [--count N] [--all] [--seed N] [--only balance] [--picture FILE.svg]
+balance.py PROGRAM mujoco [--count N] [--seed N] [--only balance] [--picture FILE.svg]
 
 The program has the whole controller, and hears and says only frames: of two M3508 wheels, of four DM-J8009P joints, of a HiPNUC IMU.
 Robots run together, a program each: while one calculates, the physics of the others goes on.
@@ -19,9 +19,11 @@ import time
 import mujoco
 import numpy as np
 
+from figures import figure
+
 #: Seconds that it has to stand, once it stands; after which it is pushed over. The pilot asks at the start.
 STAND_S, FALL_S = 20.0, 3.0
-#: Seeds of `--all`, and of a run: another tenth in each turn of the stage, which has a turn in three days.
+#: The seeds, and their share of a run without `--count`: another tenth in each turn of the stage, which has a turn in three days.
 SEEDS, SHARE, TURN_S = 100, 10, 3 * 86_400
 #: When it is pushed, by how much: s, m/s of the whole robot.
 PUSHES = ((8.0, 0.5), (14.0, 0.5))
@@ -34,6 +36,8 @@ TICK_S, SUBSTEPS = 0.001, 2
 DELAY = 1
 #: Roll or pitch of a fall, in rad, and the time in which each motor has to be off.
 FALL, OFF_S = 0.7, 0.02
+#: Longest time until it stands, in s.
+RISE_S = 4.7
 #: Largest lean of the body while it stands, in rad; way in m and speed in m/s at the end.
 LEAN, FAR, SPEED = 0.5, 1.5, 0.1
 HIP, UPPER, LOWER, RADIUS = 0.075, 0.15, 0.27, 0.075
@@ -385,7 +389,7 @@ def watched(robot, seconds, picture, figures):
         if stood is None and robot.phase == 2:
             stood, start = now, robot.data.qpos[:2].copy()
             figures["rises"] = now - 0.3
-        if stood is None and now > 5:
+        if stood is None and now > 0.3 + RISE_S:
             return "does not rise"
         if stood is not None:
             figures["lean"] = max(figures["lean"], abs(pitch), abs(roll))
@@ -438,17 +442,14 @@ def main():
     parser.add_argument("program")
     parser.add_argument("judge", choices=["mujoco"])
     parser.add_argument("--count", type=int)
-    parser.add_argument("--all", action="store_true", help="100 seeds")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only")
     parser.add_argument("--picture")
     options = parser.parse_args()
     if options.only not in (None, "balance"):
         return
-    first, count = options.seed, options.count or SHARE
-    if options.all:
-        count = SEEDS
-    elif not options.count:
+    first, count = options.seed, min(options.count or SHARE, SEEDS)
+    if not options.count:
         first += int(time.time() // TURN_S) % (SEEDS // SHARE) * SHARE
     start = time.monotonic()
     print(f"balance: MuJoCo {mujoco.__version__}")
@@ -472,6 +473,18 @@ def main():
             if text:
                 wrong.append(seed)
     print(f"  {count - len(wrong)} of {count} stand {STAND_S:.0f} s; most: " + ", ".join(f"{name} {value:.3g}" for name, value in worst.items()))
+    name = f"MuJoCo {mujoco.__version__}"
+    for what, allowed, value in (
+        (f"seeds of which the robot does not stand {STAND_S:.0f} s", 0, len(wrong)),
+        ("time from the pilot's wish to standing, s", RISE_S, worst["rises"]),
+        ("tilt while it stands, degrees", math.degrees(LEAN), math.degrees(worst["lean"])),
+        ("distance from where it stood up, at the end, m", FAR, worst["way"]),
+        ("speed at the end, m/s", SPEED, worst["speed"]),
+        ("lift-off noticed after, ms", 1000 * NOTICE_S, worst["lift-off"]),
+        ("landing noticed after, ms", 1000 * NOTICE_S, worst["landing"]),
+        ("a fall: every motor off after, ms", 1000 * OFF_S, worst["off_ms"]),
+    ):
+        figure("balance", what, name, count, allowed, value, f"balance --count {SEEDS}", SEEDS)
     print(f"  {time.monotonic() - start:.0f} s")
     if wrong:
         fail(f"seeds {wrong} fell")

@@ -11,6 +11,8 @@ import time
 import mujoco
 import numpy as np
 
+from figures import figure
+
 #: Arms in one model of MuJoCo, under one gravity; poses of each arm.
 ARMS, POSES = 50, 4
 #: Allowed: of the effort itself, if that is above a hundredth of the load; and of the load in any case. The load of a joint is the
@@ -153,6 +155,9 @@ def main():
     words, expected, loads = (np.concatenate(parts) for parts in zip(*batches, strict=True))
     own, small = errors(ours(options.program, words), expected, loads)
     require(own <= OWN and small <= SMALL, f"an effort is off by {own:.1e} of itself, {small:.1e} of the load")
+    name = f"MuJoCo {mujoco.__version__}"
+    figure("arms", "effort above a hundredth of the load, as a share of itself", name, len(expected), OWN, own, "hold")
+    figure("arms", "any effort, as a share of the load", name, len(expected), SMALL, small, "hold")
     for defect in DEFECTS:
         found = errors(ours(options.program, words, "--plant", defect), expected, loads)
         require(found[0] > OWN or found[1] > SMALL, f"the defect {defect} was not found")

@@ -12,6 +12,8 @@ import time
 import numpy as np
 import ruckig
 
+from figures import figure
+
 GOLDEN = pathlib.Path(__file__).parent.parent / "tests/data/motion/ruckig.csv"
 #: Moments of a motion that are looked at, beside its start.
 SAMPLES = 24
@@ -128,9 +130,14 @@ def compare(program, random, count, verb, axes):
     if unknown.any():
         print(f"  {verb}: {unknown.sum()} rows without a plan of Ruckig, with one of ours")
     differences = differences[~unknown]
+    name, judged = f"Ruckig {ruckig.__version__}", "" if axes == 1 else f", {axes} axes in step"
+    limits = LIMIT * max(worst[name] for name in ("velocity", "acceleration", "jerk"))
+    figure("motion", f"duration, in seconds or of the duration if that is longer than 1 s{judged}", name, count, DURATION, differences.max(), verb)
+    figure("motion", f"velocity, acceleration, jerk beyond the limit, as a share of it{judged}", name, count, LIMIT, max(0, limits), verb)
+    figure("motion", f"state at the end{judged}", name, count, 1e-6, 1e-6 * worst["end"], verb)
     print(
         f"  {verb}: {count} motions of {axes}: durations within {differences.max():.1e} (99.99 %: {np.quantile(differences, 0.9999):.1e}), "
-        f"limits within {LIMIT * max(worst[name] for name in ('velocity', 'acceleration', 'jerk')):.1e}"
+        f"limits within {limits:.1e}"
     )
 
 

@@ -14,6 +14,8 @@ import time
 import mujoco
 import numpy as np
 
+from figures import figure
+
 #: Allowed, as a share of the largest value of this kind in the scenario.
 ALLOWED = 0.02
 #: The differences that README.md explains, as the most that is allowed.
@@ -494,7 +496,7 @@ def main():
         return
     start = time.monotonic()
     print(f"simulator: {options.judge} {mujoco.__version__}")
-    wrong, runs = [], {}
+    wrong, runs, worst = [], {}, {}
     for scenario in scenarios():
         if options.only not in (None, "simulator", scenario.name):
             continue
@@ -503,8 +505,15 @@ def main():
         runs[scenario.name] = scenario, expected, found
         shares = differences(scenario, found, expected)
         wrong += verdict(scenario, shares)
+        for kind, share in shares.items():
+            allowed = listed(scenario.name, kind)
+            own = f", {kind} in *{scenario.name}*, listed" if allowed > ALLOWED else ""
+            most, names = worst.get((own, allowed), (0.0, set()))
+            worst[own, allowed] = max(most, share), names | {scenario.name}
         print(f"  {scenario.name:18}" + ", ".join(f"{kind} {100 * share:.2f} %" for kind, share in shares.items()))
     require(not wrong, "\n  ".join(["differences:", *wrong]))
+    for (own, allowed), (share, names) in worst.items():
+        figure("simulator", f"largest difference of a scenario, as a share of the largest value{own}", f"MuJoCo {mujoco.__version__}", len(names), allowed, share, "simulator")
     if options.only in (None, "simulator"):
         for defect in DEFECTS:
             found_by = [

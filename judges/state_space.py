@@ -14,6 +14,8 @@ from decimal import Decimal, getcontext
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np  # noqa: E402
 
+from figures import figure  # noqa: E402
+
 #: Largest difference of a gain, as a share of its largest entry; of a discrete plant; of a state over all steps, as a share of its largest.
 GAIN, PLANT, STATE = 1e-4, 1e-6, 1e-5
 #: Largest condition number of the solution of a Riccati equation, in units without those of the states. Systems beyond are counted.
@@ -30,6 +32,16 @@ SIZES = [(states, inputs) for inputs in (1, 2) for states in range(1, 7)]
 #: What wpimath has of these.
 REGULATORS, FILTERS = [(1, 1), (2, 1), (2, 2), (3, 2)], [(1, 1), (2, 1), (2, 2)]
 getcontext().prec = 60
+NAMES = {
+    "A": "`A` by zero-order hold",
+    "B": "`B` by zero-order hold",
+    "gain": "gain of the regulator",
+    "observer": "gain of the observer (`A K`)",
+    "gain from continuous": "gain from continuous matrices",
+    "inversion": "effort of the plant inversion",
+    "filter": "states of the Kalman filter over 1000 steps",
+    "steady filter": "states of the steady observer over 1000 steps",
+}
 DEFECTS = {"design": ["hold", "cost", "noise"], "filter": ["noise", "start"]}
 
 
@@ -406,6 +418,7 @@ def compare(verb, judge, program, random, count):
         require(ill.sum() <= 2 + 0.01 * len(values), f"{verb}: {name}: {ill.sum()} of {len(values)} systems are ill-conditioned")
         values = values[~ill]
         left_out = f", {ill.sum()} ill-conditioned ones left out" if ill.any() else ""
+        figure("state space", NAMES[name], judge.name, len(values), allowed, values.max(), verb)
         print(f"  {verb}: {name} of {len(values)}{left_out}: within {values.max():.1e} (99.9 %: {np.quantile(values, 0.999):.1e}), allowed {allowed:.0e}")
     for name, (allowed, values) in all_of.items():
         worst = np.nanmax(np.concatenate(values))
