@@ -6,9 +6,9 @@ use crate::rows::swinging;
 use core::hint::black_box;
 use drivetrain::chassis::Odometry;
 use drivetrain::control::{
-    Biquad, Cascade, Differentiator, FeedForward, Identification, LowPass, MotionLimits, Pid,
-    PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter, SpeedActuator,
-    StepResponse, Window,
+    Biquad, Cascade, Differentiator, FeedForward, Identification, LoadObserver, LowPass,
+    MotionLimits, Pid, PidConfig, PositionActuator, Profile, ProfileState, RelayTuner, SlewLimiter,
+    SpeedActuator, StepResponse, Window,
 };
 use drivetrain::error::ConfigError;
 use drivetrain::geometry::{Body, Twist};
@@ -45,6 +45,7 @@ functions! {
     control_feed_forward(gains: &FeedForward, velocity, acceleration) -> f32 = gains.effort(velocity, acceleration);
     control_relay(tuner: &mut RelayTuner, setpoint, measurement, dt_s) -> f32 = tuner.update(setpoint, measurement, dt_s);
     control_identification(identification: &mut Identification, effort, velocity, dt_s) -> () = identification.sample(effort, velocity, dt_s);
+    control_load_observer(observer: &mut LoadObserver, velocity, torque, dt_s) -> () = observer.update(velocity, torque, dt_s);
     control_step_response(response: &mut StepResponse, value, dt_s) -> () = response.record(value, dt_s);
 }
 
@@ -61,7 +62,7 @@ fn control_odometry(odometry: &mut Odometry, twist: &Twist<Body>, dt_s: f32) -> 
 }
 
 type Step<C> = fn(&mut C, f32, f32, f32) -> f32;
-type Sampling = fn(&mut Identification, f32, f32, f32);
+type Sampling<C> = fn(&mut C, f32, f32, f32);
 type Filter<C> = fn(&mut C, f32, f32) -> f32;
 type Sampler<C> = fn(&mut C, f32) -> f32;
 
@@ -116,11 +117,19 @@ fn tuning() {
     let before = identification.samples();
     row(
         "identification",
-        &[instructions(control_identification as Sampling, |sample, call| {
+        &[instructions(control_identification as Sampling<_>, |sample, call| {
             sample(&mut identification, 3.0, 1.5 + 0.1 * swinging(call), DT_S);
         })],
     );
     assert!(identification.samples() >= before + CALLS);
+    let mut observer = LoadObserver::new(black_box(0.05), 200.0).unwrap();
+    row(
+        "load_observer",
+        &[instructions(control_load_observer as Sampling<_>, |update, call| {
+            update(&mut observer, 3.0, 1.5 + 0.1 * swinging(call), DT_S);
+        })],
+    );
+    assert!(observer.rejected() == 0);
     let mut response = StepResponse::new(0.0, black_box(1.0), 1.5, 0.02).unwrap();
     let each = |record: fn(&mut StepResponse, f32, f32), call| {
         record(&mut response, swinging(call), DT_S);
