@@ -6,7 +6,7 @@
 //!
 //! The plant is a nonlinear one in the plane, from the energies of wheels, legs and body, in steps of 0.1 ms: 20 % heavier than the
 //! controller knows, and 2 ms late. Prints the largest tilt and the state at the end; fails if the body tilts by more than 15 degrees, or the robot
-//! is not at rest at its length in the end. In space, with contacts and with frames of motors, `judges/balance.py` has the same controller in MuJoCo.
+//! is not at rest at its length in the end. In space, with contacts and with frames of motors, `judges/balance.py` judges the same controller.
 
 mod picture;
 
@@ -130,8 +130,8 @@ fn accelerations(
     [wheel_nm, hip_nm, force_n]: [f32; 3],
     push_n: f32,
 ) -> [f32; 4] {
-    let along = [lean.sin(), lean.cos()];
-    let across = [lean.cos(), -lean.sin()];
+    let along @ [along_x, along_z] = [lean.sin(), lean.cos()];
+    let across @ [across_x, across_z] = [lean.cos(), -lean.sin()];
     let height = MODEL.body_height_m;
     // At this share of the leg, from the wheel.
     let on_leg = |kg: f32, share: f32| Point {
@@ -142,11 +142,10 @@ fn accelerations(
             along.map(|part| share * part),
             [0.0; 2],
         ],
-        bias: [0, 1].map(|axis| {
-            share
-                * lean_rate
-                * (2.0 * length_rate * across[axis] - length * lean_rate * along[axis])
-        }),
+        bias: [
+            share * lean_rate * (2.0 * length_rate * across_x - length * lean_rate * along_x),
+            share * lean_rate * (2.0 * length_rate * across_z - length * lean_rate * along_z),
+        ],
     };
     let mut body = on_leg(HEAVIER * MODEL.body_kg, 1.0);
     body.by[3] = [height * pitch.cos(), -height * pitch.sin()];
@@ -173,24 +172,32 @@ fn accelerations(
     solved(mass, force)
 }
 
-/// Solves `mass x = force` of a symmetric, positive matrix.
-fn solved(mut mass: [[f32; 4]; 4], mut force: [f32; 4]) -> [f32; 4] {
-    for pivot in 0..4 {
-        for row in pivot + 1..4 {
-            let share = mass[row][pivot] / mass[pivot][pivot];
-            force[row] -= share * force[pivot];
-            for column in pivot..4 {
-                mass[row][column] -= share * mass[pivot][column];
-            }
+/// Solves `mass x = force` of a symmetric, positive matrix by conjugate gradients.
+fn solved(mass: [[f32; 4]; 4], force: [f32; 4]) -> [f32; 4] {
+    let (mut found, mut rest, mut way) = ([0.0; 4], force, force);
+    for _ in 0..8 {
+        let size = dot(&rest, &rest);
+        let gone = mass.map(|row| dot(&row, &way));
+        let share = size / dot(&way, &gone);
+        if !share.is_finite() {
+            break;
         }
+        found = plus(found, share, way);
+        rest = plus(rest, -share, gone);
+        way = plus(rest, dot(&rest, &rest) / size, way);
     }
-    for row in (0..4).rev() {
-        for column in row + 1..4 {
-            force[row] -= mass[row][column] * force[column];
-        }
-        force[row] /= mass[row][row];
+    found
+}
+
+fn dot(a: &[f32; 4], b: &[f32; 4]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn plus(mut a: [f32; 4], share: f32, b: [f32; 4]) -> [f32; 4] {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += share * b;
     }
-    force
+    a
 }
 
 fn judge(samples: &[Sample]) -> Result<(), Box<dyn Error>> {
