@@ -13,7 +13,7 @@ mod picture;
 use drivetrain::chassis::{BalanceModel, BalancePhase, Balancer, FiveBar, LegEffort};
 use drivetrain::geometry::{Attitude, Rotation3};
 use drivetrain::units::{Angle, AngularVelocity};
-use picture::{BLUE, GREY, RED, console};
+use picture::{BLUE, GREY, RED, console, output};
 use std::collections::VecDeque;
 use std::error::Error;
 
@@ -53,7 +53,7 @@ struct Sample {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = picture::path("balance");
+    let path = output::path("balance");
     let samples = drive()?;
     plot(&path, &samples)?;
     judge(&samples)?;
