@@ -56,6 +56,7 @@ fn an_argument_that_is_not_utf_8_is_named_and_ends_each_example_with_code_2() {
     let names = with_arguments();
     let expected = [
         "arm",
+        "balance",
         "candump",
         "capacitor",
         "chassis",
