@@ -22,8 +22,8 @@ dominant bits of an error-passive node, extended and remote frames, the FIFO and
 motors up to 0.1 ms late. An FDCAN has one interrupt for both directions: where it is not served, no frame of zeros leaves, so the DM-MC02
 has no row `receive starved`.
 
-A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row of each robot is also run
-from power-on, and its trace has to be the same, bit for bit.
+A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row of each robot but the snake is also
+run from power-on, and its trace has to be the same, bit for bit.
 
 * Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
   other frame follows. For power-on it is the time from reset to the first frame. A dash: the robot goes on. A joint of the snake

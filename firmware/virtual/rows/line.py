@@ -256,9 +256,9 @@ def transmit_starved(robot):
     robot.nvic.mask()
     result = goes_on(robot, FAULT_AT_US, FAULT_AT_US + 90_000, "the frame before the mailboxes leaves, then a fresh one; goes on")
     # The queue of the driver takes one frame, which waits there since the interrupt was last served; the mailboxes do not know its age.
-    # Its words are those of then.
+    # Its words are those of then: nearer to the last ones before the fault than to those of its successor.
     before, after = robot.commands(FAULT_AT_US - 5 * CYCLE_US, FAULT_AT_US)[-1], robot.commands(back, back + 5_000)
-    old = [frame for frame in after if _distance(frame, before) < _distance(frame, after[-1])]
+    old = [frame for frame, next_one in zip(after, after[1:]) if _distance(frame, before) < _distance(frame, next_one)]
     must(old == after[: len(old)] and len(old) <= 1, f"{len(old)} frames are from before")
     must(after[1].us - after[0].us < 1_500, f"the second frame follows the first after {after[1].us - after[0].us} us")
     return result | {"stale": len(old)}
