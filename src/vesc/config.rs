@@ -86,7 +86,12 @@ impl CurrentControl {
         let most = model.torque_limit_nm();
         let limit = most * share;
         let wanted = match (order.target, &mut self.loops) {
-            (Target::Torque(torque), _) => torque,
+            (Target::Torque(torque), loops) => {
+                if let Some(loops) = loops {
+                    loops.step(order, (at.angle, at.velocity), limit);
+                }
+                torque
+            }
             (Target::Angle(_), _) if !self.has_angle => return None,
             (_, loops) => loops.as_mut()?.step(order, (at.angle, at.velocity), limit)?,
         };

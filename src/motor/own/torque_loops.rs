@@ -1,7 +1,7 @@
 //! Our own loops on torque.
 
 use super::{Order, Shaft, Target};
-use crate::control::{Cascade, PidConfig};
+use crate::control::{Cascade, PidConfig, limited};
 use crate::error::ConfigError;
 use crate::math::wrap_pi;
 
@@ -17,7 +17,8 @@ impl TorqueLoops {
     }
 
     /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
-    /// target without a measured angle. The integral keeps within the limit.
+    /// target without a measured angle. The integral keeps within the limit. The loops take over from a torque without a jump, and
+    /// begin anew after an impedance.
     #[inline]
     pub(crate) fn step(
         &mut self,
@@ -28,13 +29,22 @@ impl TorqueLoops {
         let velocity = velocity.as_rad_per_s();
         let torque_nm = match order.target {
             Target::Velocity(target) => {
+                self.0.position_mut().reset_to(velocity);
                 self.0.speed_mut().step(target.as_rad_per_s(), velocity, &order.step)
             }
             Target::Angle(target) => {
                 let way = wrap_pi((target - angle?).as_radians());
                 self.0.step(way, velocity, &order.step)
             }
-            Target::Torque(_) | Target::Impedance(_) => return None,
+            Target::Torque(torque_nm) => {
+                self.0.position_mut().reset_to(velocity);
+                self.0.speed_mut().reset_to(limited(torque_nm, -limit_nm, limit_nm));
+                return None;
+            }
+            Target::Impedance(_) => {
+                self.reset();
+                return None;
+            }
         };
         self.0.speed_mut().keep_integral_between(-limit_nm, limit_nm);
         Some(torque_nm)
@@ -42,5 +52,56 @@ impl TorqueLoops {
 
     pub(crate) const fn reset(&mut self) {
         self.0.reset();
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
+mod tests {
+    use super::*;
+    use crate::motor::Impedance;
+    use crate::time::TimeStep;
+    use crate::units::{Angle, AngularVelocity};
+
+    const LIMIT_NM: f32 = 3.0;
+
+    fn driven() -> (TorqueLoops, impl Fn(&mut TorqueLoops, Target) -> Option<f32>) {
+        let position = PidConfig::new(10.0, 1.0, 0.0).with_output_limit(8.0);
+        let loops = TorqueLoops::new(position, PidConfig::new(0.5, 20.0, 0.0)).unwrap();
+        let step = |loops: &mut TorqueLoops, target| {
+            let order = Order { target, share: 1.0, step: TimeStep::of(0.001) };
+            loops.step(order, (Some(Angle::ZERO), AngularVelocity::ZERO), LIMIT_NM)
+        };
+        (loops, step)
+    }
+
+    fn velocity(rad_per_s: f32) -> Target {
+        Target::Velocity(AngularVelocity::from_rad_per_s(rad_per_s))
+    }
+
+    /// A blocked shaft fills the integral. What was needed then must not drive it after another kind of target.
+    #[test]
+    fn nothing_of_an_integral_is_left_after_another_kind_of_target() {
+        let (mut loops, step) = driven();
+        for between in [Target::Torque(0.0), Target::Impedance(Impedance::FREE)] {
+            for _ in 0..200 {
+                step(&mut loops, velocity(1.0));
+            }
+            assert!(loops.0.speed().terms().i > 2.0);
+            assert_eq!(step(&mut loops, between), None);
+            assert_eq!(step(&mut loops, velocity(0.0)), Some(0.0), "{between:?}");
+            assert_eq!(step(&mut loops, between), None);
+            assert_eq!(step(&mut loops, Target::Angle(Angle::ZERO)), Some(0.0), "{between:?}");
+        }
+    }
+
+    #[test]
+    fn a_velocity_after_a_torque_begins_with_this_torque_within_the_limit() {
+        let (mut loops, step) = driven();
+        for (torque_nm, begins) in [(1.5, 1.5), (-2.0, -2.0), (9.0, LIMIT_NM)] {
+            step(&mut loops, Target::Torque(torque_nm));
+            let first = step(&mut loops, velocity(0.0)).unwrap();
+            assert!((first - begins).abs() < 1e-6, "{first} Nm after {torque_nm} Nm");
+        }
     }
 }
