@@ -228,6 +228,9 @@ impl Drive {
     /// If the drive cannot have the id.
     pub(crate) fn set_id(&mut self, id: u8) -> Result<(), String> {
         match &mut self.kind {
+            Kind::Damiao(_) if !(1..=15).contains(&id) => {
+                Err(format!("id {id}: 1 to 15 are allowed"))
+            }
             Kind::Damiao(own) => {
                 own.motor_mut().write(damiao::Register::Id, id.into()).map_err(text)
             }

@@ -140,6 +140,9 @@ pub(crate) fn parse(arguments: Vec<std::ffi::OsString>) -> Result<Asked, String>
         return Ok(Asked::Help);
     }
     options.command = command(&words, &mut options)?;
+    if options.turns.is_some() && !matches!(options.command, Command::Identify | Command::Window) {
+        return Err("--turns is of identify: nothing else has a limit of the way".into());
+    }
     match options.twist {
         Some(_) if options.rpm.is_some() => return Err("--rpm or --mecanum, not both".into()),
         None if geometry.is_some() => return Err("--geometry needs --mecanum".into()),
@@ -214,6 +217,15 @@ fn text(error: impl ToString) -> String {
     error.to_string()
 }
 
+/// Returns the options of a call without arguments.
+#[cfg(test)]
+pub(crate) fn usual() -> Options {
+    match parse(Vec::new()) {
+        Ok(Asked::Run(options)) => *options,
+        other => panic!("{other:?}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -252,6 +264,7 @@ mod tests {
             ("spin --rpm NaN", "--rpm NaN: not finite"),
             ("spin --seconds 0", "--seconds 0: not above zero"),
             ("identify --turns 0", "--turns 0: not above zero"),
+            ("spin --turns 1", "--turns is of identify: nothing else has a limit of the way"),
             ("spin --mecanum 1,0", "--mecanum takes three numbers"),
             ("spin --motors servo:1", "no model servo"),
             ("dance", "no command dance"),

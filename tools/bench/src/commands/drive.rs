@@ -121,30 +121,26 @@ impl Tune {
 }
 
 /// Gentle values for a motor that is tuned, where the options name none.
-pub(crate) fn plan(session: &Session, motor: usize, options: Option<&Options>) -> Plan {
+pub(crate) fn plan(session: &Session, motor: usize, options: &Options) -> Plan {
     let robot = session.robot();
     let (about, hysteresis, share) =
         if robot.unit(motor) == "V" { (8.0, 4.0, 0.4) } else { (15.0, 0.5, 0.5) };
-    let rpm = options.and_then(|options| options.rpm);
     Plan {
-        about: rpm.map_or(about, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),
-        amplitude: options
-            .and_then(|options| options.amplitude)
-            .unwrap_or(share * robot.limit(motor)),
-        hysteresis: options.and_then(|options| options.hysteresis).unwrap_or(hysteresis),
+        about: options.rpm.map_or(about, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),
+        amplitude: options.amplitude.unwrap_or(share * robot.limit(motor)),
+        hysteresis: options.hysteresis.unwrap_or(hysteresis),
     }
 }
 
 /// Gentle limits for a motor that is identified, where the options name none.
-pub(crate) fn limits(session: &Session, motor: usize, options: Option<&Options>) -> Limits {
+pub(crate) fn limits(session: &Session, motor: usize, options: &Options) -> Limits {
     let robot = session.robot();
     // A voltage of 0.8 of the limit turns a GM6020 without load at some 10 rad/s.
     let (speed, share) = if robot.unit(motor) == "V" { (14.0, 0.8) } else { (30.0, 0.5) };
-    let rpm = options.and_then(|options| options.rpm);
     Limits {
-        effort: options.and_then(|options| options.amplitude).unwrap_or(share * robot.limit(motor)),
-        speed: rpm.map_or(speed, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),
-        way: TAU * options.and_then(|options| options.turns).unwrap_or(16.0),
+        effort: options.amplitude.unwrap_or(share * robot.limit(motor)),
+        speed: options.rpm.map_or(speed, |rpm| AngularVelocity::from_rpm(rpm).as_rad_per_s()),
+        way: TAU * options.turns.unwrap_or(16.0),
     }
 }
 
@@ -170,10 +166,10 @@ impl Task for Tune {
         if is_armed && !self.is_busy && self.motor < session.robot().len() {
             self.is_busy = true;
             let begun = if self.options.command == Command::Identify {
-                let limits = limits(session, self.motor, Some(&self.options));
+                let limits = limits(session, self.motor, &self.options);
                 session.start_identifying(self.motor, limits)
             } else {
-                let plan = plan(session, self.motor, Some(&self.options));
+                let plan = plan(session, self.motor, &self.options);
                 session.start_tuning(self.motor, plan)
             };
             if let Err(error) = begun {

@@ -2,6 +2,7 @@ use super::*;
 use crate::identifying::{Identified, Limits};
 use crate::link::Simulated;
 use crate::motors;
+use crate::options::usual;
 
 /// All families, three at a time: at 1 kHz eight motors are more than a bus of 1 Mbit/s carries.
 const GROUPS: [&str; 3] = [
@@ -204,7 +205,7 @@ fn tuning_finds_gains_that_settle_faster() {
     for list in ["m3508:1", "gm6020:1", "damiao4310:1"] {
         let mut session = session(list);
         let outcome = measured(&mut session, |session| {
-            let plan = crate::commands::plan(session, 0, None);
+            let plan = crate::commands::plan(session, 0, &usual());
             session.start_tuning(0, plan)
         });
         let outcome = outcome.unwrap_or_else(|error| panic!("{list}: {error}"));
@@ -225,7 +226,7 @@ fn tuning_finds_gains_that_settle_faster() {
 fn identified(list: &str, change: impl Fn(&mut Limits)) -> (Session, Result<Identified, String>) {
     let mut session = session(list);
     let outcome = measured(&mut session, |session| {
-        let mut limits = crate::commands::limits(session, 0, None);
+        let mut limits = crate::commands::limits(session, 0, &usual());
         change(&mut limits);
         session.start_identifying(0, limits)
     });
@@ -271,7 +272,7 @@ fn identification_that_meets_a_limit_stops_and_says_which() {
     let (_, far) = identified("m3508:1", |limits| limits.way = 0.01);
     assert_eq!(far.unwrap_err(), "stopped: the way is beyond its limit");
     let mut session = session("m3508:1");
-    let limits = Limits { effort: 0.0, ..crate::commands::limits(&session, 0, None) };
+    let limits = Limits { effort: 0.0, ..crate::commands::limits(&session, 0, &usual()) };
     assert!(session.start_identifying(0, limits).unwrap_err().contains("effort_limit"));
 }
 
@@ -280,7 +281,7 @@ fn a_motor_that_is_lost_ends_its_identification() {
     let mut session = session("m3508:1");
     let outcome = measured(&mut session, |session| {
         simulated(session).silence(0, Duration::from_millis(400));
-        let limits = crate::commands::limits(session, 0, None);
+        let limits = crate::commands::limits(session, 0, &usual());
         session.start_identifying(0, limits)
     });
     assert_eq!(outcome, Err("no outcome".to_owned()));

@@ -46,8 +46,9 @@ impl Ui {
         self.has_changed = true;
         self.hint = None;
         let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
-        // From anywhere, also while gains are typed.
-        if matches!(key.code, KeyCode::Char(' ') | KeyCode::Esc) {
+        // From anywhere, also while gains are typed. A terminal sends Esc and a key soon after it as Alt and this key.
+        let is_alt = key.modifiers.contains(KeyModifiers::ALT);
+        if is_alt || matches!(key.code, KeyCode::Char(' ') | KeyCode::Esc) {
             self.input = None;
             return Some(Action::Stop);
         }
@@ -142,6 +143,20 @@ mod tests {
         let mut ui = Ui::default();
         assert_eq!(press(&mut ui, KeyCode::Char('a')), None);
         assert_eq!(press(&mut ui, KeyCode::Char('A')), Some(Action::Arm));
+    }
+
+    #[test]
+    fn a_key_soon_after_esc_stops_and_does_nothing_else() {
+        for (code, input) in [
+            (KeyCode::Char('s'), None),
+            (KeyCode::Char('A'), None),
+            (KeyCode::Right, None),
+            (KeyCode::Char('2'), Some("0".to_owned())),
+        ] {
+            let mut ui = Ui { input, ..Ui::default() };
+            let action = ui.press(KeyEvent::new(code, KeyModifiers::ALT), None);
+            assert_eq!((action, ui.input), (Some(Action::Stop), None), "{code:?}");
+        }
     }
 
     #[test]

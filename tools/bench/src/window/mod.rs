@@ -130,7 +130,7 @@ fn lead(
         }
     };
     _ = begun.send(Ok(()));
-    let mut remote = Remote::new(&session, actions, shared, options.held);
+    let mut remote = Remote::new(&session, actions, shared, options);
     session.run(end, &mut remote);
     let (results, mut failures) = remote.results();
     failures.extend(session.messages());

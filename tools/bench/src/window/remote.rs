@@ -4,6 +4,7 @@ use super::Shared;
 use super::view::{LINES, Strip, View};
 use crate::commands::{limits, plan};
 use crate::link::Link;
+use crate::options::Options;
 use crate::program::Program;
 use crate::record::Recorder;
 use crate::session::{Pilot, Session, Stage};
@@ -55,7 +56,7 @@ pub(crate) struct Remote {
     results: Vec<String>,
     last_messages: Vec<String>,
     pictured: Option<Instant>,
-    is_held: bool,
+    options: Options,
     was_held: bool,
 }
 
@@ -64,7 +65,7 @@ impl Remote {
         session: &Session,
         actions: Receiver<Action>,
         shared: Shared,
-        is_held: bool,
+        options: &Options,
     ) -> Self {
         Self {
             actions,
@@ -75,7 +76,7 @@ impl Remote {
             results: Vec::new(),
             last_messages: Vec::new(),
             pictured: None,
-            is_held,
+            options: options.clone(),
             was_held: false,
         }
     }
@@ -123,12 +124,12 @@ impl Remote {
                 );
             }
             Action::Tune(motor) => {
-                let plan = plan(session, motor, None);
+                let plan = plan(session, motor, &self.options);
                 let begun = session.start_tuning(motor, plan);
                 self.say_refusal(session, begun);
             }
             Action::Identify(motor) => {
-                let limits = limits(session, motor, None);
+                let limits = limits(session, motor, &self.options);
                 let begun = session.start_identifying(motor, limits);
                 self.say_refusal(session, begun);
             }
@@ -217,7 +218,7 @@ impl Remote {
             }
         }
         let (strips, log) = (self.strips.clone(), self.log.clone());
-        let view = View { snapshot, strips, log, is_held: self.is_held };
+        let view = View { snapshot, strips, log, is_held: self.options.held };
         if let Ok(mut shared) = self.shared.lock() {
             *shared = Some(view);
         }
@@ -279,6 +280,7 @@ mod tests {
     use crate::end::End;
     use crate::link::Simulated;
     use crate::motors;
+    use crate::options::usual;
     use crate::pace::Pace;
     use crate::robot::{Robot, Target};
     use crate::time::Time;
@@ -313,7 +315,7 @@ mod tests {
         let robot = Robot::new(&specs, false).unwrap();
         let mut session = Session::new(robot, link, Pace::Fast(Time::manual()), Vec::new());
         let (_sender, actions) = mpsc::channel();
-        let remote = Remote::new(&session, actions, Shared::default(), false);
+        let remote = Remote::new(&session, actions, Shared::default(), &usual());
         let mut script = Script(remote, 0, script, Vec::new());
         session.run(&End::none(), &mut script);
         let targets = script.3.into_iter().map(|target| match target? {
