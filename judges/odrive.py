@@ -426,7 +426,7 @@ def main():
     parser.add_argument("judge", choices=JUDGES)
     parser.add_argument("--count", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", choices=DEFECTS)
+    parser.add_argument("--only")
     arguments = parser.parse_args()
     judge = JUDGES[arguments.judge]()
     for part, defects in DEFECTS.items():

@@ -418,7 +418,9 @@ def compare(verb, judge, program, random, count):
         require(ill.sum() <= 2 + 0.01 * len(values), f"{verb}: {name}: {ill.sum()} of {len(values)} systems are ill-conditioned")
         values = values[~ill]
         left_out = f", {ill.sum()} ill-conditioned ones left out" if ill.any() else ""
-        figure("state space", NAMES[name], judge.name, len(values), allowed, values.max(), verb)
+        is_ours = name == "filter" and isinstance(judge, Control)
+        who = "the textbook form in numpy" if is_ours else judge.name
+        figure("state space", NAMES[name], who, len(values), allowed, values.max(), verb)
         print(f"  {verb}: {name} of {len(values)}{left_out}: within {values.max():.1e} (99.9 %: {np.quantile(values, 0.999):.1e}), allowed {allowed:.0e}")
     for name, (allowed, values) in all_of.items():
         worst = np.nanmax(np.concatenate(values))
