@@ -34,7 +34,7 @@ class Machine(Board):
         return [frame for frame in self.commands(since, until) if self.drives(frame)]
 
     def stale(self, since=0.0):
-        """Frames that drive and left later than a cycle after the program made them."""
+        """Frames that drive and left later than a cycle after they were in the controller."""
         return [frame for frame in self.driven(since) if frame.us - frame.born > self.FRESH_US]
 
     def jitter_us(self, since, until, identifier):

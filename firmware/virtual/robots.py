@@ -24,7 +24,7 @@ class Program:
         self.transmit_irq, self.debug_port = transmit_irq, debug_port
         self.has = {"loop", "remote" if remote else "key"} | ({"transmit irq"} if transmit_irq else set())
         self.has |= {"debug port"} if debug_port else set()
-        # An FDCAN has one interrupt for both directions: where it is not served, no frame of zeros leaves either.
+        # embassy serves both directions of an FDCAN in one interrupt: where it is not served, no frame of zeros leaves either.
         if chip is not Stm32h723:
             self.has.add("receive irq")
         self.fault_at_us = FAULT_AT_US
@@ -107,7 +107,7 @@ class Robot(Board):
         return zeros[0].us - since if zeros else None
 
     def stale(self, since=0.0):
-        """Frames that drive and left later than a cycle after the program made them."""
+        """Frames that drive and left later than a cycle after they were in the controller."""
         return [frame for frame in self.driven(since) if frame.us - frame.born > FRESH_US]
 
     def jitter_us(self, since, until):

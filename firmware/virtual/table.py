@@ -19,8 +19,8 @@ as their examples do: CAN in loop-back, a serial port by DMA in both directions,
 
 Not modelled: wait states and caches, the clock before the PLL runs, the receive error counter, retransmission by the motors,
 dominant bits of an error-passive node, extended and remote frames, the FIFO and the bursts of the DMA controller. A command reaches the
-motors up to 0.1 ms late. An FDCAN has one interrupt for both directions: where it is not served, no frame of zeros leaves, so the DM-MC02
-has no row `receive starved`.
+motors up to 0.1 ms late. The driver of embassy serves both directions of an FDCAN in one
+interrupt: where it is not served, no frame of zeros leaves, so the DM-MC02 has no row `receive starved`.
 
 A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row of each robot but the snake is also
 run from power-on, and its trace has to be the same, bit for bit.

@@ -82,7 +82,8 @@
 //!
 //! Not known: the side from which the manual sees its positive direction: angles and torques have the sign of the drive, and
 //! [`Motor::reversed`] reverses both. Whether off locks the holding brake. Whether a drive goes on with its last command when frames
-//! come again after its time-out: if so, for one update, until the second frame of rest. Whether a drive answers while its brake
+//! come again after its time-out: if so, until the second frame of rest, for two updates, or for the whole time-out where only one frame
+//! gets through. Whether a drive answers while its brake
 //! opens: after 100 ms without an answer the motor trips, and needs longer [`Timeouts`](crate::motor::Timeouts). How feedback counts
 //! beyond 32767°, 91 turns. An example of the manual answers a time-out with zeros where its text says that the frame is sent back:
 //! such a drive is refused.
