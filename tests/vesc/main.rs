@@ -656,20 +656,44 @@ fn the_share_of_the_order_scales_the_current() {
     use drivetrain::motor::{Order, OwnMotor, Target};
     use drivetrain::time::TimeStep;
     for (share, expected) in [(1.0, 20_000), (0.25, 5_000), (0.0, 0)] {
-        let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
-        _ = motor.decode(&drive(23).report(9).unwrap());
-        _ = motor.decode_answer(&drive(23).report(27).unwrap());
         for (target, sign) in [
             (Target::Torque(1e3), 1),
             (Target::Velocity(rad_s(-300.0)), -1),
             (Target::Angle(Angle::from_radians(3.0)), 1),
         ] {
+            let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
+            _ = motor.decode(&drive(23).report(9).unwrap());
+            _ = motor.decode_answer(&drive(23).report(27).unwrap());
             let frame = motor.control(Order { target, share, step: TimeStep::of(0.001) });
             let (packet, value) = read(&frame);
             let most = i64::from(sign) * expected;
             assert!(packet == 1 && value.abs() <= expected && value * most >= 0, "{frame:?}");
         }
     }
+}
+
+/// The velocity loop takes over from the torque before it, and leaves it.
+#[test]
+fn a_velocity_after_a_torque_begins_with_the_current_of_the_torque() {
+    use drivetrain::motor::{Order, OwnMotor, Target};
+    use drivetrain::time::TimeStep;
+    let mut motor = Motor::new(MODEL, 23, looped()).unwrap();
+    _ = motor.decode(&drive(23).report(9).unwrap());
+    _ = motor.decode_answer(&drive(23).report(27).unwrap());
+    let mut current = |target| {
+        let order = Order { target, share: 1.0, step: TimeStep::of(0.001) };
+        read(&motor.control(order))
+    };
+    let (_, torque) = current(Target::Torque(0.2));
+    let commands = (0..300).map(|_| current(Target::Velocity(rad_s(-1.0))));
+    // Without the questions.
+    let currents: Vec<i64> =
+        commands.filter_map(|(packet, value)| (packet == 1).then_some(value)).collect();
+    assert!(torque > 0 && (currents[0] - torque).abs() <= 1, "{torque}, {currents:?}");
+    let steps = currents.windows(2).map(|pair| pair[0] - pair[1]);
+    // 1 rad/s times 1 Nm/rad in 1 ms, at 0.05 Nm/A.
+    assert!(steps.clone().all(|step| (0..=40).contains(&step)), "{currents:?}");
+    assert!(steps.sum::<i64>() > 5_000, "{currents:?}");
 }
 
 /// A motor that was armed while another program drove the shaft, or a hand: no order before the first feedback after a loss.
