@@ -56,7 +56,6 @@ impl TorqueLoops {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact results are the rule under test")]
 mod tests {
     use super::*;
     use crate::motor::Impedance;
