@@ -1,14 +1,12 @@
 """What goes wrong on the board itself, and the board when nothing does."""
 from robots import ARM_AT_US, CYCLE_US, FAULT_AT_US
-from rows.judge import START_US, WATCHDOG_US, drives_again, driving, goes_on, must, rested, rests, row
+from rows.judge import START_US, WATCHDOG_US, drives_again, driving, figures, goes_on, must, rested, rests, row, watched
 
 
 @row("-", "fresh")
 def start(robot):
     """Power-on, arming, driving: zeros first, nothing but zeros until it is armed."""
-    busy = []
-    for cycle in range(51):
-        robot.at(FAULT_AT_US - 50_000 + cycle * CYCLE_US, lambda: busy.append((robot.core.busy, robot.core.interrupted)))
+    busy = watched(robot, FAULT_AT_US)
     robot.run(FAULT_AT_US + 1)
     frames = robot.commands()
     must(frames and not any(frames[0].data), "the first frame is not zero")
@@ -20,17 +18,11 @@ def start(robot):
     rpm, _, _ = robot.world.state(0)
     must(abs(rpm) > 20, f"the motor turns with {rpm:.1f} rpm only")
     must(not robot.resets, "it was reset")
-    last = busy[-1]
     return {
         "zero_us": frames[0].us,
         "stale": len(robot.stale()),
         "note": "zeros until it is armed",
-        "figures": {
-            "jitter_us": robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US),
-            "mean": (last[0] - busy[0][0]) / 50,
-            "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
-            "interrupts": (last[1] - busy[0][1]) / 50,
-        },
+        "figures": figures(busy, robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US)),
     }
 
 

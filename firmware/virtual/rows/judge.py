@@ -40,6 +40,25 @@ def must(condition, text):
         raise Wrong(text)
 
 
+def watched(robot, until):
+    """Busy and interrupted cycles of the core at each cycle of the program, for the 50 ms before `until`."""
+    busy = []
+    for cycle in range(51):
+        robot.at(until - 50_000 + cycle * CYCLE_US, lambda: busy.append((robot.core.busy, robot.core.interrupted)))
+    return busy
+
+
+def figures(busy, jitter_us):
+    """The costs of a cycle, for the second table."""
+    first, last = busy[0], busy[-1]
+    return {
+        "jitter_us": jitter_us,
+        "mean": (last[0] - first[0]) / 50,
+        "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
+        "interrupts": (last[1] - first[1]) / 50,
+    }
+
+
 def driving(robot, until=FAULT_AT_US):
     robot.run(until)
     must(robot.driven(until - 3 * CYCLE_US, until), "it does not drive before the fault")

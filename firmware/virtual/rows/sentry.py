@@ -1,6 +1,6 @@
 """The sentry: two buses, a gimbal on an IMU, a shooter."""
 from machines import ARM_AT_US, CYCLE_US, FAULT_AT_US, FLYWHEELS, LOADER, PITCH, UP, YAW
-from rows.judge import LOST_US, START_US, WATCHDOG_US, must, row
+from rows.judge import LOST_US, START_US, WATCHDOG_US, figures, must, row, watched
 
 YAW_COMMAND, SHOOTER_COMMAND = 0x1FF, 0x200
 
@@ -31,9 +31,7 @@ def _shoot(robot, us):
 @row("-", "fresh", "sentry")
 def closed_loop(robot):
     """It is armed, drives and turns its gimbal, follows it, and shoots."""
-    busy = []
-    for cycle in range(51):
-        robot.at(FAULT_AT_US - 50_000 + cycle * CYCLE_US, lambda: busy.append((robot.core.busy, robot.core.interrupted)))
+    busy = watched(robot, FAULT_AT_US)
     robot.run(ARM_AT_US)
     must(robot.commands() and not robot.driven(), "it drives before it was armed")
     first = robot.commands()[0].us
@@ -55,16 +53,11 @@ def closed_loop(robot):
     off = abs(heading - robot.attitude()["yaw_deg"])
     must(off < 12, f"the chassis is {off:.1f} degrees off its gimbal")
     must(not robot.stale() and not robot.resets, "stale frames, or a reset")
-    last, jitter_us = busy[-1], robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, YAW_COMMAND)
+    jitter_us = robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, YAW_COMMAND)
     must(jitter_us < CYCLE_US / 4, f"the cycle is {jitter_us:.0f} us off")
     return {
         "zero_us": first, "stale": 0, "note": "drives, follows its gimbal, shoots",
-        "figures": {
-            "jitter_us": jitter_us,
-            "mean": (last[0] - busy[0][0]) / 50,
-            "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
-            "interrupts": (last[1] - busy[0][1]) / 50,
-        },
+        "figures": figures(busy, jitter_us),
     }
 
 

@@ -3,7 +3,7 @@ import math
 
 from board.host import JOINTS
 from machines import ARM_AT_US, CYCLE_US, FAULT_AT_US
-from rows.judge import START_US, WATCHDOG_US, must, row
+from rows.judge import START_US, WATCHDOG_US, figures, must, row, watched
 
 # A joint goes on to its last target: it rests when its "disable" was sent.
 DISABLE = bytes((1, 0x10, 0, 0, 0, 0))
@@ -49,9 +49,8 @@ def _goes_on(robot, until, note):
 @row("-", "fresh", "snake")
 def gait(robot):
     """It is zeroed, enabled and swings: joints, gripper, servo, IMUs and telemetry."""
-    busy, errors, servo = [], [], []
-    for cycle in range(51):
-        robot.at(FAULT_AT_US - 50_000 + cycle * CYCLE_US, lambda: busy.append((robot.core.busy, robot.core.interrupted)))
+    busy = watched(robot, FAULT_AT_US)
+    errors, servo = [], []
     for place in range(30):
         errors_of = lambda: [robot.angle(joint) - robot.gait(joint, robot.clock.us()) for joint in range(JOINTS)]
         robot.at(FAULT_AT_US + place * 10_000, lambda: errors.extend(errors_of()))
@@ -72,16 +71,11 @@ def gait(robot):
     must(robot.servo.answers > 20, f"{robot.servo.answers} answers of the servo")
     must(robot.wire.collisions == 0, f"{robot.wire.collisions} collisions of a joint's id")
     must(not robot.resets and not robot.stale(), "a reset, or stale frames")
-    last, jitter_us = busy[-1], robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, 0x1FF)
+    jitter_us = robot.jitter_us(FAULT_AT_US - 50_000, FAULT_AT_US, 0x1FF)
     must(jitter_us < CYCLE_US / 2, f"the cycle is {jitter_us:.0f} us off")
     return {
         "zero_us": first, "stale": 0, "note": f"follows a gait, {rms:.1f} degrees off",
-        "figures": {
-            "jitter_us": jitter_us,
-            "mean": (last[0] - busy[0][0]) / 50,
-            "busiest": max(after[0] - before[0] for before, after in zip(busy, busy[1:])),
-            "interrupts": (last[1] - busy[0][1]) / 50,
-        },
+        "figures": figures(busy, jitter_us),
     }
 
 
