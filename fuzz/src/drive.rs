@@ -24,16 +24,23 @@ pub trait Drive {
     fn suffer(&mut self, kind: u8);
 }
 
+/// The methods that the drives have by themselves.
+macro_rules! forward {
+    () => {
+        fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+            Self::hear(self, frame)
+        }
+        fn step(&mut self, dt_s: f32) {
+            Self::step(self, dt_s);
+        }
+        fn shaft_mut(&mut self) -> &mut DriveShaft {
+            Self::shaft_mut(self)
+        }
+    };
+}
+
 impl Drive for DamiaoDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
-    }
+    forward!();
     fn suffer(&mut self, kind: u8) {
         match kind % 2 {
             0 => self.fail(8 + kind % 7),
@@ -43,15 +50,7 @@ impl Drive for DamiaoDrive {
 }
 
 impl Drive for LkDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
-    }
+    forward!();
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
             0 => self.fail(kind >> 2),
@@ -63,17 +62,9 @@ impl Drive for LkDrive {
 }
 
 impl Drive for RmdDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
+    forward!();
     fn report(&mut self, frames: &mut Vec<CanFrame>) {
         frames.extend(Self::report(self));
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
@@ -86,17 +77,9 @@ impl Drive for RmdDrive {
 }
 
 impl Drive for VescDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
+    forward!();
     fn report(&mut self, frames: &mut Vec<CanFrame>) {
         frames.extend([27, 16, 9].into_iter().filter_map(|packet| Self::report(self, packet)));
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
@@ -109,17 +92,9 @@ impl Drive for VescDrive {
 }
 
 impl Drive for OdriveDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
+    forward!();
     fn report(&mut self, frames: &mut Vec<CanFrame>) {
         frames.extend(core::iter::from_fn(|| self.next_frame()));
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {
@@ -133,15 +108,7 @@ impl Drive for OdriveDrive {
 }
 
 impl Drive for RobStrideDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft_mut(&mut self) -> &mut DriveShaft {
-        Self::shaft_mut(self)
-    }
+    forward!();
     fn suffer(&mut self, kind: u8) {
         match kind % 3 {
             0 => self.fail(1 << (kind >> 3)),

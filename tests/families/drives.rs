@@ -28,7 +28,7 @@ fn standard(id: u32, data: [u8; 8]) -> CanFrame {
     CanFrame::standard(u16::try_from(id).unwrap(), data).unwrap()
 }
 
-fn with_id(frame: &CanFrame, id: u32) -> CanFrame {
+pub(crate) fn with_id(frame: &CanFrame, id: u32) -> CanFrame {
     let id = match frame.id() {
         Id::Standard(_) => Id::from(StandardId::new(u16::try_from(id).unwrap()).unwrap()),
         Id::Extended(_) => ExtendedId::new(id).unwrap().into(),
@@ -36,7 +36,7 @@ fn with_id(frame: &CanFrame, id: u32) -> CanFrame {
     CanFrame::new(id, frame.data()).unwrap()
 }
 
-fn raw(frame: &CanFrame) -> u32 {
+pub(crate) fn raw(frame: &CanFrame) -> u32 {
     match frame.id() {
         Id::Standard(id) => u32::from(id.as_raw()),
         Id::Extended(id) => id.as_raw(),
@@ -94,9 +94,6 @@ impl Drive for RobStride {
         self.0 = self.0.with_parameter(0x7005, 3.0);
         Ok(())
     }
-    fn impossible(&mut self) -> Result<CanFrame, &'static str> {
-        Err("the fields have no such value")
-    }
     fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
         with_id(frame, raw(frame) + 0x100)
     }
@@ -127,15 +124,6 @@ impl Drive for Vesc {
     fn fail(&mut self) {
         self.0.fail(4);
     }
-    fn missets(&mut self) -> Result<(), &'static str> {
-        Err("each command has its mode")
-    }
-    fn impossible(&mut self) -> Result<CanFrame, &'static str> {
-        Err("the fields have no such value")
-    }
-    fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
-        with_id(frame, raw(frame) + 1)
-    }
     fn echo(&self, _command: &CanFrame) -> Result<CanFrame, &'static str> {
         Err("status packets have numbers of their own")
     }
@@ -156,15 +144,6 @@ impl Drive for Lk {
     usual!();
     fn fail(&mut self) {
         self.0.fail(0b1000);
-    }
-    fn missets(&mut self) -> Result<(), &'static str> {
-        Err("each command has its mode")
-    }
-    fn impossible(&mut self) -> Result<CanFrame, &'static str> {
-        Err("the fields have no such value")
-    }
-    fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
-        with_id(frame, raw(frame) + 1)
     }
     fn echo(&self, command: &CanFrame) -> Result<CanFrame, &'static str> {
         let mut data = *command.bytes();
@@ -194,12 +173,6 @@ impl Drive for Rmd {
     fn missets(&mut self) -> Result<(), &'static str> {
         self.0 = self.0.refusing_timeouts();
         Ok(())
-    }
-    fn impossible(&mut self) -> Result<CanFrame, &'static str> {
-        Err("the fields have no such value")
-    }
-    fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
-        with_id(frame, raw(frame) + 1)
     }
     fn echo(&self, command: &CanFrame) -> Result<CanFrame, &'static str> {
         Ok(standard(0x241, *command.bytes()))

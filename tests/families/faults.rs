@@ -1,4 +1,4 @@
-//! Faults that every drive may meet, each driven through every family: what happens is the cell of the table.
+//! Faults that every drive may meet, each driven through every family: the outcome is the cell of the table.
 
 use crate::motors::Family;
 use crate::station::{Bend, Drive, Station};
@@ -6,7 +6,7 @@ use drivetrain::frame::CanFrame;
 use drivetrain::motor::{ArmError, Ingest, Link};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-/// What happened, or why the family has no such fault.
+/// The outcome, or the reason that the family has no such fault.
 type Outcome = Result<String, &'static str>;
 type Case = (&'static str, fn(&Family) -> Outcome);
 

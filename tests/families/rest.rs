@@ -1,5 +1,5 @@
-//! What a foreign decoder reads in each frame after whatever ends the driving: rest, in each mode of each family, at every moment
-//! from the arming on.
+//! Each frame after an event that ends the driving is rest to a foreign decoder: in each mode of each family, at every moment from the
+//! arming on.
 
 use crate::motors::FAMILIES;
 use crate::station::Station;

@@ -1,5 +1,6 @@
 //! A motor of any family with its simulated drive: the face that tests of all families need.
 
+use crate::drives::{raw, with_id};
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{
     ArmError, BusLoad, CanDevice, Claim, Devices, Ingest, Link, Own, OwnMotor, TargetError,
@@ -97,15 +98,21 @@ pub(crate) trait Drive {
     ///
     /// # Errors
     /// The reason why the family has no such setting.
-    fn missets(&mut self) -> Result<(), &'static str>;
+    fn missets(&mut self) -> Result<(), &'static str> {
+        Err("each command has its mode")
+    }
     /// A frame of the feedback whose value no shaft has.
     ///
     /// # Errors
     /// The reason why there is none.
-    fn impossible(&mut self) -> Result<CanFrame, &'static str>;
+    fn impossible(&mut self) -> Result<CanFrame, &'static str> {
+        Err("the fields have no such value")
+    }
     /// The same frame, from a drive with another id on the same bus.
-    fn of_neighbour(&self, frame: &CanFrame) -> CanFrame;
-    /// The frame that this drive, or another one, sends back when it echoes a command.
+    fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
+        with_id(frame, raw(frame) + 1)
+    }
+    /// The echo of a command by this drive or another.
     ///
     /// # Errors
     /// The reason why no command comes back on the id of the feedback.
@@ -118,14 +125,14 @@ pub(crate) trait Drive {
 pub(crate) struct Station {
     pub(crate) device: Box<dyn Device>,
     pub(crate) drive: Box<dyn Drive>,
-    /// What arming two motors with the id of this one says.
+    /// The result of arming two motors with the id of this one.
     pub(crate) twins: Result<(), ArmError>,
     pub(crate) now_us: u64,
     /// The time step that an update is given.
     pub(crate) dt_s: f32,
     /// The frames of the last update.
     pub(crate) frames: Vec<CanFrame>,
-    /// What became of each frame of the drive in the last update.
+    /// The outcome of each frame of the drive in the last update.
     pub(crate) outcomes: Vec<Ingest>,
     /// No frame reaches the drive.
     pub(crate) is_cut: bool,
@@ -140,7 +147,7 @@ pub(crate) struct Station {
     pub(crate) heard: Vec<CanFrame>,
 }
 
-/// What the bus makes of a frame of the drive.
+/// The frames that the bus delivers for a frame of the drive.
 pub(crate) type Bend = Box<dyn FnMut(&dyn Drive, &CanFrame) -> Vec<CanFrame>>;
 
 impl Station {

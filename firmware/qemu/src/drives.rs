@@ -32,61 +32,44 @@ trait Drive {
     fn is_feedback(frame: &CanFrame) -> bool;
 }
 
+/// The methods that the drives have by themselves.
+macro_rules! forward {
+    () => {
+        fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+            Self::hear(self, frame)
+        }
+        fn step(&mut self, dt_s: f32) {
+            Self::step(self, dt_s);
+        }
+        fn shaft(&self) -> &DriveShaft {
+            Self::shaft(self)
+        }
+    };
+}
+
 impl Drive for LkDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft(&self) -> &DriveShaft {
-        Self::shaft(self)
-    }
+    forward!();
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.bytes()[0] == 0xA1
     }
 }
 
 impl Drive for RmdDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft(&self) -> &DriveShaft {
-        Self::shaft(self)
-    }
+    forward!();
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.bytes()[0] == 0xA1
     }
 }
 
 impl Drive for RobStrideDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft(&self) -> &DriveShaft {
-        Self::shaft(self)
-    }
+    forward!();
     fn is_feedback(frame: &CanFrame) -> bool {
         frame.header() >> 24 & 0x1F == 2
     }
 }
 
 impl Drive for OdriveDrive {
-    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
-        Self::hear(self, frame)
-    }
-    fn step(&mut self, dt_s: f32) {
-        Self::step(self, dt_s);
-    }
-    fn shaft(&self) -> &DriveShaft {
-        Self::shaft(self)
-    }
+    forward!();
     fn report(&mut self) -> Option<CanFrame> {
         self.next_frame()
     }
@@ -118,7 +101,7 @@ impl Drive for Vesc {
     }
 }
 
-/// Eight motors that are driven, and what their drives sent last.
+/// Eight driven motors, and the last frames of their drives.
 struct Group<M, D> {
     motors: [Own<M>; MOTORS],
     drives: [D; MOTORS],
@@ -194,8 +177,8 @@ fn ingest<M: OwnMotor>(motors: &mut [Own<M>; MOTORS], feedback: &[CanFrame; MOTO
     }
 }
 
-/// Prints the tick, and a frame of the feedback. Commands do not arrive here, so the drives send what they had; what is no feedback
-/// comes each 100 ms, and does not count.
+/// Prints the tick, and a frame of the feedback. Commands do not arrive here, so the drives repeat their last frames; frames other than
+/// feedback come each 100 ms, and do not count.
 fn measure<M: OwnMotor + Debug, D: Drive>(names: [&str; 2], group: Group<M, D>) {
     let Group { mut motors, feedback, others, mut now, .. } = group;
     let feedback = feedback.map(Option::unwrap);
