@@ -7,13 +7,27 @@ use crate::math::wrap_pi;
 
 /// A loop from the way to an angle, in rad, to a velocity, and a loop from a velocity, in rad/s, to a torque in Nm.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TorqueLoops(Cascade);
+pub(crate) struct TorqueLoops {
+    loops: Cascade,
+    before: Before,
+}
+
+/// The target of the step before.
+#[derive(Debug, Clone, Copy)]
+enum Before {
+    /// Or an impedance, which has no loops: they begin anew.
+    Rest,
+    /// In Nm, within the limit.
+    Torque(f32),
+    Velocity,
+    Angle,
+}
 
 impl TorqueLoops {
     /// # Errors
     /// As [`Cascade::new`].
     pub(crate) fn new(position: PidConfig, speed: PidConfig) -> Result<Self, ConfigError> {
-        Ok(Self(Cascade::new(position, speed)?))
+        Ok(Self { loops: Cascade::new(position, speed)?, before: Before::Rest })
     }
 
     /// Returns the torque for a velocity or an angle, possibly more than the limit; `None` for another target, and for an angle
@@ -29,29 +43,47 @@ impl TorqueLoops {
         let velocity = velocity.as_rad_per_s();
         let torque_nm = match order.target {
             Target::Velocity(target) => {
-                self.0.position_mut().reset_to(velocity);
-                self.0.speed_mut().step(target.as_rad_per_s(), velocity, &order.step)
+                if !matches!(self.before, Before::Velocity) {
+                    self.take_over(Before::Velocity, velocity);
+                }
+                self.loops.speed_mut().step(target.as_rad_per_s(), velocity, &order.step)
             }
             Target::Angle(target) => {
                 let way = wrap_pi((target - angle?).as_radians());
-                self.0.step(way, velocity, &order.step)
+                if !matches!(self.before, Before::Angle) {
+                    self.take_over(Before::Angle, velocity);
+                }
+                self.loops.step(way, velocity, &order.step)
             }
             Target::Torque(torque_nm) => {
-                self.0.position_mut().reset_to(velocity);
-                self.0.speed_mut().reset_to(limited(torque_nm, -limit_nm, limit_nm));
+                self.before = Before::Torque(limited(torque_nm, -limit_nm, limit_nm));
                 return None;
             }
             Target::Impedance(_) => {
-                self.reset();
+                self.before = Before::Rest;
                 return None;
             }
         };
-        self.0.speed_mut().keep_integral_between(-limit_nm, limit_nm);
+        self.loops.speed_mut().keep_integral_between(-limit_nm, limit_nm);
         Some(torque_nm)
     }
 
+    /// Continues from the output of the target before, so that a change of the kind of target does not jump.
+    #[cold]
+    fn take_over(&mut self, now: Before, velocity: f32) {
+        match core::mem::replace(&mut self.before, now) {
+            Before::Rest => self.loops.reset(),
+            Before::Torque(torque_nm) => {
+                self.loops.position_mut().reset_to(velocity);
+                self.loops.speed_mut().reset_to(torque_nm);
+            }
+            Before::Velocity => self.loops.position_mut().reset_to(velocity),
+            Before::Angle => {}
+        }
+    }
+
     pub(crate) const fn reset(&mut self) {
-        self.0.reset();
+        self.before = Before::Rest;
     }
 }
 
@@ -78,7 +110,7 @@ mod tests {
         Target::Velocity(AngularVelocity::from_rad_per_s(rad_per_s))
     }
 
-    /// A blocked shaft fills the integral. What was needed then must not drive it after another kind of target.
+    /// A blocked shaft fills the integral. This integral must not drive the shaft after another kind of target.
     #[test]
     fn nothing_of_an_integral_is_left_after_another_kind_of_target() {
         let (mut loops, step) = driven();
@@ -86,7 +118,7 @@ mod tests {
             for _ in 0..200 {
                 step(&mut loops, velocity(1.0));
             }
-            assert!(loops.0.speed().terms().i > 2.0);
+            assert!(loops.loops.speed().terms().i > 2.0);
             assert_eq!(step(&mut loops, between), None);
             assert_eq!(step(&mut loops, velocity(0.0)), Some(0.0), "{between:?}");
             assert_eq!(step(&mut loops, between), None);
