@@ -1,4 +1,4 @@
-//! What brakes a motor, told within 20 ms from its feedback, on the simulator: friction, a load of 1 Nm, and a blocked shaft.
+//! Load torque of a motor, observed within 20 ms from its feedback on the simulator: friction, a load of 1 Nm, and a blocked shaft.
 //!
 //! ```text
 //! cargo run --release --example observer [FILE.svg]

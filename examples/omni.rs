@@ -21,8 +21,7 @@ use std::error::Error;
 
 const WHEEL_RADIUS_M: f32 = 0.076;
 const DISTANCE_M: f32 = 0.22;
-/// A per rad/s and A per rad of the output shaft: what `WheelTuning` reckons for 15 kg, with twice its `ki`, for a plan that has to
-/// be kept. The floor holds some 9 A on each of three wheels.
+/// A per rad/s and A per rad of the output shaft: gains of `WheelTuning` for 15 kg, with twice its `ki`, since the robot follows a plan. The floor holds some 9 A on each of three wheels.
 const SPEED: PidConfig = PidConfig::new(4.0, 10.0, 0.0).with_output_limit(8.0);
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -34,7 +34,7 @@ const DRIVE: PidConfig = PidConfig::new(2.4, 6.0, 0.0).with_output_limit(8.0);
 const ANGLE: PidConfig = PidConfig::new(50.0, 0.0, 0.0).with_output_limit(25.0);
 const RATE: PidConfig = PidConfig::new(3.0, 30.0, 0.0);
 
-/// Where the modules stand, and what their encoders show when they point forward.
+/// Places of the modules, and angles of their encoders when they point forward.
 const MODULES: [(Vec2, Angle); 4] = [
     (Vec2::new(0.2, 0.2), Angle::from_degrees(12.0)),
     (Vec2::new(0.2, -0.2), Angle::from_degrees(251.0)),
@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     course::judge(&samples)
 }
 
-/// The motors that roll, those that steer, and the floor under them.
+/// Rolling motors, steering motors, and the floor under them.
 fn robot(world: &Simulation) -> Result<(Robot<'_>, Robot<'_>, Modules), Box<dyn Error>> {
     let (mut can1, mut can2) =
         (Bus::new().with_load_ceiling(0.9), Bus::new().with_load_ceiling(0.9));

@@ -1,4 +1,4 @@
-//! What a shell does to the examples: arguments that make no sense, an output that nobody reads, and one that a page shows.
+//! Arguments that make no sense, an output that nobody reads, and an output that a page shows: each example under a shell.
 
 #![cfg(test)]
 #![cfg(unix)]

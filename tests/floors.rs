@@ -107,7 +107,7 @@ fn named(line: &str) -> Vec<String> {
     modules
 }
 
-/// What the simulator may know of the driver: its table of facts, not its code.
+/// Names of the driver that the simulator may use: the table of facts, not the code.
 const FACTS: [&str; 11] = [
     "CommandFrame",
     "Facts",

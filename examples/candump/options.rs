@@ -1,4 +1,4 @@
-//! What was asked for on the command line.
+//! Options of the command line.
 
 use drivetrain::time::Duration;
 use lexopt::prelude::*;

@@ -1,4 +1,4 @@
-//! What the examples `omni` and `swerve` share: a course to drive, what came of it, and its picture.
+//! The course of the examples `omni` and `swerve`, its result, and its picture.
 
 #[path = "../output/mod.rs"]
 pub(crate) mod output;
@@ -73,7 +73,7 @@ fn speed(t: f32) -> f32 {
     1.0 - (TAU * t).cos()
 }
 
-/// Commands the planned motion, and what drives off the error of the believed position; at the end, to stay there.
+/// Commands the planned motion, and a correction of the believed position; after the end, a standstill.
 pub(crate) fn command<K: Kinematics>(chassis: &mut Chassis<K>, time_s: f32, heading: Heading) {
     if time_s < END_S {
         let (position, motion) = plan(time_s);

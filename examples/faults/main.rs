@@ -1,5 +1,5 @@
-//! Drives the whole catalogue of `docs/faults.md` through the simulator and the public API, and prints for each row what
-//! has to follow, what was seen, and after how many ticks the output was safe. Fails when one differs.
+//! Drives the whole catalogue of `docs/faults.md` through the simulator and the public API, and prints for each row the
+//! expected reaction, the reaction seen, and the ticks until the output was safe. Fails when a row differs.
 //!
 //! `cargo run --release --example faults`, or with ids: `cargo run --release --example faults -- F24 F54`
 

@@ -52,7 +52,7 @@ const fn speed() -> AngularVelocity {
 const SPEED_LOOP: PidConfig = PidConfig::new(0.5, 2.0, 0.0);
 const POSITION_LOOP: PidConfig = PidConfig::new(10.0, 0.0, 0.0).with_output_limit(8.0);
 
-/// What a drive may do, in Nm.
+/// Torques that a drive may have, in Nm.
 #[derive(Debug, Clone, Copy)]
 struct Limits {
     /// At rest: half a count of its command.
@@ -248,7 +248,7 @@ fn robstride_of(kind: u8, input: &mut Input) {
     }
 }
 
-/// A motor, its drive, and what was told apart from the two.
+/// A motor, its drive, and records apart from both.
 struct Bench<M, D> {
     own: Own<M>,
     drive: D,
@@ -429,7 +429,7 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
         }
     }
 
-    /// Tells whether the motor may be driven: by what it says, and by what happened to it.
+    /// Tells whether the motor may be driven, by its reports and by the events so far.
     fn may_drive(&self) -> bool {
         let is_young = self.unheard_ms < LATE_MS && self.untold_ms < OLD_MS;
         self.own.is_armed() && self.own.guard().has_target() && self.is_granted && is_young

@@ -6,7 +6,7 @@
 //!   PHASE SLIPS [BUS:ID#HEX]...
 //! ```
 //! Buses: 0 the wheels (left 1, right 2, whose motor is mirrored), 1 and 2 the legs, left and right (front 1, rear 2). `i:` bytes of the
-//! IMU. Phases: 0 fallen, 1 rising, 2 standing, 3 airborne. The controller knows the nominal robot, whatever stands outside.
+//! IMU. Phases: 0 fallen, 1 rising, 2 standing, 3 airborne. The controller knows the nominal robot alone.
 
 use crate::Outcome;
 use crate::defect::defects;

@@ -94,8 +94,8 @@ pub fn encode(
     Ok(())
 }
 
-/// Reads the data of answers and writes 16 bytes for each, the low one first: what it is (0 nothing, 1 feedback, 2 state, 3 angle) and
-/// three zeros; then its four values of 16 bits each; zeros follow.
+/// Reads the data of answers and writes 16 bytes for each, the low one first: the kind (0 nothing, 1 feedback, 2 state, 3 angle) and
+/// three zeros; then the four values of 16 bits each; zeros follow.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits")]
 pub fn decode(
     values_of: impl Fn(&[u8; 8]) -> Option<(u8, [i64; 4])>,

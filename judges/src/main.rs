@@ -1,4 +1,4 @@
-//! What drivetrain sends and reads, for judges that are written in Python.
+//! Codecs and algorithms of drivetrain, for judges that are written in Python.
 //!
 //! ```text
 //! drivetrain-judges models                one a line: name, PMAX, VMAX, TMAX
@@ -39,7 +39,7 @@ use drivetrain::damiao::{Model, Register};
 use std::io::{self, BufRead, BufWriter, Write};
 use std::process::ExitCode;
 
-/// What goes wrong, as a text for a person.
+/// A result whose error is a text for a person.
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// The registers that the family has. `judges/damiao.py` compares them with the source and with the judges.

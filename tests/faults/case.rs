@@ -1,4 +1,4 @@
-//! What a row of the catalogue is as a program: a function that fails, and what it saw.
+//! A row of the catalogue as a program: a function that returns its observation, or fails.
 
 use drivetrain::motor::{Own, OwnMotor};
 use std::any::type_name;

@@ -3,7 +3,7 @@
 use super::*;
 use drivetrain::motor::Claim;
 
-/// What a motor at rest may send, read by the manual alone: off, questions, clear, and a torque without current.
+/// Frames of a motor at rest, by the manual alone: off, questions, clear, and a torque without current.
 fn is_rest(frame: &CanFrame) -> bool {
     let [code, rest @ ..] = *frame.bytes();
     [0x80, 0x92, 0x9A, 0x9B, 0x9C, 0xA1].contains(&code) && rest == [0; 7]

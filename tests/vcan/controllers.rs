@@ -110,13 +110,13 @@ impl Bus {
     }
 }
 
-/// What the driver of an interface counted.
+/// A counter of the driver of an interface.
 fn counted(interface: &str, counter: &str) -> u64 {
     let file = format!("/sys/class/net/{interface}/statistics/{counter}");
     fs::read_to_string(file).unwrap().trim().parse().unwrap()
 }
 
-/// What the bench counted.
+/// A counter of the bench.
 fn reported(report: &[String], name: &str) -> u64 {
     let count = report.iter().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
     count.unwrap_or_else(|| panic!("no {name} in {report:?}")).parse().unwrap()

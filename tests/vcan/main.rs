@@ -40,7 +40,7 @@ const MARKER: u16 = 0x7F0;
 const END: u16 = 0x7F1;
 const RPM: f32 = 60.0;
 
-/// Name, what stands between the sockets and the bus, milliseconds.
+/// Name, queueing discipline between the sockets and the bus, milliseconds.
 const PHASES: [(&str, &str, u32); 6] = [
     ("clean", "", 1_500),
     ("5 % lost", "netem loss 5%", 4_000),
@@ -96,7 +96,7 @@ fn result(name: &str) -> String {
     folder.join(name).to_str().unwrap().to_owned()
 }
 
-/// What the last bench said on standard error.
+/// Standard error of the last bench.
 fn said() -> String {
     fs::read_to_string(result("said")).unwrap()
 }
@@ -174,7 +174,7 @@ struct Robot {
     world: Simulation,
     socket: CanSocket,
     written: Written,
-    /// What it received, as candump would write it.
+    /// The received frames, as candump would write them.
     received: Vec<String>,
     ms: u32,
 }

@@ -358,7 +358,7 @@ pub fn family<D: CanDevice + 'static>() {
     (|device: &mut D| device.clear_emergency_stop()).call();
 }
 
-/// What every caller has of devices and their combinations.
+/// Functions of devices and their combinations.
 pub fn device<D: Devices + 'static>() {
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest(frame, now)).call();
     (|device: &mut D, frame: &CanFrame, now: Instant| device.ingest_any(frame, now)).call();

@@ -66,7 +66,7 @@ type Sampling<C> = fn(&mut C, f32, f32, f32);
 type Filter<C> = fn(&mut C, f32, f32) -> f32;
 type Sampler<C> = fn(&mut C, f32) -> f32;
 
-/// Two controllers of one loop, the actuators, the filters, and what shapes a target.
+/// Two controllers of one loop, the actuators, the filters, and the generators of targets.
 pub fn rows() {
     loops();
     let mut filter = LowPass::new(black_box(30.0)).unwrap();

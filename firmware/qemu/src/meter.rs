@@ -9,8 +9,8 @@ pub const CALLS: u32 = 1_000;
 /// QEMU's `-icount shift=0` takes one ns an instruction, and the timer of this board runs at 25 MHz.
 const INSTRUCTIONS_A_TICK: u32 = 40;
 
-/// What a measured call is compared with: a call with the same arguments to a function with nothing but the frame that
-/// this target forces on every one (push, mov, pop). A figure is what a function does beyond being one.
+/// Reference of a measured call: a call with the same arguments to an empty function, with the stack frame that this target forces
+/// on every function (push, mov, pop). A figure is the difference of both calls.
 #[inline(never)]
 extern "C" fn returns_at_once() {}
 
@@ -21,8 +21,8 @@ pub fn start(timer: &mut SYST) {
     timer.enable_counter();
 }
 
-/// Returns the instructions of one call of `function`, a function pointer: `each` calls what it is given, once with
-/// `function` and once with one that returns at once, and the difference is the figure.
+/// Returns the instructions of one call of `function`, a function pointer: `each` calls its argument, once
+/// `function` and once an empty function, and the difference is the figure.
 pub fn instructions<F: Copy>(function: F, each: impl FnMut(F, u32)) -> u32 {
     instructions_of(CALLS, function, each)
 }

@@ -20,7 +20,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 const RPM: i16 = 191;
 const COUNTS: u16 = 26;
 
-/// What the motors are asked for.
+/// Targets of the motors.
 #[derive(Clone, Copy)]
 pub enum Targets {
     Speed,

@@ -1,4 +1,4 @@
-//! The cycle of a program: a `Runner` over a driver, and what a program asks of its motors in between.
+//! The cycle of a program: a `Runner` over a driver, and calls for each motor in between.
 
 use crate::driver::Driver;
 use crate::driver_frame::DriverFrame;
@@ -201,7 +201,8 @@ fn disarmed() -> u32 {
     robot.cycles()
 }
 
-/// Cycles of motors that were driven: in which the feedback of all gets late, one of those after it, and in which all are heard again.
+/// Three cycles of motors that were driven: the cycle in which the feedback of all gets late, a cycle of late feedback, and the cycle in
+/// which all are heard again.
 fn late() -> [u32; 3] {
     [0, 3, 4].map(|cycles| {
         let now = Cell::new(START);

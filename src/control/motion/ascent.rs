@@ -8,7 +8,7 @@ use crate::math;
 /// and more where the way hardly depends on the roots. The bracket halves where a step would leave it.
 const ROUGH_STEPS: u32 = 7;
 const EXACT_STEPS: u32 = 16;
-/// Shares of the last step. That of a rough one leaves a deviation near the rounding of `f32`, which the exact step takes away.
+/// Shares of the last step. The rough share leaves a deviation near the rounding of `f32`, and the exact step removes this deviation.
 const ROUGH: f32 = 1e-3;
 const EXACT: f32 = 3e-5;
 
@@ -62,7 +62,7 @@ pub(super) struct Curve {
 ///            state /           \__ exit        way of a slope = (velocity below + crest) / 2 * duration
 ///         entry __/                            whole way = sum of both, whole time = sum of both
 /// ```
-/// The state lies on a slope that began at `entry` with an acceleration of zero: it is later than that start by its acceleration, and
+/// The state lies on a slope that began at `entry` with an acceleration of zero: it is later than the start of the slope by its acceleration, and
 /// farther by a part that `way` contains. Without holding and cruising, the sum `s` of both roots gives the whole way:
 /// `s³/4 + (entry + exit) s - (exit - entry)² / 4s`.
 ///

@@ -119,8 +119,9 @@ pub trait OwnMotor {
     /// or be another drive.
     fn forget_settings(&mut self) {}
 
-    /// Returns of how many frames to the drive one is answered, for the largest [load](super::Own::load) of the bus: 1, the default, if
-    /// the drive answers each; 2 if the drive answers questions only, as a question stands between two other frames; 0 for no answers.
+    /// Returns the number of frames to the drive for one answer, for the largest [load](super::Own::load) of the bus: 1, the default, if
+    /// the drive answers each frame; 2 if the drive answers questions alone, since a question stands between two other frames; 0 for no
+    /// answers.
     fn frames_per_answer(&self) -> u32 {
         1
     }

@@ -1,4 +1,4 @@
-//! What the command line asks for.
+//! Options of the command line.
 
 use crate::motors::{self, Spec};
 use drivetrain::geometry::Vec2;

@@ -1,4 +1,4 @@
-//! What a motor does while it is armed: a speed, a sine, steps, or being tuned or identified.
+//! Programs of an armed motor: a speed, a sine, steps, tuning, identification.
 
 use crate::identifying::Identifying;
 use crate::outcome::{Next, Outcome};
@@ -30,7 +30,7 @@ pub(crate) enum Program {
     Identify(Box<Identifying>),
 }
 
-/// What a program asks for in a tick.
+/// Request of a program in a tick.
 #[derive(Debug)]
 pub(crate) enum Asks {
     Target(Target),

@@ -16,7 +16,7 @@ const M2006_SPEED: PidConfig = PidConfig::new(0.15, 1.5, 0.0).with_output_limit(
 const GM6020_SPEED: PidConfig = PidConfig::new(1.0, 5.0, 0.0).with_output_limit(10.0);
 const GM6020_CURRENT_SPEED: PidConfig = PidConfig::new(0.1, 1.0, 0.0).with_output_limit(1.0);
 
-/// What a motor is asked for, at its output shaft.
+/// Target of a motor, at its output shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Target {
     /// In rad/s.
@@ -318,7 +318,7 @@ impl Robot {
         }
     }
 
-    /// What the bus of DJI counts.
+    /// Counters of the DJI bus.
     pub(crate) fn counters(&self) -> Counters {
         self.bus.counters()
     }

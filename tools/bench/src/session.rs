@@ -1,4 +1,4 @@
-//! The session: the motors as a device, the link, and what records both. The window and every command use this one.
+//! The session: the motors as a device, the link, and the recorders of both. The window and every command use a session.
 //!
 //! ```text
 //! link ──> tap (count, record, ledger) ──> runner ──> robot ──> programs set targets
@@ -291,7 +291,7 @@ impl Session {
         }
     }
 
-    /// What was lost stays relaxed, and one motor that was lost stops them all.
+    /// A lost motor stays relaxed, and stops all motors.
     fn drive(&mut self, tick: Tick) {
         self.run_programs(tick.dt_s());
         self.tap().is_driving = true;
@@ -347,7 +347,7 @@ impl Session {
         self.has_failed = true;
     }
 
-    /// What the runner and the bus of DJI counted, by name.
+    /// Counts of the runner and of the DJI bus, by name.
     pub(crate) fn counts(&mut self) -> Vec<(&'static str, u64)> {
         let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
         let counts = [

@@ -19,7 +19,7 @@ impl embedded_can::Error for LinkError {
     }
 }
 
-/// The link of a session, and whatever looks at its frames.
+/// The link of a session, and the observers of its frames.
 #[derive(Debug)]
 pub(crate) struct Tap {
     pub(crate) link: Link,
@@ -27,7 +27,7 @@ pub(crate) struct Tap {
     pub(crate) traffic: Traffic,
     pub(crate) recorders: Vec<Recorder>,
     pub(crate) time: Time,
-    /// The motors are armed: what is sent may drive them.
+    /// The motors are armed: sent frames may drive them.
     pub(crate) is_driving: bool,
     /// Frames that the interface said were on the bus.
     pub(crate) confirmed: u64,

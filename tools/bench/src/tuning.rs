@@ -18,7 +18,7 @@ const RUN_UP_S: f32 = 1.0;
 /// The time in which it comes to rest between two steps.
 const PAUSE_S: f32 = 1.0;
 
-/// What is asked of a motor while it is tuned.
+/// Targets and efforts of a motor while it is tuned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plan {
     /// The speed in rad/s about which it swings, away from zero, where dry friction would hold it.
@@ -53,7 +53,7 @@ pub(crate) struct Tuned {
 
 #[derive(Debug)]
 enum Stage {
-    /// It comes to rest, whatever it did.
+    /// From any motion to rest.
     Rest {
         left_s: f32,
     },
@@ -100,7 +100,7 @@ impl Tuning {
         Ok(Self { plan, stage: Stage::Rest { left_s: PAUSE_S }, outcome })
     }
 
-    /// What is being done, for a person who waits.
+    /// The name of the present stage, for a person who waits.
     pub(crate) fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Rest { .. } => "rest",
@@ -231,7 +231,7 @@ impl Tuned {
         })
     }
 
-    /// What both steps showed, a line for each.
+    /// A line for each step.
     pub(crate) fn lines(&self) -> Vec<String> {
         let mut lines = vec![format!(
             "{}: ultimate gain {:.3} {} per rad/s, ultimate period {:.1} ms",

@@ -106,7 +106,7 @@ extern "C" fn take_log() -> *const u8 {
     leave(with(Session::take_log))
 }
 
-/// What was done so far, as a script.
+/// The actions so far, as a script.
 #[unsafe(no_mangle)]
 extern "C" fn script() -> *const u8 {
     leave(with(|session| session.script()))

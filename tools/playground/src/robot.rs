@@ -1,4 +1,4 @@
-//! The program of the robot: what would run on its microcontroller, in any layout.
+//! The program of the robot, as for a microcontroller, in any layout.
 
 use crate::delay::Delayed;
 use drivetrain::chassis::{
@@ -52,7 +52,7 @@ impl Layout {
 /// Age of the last command at which the motors of [`Watchdogs::Both`] stop.
 const MOTOR_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// What stops the motors when frames do not come.
+/// The watchdog that stops the motors when frames do not come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Watchdogs {
     /// The program stops them 10 ms after their last feedback; a motor stops 50 ms after its last command.
@@ -74,7 +74,7 @@ impl Watchdogs {
     }
 }
 
-/// What the pilot does in a tick.
+/// Inputs of the pilot in a tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pilot {
     /// The position of the arming switch; turning it on arms.
@@ -83,7 +83,7 @@ pub(crate) struct Pilot {
     pub(crate) twist: Twist<Body>,
 }
 
-/// What a page shows of a wheel: rad/s of the wheel, A of its motor; `None` without fresh feedback.
+/// Values of a wheel on the page: rad/s of the wheel, A of its motor; `None` without fresh feedback.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct WheelView {
     pub(crate) target: f32,
@@ -156,7 +156,7 @@ pub(crate) fn build(
     Ok((robot, parts.keys))
 }
 
-/// What the layouts have in common while they are built.
+/// Parts that all layouts have while they are built.
 struct Parts {
     world: &'static Simulation,
     bus: Bus,

@@ -17,10 +17,10 @@ use std::rc::Rc;
 const WINDOW_MS: u64 = 20;
 /// How often the loop of the robot looks for frames and for time.
 const POLL: Duration = Duration::from_micros(100);
-/// The log keeps this many bytes for the page; what the page does not read is dropped, and said.
+/// The log keeps this many bytes for the page; lines that the page does not read are dropped, with a note.
 const LOG_BYTES: usize = 16_384;
 
-/// What is decided before a robot starts.
+/// Settings that a start fixes.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup {
     /// Decides phases, clock errors and every chance.
@@ -33,11 +33,11 @@ pub struct Setup {
     pub kp: f32,
     /// Integral gain of each wheel in A per rad.
     pub ki: f32,
-    /// What stops the motors when frames do not come.
+    /// The watchdog that stops the motors when frames do not come.
     pub watchdogs: Watchdogs,
 }
 
-/// What a hand may turn while the robot runs.
+/// Settings that a hand may turn while the robot runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Knob {
     /// The arming switch: on from 0.5.
@@ -72,7 +72,7 @@ impl Knob {
     ];
 }
 
-/// What may go wrong, from when it is begun until it is ended.
+/// A fault, which lasts until it is ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
     /// The CAN plug of the controller is out.

@@ -1,4 +1,4 @@
-//! A run that is written down: what a hand does, and when.
+//! A written run: the actions of a hand with their times.
 //!
 //! ```text
 //! start SEED LAYOUT MASS_KG KP KI WATCHDOGS

@@ -140,7 +140,7 @@ impl Pilot {
         frame
     }
 
-    /// Returns the gains of the wheels: those that a PC set, or those of the robot's mass.
+    /// Returns the gains of the wheels: set by a PC, or by the mass of the robot.
     fn gains(&self, now: Instant) -> (f32, f32, f32) {
         let (kp, ki, kd) = SPEED.gains();
         let set = |index| self.parameters.value(index, now);

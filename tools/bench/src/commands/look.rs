@@ -21,8 +21,7 @@ impl Scan {
     }
 }
 
-/// Frames that change nothing and that drives answer: what is their state, for LK and RMD; their control mode, for Damiao; and
-/// who are you, for RobStride.
+/// Questions that change nothing: for the state of LK and RMD, for the control mode of Damiao, and for the identity of RobStride.
 fn questions() -> Vec<CanFrame> {
     let standard = |id: u16, data: [u8; 8]| StandardId::new(id).map(|id| CanFrame::of(id, data));
     let lk = (1..=32).filter_map(|id| standard(0x140 + id, [0x9A, 0, 0, 0, 0, 0, 0, 0]));

@@ -20,16 +20,16 @@ use std::process::ExitCode;
 /// Texts that wait for a reader.
 const ROOM: usize = 64;
 
-/// What a command does in each tick: `false` ends it.
+/// A command, tick by tick: `false` ends it.
 pub(crate) trait Task {
-    /// What is asked for before the first tick.
+    /// Requests before the first tick.
     fn begin(&mut self, session: &mut Session) {
         _ = session;
     }
 
     fn ticked(&mut self, session: &mut Session, ticks: u64, out: &mut Out) -> bool;
 
-    /// What is said at the end, after all else.
+    /// The last text.
     fn report(&mut self, session: &mut Session, out: &mut Out) -> String;
 
     /// Whether the end of the time is a failure.

@@ -1,4 +1,4 @@
-//! Keys, and what they ask for.
+//! Keys and their actions.
 
 use super::remote::Action;
 use super::view::View;
@@ -11,7 +11,7 @@ const JOG_RPM: f32 = 10.0;
 /// The sine and the steps, in rpm.
 const SWING_RPM: f32 = 60.0;
 
-/// What the window shows in its middle.
+/// The middle of the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Page {
     #[default]
@@ -20,7 +20,7 @@ pub(crate) enum Page {
     Help,
 }
 
-/// What of the window is not of the session.
+/// State of the window that is not of the session.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ui {
     pub(crate) page: Page,

@@ -37,7 +37,7 @@ const GLANCE: Duration = Duration::from_millis(40);
 /// A window gets this long to give the terminal back.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// What the user is told when the window is gone.
+/// Texts for the user after the window is gone.
 #[derive(Debug, Default)]
 struct Ending {
     /// Gains that were found.
@@ -46,7 +46,7 @@ struct Ending {
     failures: Vec<String>,
 }
 
-/// What the session's thread leaves for the window.
+/// The last view, from the thread of the session to the window.
 type Shared = Arc<Mutex<Option<View>>>;
 
 /// Messages of panics, printed once the screen is the user's again.
@@ -55,7 +55,7 @@ type Defects = Arc<Mutex<Vec<String>>>;
 /// Shows the session until it ends.
 ///
 /// # Errors
-/// Says which option cannot be met, or what is wrong with the terminal.
+/// Names the option that cannot be met, or the error of the terminal.
 pub(crate) fn run(options: &Options, end: &End) -> Result<ExitCode, String> {
     let tty = Tty::open().map_err(|error| format!("the terminal: {error}"))?;
     let (actions, received) = channel();
