@@ -18,17 +18,17 @@ drivers of embassy-stm32, stm32f4xx-hal and bxcan come up unchanged, and the pro
 as their examples do: CAN in loop-back, a serial port by DMA in both directions, DMA from memory to memory.
 
 Not modelled: wait states and caches, the clock before the PLL runs, the receive error counter, retransmission by the motors,
-dominant bits of an error-passive node, extended and remote frames, the FIFO and the bursts of the DMA controller. A command reaches the
-motors up to 0.1 ms late. The driver of embassy serves both directions of an FDCAN in one
+dominant bits of an error-passive node, extended and remote frames, the FIFO and the bursts of the DMA controller, and the bytes that
+a circular DMA stream leaves out when it is switched off and on. A command reaches the motors up to 0.1 ms late. The driver of embassy serves both directions of an FDCAN in one
 interrupt: where it is not served, no frame of zeros leaves, so the DM-MC02 has no row `receive starved`.
 
 A robot is driven to the fault once, and each row goes on from there on a copy of the process; one row of each robot but the snake is also
 run from power-on, and its trace has to be the same, bit for bit.
 
 * Zeros after: the time from the fault, or from the end of a fault of the line, until the first frame of zeros after which no
-  other frame follows. For power-on it is the time from reset to the first frame. A dash: the robot goes on. A joint of the snake
-  robot rests when its "disable" was sent: the time is that of the last joint. Without IMU, a chassis is stopped by its wheels: the time
-  is that until they stand.
+  other frame follows; where one motor fails and the others go on, the first from which on its own word is zero. For power-on it is the
+  time from reset to the first frame. A dash: the robot goes on, or no zeros are asked for. A joint of the snake robot rests when its
+  "disable" was sent: the time is that of the last joint. Without IMU, a chassis is stopped by its wheels: the time is that until they stand.
 * Stale: frames on the wire that are not zero and that waited in the controller for more than a cycle. The age in a queue before it is
   not seen, except by the words in the row `transmit starved`.
 

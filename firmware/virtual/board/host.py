@@ -41,6 +41,8 @@ class Host:
         self.is_sending = True
         self.cut_after = None
         self.spoil = None
+        # The place of a byte that gets a framing error, once.
+        self.flaw = None
         self.sent = 0
         self.received = bytearray()
         self.telemetry = []
@@ -58,11 +60,16 @@ class Host:
             self.sent += 1
             for place, byte in enumerate(data):
                 byte = self.spoil(place, byte) if self.spoil else byte
-                clock.after(clock.cycles(1 + place * 1e7 / BAUD), lambda byte=byte: self._byte(byte))
+                clock.after(clock.cycles(1 + place * 1e7 / BAUD), lambda byte=byte, place=place: self._byte(place, byte))
         clock.after(clock.cycles(PERIOD_US), self._send)
 
-    def _byte(self, byte):
-        self.board.chip.usarts[self.usart].receive(byte, BAUD)
+    def _byte(self, place, byte):
+        usart = self.board.chip.usarts[self.usart]
+        if place == self.flaw:
+            self.flaw = None
+            usart.disturb(byte, BAUD)
+        else:
+            usart.receive(byte, BAUD)
 
     def _hear(self, byte, baud):
         if abs(baud / BAUD - 1) > 0.03:

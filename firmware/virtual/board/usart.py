@@ -62,6 +62,10 @@ class Usart(Device):
             wanted |= ORE | FE | NOISE
         self.nvic.set_line(self.irq, bool(self.flags & wanted))
 
+    def disturb(self, byte, baud):
+        """A byte arrives whose stop bit is low."""
+        self.receive(byte, baud, FE)
+
     def receive(self, byte, baud, errors=0):
         """A byte arrives; `errors` are bits of the status register. The line is idle a byte later unless another one comes."""
         if not self._is_on(RECEIVER):

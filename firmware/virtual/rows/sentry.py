@@ -1,6 +1,7 @@
 """The sentry: two buses, a gimbal on an IMU, a shooter."""
+from board.remote import BAUD
 from machines import ARM_AT_US, CYCLE_US, FAULT_AT_US, FLYWHEELS, LOADER, PITCH, UP, YAW
-from rows.judge import LOST_US, START_US, WATCHDOG_US, figures, must, row, watched
+from rows.judge import LOST_US, START_US, WATCHDOG_US, drives_again, figures, must, rests, row, watched
 
 YAW_COMMAND, SHOOTER_COMMAND = 0x1FF, 0x200
 
@@ -168,7 +169,30 @@ def sentry_remote_storm(robot):
     """The bytes of the remote control come at twice its rate: the USART reports framing errors, and DMA starts again each time."""
     _driving(robot)
     robot.remote.baud = 200_000
-    return _at_rest(robot, FAULT_AT_US, 124_000, "at rest until armed again", FAULT_AT_US + 200_000)
+    heard = FAULT_AT_US + 200_000
+    result = _at_rest(robot, FAULT_AT_US, 124_000, "rests when heard again; drives again when armed again", heard)
+    robot.remote.baud = BAUD
+    robot.run(heard + 50_000)
+    rests(robot, heard, heard + 50_000)
+    drives_again(robot, heard + 50_000)
+    return result
+
+
+@row("F59", needs="sentry")
+def sentry_remote_flaw(robot):
+    """Three bytes of the remote control have a framing error; then the switch is turned away."""
+    _driving(robot)
+    for place, flaw in enumerate((0, 8, 17)):
+        robot.at(FAULT_AT_US + place * 30_000, lambda flaw=flaw: setattr(robot.remote, "flaw", flaw))
+    away = FAULT_AT_US + 110_000
+    robot.run(away)
+    must(robot.driven(away - 10_000), "it does not drive any more")
+    must(robot.remote.flaw is None, "no byte had an error")
+    robot.ask_to_arm(False)
+    result = _at_rest(robot, away, 40_000, "goes on; rests when the switch is turned away", away + 100_000)
+    rests(robot, away + 50_000, away + 100_000)
+    drives_again(robot, away + 100_000)
+    return result
 
 
 @row("F27", needs="sentry")

@@ -99,6 +99,20 @@ def host_noise(robot):
     return _at_rest(robot, FAULT_AT_US, HOST_LOST_US, "disabled", FAULT_AT_US + 300_000)
 
 
+@row("F59", needs="snake")
+def host_flaw(robot):
+    """Two bytes of the computer have a framing error; then the computer sends "disable"."""
+    _swinging(robot)
+    for place, flaw in enumerate((0, 30)):
+        robot.at(FAULT_AT_US + place * 60_000, lambda flaw=flaw: setattr(robot.host, "flaw", flaw))
+    asked = FAULT_AT_US + 160_000
+    robot.run(asked)
+    must(robot.enabled() == JOINTS, f"{robot.enabled()} joints are enabled")
+    must(robot.host.flaw is None, "no byte had an error")
+    robot.ask(6)
+    return _at_rest(robot, asked, 65_000, "goes on; disabled when asked", asked + 100_000)
+
+
 @row("F57", needs="snake")
 def host_drops(robot):
     """Each second command is damaged: the others count."""
@@ -129,7 +143,7 @@ def joint_silent(robot):
 
 @row("F15", needs="snake")
 def joint_power(robot):
-    """A joint has no supply for 100 ms: it starts disabled, which shows, and all are disabled."""
+    """A joint has no supply for 150 ms: it starts disabled, which shows, and all are disabled."""
     _swinging(robot)
     robot.world.fault("power", 4, FAULT_AT_US, FAULT_AT_US + 150_000)
     return _at_rest(robot, FAULT_AT_US, 300_000, "all are disabled", FAULT_AT_US + 350_000)

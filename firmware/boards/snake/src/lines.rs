@@ -9,25 +9,22 @@ use drivetrain::wire::host_link::{
 };
 use drivetrain::wire::{Decode, Deframer};
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{RingBufferedUartRx, UartRx, UartTx};
+use embassy_stm32::usart::{UartRx, UartTx};
 use embassy_time::{Duration, Ticker, Timer};
 use halves::now;
 use pilot::snake::{Heard, IMU_DEADLINE};
 use static_cell::StaticCell;
 
-/// Bytes of a DMA ring: three frames of an IMU.
-pub const RING: usize = 256;
-
 /// Reads frames of one kind for ever.
 async fn hear<T: Decode, const N: usize>(
-    mut line: RingBufferedUartRx<'static>,
+    mut line: UartRx<'static, Async>,
     mut deframer: Deframer<T, N>,
     mut take: impl FnMut(T),
 ) -> ! {
     let mut bytes = [0; 128];
     loop {
-        // After an error of the line, the next read starts the DMA again; the deframer throws the broken frame away.
-        let count = line.read(&mut bytes).await.unwrap_or(0);
+        // Each read is a transfer of its own: a ring of embassy 0.6 may read old bytes anew after an error of the line.
+        let count = line.read_until_idle(&mut bytes).await.unwrap_or(0);
         let mut rest = bytes.get(..count).unwrap_or_default();
         while let Some(frame) = deframer.read(&mut rest) {
             take(frame);
@@ -37,8 +34,6 @@ async fn hear<T: Decode, const N: usize>(
 
 #[embassy_executor::task]
 pub async fn hear_host(line: UartRx<'static, Async>) {
-    static BYTES: StaticCell<[u8; RING]> = StaticCell::new();
-    let line = line.into_ring_buffered(BYTES.init([0; RING]));
     let topic = COMMAND.sender();
     hear(line, Deframer::<HostCommand, COMMAND_LENGTH>::new(), |value| {
         topic.send(Heard { value, at: now() });
@@ -47,13 +42,9 @@ pub async fn hear_host(line: UartRx<'static, Async>) {
 }
 
 #[embassy_executor::task(pool_size = 4)]
-pub async fn hear_imu(
-    line: UartRx<'static, Async>,
-    ring: &'static mut [u8; RING],
-    topic: &'static Topic<Heard<Imu>>,
-) {
+pub async fn hear_imu(line: UartRx<'static, Async>, topic: &'static Topic<Heard<Imu>>) {
     let topic = topic.sender();
-    hear(line.into_ring_buffered(ring), Deframer::<Imu, { hipnuc::MAX_FRAME }>::new(), |value| {
+    hear(line, Deframer::<Imu, { hipnuc::MAX_FRAME }>::new(), |value| {
         topic.send(Heard { value, at: now() });
     })
     .await
@@ -62,8 +53,6 @@ pub async fn hear_imu(
 /// What the servo answers is only looked at for its errors.
 #[embassy_executor::task]
 pub async fn hear_servo(line: UartRx<'static, Async>) {
-    static BYTES: StaticCell<[u8; 64]> = StaticCell::new();
-    let line = line.into_ring_buffered(BYTES.init([0; 64]));
     let mut errors = 0;
     hear(line, Deframer::<Status, { feetech::MAX_FRAME }>::new(), |status| {
         if status.errors() != errors {

@@ -182,11 +182,9 @@ async fn main(spawner: Spawner) {
         usart::UartRx::new(board.UART8, board.PE0, board.DMA1_CH6, Interrupts, line(115_200)),
         usart::UartRx::new(board.USART6, board.PG9, board.DMA2_CH1, Interrupts, line(115_200)),
     ];
-    static RINGS: StaticCell<[[u8; lines::RING]; 4]> = StaticCell::new();
-    let rings = RINGS.init([[0; lines::RING]; 4]);
-    for ((imu, ring), topic) in imus.into_iter().zip(rings).zip(&topics::IMUS) {
+    for (imu, topic) in imus.into_iter().zip(&topics::IMUS) {
         let Ok(imu) = imu else { panic!("the line of an IMU") };
-        spawner.spawn(lines::hear_imu(imu, ring, topic).expect("four of them"));
+        spawner.spawn(lines::hear_imu(imu, topic).expect("four of them"));
     }
 
     let port = usart::Uart::new(

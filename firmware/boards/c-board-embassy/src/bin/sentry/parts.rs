@@ -10,7 +10,6 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::UartRx;
 use embassy_time::Ticker;
 use pilot::sentry::{Aiming, Attitude, Event, Shooter, Steering};
-use static_cell::StaticCell;
 
 /// A remote control that was not heard for so long is neutral.
 const REMOTE_DEADLINE: Duration = Duration::from_millis(100);
@@ -21,14 +20,11 @@ pub fn fresh((remote, at): (Remote, Instant), now: Instant) -> Remote {
 }
 
 #[embassy_executor::task]
-pub async fn hear_remote(line: UartRx<'static, Async>) {
-    // Two frames: each whole one wakes the task, by the half of the ring or by the idle line.
-    static RING: StaticCell<[u8; 36]> = StaticCell::new();
-    let mut line = line.into_ring_buffered(RING.init([0; 36]));
+pub async fn hear_remote(mut line: UartRx<'static, Async>) {
     let (mut dbus, mut bytes, topic) = (Dbus::new(), [0; 36], REMOTE.sender());
     loop {
-        // After an error of the line the next read starts the DMA again.
-        let count = line.read(&mut bytes).await.unwrap_or(0);
+        // Each read is a transfer of its own: a ring of embassy 0.6 may read old bytes anew after an error of the line.
+        let count = line.read_until_idle(&mut bytes).await.unwrap_or(0);
         let (mut rest, now) = (bytes.get(..count).unwrap_or_default(), now());
         while let Some(remote) = dbus.read(&mut rest, now) {
             topic.send((remote, now));
@@ -37,13 +33,11 @@ pub async fn hear_remote(line: UartRx<'static, Async>) {
 }
 
 #[embassy_executor::task]
-pub async fn hear_imu(line: UartRx<'static, Async>) {
-    static RING: StaticCell<[u8; 256]> = StaticCell::new();
-    let mut line = line.into_ring_buffered(RING.init([0; 256]));
+pub async fn hear_imu(mut line: UartRx<'static, Async>) {
     let (mut imu, mut bytes) = (Deframer::<Imu, MAX_FRAME>::new(), [0; 128]);
     let (topic, mut last) = (ATTITUDE.sender(), None);
     loop {
-        let count = line.read(&mut bytes).await.unwrap_or(0);
+        let count = line.read_until_idle(&mut bytes).await.unwrap_or(0);
         let mut rest = bytes.get(..count).unwrap_or_default();
         while let Some(frame) = imu.read(&mut rest) {
             // One whose time stands sends an old attitude.
