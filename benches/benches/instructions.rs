@@ -1,4 +1,4 @@
-//! The verdict of `cargo bench`: instructions of the 1 kHz loop on the host, counted by callgrind, against a budget.
+//! The verdict of `cargo bench`: instructions of the 1 kHz loop and of the simulator on the host, counted by callgrind, against a budget.
 //!
 //! Needs valgrind, and `cargo install gungraun-runner` in the version of Cargo.toml. Counts are of an x86-64 without extensions, and of
 //! the compiler: a budget lies a twentieth above what Rust 1.95 takes, for other compilers and for the copy functions of the C library,
@@ -6,9 +6,12 @@
 
 use drivetrain::chassis::Mecanum;
 use drivetrain::control::{Pid, PidConfig};
+use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Body, Twist, Vec2};
-use drivetrain::time::TimeStep;
+use drivetrain::sim::{MotorConfig, Simulation};
+use drivetrain::time::{Duration, TimeStep};
 use drivetrain_benches::{Eight, Robot, Targets};
+use embedded_can::nb::Can;
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
 use std::hint::black_box;
@@ -95,7 +98,37 @@ fn mecanum() {
     }
 }
 
-library_benchmark_group!(name = control; benchmarks = cycle, program, poll, tick, pid_step, mecanum);
+/// So many M3508 on one bus.
+fn world(motors: u8) -> Box<Simulation> {
+    let world = Box::new(Simulation::new(7));
+    for id in 1..=motors {
+        world.attach(MotorConfig::m3508(id)).expect("a free id");
+    }
+    world
+}
+
+// A simulated second at 1 kHz: commands out, all feedback in.
+#[library_benchmark]
+#[bench::one(args = (1), setup = world, config = at_most(8_050_000))]
+#[bench::four(args = (4), setup = world, config = at_most(19_100_000))]
+#[bench::eight(args = (8), setup = world, config = at_most(32_200_000))]
+fn simulator(world: Box<Simulation>) -> Box<Simulation> {
+    let mut can = world.controller();
+    let words = [0x04, 0x00, 0x04, 0x00, 0x04, 0x00, 0x04, 0x00];
+    let commands = [0x200, 0x1FF].map(|id| CanFrame::standard(id, words).expect("a real id"));
+    for _ in 0..CYCLES {
+        for command in &commands {
+            _ = black_box(can.transmit(command));
+        }
+        world.advance(Duration::from_millis(1));
+        while let Ok(frame) = can.receive() {
+            black_box(frame);
+        }
+    }
+    world
+}
+
+library_benchmark_group!(name = control; benchmarks = cycle, program, poll, tick, pid_step, mecanum, simulator);
 mod harness {
     use super::control;
     gungraun::main!(library_benchmark_groups = control);

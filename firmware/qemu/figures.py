@@ -154,6 +154,9 @@ def compare(title, column, budget, found, closed_loop):
             wrong.append(f"{name} was not measured")
         elif figure > row["budget"][column]:
             wrong.append(f"{name} is {figure}, its budget {row['budget'][column]}")
+    for name in found["rows"]:
+        if name not in budget and not name.startswith(("constant_", "ram_")):
+            wrong.append(f"{name} has no budget")
     for name, (least, most) in found["spread"].items():
         # Means of 1000 calls, rounded: a keep-alive more or less among them, by the phase of its timer, may show as 1.
         if most - least > 1:

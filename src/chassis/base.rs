@@ -103,6 +103,8 @@ impl<K: Kinematics> Chassis<K> {
     }
 
     /// Commands a motion in the frame of the body.
+    ///
+    /// Costs 26 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn set_body(&mut self, twist: Twist<Body>) {
         self.set_command(Command::Body(twist), can_be_meant(twist));
     }
@@ -317,6 +319,8 @@ impl<K: Kinematics> Chassis<K> {
     /// wheels are driven, on the same device and on other devices. If all wheels of all devices refuse, the chassis starts
     /// over: it discards the angles to hold, and when a motor takes its target again, the command is approached from the
     /// measured motion. An application that stops a chassis with a lost wheel disarms its devices.
+    ///
+    /// Costs 1055 instructions on a Cortex-M4F, for four M3508 and mecanum wheels (`docs/figures.md`).
     ///
     /// # Examples
     /// Front wheels on one bus, rear wheels on another:

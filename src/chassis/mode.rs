@@ -236,6 +236,8 @@ impl Modes {
     /// motion overflows, counts as standing still. A `dt_s` that is zero, negative, NaN or infinite counts as zero. From
     /// the 100th such call in a row on the clock is dead: the motion is zero, and a missing yaw counts as lost. When time
     /// is back the motion starts from rest.
+    ///
+    /// Costs 291 instructions on a Cortex-M4F, to follow the gimbal (`docs/figures.md`).
     pub fn update(
         &mut self,
         command: Twist<Gimbal>,

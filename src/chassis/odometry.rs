@@ -83,6 +83,8 @@ impl Odometry {
     ///
     /// A heading that is not finite counts as missing. A twist that is not finite adds no way and no turn, nor does a
     /// step that is not above zero, NaN, or longer than [`MAX_STEP_S`](Self::MAX_STEP_S): the result is then `false`.
+    ///
+    /// Costs 249 instructions on a Cortex-M4F, with a gyro (`docs/figures.md`).
     pub fn advance(&mut self, twist: Twist<Body>, gyro: Option<Heading>, dt_s: f32) -> bool {
         let gyro = gyro.filter(|heading| heading.is_finite()).map(|heading| {
             // Most steps have none, and a heading has its sine and cosine already.

@@ -94,12 +94,16 @@ impl<const N: usize> Omni<N> {
     }
 
     /// Returns the wheel velocities for the motion `twist` of the body.
+    ///
+    /// Costs 44 instructions on a Cortex-M4F, for four wheels (`docs/figures.md`).
     #[must_use]
     pub fn inverse(&self, twist: Twist<Body>) -> [AngularVelocity; N] {
         self.rows.map(|row| AngularVelocity::from_rad_per_s(row.of(twist) * self.per_radius))
     }
 
     /// Returns the motion of the body of best fit to the wheel velocities (least squares).
+    ///
+    /// Costs 44 instructions on a Cortex-M4F, for four wheels (`docs/figures.md`).
     #[must_use]
     pub fn forward(&self, wheels: [AngularVelocity; N]) -> Twist<Body> {
         self.shares

@@ -100,6 +100,8 @@ impl PowerModel {
     /// wheel's power counts for the others. A limit below zero or NaN counts as zero, and an infinite limit cuts nothing. If
     /// a load is NaN or infinite, the factor is zero.
     ///
+    /// Costs 208 instructions on a Cortex-M4F, for four wheels (`docs/figures.md`).
+    ///
     /// # Examples
     /// ```
     /// use drivetrain::chassis::{PowerModel, WheelLoad};

@@ -127,6 +127,8 @@ impl<const N: usize> Swerve<N> {
 
     /// Returns the state of each module for the motion `twist` of the body: velocities of zero or more, angles in
     /// -180..=180 degrees. A module at rest has the angle 0.
+    ///
+    /// Costs 636 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
     #[must_use]
     pub fn inverse(&self, twist: Twist<Body>) -> [ModuleState; N] {
         self.positions_m.map(|position| {
@@ -139,6 +141,8 @@ impl<const N: usize> Swerve<N> {
     }
 
     /// Returns the motion of the body of best fit to the states of the modules (least squares).
+    ///
+    /// Costs 301 instructions on a Cortex-M4F, for four modules (`docs/figures.md`).
     #[must_use]
     pub fn forward(&self, modules: [ModuleState; N]) -> Twist<Body> {
         self.shares.iter().zip(modules).fold(Twist::ZERO, |sum, (&[forward, left], module)| {

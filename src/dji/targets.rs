@@ -38,8 +38,7 @@ impl<B, const N: usize> Bus<B, N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::time::Instant;
+    /// use drivetrain::{dji::{Bus, Config, M3508}, time::Instant};
     ///
     /// let mut bus = Bus::new();
     /// let wheel = bus.attach(Config::<M3508>::new(2))?;
@@ -149,8 +148,7 @@ impl<B, const N: usize> Bus<B, N> {
     ///
     /// # Examples
     /// ```
-    /// use drivetrain::dji::{Bus, Config, M3508};
-    /// use drivetrain::time::Instant;
+    /// use drivetrain::{dji::{Bus, Config, M3508}, time::Instant};
     ///
     /// let mut bus = Bus::new();
     /// let [left, right] = bus.attach_all([1, 2].map(Config::<M3508>::new))?;
@@ -177,6 +175,8 @@ impl<B, const N: usize> Bus<B, N> {
 /// loop for this target. NaN or infinity also fails, and cancels the present target.
 impl<B, const N: usize> Bus<B, N> {
     /// Sets a torque current.
+    ///
+    /// Costs 48 instructions on a Cortex-M4F (`docs/figures.md`).
     ///
     /// # Errors
     /// Fails unless the motor is attached, armed and online, and for NaN and infinity.

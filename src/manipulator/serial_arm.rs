@@ -100,6 +100,8 @@ impl<const N: usize> SerialArm<N> {
     ///
     /// Two passes: gravity is turned outward into each link, then the masses are gathered inward. In the frame of a link, axis and
     /// centre of mass stay where the zero pose has them.
+    ///
+    /// Costs 1253 instructions on a Cortex-M4F, for six joints (`docs/figures.md`).
     #[must_use]
     pub fn holding_efforts(&self, positions: &[f32; N]) -> Option<[f32; N]> {
         let mut links = self.joints.each_ref().map(|joint| Link {

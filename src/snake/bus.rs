@@ -189,6 +189,8 @@ impl Joints {
     }
 
     /// Takes a frame received at `now`. Runs in constant time.
+    ///
+    /// Costs 213 instructions on a Cortex-M4F (`docs/figures.md`).
     pub fn ingest(&mut self, frame: &CanFrame, now: Instant) -> Ingest {
         let index = frame.header().wrapping_sub(1) as usize;
         let Some(slot) = self.slots.get_mut(index) else { return Ingest::Unrelated };
@@ -232,6 +234,8 @@ impl Joints {
     /// An update that does not lie after the previous one relaxes every joint until armed again. A `dt_s` of zero, below zero, infinite or
     /// NaN chooses no joint for one update; a second such update in a row relaxes all joints. Frames that disable a joint are sent
     /// nevertheless.
+    ///
+    /// Costs 3995 instructions on a Cortex-M4F, for 12 joints, with the frames out and an answer in (`docs/figures.md`).
     pub fn update(&mut self, tick: Tick) {
         let before = self.guard.begin(tick.now());
         let moves_on = self.guard.moves_on(before);

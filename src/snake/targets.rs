@@ -16,6 +16,8 @@ use crate::units::AngularVelocity;
 impl Joints {
     /// Sets the position to go to, from the joint's zero. Saturates at the ±32768 turns of the joint's counter.
     ///
+    /// Costs 76 instructions on a Cortex-M4F (`docs/figures.md`).
+    ///
     /// # Errors
     /// Fails unless the joint is attached, armed and online, and for NaN and infinity.
     pub fn set_position(&mut self, joint: Joint, position: Position) -> Result<(), TargetError> {

@@ -154,6 +154,8 @@ impl<F: Decode, const N: usize> Deframer<F, N> {
     /// may be the beginning of a frame and are kept.
     ///
     /// Call this until `None`, as in `while let Some(frame) = decoder.read(&mut input) { .. }`.
+    ///
+    /// Costs 1205 instructions on a Cortex-M4F, for a frame of a HiPNUC of 82 bytes (`docs/figures.md`).
     #[must_use]
     pub fn read(&mut self, input: &mut &[u8]) -> Option<F> {
         loop {

@@ -40,6 +40,8 @@ const TAIL: [u8; 4] = [0x00, 0x00, 0x80, 0x7F];
 
 /// Writes one `JustFloat` frame: `values`, then the tail. Returns the filled part of `out`.
 ///
+/// Costs 105 instructions on a Cortex-M4F, of 4 values (`docs/figures.md`).
+///
 /// # Errors
 /// [`EncodeError::BufferTooSmall`] when `out` has less than 4 bytes a value and 4 more.
 pub fn justfloat<'a>(values: &[f32], out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {

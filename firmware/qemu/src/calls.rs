@@ -8,7 +8,7 @@ use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::{Edge, TargetError};
 use drivetrain::time::Tick;
-use drivetrain::units::AngularVelocity;
+use drivetrain::units::{Angle, AngularVelocity, Current};
 
 type Wheel = Handle<M3508>;
 
@@ -34,6 +34,24 @@ fn call_set_velocity(bus: &mut Bus, wheel: Wheel, rad_per_s: f32) -> Result<(), 
 #[inline(never)]
 fn call_set_position(bus: &mut Bus, wheel: Wheel, position: &Position) -> Result<(), TargetError> {
     bus.set_position(wheel, *position)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn call_set_angle(bus: &mut Bus, wheel: Wheel, angle: Angle) -> Result<(), TargetError> {
+    bus.set_angle(wheel, angle)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn call_set_current(bus: &mut Bus, wheel: Wheel, amperes: f32) -> Result<(), TargetError> {
+    bus.set_current(wheel, Current::from_amperes(amperes))
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn call_set_raw(bus: &mut Bus, wheel: Wheel, word: i16) -> Result<(), TargetError> {
+    bus.set_raw(wheel, word)
 }
 
 #[unsafe(no_mangle)]
@@ -80,6 +98,19 @@ fn calls() {
         })
     });
     row("set_velocity", &all);
+    let wheel = motors[0];
+    let angle = instructions(call_set_angle as fn(&mut Bus, Wheel, Angle) -> _, |f, _| {
+        _ = f(bus, wheel, Angle::from_radians(0.5));
+    });
+    row("set_angle", &[angle]);
+    let current = instructions(call_set_current as fn(&mut Bus, Wheel, f32) -> _, |f, _| {
+        _ = f(bus, wheel, 1.0);
+    });
+    row("set_current", &[current]);
+    let raw = instructions(call_set_raw as fn(&mut Bus, Wheel, i16) -> _, |f, _| {
+        _ = f(bus, wheel, 100);
+    });
+    row("set_raw", &[raw]);
     row("next_edge", &[instructions(call_next_edge as fn(&mut Bus) -> _, |f, _| _ = f(bus))]);
 }
 

@@ -3,6 +3,7 @@
 use crate::meter::instructions;
 use crate::report::row;
 use crate::rows::{row_decode, tick};
+use crate::snake;
 use crate::wiring::{START, Targets, feedback};
 use core::hint::black_box;
 use drivetrain::control::PidConfig;
@@ -10,9 +11,8 @@ use drivetrain::dji::{Bus, Config, Gm6020Current, Gm6020Voltage, M2006, M3508, M
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::motor::Ingest;
-use drivetrain::snake::{self, IDS, Joints, PULSES_PER_TURN, Register, Reply};
+use drivetrain::snake::IDS;
 use drivetrain::time::{Duration, Instant, Tick};
-use embedded_can::StandardId;
 
 const TURNS: [i64; 3] = [0, 1_000_000, 1_000_000_000_000];
 
@@ -73,42 +73,18 @@ fn decode<M: Model>(id: u8, turns: i64, start: Instant) -> u32 {
     })
 }
 
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn joints_decode(joints: &mut Joints, frame: &CanFrame, now: Instant) -> Ingest {
-    joints.ingest(frame, now)
-}
-
-/// One position of a joint of a full bus, up to the end of its counter.
+/// Joints of a full bus, up to the end of their counter.
 fn joints() {
-    let mut figures = [0; 9 * IDS as usize];
-    let cases = (1..=IDS).flat_map(|id| cases([0, 1_000, 32_000]).map(move |case| (id, case)));
-    for (figure, (id, (turns, start))) in figures.iter_mut().zip(cases) {
-        *figure = decode_joint(id, turns, start);
+    const TURNS: [i32; 3] = [0, 1_000, 32_000];
+    let mut decoded = [0; 9 * IDS as usize];
+    let of_all = (1..=IDS).flat_map(|id| cases(TURNS).map(move |case| (id, case)));
+    for (figure, (id, (turns, start))) in decoded.iter_mut().zip(of_all) {
+        *figure = snake::ingest(id, turns, start);
     }
-    row("constant_decode_joint", &figures);
-}
-
-fn decode_joint(id: u8, turns: i32, start: Instant) -> u32 {
-    let mut joints = Joints::new();
-    for id in 1..=IDS {
-        joints.attach(snake::Config::new(black_box(id))).unwrap();
+    row("constant_decode_joint", &decoded);
+    let mut ticks = [0; 9];
+    for (figure, (turns, start)) in ticks.iter_mut().zip(cases(TURNS)) {
+        *figure = snake::tick(turns, start);
     }
-    let mut now = start;
-    joints.update(Tick::new(now, 0.001));
-    let mut pulses = turns * PULSES_PER_TURN;
-    let mut frame = || {
-        pulses += 3;
-        let data = Reply::new(Register::ActualPosition, pulses).encode();
-        CanFrame::of(StandardId::new(u16::from(id)).unwrap(), data)
-    };
-    for _ in 0..10 {
-        now = now + PERIOD;
-        assert_eq!(joints.ingest(&frame(), now), Ingest::Taken);
-    }
-    let function = joints_decode as fn(&mut Joints, &CanFrame, Instant) -> Ingest;
-    instructions(function, |decode, _| {
-        now = now + PERIOD;
-        _ = decode(&mut joints, &frame(), now);
-    })
+    row("constant_tick_joints", &ticks);
 }

@@ -19,7 +19,9 @@ mod meter;
 mod motion;
 mod paint;
 mod report;
+mod robot;
 mod rows;
+mod snake;
 mod state_space;
 mod wiring;
 
@@ -37,7 +39,9 @@ fn main() -> ! {
         calls::rows();
         joints::rows();
         drives::rows();
+        snake::rows();
         rows::control();
+        robot::rows();
         controllers::rows();
         motion::rows();
         state_space::rows();

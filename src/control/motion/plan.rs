@@ -105,6 +105,8 @@ pub struct Motion {
 impl Motion {
     /// Plans the fastest motion.
     ///
+    /// Costs 1838 instructions on a Cortex-M4F, in the mean of 200 states (`docs/figures.md`).
+    ///
     /// # Errors
     /// Names the limit that is NaN, infinite, zero, negative or (`jerk`) missing, or the value that is NaN or infinite: `position`,
     /// `start_velocity`, `start_acceleration`, `target` or `target_velocity`.
@@ -117,6 +119,8 @@ impl Motion {
     }
 
     /// Returns position, velocity and acceleration `time_s` seconds after the start.
+    ///
+    /// Costs 138 instructions on a Cortex-M4F (`docs/figures.md`).
     #[must_use]
     pub fn at(&self, time_s: f32) -> ProfileState {
         let sample = self.sample(time_s);

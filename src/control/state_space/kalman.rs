@@ -102,6 +102,8 @@ impl<const N: usize, const M: usize, const P: usize> KalmanFilter<N, M, P> {
     }
 
     /// Corrects the state with one measurement of each output.
+    ///
+    /// Costs 23267 instructions on a Cortex-M4F, with `predict`, of 4 states, 2 inputs and 2 measurements (`docs/figures.md`).
     pub fn correct(&mut self, y: &[f32; P]) {
         self.take(self.corrected(y));
     }

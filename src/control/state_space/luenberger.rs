@@ -107,6 +107,8 @@ impl<const N: usize, const M: usize, const P: usize> LuenbergerObserver<N, M, P>
     }
 
     /// Corrects the state with one measurement of each output.
+    ///
+    /// Costs 1874 instructions on a Cortex-M4F, with `predict`, of 4 states, 2 inputs and 2 measurements (`docs/figures.md`).
     pub fn correct(&mut self, y: &[f32; P]) {
         self.estimate.take(Some(self.estimate.corrected(&wide(&self.c), &self.gain, y)));
     }

@@ -81,6 +81,8 @@ impl<const N: usize, const M: usize> LinearQuadraticRegulator<N, M> {
     }
 
     /// Returns the inputs of the plant that drive the states `x` to the reference.
+    ///
+    /// Costs 99 instructions on a Cortex-M4F, of 4 states and 2 inputs (`docs/figures.md`).
     pub fn step(&mut self, reference: &[f32; N], x: &[f32; N]) -> [f32; M] {
         let mut error = *reference;
         for (error, state) in error.iter_mut().zip(x) {

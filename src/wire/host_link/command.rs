@@ -111,6 +111,8 @@ impl Reset {
 impl HostCommand {
     /// Writes the frame, and returns the filled part of `out`.
     ///
+    /// Costs 545 instructions on a Cortex-M4F (`docs/figures.md`).
+    ///
     /// # Errors
     /// [`EncodeError::BufferTooSmall`] when `out` has less than [`COMMAND_LENGTH`] bytes.
     pub fn encode<'a>(&self, out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {

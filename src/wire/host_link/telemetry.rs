@@ -72,6 +72,8 @@ impl TelemetryFormat {
 
     /// Writes the frame, and returns the filled part of `out`.
     ///
+    /// Costs 706 instructions on a Cortex-M4F (`docs/figures.md`).
+    ///
     /// # Errors
     /// [`EncodeError::BufferTooSmall`] when `out` has less than [`TELEMETRY_LENGTH`] bytes.
     pub fn encode<'a>(
