@@ -23,8 +23,8 @@ from figures import figure
 
 #: Seconds that it has to stand, once it stands; after which it is pushed over. The pilot asks at the start.
 STAND_S, FALL_S = 20.0, 3.0
-#: The seeds, and their share of a run without `--count`: another tenth in each turn of the stage, which has a turn in three days.
-SEEDS, SHARE, TURN_S = 100, 10, 3 * 86_400
+#: The seeds, and their share of a run without `--count`: another tenth in each turn of the stage, which has a turn in seven days.
+SEEDS, SHARE, TURN_S = 100, 10, 7 * 86_400
 #: When it is pushed, by how much: s, m/s of the whole robot.
 PUSHES = ((8.0, 0.5), (14.0, 0.5))
 #: When it is thrown up, in s; by how much in m/s; the time in which both changes are to be noticed, in s.
