@@ -337,7 +337,7 @@ const SIZES: [(&str, usize); 6] = [
 
 const MOST_TYPES: usize = 12;
 
-/// The lines that count: as the command in CONTRIBUTING has them.
+/// The lines that count: as the command in `docs/checks.md` has them.
 fn is_code(line: &str) -> bool {
     let line = line.trim();
     !line.is_empty() && !line.starts_with("//")

@@ -173,7 +173,8 @@ fn every_link_of_the_pages_leads_to_a_file_and_every_page_is_linked() {
     let docs: Vec<String> = fs::read_dir(root.join("docs")).unwrap().map(names).collect();
     let pages = docs.iter().filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
     let mut linked = Vec::new();
-    for path in ["README.md".to_owned(), "README.zh-CN.md".to_owned()].into_iter().chain(pages) {
+    let top = ["README.md", "README.zh-CN.md", "CONTRIBUTING.md", "DESIGN.md"];
+    for path in top.map(ToOwned::to_owned).into_iter().chain(pages) {
         let text = page(&path);
         for address in links(&text) {
             let target = root.join(&path).with_file_name(address);
