@@ -238,9 +238,13 @@ def price(place, row):
     while lines[start - 1].lstrip().startswith("///"):
         start -= 1
     said = f"{indent}/// {words(row, *case)}"
-    old = [number for number in range(start, end) if re.match(r"\s*/// (Costs|Takes) \d+ ", lines[number])]
+    figure = re.compile(r"\s*/// (Costs|Takes) \d+ ")
+    prices = [number for number in range(start, end) if figure.match(lines[number])]
+    old = [number for number in prices if figure.sub("", lines[number]) == figure.sub("", said)]
     if old:
         lines[old[0]] = said
+    elif prices:
+        lines[prices[-1] + 1 : prices[-1] + 1] = [f"{indent}///", said]
     else:
         # Before the first heading, or at the end.
         heads = [number for number in range(start, end) if re.match(r"\s*/// # [A-Z][a-z]+$", lines[number])]
