@@ -6,12 +6,10 @@
 
 use drivetrain::chassis::Mecanum;
 use drivetrain::control::{Pid, PidConfig};
-use drivetrain::frame::CanFrame;
 use drivetrain::geometry::{Body, Twist, Vec2};
-use drivetrain::sim::{MotorConfig, Simulation};
-use drivetrain::time::{Duration, TimeStep};
-use drivetrain_benches::{Eight, Robot, Targets};
-use embedded_can::nb::Can;
+use drivetrain::sim::Simulation;
+use drivetrain::time::TimeStep;
+use drivetrain_benches::{Eight, Robot, Targets, run_second, simulated};
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
 use std::hint::black_box;
@@ -98,33 +96,13 @@ fn mecanum() {
     }
 }
 
-/// So many M3508 on one bus.
-fn world(motors: u8) -> Box<Simulation> {
-    let world = Box::new(Simulation::new(7));
-    for id in 1..=motors {
-        world.attach(MotorConfig::m3508(id)).expect("a free id");
-    }
-    world
-}
-
 // A simulated second at 1 kHz: commands out, all feedback in.
 #[library_benchmark]
-#[bench::one(args = (1), setup = world, config = at_most(8_050_000))]
-#[bench::four(args = (4), setup = world, config = at_most(19_100_000))]
-#[bench::eight(args = (8), setup = world, config = at_most(32_200_000))]
+#[bench::one(args = (1), setup = simulated, config = at_most(8_050_000))]
+#[bench::four(args = (4), setup = simulated, config = at_most(19_100_000))]
+#[bench::eight(args = (8), setup = simulated, config = at_most(32_200_000))]
 fn simulator(world: Box<Simulation>) -> Box<Simulation> {
-    let mut can = world.controller();
-    let words = [0x04, 0x00, 0x04, 0x00, 0x04, 0x00, 0x04, 0x00];
-    let commands = [0x200, 0x1FF].map(|id| CanFrame::standard(id, words).expect("a real id"));
-    for _ in 0..CYCLES {
-        for command in &commands {
-            _ = black_box(can.transmit(command));
-        }
-        world.advance(Duration::from_millis(1));
-        while let Ok(frame) = can.receive() {
-            black_box(frame);
-        }
-    }
+    run_second(&world);
     world
 }
 

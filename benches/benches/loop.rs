@@ -1,7 +1,8 @@
 //! The 1 kHz loop on the host: time, and its share of a millisecond.
 //!
 //! `cargo bench -p drivetrain-benches`. Times depend on the machine and judge nothing: the verdict is that of `instructions.rs`,
-//! and the figures that count are those of the target, see `firmware/qemu`.
+//! and the figures that count are those of the target, see `firmware/qemu`. Cycles with outputs at a limit, late feedback, errors and
+//! recovery are counted there alone. The pace of the simulator is one second by the time of a simulated second.
 
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -11,7 +12,7 @@ use drivetrain::encoder::Position;
 use drivetrain::geometry::{Body, Twist, Vec2};
 use drivetrain::time::{Tick, TimeStep};
 use drivetrain::units::AngularVelocity;
-use drivetrain_benches::{Eight, Robot, Targets};
+use drivetrain_benches::{Eight, Robot, Targets, run_second, simulated};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -148,6 +149,15 @@ fn bus(criterion: &mut Bench) {
     criterion.bench_function("next_edge, none waits", |b| b.iter(|| eight.bus.next_edge()));
 }
 
+fn simulator(criterion: &mut Bench) {
+    for motors in [1, 4, 8] {
+        let world = simulated(motors);
+        criterion.bench_function(&format!("simulated second, {motors} motors"), |b| {
+            b.iter(|| run_second(&world));
+        });
+    }
+}
+
 fn parts(criterion: &mut Bench) {
     let mut pid = Pid::new(PidConfig::new(0.5, 4.0, 0.0)).expect("valid gains");
     let step = TimeStep::new(0.001, 0.1);
@@ -167,6 +177,6 @@ fn parts(criterion: &mut Bench) {
 criterion_group! {
     name = all;
     config = Criterion::default().with_measurement(Share);
-    targets = program, bus, parts
+    targets = program, bus, simulator, parts
 }
 criterion_main!(all);

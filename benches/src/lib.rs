@@ -1,10 +1,11 @@
-//! The robot that the benches run: eight M3508, alone on a bus or under a runner, whose feedback is always there.
+//! The robot that the benches run: eight M3508, alone on a bus or under a runner, whose feedback is always there; and simulated motors.
 
 use drivetrain::control::PidConfig;
 use drivetrain::dji::{Bus, Config, Handle, M3508};
 use drivetrain::encoder::Position;
 use drivetrain::frame::CanFrame;
 use drivetrain::runner::{Nb, Runner};
+use drivetrain::sim::{MotorConfig, Simulation};
 use drivetrain::time::{Clock, Duration, Instant, Tick};
 use drivetrain::units::{Angle, AngularVelocity};
 use embedded_can::{ErrorKind, nb::Can};
@@ -191,6 +192,39 @@ impl Robot {
         }
         self.cycle();
         speeds.iter().sum()
+    }
+}
+
+/// Simulates so many M3508 on one bus.
+///
+/// # Panics
+/// With more motors than the bus has ids.
+#[must_use]
+pub fn simulated(motors: u8) -> Box<Simulation> {
+    let world = Box::new(Simulation::new(7));
+    for id in 1..=motors {
+        world.attach(MotorConfig::m3508(id)).expect("a free id");
+    }
+    world
+}
+
+/// Lets a second pass at 1 kHz: two command frames out, all feedback in.
+///
+/// # Panics
+/// If an id of a command is none of 11 bits, which it is.
+pub fn run_second(world: &Simulation) {
+    let mut can = world.controller();
+    let words = [0x04, 0x00, 0x04, 0x00, 0x04, 0x00, 0x04, 0x00];
+    let commands =
+        [0x200, 0x1FF].map(|id| CanFrame::standard(id, words).expect("an id of 11 bits"));
+    for _ in 0..1_000 {
+        for command in &commands {
+            _ = black_box(can.transmit(command));
+        }
+        world.advance(Duration::from_millis(1));
+        while let Ok(frame) = can.receive() {
+            black_box(frame);
+        }
     }
 }
 
