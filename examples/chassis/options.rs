@@ -16,7 +16,8 @@ pub(crate) const USAGE: &str = "usage: chassis [options]
   --candump FILE    writes every frame on the bus as a line of candump, too
   --seed N          chooses phases and chances of the simulation (default 1)
   --fault NAME      silent-motor, lost-frames or bus-off
-  --mode NAME       a pilot drives under a gimbal instead: follow, rotor, independent or relax
+  --mode NAME       a pilot drives under a gimbal instead: follow, rotor, independent or relax; not with
+                    --fault, --csv, --justfloat and --serial
   --power-limit W   keeps a referee's limit of 10 to 500 W and its buffer of 60 J; independent without --mode
   --help            shows this";
 
