@@ -278,6 +278,6 @@ fn a_log_on_a_full_disk_holds_up_no_motor_and_is_an_error_at_the_end() {
     writeln!(bench.steps).unwrap();
     assert_eq!(ends(&mut bench).code(), Some(1));
     is_left_at_zero(&mut robot, &Witness::new());
-    assert!(said().starts_with("bench: --log: "), "{}", said());
+    assert!(said().starts_with("bench: --log /dev/full: "), "{}", said());
     assert!(bench.answers.lines().any(|line| line.unwrap().starts_with("packed ")));
 }

@@ -27,6 +27,7 @@ pub(crate) struct Outlet {
     lines: SyncSender<String>,
     writer: JoinHandle<io::Result<()>>,
     lost: u32,
+    is_broken: bool,
     /// What [`is_full`](Self::is_full) could not leave yet.
     refused: Option<String>,
 }
@@ -39,7 +40,8 @@ impl Outlet {
     pub(crate) fn new(name: &str, sink: impl Sink, room: usize) -> io::Result<Self> {
         let (lines, waiting) = sync_channel(room);
         let writer = Builder::new().spawn(|| write(waiting, sink))?;
-        Ok(Self { name: name.into(), lines, writer, lost: 0, refused: None })
+        let (lost, is_broken, refused) = (0, false, None);
+        Ok(Self { name: name.into(), lines, writer, lost, is_broken, refused })
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -52,7 +54,8 @@ impl Outlet {
             Ok(()) => true,
             Err(refused) => {
                 self.lost = self.lost.saturating_add(1);
-                matches!(refused, TrySendError::Full(_))
+                self.is_broken = matches!(refused, TrySendError::Disconnected(_));
+                !self.is_broken
             }
         }
     }
@@ -66,6 +69,11 @@ impl Outlet {
             }
             Ok(()) | Err(TrySendError::Disconnected(_)) => false,
         }
+    }
+
+    /// Tells whether a text was offered, and nothing is written any more.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.is_broken
     }
 
     /// Texts that were not written.

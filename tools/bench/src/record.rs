@@ -33,12 +33,12 @@ impl Recorder {
     pub(crate) fn create(option: &str, path: &str) -> Result<Self, String> {
         let failed = |error: &dyn std::fmt::Display| format!("{option} {path}: {error}");
         let file = File::create(path).map_err(|error| failed(&error))?;
-        let is_mcap = path.ends_with(".mcap");
+        let (is_mcap, name) = (path.ends_with(".mcap"), format!("{option} {path}"));
         let outlet = if is_mcap {
             let sink = McapSink::new(file).map_err(|error| failed(&error))?;
-            Outlet::new(option, sink, ROOM)
+            Outlet::new(&name, sink, ROOM)
         } else {
-            Outlet::new(option, file, ROOM)
+            Outlet::new(&name, file, ROOM)
         };
         Ok(Self { outlet: outlet.map_err(|error| failed(&error))?, is_mcap })
     }
@@ -63,6 +63,11 @@ impl Recorder {
         if self.is_mcap {
             _ = self.outlet.offer(line(at, topic, values));
         }
+    }
+
+    /// Tells whether nothing is written any more: a disk is full, or gone.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.outlet.is_broken()
     }
 
     /// Waits until all is written.

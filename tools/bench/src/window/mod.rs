@@ -132,11 +132,12 @@ fn lead(
     _ = begun.send(Ok(()));
     let mut remote = Remote::new(&session, actions, shared, options);
     session.run(end, &mut remote);
-    let (results, mut failures) = remote.results();
-    failures.extend(session.messages());
+    let mut failures = session.messages();
     // A second SIGHUP of the same terminal does not cut the recordings short; a disk that hangs may be left by a signal.
     failures.extend(session.finish(|_| end.is_safe(true)));
     end.is_safe(true);
+    let (results, said) = remote.results();
+    let failures = said.into_iter().chain(failures).collect();
     Ending { results, failures }
 }
 

@@ -13,6 +13,7 @@ use drivetrain::time::{Duration, Instant};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, TryRecvError};
+use std::thread::JoinHandle;
 
 /// A window that says nothing for so long, of the machine's time, is taken for lost.
 const SILENCE: std::time::Duration = std::time::Duration::from_secs(2);
@@ -55,6 +56,8 @@ pub(crate) struct Remote {
     log: VecDeque<String>,
     results: Vec<String>,
     last_messages: Vec<String>,
+    /// Recordings that are being ended, and what goes wrong with them.
+    endings: Vec<JoinHandle<Vec<String>>>,
     pictured: Option<Instant>,
     options: Options,
     was_held: bool,
@@ -75,15 +78,19 @@ impl Remote {
             log: VecDeque::new(),
             results: Vec::new(),
             last_messages: Vec::new(),
+            endings: Vec::new(),
             pictured: None,
             options: options.clone(),
             was_held: false,
         }
     }
 
-    /// The texts for the user when the window is gone: results of tuning, and messages since the end began.
+    /// The texts for the user when the window is gone: results of tuning, and failures, the messages since the end began included.
+    /// Waits for the disk.
     pub(crate) fn results(self) -> (Vec<String>, Vec<String>) {
-        (self.results, self.last_messages)
+        let Self { results, mut last_messages, endings, .. } = self;
+        last_messages.extend(endings.into_iter().filter_map(|ending| ending.join().ok()).flatten());
+        (results, last_messages)
     }
 
     fn act(&mut self, session: &mut Session, action: Action) {
@@ -146,13 +153,7 @@ impl Remote {
     /// Begins a recording in both forms under the next free name, or ends it.
     fn record(&mut self, session: &mut Session) {
         if !session.tap().recorders.is_empty() {
-            let recorders = std::mem::take(&mut session.tap().recorders);
-            // A disk that hangs holds up no motor.
-            std::thread::spawn(move || {
-                for recorder in recorders {
-                    _ = recorder.finish(|_| {});
-                }
-            });
+            self.end_recording(session);
             return self.say(session, "recording ended".into());
         }
         let free = (1..)
@@ -167,6 +168,31 @@ impl Remote {
                 }
                 Err(error) => self.say(session, error),
             }
+        }
+    }
+
+    fn end_recording(&mut self, session: &mut Session) {
+        let recorders = std::mem::take(&mut session.tap().recorders);
+        // A disk that hangs holds up no motor.
+        self.endings.push(std::thread::spawn(move || {
+            let ends = recorders.into_iter().map(|recorder| recorder.finish(|_| {}));
+            ends.filter_map(Result::err).collect()
+        }));
+    }
+
+    /// Ends a recording that has no room, and says which recordings are not whole.
+    fn watch_recording(&mut self, session: &mut Session) {
+        if session.tap().recorders.iter().any(Recorder::is_broken) {
+            self.end_recording(session);
+        }
+        let (ended, endings) =
+            std::mem::take(&mut self.endings).into_iter().partition(JoinHandle::is_finished);
+        self.endings = endings;
+        for failure in
+            Vec::from(ended).into_iter().filter_map(|ending| ending.join().ok()).flatten()
+        {
+            self.say(session, format!("the recording is cut: {failure}"));
+            self.last_messages.push(failure);
         }
     }
 
@@ -259,6 +285,7 @@ impl Pilot for Remote {
         let now = session.pace().time().read();
         if self.pictured.is_none_or(|at| now.since(at) >= PICTURE) {
             self.pictured = Some(now);
+            self.watch_recording(session);
             self.picture(session);
         }
         true
@@ -310,12 +337,7 @@ mod tests {
 
     /// The targets in rad/s at each tick, and the log.
     fn run(script: Vec<(u64, Action)>) -> (Vec<Option<f32>>, String) {
-        let specs = motors::parse("m3508:1").unwrap();
-        let link = Link::Simulated(Simulated::new(&specs, 1).unwrap());
-        let robot = Robot::new(&specs, false).unwrap();
-        let mut session = Session::new(robot, link, Pace::Fast(Time::manual()), Vec::new());
-        let (_sender, actions) = mpsc::channel();
-        let remote = Remote::new(&session, actions, Shared::default(), &usual());
+        let (mut session, remote, _sender) = begun(Vec::new());
         let mut script = Script(remote, 0, script, Vec::new());
         session.run(&End::none(), &mut script);
         let targets = script.3.into_iter().map(|target| match target? {
@@ -323,6 +345,41 @@ mod tests {
             Target::Effort(_) => None,
         });
         (targets.collect(), Vec::from(script.0.log).join("\n"))
+    }
+
+    fn begun(recorders: Vec<Recorder>) -> (Session, Remote, mpsc::Sender<Action>) {
+        let specs = motors::parse("m3508:1").unwrap();
+        let link = Link::Simulated(Simulated::new(&specs, 1).unwrap());
+        let robot = Robot::new(&specs, false).unwrap();
+        let session = Session::new(robot, link, Pace::Fast(Time::manual()), recorders);
+        let (sender, actions) = mpsc::channel();
+        let remote = Remote::new(&session, actions, Shared::default(), &usual());
+        (session, remote, sender)
+    }
+
+    // "recording ended" was said, and the files were cut.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_recording_on_a_full_disk_is_said_and_is_a_failure_at_the_end() {
+        for is_ended_by_hand in [false, true] {
+            let recorder = Recorder::create("record", "/dev/full").unwrap();
+            let (mut session, mut remote, _sender) = begun(vec![recorder]);
+            while !is_ended_by_hand && !session.tap().recorders[0].is_broken() {
+                session.tap().recorders[0].frame(Instant::START, "can0", "201#", false);
+            }
+            session.tap().recorders[0].frame(Instant::START, "can0", "201#", false);
+            if is_ended_by_hand {
+                remote.act(&mut session, Action::Record);
+            }
+            while remote.last_messages.is_empty() {
+                remote.watch_recording(&mut session);
+            }
+            assert!(session.tap().recorders.is_empty());
+            let (log, (_, failures)) = (Vec::from(remote.log.clone()).join("\n"), remote.results());
+            assert_eq!(failures.len(), 1, "{failures:?}");
+            assert!(failures[0].starts_with("record /dev/full: "), "{failures:?}");
+            assert!(log.contains(&format!("the recording is cut: {}", failures[0])), "{log}");
+        }
     }
 
     // Each press added to the target of the last picture: of two within 50 ms one was lost.
