@@ -20,6 +20,11 @@ const MOTOR_A: f32 = 10.0;
 const ODRIVE_RPM_PER_V: f32 = 8.27 / MOTOR_NM_PER_A;
 const MOTOR_RPM: f32 = 6_000.0;
 
+/// The id under which a Damiao answers.
+pub(crate) fn master_id(spec: Spec) -> u16 {
+    spec.host.unwrap_or(0x10 + u16::from(spec.id))
+}
+
 /// A motor of each family that [`Own`] makes a device of.
 #[derive(Debug)]
 enum Kind {

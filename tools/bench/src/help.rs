@@ -41,7 +41,8 @@ options
                     identify 0.8)
   --hysteresis N    of the relay, in rad/s (default: 0.5; of a GM6020 by voltage 4)
   --turns N         the way of identify to either side (default: 16); a joint between stops needs less
-  --seconds S       how long (default: 5); Ctrl-C, Ctrl-Z and a terminal that is gone end it as well, with zeros
+  --seconds S       how long (default: 5; scan, get, set and set-id 2; tune, identify, replay and the window without
+                    an end); Ctrl-C, Ctrl-Z and a terminal that is gone end it as well, with zeros
   --log FILE        every frame: MCAP if the name ends in .mcap, otherwise the form of candump -L
   --json            a line of JSON for each report
   --held            the simulator of the window stands, and moves on by the keys . and :

@@ -43,6 +43,9 @@ fn main() -> ExitCode {
         }
         Err(error) => return refuse(&error, 2),
     };
+    if let Err(error) = commands::check(&options) {
+        return refuse(&error, 2);
+    }
     let end = match end::End::new() {
         Ok(end) => end,
         Err(error) => return refuse(&error.to_string(), 1),

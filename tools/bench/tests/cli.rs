@@ -2,7 +2,7 @@
 
 #![cfg(test)]
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::process::{Command, Output, Stdio};
 
@@ -29,7 +29,21 @@ fn folder(name: &str) -> String {
 
 #[test]
 fn arguments_that_make_no_sense_end_it_with_code_2_and_help_with_0() {
-    for line in ["dance", "spin --rpm soon", "--motors servo:1", "spin --seconds"] {
+    for line in [
+        "dance",
+        "spin --rpm soon",
+        "--motors servo:1",
+        "--motors m3508:9",
+        "watch --motors m3508:1,m2006:1",
+        "spin --mecanum 1,0,0 --motors m3508:1",
+        "spin --seconds",
+        "tune --motors m3508:1",
+        "identify --motors m3508:1",
+        "identify --motors m3508:1 --arm --rpm -5",
+        "get Colour --motors damiao4310:1",
+        "set-id 16 --motors damiao4310:1",
+        "get ControlMode --motors m3508:1",
+    ] {
         let output = bench(line);
         assert_eq!(output.status.code(), Some(2), "{line}");
         assert!(output.stderr.starts_with(b"bench: ") && output.stdout.is_empty(), "{output:?}");
@@ -131,7 +145,6 @@ fn a_session_is_recorded_replayed_and_converted() {
 
 #[test]
 fn gains_are_a_line_of_rust_and_toml() {
-    assert_eq!(bench("tune --motors m3508:1").status.code(), Some(1), "without --arm");
     let said = lines("tune --motors m3508:1 --arm").join("\n");
     assert!(said.contains("PidConfig::new(") && said.contains("[\"M3508 #1\"]\nkp = "), "{said}");
     let found = objects("identify --motors m3508:1 --arm --json").swap_remove(0);
@@ -155,12 +168,57 @@ fn registers_are_read_and_written_and_ids_are_set() {
     assert_eq!(value("get ControlMode --motors damiao4310:1 --json"), 1.0);
     assert_eq!(value("get positionrange --motors damiao4310:1 --json"), 12.5);
     assert_eq!(value("set VelocityRange 45 --motors damiao4310:1 --json"), 45.0);
-    let unknown = bench("get Colour --motors damiao4310:1");
-    assert_eq!(unknown.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&unknown.stdout).contains("no register Colour, but "));
-    let none = bench("get ControlMode --motors m3508:1");
-    assert!(String::from_utf8_lossy(&none.stdout).contains("M3508 #1 has no registers"));
-    assert!(lines("set-id 9 --motors damiao4310:1").join("\n").contains("was told to be #9"));
+    let unknown = failure("get Colour --motors damiao4310:1", 2);
+    assert!(unknown.contains("no register Colour, but "), "{unknown}");
+    let none = failure("get ControlMode --motors m3508:1", 2);
+    assert!(none.contains("M3508 #1 has no registers"), "{none}");
+    // The drive hears that its id is another, and that it is to be kept.
+    for (motors, command, renamed) in [
+        ("damiao4310:1", " 7FF#0100550809000000", "damiao4310:9:0x11"),
+        ("damiao4310:1:0x21", " 7FF#0100AA0100000000", "damiao4310:9:0x21"),
+        ("rs02:1", " 0709FD01#", "rs02:9"),
+    ] {
+        let log = folder("id.log");
+        let said = objects(&format!("set-id 9 --motors {motors} --json --log {log}"));
+        assert_eq!(said, [json!({ "id": 9, "motors": renamed })]);
+        let sent = fs::read_to_string(&log).unwrap();
+        assert!(sent.contains(command), "{motors}: {sent}");
+        fs::remove_file(log).unwrap();
+    }
+    assert!(lines("set-id 9 --motors rs02:1")[0].contains("from now on --motors rs02:9"));
+}
+
+/// What a run that ends with `code` says on standard error; nothing else is said.
+fn failure(line: &str, code: i32) -> String {
+    let output = bench(line);
+    assert_eq!(output.status.code(), Some(code), "{line}: {output:?}");
+    assert!(output.stdout.is_empty(), "{line}: {output:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// A serial adapter that takes everything and hears nothing: the other end of a terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn who_is_not_there_gets_no_id_and_is_not_armed() {
+    use serialport::{SerialPort, TTYPort};
+    use std::io::Read;
+    let (mut adapter, terminal) = TTYPort::pair().unwrap();
+    let port = terminal.name().unwrap();
+    std::thread::spawn(move || {
+        loop {
+            _ = adapter.read(&mut [0; 256]);
+        }
+    });
+    for line in ["set-id 9 --json", "set-id 9"] {
+        let said = failure(&format!("{line} --serial {port} --motors damiao4310:1"), 1);
+        assert!(said.contains("DM-J4310 #1 is not heard"), "{said}");
+    }
+    let said = failure(&format!("get ControlMode --serial {port} --motors damiao4310:1"), 1);
+    assert!(said.contains("ControlMode: no answer"), "{said}");
+    let output = bench(&format!("spin --serial {port} --motors m3508:1 --seconds 1 --arm"));
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("bench: not armed: no feedback from M3508 #1"), "{said}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::identifying::Limits;
 use crate::options::{Command, Options};
 use crate::outcome::Outcome;
 use crate::program::Program;
-use crate::session::Session;
+use crate::session::{Session, Stage};
 use crate::snapshot;
 use crate::tuning::Plan;
 use drivetrain::chassis::{Mecanum, MecanumWheels};
@@ -21,6 +21,8 @@ const REPORT: u64 = 500;
 #[derive(Debug)]
 pub(super) struct Spin {
     arm: bool,
+    was_armed: bool,
+    refusal: Option<String>,
     asks_for_motion: bool,
     speeds: Vec<AngularVelocity>,
     is_lock_step: bool,
@@ -33,6 +35,8 @@ impl Spin {
         let is_spin = options.command == Command::Spin;
         Ok(Self {
             arm: options.arm && is_spin,
+            was_armed: false,
+            refusal: None,
             asks_for_motion: options.rpm.is_some() || options.twist.is_some(),
             speeds: speeds(options)?,
             is_lock_step: options.lock_step,
@@ -68,6 +72,7 @@ impl Task for Spin {
     }
 
     fn ticked(&mut self, session: &mut Session, ticks: u64, out: &mut Out) -> bool {
+        self.was_armed |= session.stage() == Stage::Armed;
         if !self.is_lock_step && ticks.is_multiple_of(REPORT) {
             let text = self.state(session, out.is_json);
             out.say(text);
@@ -77,6 +82,7 @@ impl Task for Spin {
 
     fn report(&mut self, session: &mut Session, out: &mut Out) -> String {
         let state = self.state(session, out.is_json);
+        self.refusal = session.refusal().map(|refusal| refusal.to_string());
         let unread = [("unread", u64::from(out.lost()))];
         let counts = session.counts().into_iter().chain(unread);
         if out.is_json {
@@ -85,6 +91,15 @@ impl Task for Spin {
             return format!("{state}{}\n", json!({ "counts": counts }));
         }
         counts.fold(state, |text, (name, count)| text + &format!("{name} {count}\n"))
+    }
+
+    fn is_missed(&self) -> bool {
+        self.arm && !self.was_armed
+    }
+
+    fn failures(&self) -> Vec<String> {
+        let refusals = self.refusal.iter().filter(|_| self.is_missed());
+        refusals.map(|refusal| format!("not armed: {refusal}")).collect()
     }
 }
 
@@ -162,7 +177,7 @@ impl Task for Tune {
             }
             (self.motor, self.is_busy) = (self.motor + 1, false);
         }
-        let is_armed = session.stage() == crate::session::Stage::Armed;
+        let is_armed = session.stage() == Stage::Armed;
         if is_armed && !self.is_busy && self.motor < session.robot().len() {
             self.is_busy = true;
             let begun = if self.options.command == Command::Identify {
@@ -182,22 +197,20 @@ impl Task for Tune {
             let stage = session.program(self.motor).map(Program::name).unwrap_or_default();
             out.say(format!("{:>3} s  motor {}: {stage}\n", ticks / 1_000, self.motor + 1));
         }
-        let is_refused = session.stage() == crate::session::Stage::Listening;
+        let is_refused = session.stage() == Stage::Listening;
         self.motor < session.robot().len() && !is_refused
     }
 
-    fn report(&mut self, _: &mut Session, out: &mut Out) -> String {
-        let failures = self.failures.iter();
-        if out.is_json {
-            return failures
-                .map(|failure| format!("{}\n", json!({ "failure": failure })))
-                .collect();
-        }
-        failures.map(|failure| format!("{failure}\n")).collect()
+    fn report(&mut self, _: &mut Session, _: &mut Out) -> String {
+        String::new()
     }
 
     fn is_missed(&self) -> bool {
         self.outcomes.len() < self.options.motors.len()
+    }
+
+    fn failures(&self) -> Vec<String> {
+        self.failures.clone()
     }
 }
 

@@ -36,6 +36,11 @@ pub(crate) trait Task {
     fn is_missed(&self) -> bool {
         false
     }
+
+    /// What failed, for standard error.
+    fn failures(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Standard output.
@@ -64,6 +69,7 @@ struct Lead<'a, T> {
     out: Out,
     errors: &'a mut Outlet,
     ticks: u64,
+    is_late: bool,
 }
 
 impl<T: Task> Pilot for Lead<'_, T> {
@@ -72,9 +78,9 @@ impl<T: Task> Pilot for Lead<'_, T> {
             return matches!(io::stdin().lock().skip_until(b'\n'), Ok(1..));
         }
         let is_over = matches!(&session.tap().link, Link::Replay(replay) if replay.is_over());
-        let is_late =
+        self.is_late =
             self.seconds.is_some_and(|seconds| session.elapsed().as_secs_f32() >= seconds);
-        !is_over && !is_late
+        !is_over && !self.is_late
     }
 
     fn ticked(&mut self, session: &mut Session) -> bool {
@@ -124,6 +130,26 @@ pub(crate) fn session(options: &Options, simulator: fn() -> Pace) -> Result<Sess
     Ok(Session::new(robot, link, pace, recorders))
 }
 
+/// Looks for arguments that make no sense, before anything is opened.
+///
+/// # Errors
+/// Names the argument.
+pub(crate) fn check(options: &Options) -> Result<(), String> {
+    let mut robot = Robot::new(&options.motors, options.twist.is_some())?;
+    match &options.command {
+        Command::Tune | Command::Identify if !options.arm => {
+            Err("the motors move: --arm says that they may".into())
+        }
+        Command::Identify if options.rpm.is_some_and(|rpm| rpm <= 0.0) => {
+            Err("--rpm is the limit of identify: not above zero".into())
+        }
+        Command::Get(_) | Command::Set(..) | Command::SetId(_) => {
+            setup::check(&mut robot, &options.command)
+        }
+        _ => drive::Spin::new(options).map(|_| ()),
+    }
+}
+
 /// Runs a command to its end.
 ///
 /// # Errors
@@ -137,10 +163,6 @@ pub(crate) fn run(options: &Options, end: &End) -> Result<ExitCode, String> {
         let count = record::convert(from, to)?;
         println(&format!("{count} frames to {to}"));
         return Ok(ExitCode::SUCCESS);
-    }
-    let needs_arm = matches!(options.command, Command::Tune | Command::Identify);
-    if needs_arm && !options.arm {
-        return Err("the motors move: --arm says that they may".into());
     }
     let session = session(options, fast)?;
     match &options.command {
@@ -187,13 +209,23 @@ fn lead(
         is_json: options.json,
     };
     let is_lock_step = options.lock_step;
-    let mut lead = Lead { task, seconds, is_lock_step, out, errors: &mut errors, ticks: 0 };
+    let mut lead =
+        Lead { task, seconds, is_lock_step, out, errors: &mut errors, ticks: 0, is_late: false };
     lead.task.begin(&mut session);
     session.run(end, &mut lead);
     lead.take_messages(&mut session);
-    let Lead { mut task, mut out, .. } = lead;
-    let mut has_failed = session.has_failed() || (task.is_missed() && !end.is_asked_for());
+    let Lead { mut task, mut out, is_late, .. } = lead;
+    let is_missed = task.is_missed() && !end.is_asked_for();
+    let mut has_failed = session.has_failed() || is_missed;
     let report = task.report(&mut session, &mut out);
+    let mut missed = task.failures();
+    if is_missed && missed.is_empty() && is_late {
+        missed.push(format!(
+            "not done after {:.1} s: see --seconds",
+            session.elapsed().as_secs_f32()
+        ));
+    }
+    missed.iter().for_each(|failure| say(&mut errors, failure));
     // Where a reader or a disk holds up the end, a signal may end the program.
     let mut wait = |text: String| {
         end.is_safe(true);

@@ -1,7 +1,7 @@
 //! The simulated robot: motors with lifted wheels on one bus of the simulator.
 
 use super::{Heard, Taken};
-use crate::drive::MOTOR_NM_PER_A;
+use crate::drive::{MOTOR_NM_PER_A, master_id};
 use crate::motors::{Model, Spec};
 use drivetrain::frame::CanFrame;
 use drivetrain::lk::Series;
@@ -163,12 +163,11 @@ fn shaft(limit_nm: f32) -> DriveShaft {
 
 /// A drive of another family.
 fn kind(spec: Spec) -> Option<Kind> {
-    let Spec { id, host, .. } = spec;
+    let id = spec.id;
     Some(match spec.model {
         Model::Damiao(model) => {
-            let master = host.unwrap_or(0x10 + u16::from(id));
             let ranges = [model.pmax_rad(), model.vmax_rad_per_s(), model.tmax_nm()];
-            let drive = DamiaoDrive::new(id, master, ranges).with_register(10, 1.0);
+            let drive = DamiaoDrive::new(id, master_id(spec), ranges).with_register(10, 1.0);
             Kind::Damiao(drive.with_shaft(shaft(0.3 * model.tmax_nm())))
         }
         Model::Lk(model) => {
