@@ -56,6 +56,8 @@ pub(crate) struct Drive {
     kind: Kind,
     speed: Pid,
     limit_nm: f32,
+    /// The speed without load in rad/s, or that of the feedback's range.
+    pub(crate) top_speed: f32,
 }
 
 impl Drive {
@@ -66,7 +68,8 @@ impl Drive {
         // An unloaded shaft follows in some 0.1 s; `tune` finds better gains.
         let config =
             PidConfig::new(0.1 * limit_nm, 0.3 * limit_nm, 0.0).with_output_limit(limit_nm);
-        Ok(Self { kind, speed: Pid::new(config).map_err(text)?, limit_nm })
+        let top_speed = top_speed(spec.model);
+        Ok(Self { kind, speed: Pid::new(config).map_err(text)?, limit_nm, top_speed })
     }
 
     /// The largest torque in Nm that is asked for.
@@ -123,6 +126,11 @@ impl Drive {
             Kind::Vesc(own) => Some(own.motor().feedback().current_a? * MOTOR_NM_PER_A),
             Kind::Lk(_) | Kind::Rmd(_) | Kind::Odrive(_) => None,
         }
+    }
+
+    /// Tells whether the drive reports when it is asked, and not by itself.
+    pub(crate) fn answers_only(&self) -> bool {
+        !matches!(self.kind, Kind::Odrive(_) | Kind::Vesc(_))
     }
 
     pub(crate) fn health(&self) -> Health {
@@ -242,6 +250,18 @@ impl Drive {
             Kind::RobStride(own) => own.motor_mut().set_id(id).map_err(text),
             _ => Ok(()),
         }
+    }
+}
+
+/// The speed without load in rad/s, by the torque constant where no table has it, or that of the feedback's range.
+fn top_speed(model: Model) -> f32 {
+    const SUPPLY_V: f32 = 24.0;
+    match model {
+        Model::Damiao(model) => model.vmax_rad_per_s(),
+        Model::RobStride(model) => model.vmax_rad_per_s(),
+        Model::Lk(model) => SUPPLY_V / model.torque_constant(),
+        Model::Rmd(model) => SUPPLY_V / model.torque_constant(),
+        _ => AngularVelocity::from_rpm(MOTOR_RPM).as_rad_per_s(),
     }
 }
 

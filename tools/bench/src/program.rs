@@ -51,9 +51,10 @@ impl Program {
         }
     }
 
-    /// The speed of this program and `by` rad/s more; from any other program, `by` from a standstill.
-    pub(crate) fn jogged(&self, by: f32) -> Self {
+    /// The speed of this program and `by` rad/s more, `top` rad/s at most; from any other program, `by` from a standstill.
+    pub(crate) fn jogged(&self, by: f32, top: f32) -> Self {
         let speed = by + if let Self::Speed(speed) = self { *speed } else { 0.0 };
+        let speed = speed.min(top).max(-top);
         // The sum of 10 rpm up and down leaves a rest of rounding.
         if speed.abs() < 1e-3 { Self::Still } else { Self::Speed(speed) }
     }

@@ -175,6 +175,11 @@ impl Robot {
         }
     }
 
+    /// Tells whether a motor reports when it is asked, and not by itself.
+    pub(crate) fn answers_only(&self, motor: usize) -> bool {
+        self.drive(motor).is_some_and(Drive::answers_only)
+    }
+
     /// The unit of [`Target::Effort`].
     pub(crate) fn unit(&self, motor: usize) -> &'static str {
         match self.place(motor) {
@@ -203,6 +208,16 @@ impl Robot {
         match self.place(motor) {
             Some(Place::Dji(dji)) => dji.speed.output_range().1,
             _ => self.drive(motor).map_or(0.0, Drive::limit_nm),
+        }
+    }
+
+    /// The speed without load in rad/s, as far as it is known.
+    pub(crate) fn top_speed(&self, motor: usize) -> f32 {
+        match self.place(motor) {
+            Some(Place::Dji(dji)) => {
+                AngularVelocity::from_rpm(dji.facts.no_load_rpm).as_rad_per_s()
+            }
+            _ => self.drive(motor).map_or(0.0, |drive| drive.top_speed),
         }
     }
 

@@ -109,7 +109,9 @@ impl Remote {
                 self.say(session, "arm first: Shift-A".into());
             }
             Action::Jog(motor, by) => {
-                let program = session.program(motor).map_or(Program::Still, |now| now.jogged(by));
+                let top = session.robot().top_speed(motor);
+                let program =
+                    session.program(motor).map_or(Program::Still, |now| now.jogged(by, top));
                 session.start_program(motor, program);
             }
             Action::Still(motor) => session.start_program(motor, Program::Still),
@@ -389,6 +391,23 @@ mod tests {
         let (targets, log) = run([(1, Action::Arm)].into_iter().chain(jogs).collect());
         assert_eq!(targets[998], Some(0.0), "{log}");
         assert_eq!(targets[1_010], Some(3.0), "{log}");
+    }
+
+    // Two seconds of a held key were 6000 rpm, and it took as many to come back from there.
+    #[test]
+    fn a_jog_ends_at_the_speed_without_load() {
+        let up = (1_000..1_060).map(|at| (at, Action::Jog(0, 10.0)));
+        let script =
+            [(1, Action::Arm)].into_iter().chain(up).chain([(1_100, Action::Jog(0, -10.0))]);
+        let (targets, log) = run(script.collect());
+        // 482 rpm, as the data sheet has it.
+        let top = 482.0 * std::f32::consts::TAU / 60.0;
+        for (at, expected) in [(1_080, top), (1_110, top - 10.0)] {
+            assert!(
+                targets[at].is_some_and(|target| (target - expected).abs() < 1e-3),
+                "{at}: {log}"
+            );
+        }
     }
 
     #[test]
