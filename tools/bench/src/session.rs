@@ -20,7 +20,7 @@ use crate::tap::Tap;
 use crate::time::Time;
 use crate::traffic::Traffic;
 use drivetrain::motor::{ArmError, Condition, Devices};
-use drivetrain::runner::{Nb, Runner};
+use drivetrain::runner::{BusCondition, Nb, Runner};
 use drivetrain::time::{Duration, Instant, Tick, Ticker};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -61,6 +61,10 @@ pub(crate) struct Session {
     targets: Vec<Option<Target>>,
     start: Instant,
     armed_once: bool,
+    /// The runner has had a step.
+    has_sent: bool,
+    /// Nothing was sent for a while: the steps in that time are not missing.
+    has_paused: bool,
     has_tripped: bool,
     has_failed: bool,
     /// Why it is not armed yet.
@@ -100,6 +104,8 @@ impl Session {
             targets: vec![None; count],
             start,
             armed_once: false,
+            has_sent: false,
+            has_paused: false,
             has_tripped: false,
             has_failed: false,
             refusal: None,
@@ -176,6 +182,7 @@ impl Session {
         if !self.tap().link.sends() {
             self.messages.push("a recording has no motors to arm".into());
         } else if self.stage == Stage::Listening {
+            self.has_paused = self.has_sent;
             self.stage = Stage::Asking { since: self.pace.time().read(), asked: None, limit };
         }
     }
@@ -233,6 +240,7 @@ impl Session {
         if !self.pace.pause(link) {
             return false;
         }
+        self.has_sent |= self.stage != Stage::Listening;
         while self.runner.poll(64) == 64 {}
         // A step of the runner stays due until it was run, and where nothing is sent none is.
         let due = match self.stage {
@@ -331,15 +339,37 @@ impl Session {
     fn take_edges(&mut self, now: Instant) -> Vec<String> {
         let mut changes = Vec::new();
         while let Some(edge) = self.runner.device_mut().next_edge() {
+            let motor = self.robot().names().position(|name| name == edge.motor);
+            if is_silence(edge.condition) && motor.is_some_and(|motor| self.is_unasked(motor)) {
+                continue;
+            }
             let text = without_time(&edge);
             if edge.began && edge.condition == Condition::SecondMaster {
                 self.messages.push(format!("{text}: another program or board commands it too"));
             }
             changes.push(text);
         }
-        changes.extend(self.runner.edges().map(|edge| without_time(&edge)));
+        while let Some(edge) = self.runner.next_edge() {
+            if self.has_paused && edge.condition == BusCondition::TickOverrun {
+                self.has_paused = edge.began;
+                continue;
+            }
+            changes.push(without_time(&edge));
+        }
         self.edges.extend(changes.iter().map(|text| (now, text.clone())));
         changes
+    }
+
+    /// Tells whether a motor reports when it is asked only, and is not armed: its silence means nothing.
+    fn is_unasked(&self, motor: usize) -> bool {
+        !matches!(self.stage, Stage::Armed | Stage::Resting { .. })
+            && self.robot().answers_only(motor)
+    }
+
+    /// Tells whether a motor is silent because nobody asks it.
+    pub(crate) fn is_idle(&self, motor: usize) -> bool {
+        let is_heard = self.robot().reading(motor).is_some_and(|reading| reading.is_heard());
+        self.stage == Stage::Listening && self.robot().answers_only(motor) && !is_heard
     }
 
     fn fail(&mut self, text: String) {
@@ -376,6 +406,11 @@ impl Session {
         let ends = tap.recorders.into_iter().map(|recorder| recorder.finish(&mut say));
         ends.filter_map(Result::err).collect()
     }
+}
+
+/// Tells whether a condition says that a motor does not report.
+pub(crate) fn is_silence(condition: Condition) -> bool {
+    matches!(condition, Condition::Late | Condition::Offline)
 }
 
 /// An edge without the time on the clock of the device, beside which the session's time stands.

@@ -1,10 +1,9 @@
 //! A session at one moment: what the window draws and the commands print.
 
 use crate::robot::Target;
-use crate::session::{Session, Stage};
+use crate::session::{Session, Stage, is_silence};
 use crate::text;
 use crate::traffic::Row;
-use drivetrain::motor::Link;
 use drivetrain::time::Instant;
 use drivetrain::units::AngularVelocity;
 use serde_json::{Value, json};
@@ -14,7 +13,8 @@ use std::fmt::Write;
 #[derive(Debug, Clone)]
 pub(crate) struct Motor {
     pub(crate) name: String,
-    pub(crate) link: Link,
+    /// "Idle": it reports when it is asked, and nobody asks.
+    pub(crate) link: String,
     pub(crate) is_armed: bool,
     pub(crate) is_heard: bool,
     pub(crate) rpm: f32,
@@ -76,6 +76,14 @@ fn motor_of(session: &Session, motor: usize) -> Motor {
     let reading = robot.reading(motor);
     let reading = reading.as_ref();
     let health = reading.map(|reading| &reading.health);
+    let is_idle = session.is_idle(motor);
+    let link = match health.map(|health| health.link) {
+        None => "not heard".to_owned(),
+        Some(_) if is_idle => "Idle".to_owned(),
+        Some(link) => format!("{link:?}"),
+    };
+    let conditions = health.into_iter().flat_map(|health| health.conditions.iter());
+    let conditions = conditions.filter(|condition| !(is_idle && is_silence(*condition)));
     let target_rpm = match session.target(motor) {
         Some(Target::Velocity(rad_per_s)) => {
             Some(AngularVelocity::from_rad_per_s(rad_per_s).as_rpm())
@@ -84,7 +92,7 @@ fn motor_of(session: &Session, motor: usize) -> Motor {
     };
     Motor {
         name: robot.names().nth(motor).map(|name| name.to_string()).unwrap_or_default(),
-        link: health.map_or(Link::Unheard, |health| health.link),
+        link,
         is_armed: robot.is_motor_armed(motor),
         is_heard: reading.is_some(),
         rpm: reading
@@ -94,9 +102,7 @@ fn motor_of(session: &Session, motor: usize) -> Motor {
         measured_unit: robot.measured_unit(motor),
         temperature_c: health.and_then(|health| health.temperature_c),
         error: reading.and_then(|reading| reading.error.clone()),
-        conditions: health.map_or(Vec::new(), |health| {
-            health.conditions.iter().map(|condition| condition.as_str()).collect()
-        }),
+        conditions: conditions.map(|condition| condition.as_str()).collect(),
         feedback_hz: health.map_or(0, |health| health.feedback_hz),
         target_rpm,
         program: session.program(motor).map(|program| program.name()).unwrap_or_default(),
@@ -118,7 +124,7 @@ impl Snapshot {
             let turns = motor.turns.map_or("-".into(), |turns| format!("{turns:.3}"));
             _ = writeln!(
                 text,
-                "{} {:?}: {:8.1} rpm, {effort} {}, position {turns} turns, {}",
+                "{} {}: {:8.1} rpm, {effort} {}, position {turns} turns, {}",
                 motor.name,
                 motor.link,
                 motor.rpm,
@@ -142,7 +148,7 @@ impl Snapshot {
 impl Motor {
     pub(crate) fn json(&self) -> Value {
         json!({
-            "motor": self.name, "link": format!("{:?}", self.link), "armed": self.is_armed, "rpm": self.rpm,
+            "motor": self.name, "link": self.link, "armed": self.is_armed, "rpm": self.rpm,
             "target_rpm": self.target_rpm, "turns": self.turns, "effort": self.effort,
             "unit": self.measured_unit, "temperature_c": self.temperature_c, "error": self.error,
             "conditions": self.conditions, "feedback_hz": self.feedback_hz,

@@ -8,33 +8,40 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Row, Table};
+use ratatui::widgets::{
+    Axis, Block, Chart, Dataset, GraphType, Paragraph, Row, Table, TableState, Wrap,
+};
 
-const KEYS: &str = "Shift-A arm  SPACE STOP ALL  ↑↓ motor  ←→ jog  0 still  s sine  e steps  t tune  i identify  g gains  r record  b bus  ? help  q quit";
+const KEYS: &str = "Shift-A arm  SPACE STOP ALL  ↑↓ motor  ←→ jog  0 still  s sine  e steps  t tune  i identify  g gains  b bus  ? all keys";
 
-const HELP: [&str; 21] = [
-    "Shift-A       arm: all motors have to be heard. Lift the wheels first",
-    "Space, Esc    stop everything: zeros until they are seen on the bus",
-    "↑ ↓           choose a motor",
-    "← →           its speed, 10 rpm less or more; with Shift 100 rpm",
-    "0             its speed is zero",
-    "s             a sine of 60 rpm and 2 s",
-    "e             steps of 60 rpm, each second",
-    "g             its gains: kp,ki,kd and Enter; they count at once",
-    "t             tune: a step, a relay, gains by a rule, a step",
-    "i             identify: friction, inertia and delay by ten seconds of swings; the gains stay",
-    "r             record to session-N.mcap and session-N.log, or end that",
-    "b             the ids on the bus, with a guess of those that are unknown",
-    "x             the motor falls silent for 1 s (simulator)",
-    ". :           0.1 s or 1 s more of a simulator that stands (--held)",
-    "q, Ctrl-C     end, with zeros",
-    "",
-    "What is red needs you: an armed robot, a fault, a motor that is not heard.",
+/// On 80 columns and 24 lines, all of it is on the screen.
+const HELP: [&str; 19] = [
+    "Shift-A     arm: all motors have to be heard. Lift the wheels first",
+    "Space, Esc  stop everything: zeros until they are seen on the bus",
+    "↑ ↓         choose a motor",
+    "← →         its speed, 10 rpm less or more; with Shift 100 rpm",
+    "0           its speed is zero",
+    "s, e        a sine of 60 rpm and 2 s; steps of 60 rpm, each second",
+    "g           its gains: kp,ki,kd and Enter; they count at once",
+    "t           tune: a step, a relay, gains by a rule, a step. The gains count",
+    "i           identify: friction, inertia, delay by ten seconds of swings",
+    "r           record to session-N.mcap and session-N.log, or end that",
+    "b           the ids on the bus, with a guess of those that are unknown",
+    "x           the motor falls silent for 1 s (simulator)",
+    ". :         0.1 s or 1 s more of a simulator that stands (--held)",
+    "q, Ctrl-C   end, with zeros",
+    "An armed robot, a fault and a silent motor are red; a drive that speaks",
+    "only when it is asked is idle until then. One lost motor stops all.",
     "Gains are of the speed loop: A, V or Nm per rad/s, and per rad.",
-    "When one motor is lost, all stop. Arm again with Shift-A.",
     "Results of t and i stand in the log, and are printed as TOML at the end.",
     "Without a window: drivetrain-bench --help",
 ];
+
+/// Of a window with fewer lines, the log gives some to the motors.
+const LOW: u16 = 32;
+
+/// A window with fewer columns has no room for turns and rate, and shows conditions in the place of the program.
+const WIDE: u16 = 116;
 
 const ALARM: Style = Style::new().fg(Color::White).bg(Color::Red).add_modifier(Modifier::BOLD);
 const CALM: Style = Style::new().fg(Color::Black).bg(Color::Gray);
@@ -42,17 +49,23 @@ const CALM: Style = Style::new().fg(Color::Black).bg(Color::Gray);
 /// Draws a view.
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &View, ui: &Ui) {
     let motors = u16::try_from(view.snapshot.motors.len()).unwrap_or(u16::MAX);
+    let log_room = match (frame.area().height < LOW, ui.page) {
+        (true, Page::Help) => 0,
+        (true, _) => 4,
+        (false, _) => 9,
+    };
     let [title, middle, log, keys] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Min(8),
-        Constraint::Length(9),
+        Constraint::Length(log_room),
         Constraint::Length(2),
     ])
     .areas(frame.area());
     draw_title(frame, title, view);
     match ui.page {
         Page::Motors => {
-            let room = Constraint::Length(motors.saturating_add(3).min(middle.height / 2));
+            let most = middle.height.saturating_sub(5);
+            let room = Constraint::Length(motors.saturating_add(3).min(most));
             let [table, chart] = Layout::vertical([room, Constraint::Min(5)]).areas(middle);
             draw_motors(frame, table, view, ui);
             draw_strip(frame, chart, view, ui);
@@ -90,8 +103,15 @@ fn draw_title(frame: &mut Frame<'_>, area: Rect, view: &View) {
 }
 
 fn draw_motors(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
+    let is_wide = area.width >= WIDE;
+    let kept = |column: usize| is_wide || !matches!(column, 5 | 8 | 10);
     let rows = view.snapshot.motors.iter().enumerate().map(|(index, motor)| {
-        let row = Row::new(cells(motor, index == ui.selected));
+        let mut cells = cells(motor, index == ui.selected);
+        if !is_wide && !cells[10].is_empty() {
+            cells.swap(9, 10);
+        }
+        let cells = cells.into_iter().enumerate().filter(|(column, _)| kept(*column));
+        let row = Row::new(cells.map(|(_, cell)| cell));
         let is_wrong = motor.error.is_some() || !motor.conditions.is_empty();
         let style = match (is_wrong, motor.is_armed) {
             (true, _) => Style::new().fg(Color::Red),
@@ -100,13 +120,21 @@ fn draw_motors(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
         };
         row.style(if index == ui.selected { style.add_modifier(Modifier::BOLD) } else { style })
     });
-    let widths = [2, 20, 9, 8, 8, 10, 10, 5, 6, 16].map(Constraint::Length);
-    let widths = widths.into_iter().chain([Constraint::Min(10)]);
+    let (lengths, last): (&[u16], u16) = if is_wide {
+        (&[2, 20, 9, 8, 8, 10, 10, 5, 6, 16], 10)
+    } else {
+        (&[1, 19, 9, 7, 7, 9, 3], 0)
+    };
+    let widths = lengths.iter().map(|length| Constraint::Length(*length));
+    let widths = widths.chain([Constraint::Min(last)]);
     let header =
         ["", "motor", "link", "target", "rpm", "turns", "effort", "°C", "Hz", "does", "conditions"];
-    let table =
-        Table::new(rows, widths).header(Row::new(header)).block(Block::bordered().title("motors"));
-    frame.render_widget(table, area);
+    let header = header.into_iter().enumerate().filter(|(column, _)| kept(*column));
+    let header = Row::new(header.map(|(_, name)| name));
+    let table = Table::new(rows, widths).header(header).block(Block::bordered().title("motors"));
+    // Scrolls as far as the chosen motor.
+    let mut state = TableState::new().with_selected(ui.selected);
+    frame.render_stateful_widget(table, area, &mut state);
 }
 
 fn cells(motor: &Motor, is_selected: bool) -> [String; 11] {
@@ -116,7 +144,7 @@ fn cells(motor: &Motor, is_selected: bool) -> [String; 11] {
     [
         if is_selected { ">".into() } else { String::new() },
         motor.name.clone(),
-        if motor.is_heard { format!("{:?}", motor.link) } else { "not heard".into() },
+        motor.link.clone(),
         or_dash(motor.target_rpm.map(|rpm| fixed(rpm, 1))),
         if motor.is_heard { fixed(motor.rpm, 1) } else { "-".into() },
         or_dash(motor.turns.map(|turns| format!("{turns:.2}"))),
@@ -196,11 +224,12 @@ fn draw_bus(frame: &mut Frame<'_>, area: Rect, view: &View) {
 }
 
 fn draw_log(frame: &mut Frame<'_>, area: Rect, view: &View) {
-    let room = usize::from(area.height.saturating_sub(2));
-    let skipped = view.log.len().saturating_sub(room);
-    let lines: Vec<_> =
-        view.log.iter().skip(skipped).map(|line| Line::from(line.as_str())).collect();
-    frame.render_widget(Paragraph::new(lines).block(Block::bordered().title("log")), area);
+    let lines: Vec<_> = view.log.iter().map(|line| Line::from(line.as_str())).collect();
+    let log = Paragraph::new(lines).wrap(Wrap { trim: false });
+    let count = log.line_count(area.width.saturating_sub(2));
+    let skipped = count.saturating_sub(area.height.saturating_sub(2).into());
+    let log = log.scroll((u16::try_from(skipped).unwrap_or(u16::MAX), 0));
+    frame.render_widget(log.block(Block::bordered().title("log")), area);
 }
 
 fn draw_keys(frame: &mut Frame<'_>, area: Rect, ui: &Ui) {
@@ -212,7 +241,7 @@ fn draw_keys(frame: &mut Frame<'_>, area: Rect, ui: &Ui) {
         (None, Some(hint)) => (hint.clone(), Style::new().fg(Color::Yellow)),
         (None, None) => (KEYS.into(), Style::new().fg(Color::DarkGray)),
     };
-    let paragraph = Paragraph::new(text).style(style).wrap(ratatui::widgets::Wrap { trim: true });
+    let paragraph = Paragraph::new(text).style(style).wrap(Wrap { trim: true });
     frame.render_widget(paragraph, area);
 }
 
@@ -220,7 +249,6 @@ fn draw_keys(frame: &mut Frame<'_>, area: Rect, ui: &Ui) {
 mod tests {
     use super::*;
     use crate::snapshot::Snapshot;
-    use drivetrain::motor::Link;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
     use std::collections::VecDeque;
@@ -228,7 +256,7 @@ mod tests {
     fn view(is_armed: bool) -> View {
         let motor = Motor {
             name: "M3508 #1".into(),
-            link: Link::Online,
+            link: "Online".into(),
             is_armed,
             is_heard: true,
             rpm: 59.7,
@@ -305,6 +333,50 @@ mod tests {
         }
         let text = screen(&view(false), &Ui { page: Page::Bus, ..Ui::default() }, (140, 36));
         assert!(text.contains("received 7") && !text.contains("sent 0"), "{text}");
+    }
+
+    /// As a terminal opens.
+    #[test]
+    fn eighty_columns_and_24_lines_have_room_for_eight_motors_and_all_keys() {
+        let mut view = view(true);
+        let names = (1..=8).map(|id| format!("GM6020 (voltage) #{id}"));
+        let of = |name| Motor { name, ..view.snapshot.motors[0].clone() };
+        view.snapshot.motors = names.map(of).collect();
+        view.snapshot.motors[2].conditions.clear();
+        let text = screen(&view, &Ui { selected: 7, ..Ui::default() }, (80, 24));
+        for motor in &view.snapshot.motors {
+            assert!(text.contains(&motor.name), "{} is not in\n{text}", motor.name);
+        }
+        for words in [
+            "> GM6020 (voltage) #8 Online    60.0    59.7    0.50 A    33  late",
+            "  GM6020 (voltage) #3 Online    60.0    59.7    0.50 A    33  speed",
+            "something happened",
+            "? all keys",
+        ] {
+            assert!(text.contains(words), "{words} is not in\n{text}");
+        }
+        // More than there is room for: the table scrolls to the chosen one.
+        let more = (9..=20)
+            .map(|id| Motor { name: format!("M3508 #{id}"), ..view.snapshot.motors[0].clone() });
+        let more: Vec<_> = more.collect();
+        view.snapshot.motors.extend(more);
+        for (selected, name) in [(0, "GM6020 (voltage) #1"), (11, "M3508 #12"), (19, "M3508 #20")] {
+            let text = screen(&view, &Ui { selected, ..Ui::default() }, (80, 24));
+            assert!(text.contains(&format!("> {name}")), "{name} is not in\n{text}");
+        }
+        let help = screen(&view, &Ui { page: Page::Help, ..Ui::default() }, (80, 24));
+        for line in HELP {
+            assert!(help.contains(line), "{line} is not in\n{help}");
+        }
+    }
+
+    #[test]
+    fn the_keys_have_one_line_of_120_columns_and_the_log_its_last_words() {
+        assert!(KEYS.chars().count() <= 120, "{}", KEYS.chars().count());
+        let mut view = view(true);
+        view.log.push_back("word ".repeat(60) + "and the advice");
+        let text = screen(&view, &Ui::default(), (80, 24));
+        assert!(text.contains("the advice"), "{text}");
     }
 
     #[test]
