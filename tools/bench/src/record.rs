@@ -94,7 +94,9 @@ struct McapSink {
 
 impl McapSink {
     fn new(file: File) -> io::Result<Self> {
-        let options = mcap::WriteOptions::new().compression(None).library("drivetrain-bench");
+        let options = mcap::WriteOptions::new()
+            .compression(Some(mcap::Compression::Lz4))
+            .library("drivetrain-bench");
         let writer = options.create(BufWriter::new(file)).map_err(io::Error::other)?;
         Ok(Self { writer, channels: BTreeMap::new(), partial: String::new() })
     }
@@ -207,14 +209,19 @@ pub(crate) fn key(frame: &CanFrame) -> (bool, u32) {
     }
 }
 
-/// Converts a recording into the other form, or the same anew.
+/// Converts a recording into the other form, or the same anew; each second, `say` takes the progress.
 ///
 /// # Errors
 /// Says what is wrong with either file.
-pub(crate) fn convert(from: &str, to: &str) -> Result<usize, String> {
+pub(crate) fn convert(from: &str, to: &str, mut say: impl FnMut(&str)) -> Result<usize, String> {
     let frames = read(from)?;
     let mut recorder = Recorder::create("--output", to)?;
-    for (at, frame) in &frames {
+    let mut said = std::time::Instant::now();
+    for ((at, frame), count) in frames.iter().zip(0_usize..) {
+        if said.elapsed().as_secs() >= 1 {
+            said = std::time::Instant::now();
+            say(&format!("{count} of {} frames", frames.len()));
+        }
         // The disk sets the pace here, not a bus.
         while recorder.outlet.is_full() {
             std::thread::yield_now();
@@ -271,8 +278,8 @@ mod tests {
             })
             .collect();
         std::fs::write(&text_a, &lines).unwrap();
-        assert_eq!(convert(&text_a, &mcap), Ok(70_000));
-        assert_eq!(convert(&mcap, &text_b), Ok(70_000));
+        assert_eq!(convert(&text_a, &mcap, |_| {}), Ok(70_000));
+        assert_eq!(convert(&mcap, &text_b, |_| {}), Ok(70_000));
         assert!(std::fs::read_to_string(&text_b).unwrap() == lines);
         [text_a, mcap, text_b].iter().for_each(|path| std::fs::remove_file(path).unwrap());
     }

@@ -14,7 +14,7 @@ use crate::record::{self, Recorder};
 use crate::robot::Robot;
 use crate::session::{Pilot, Session};
 use crate::time::Time;
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Write};
 use std::process::ExitCode;
 
 /// Texts that wait for a reader.
@@ -160,7 +160,8 @@ pub(crate) fn run(options: &Options, end: &End) -> Result<ExitCode, String> {
     if let (Command::Replay, Source::Recording(from), Some(to)) =
         (&options.command, &options.source, &options.output)
     {
-        let count = record::convert(from, to)?;
+        let progress = |text: &str| _ = writeln!(io::stderr(), "bench: {text}");
+        let count = record::convert(from, to, progress)?;
         println(&format!("{count} frames to {to}"));
         return Ok(ExitCode::SUCCESS);
     }
@@ -245,5 +246,5 @@ fn lead(
 
 /// Writes a line on standard output, for somebody who may have stopped reading.
 pub(crate) fn println(text: &str) {
-    _ = io::Write::write_all(&mut io::stdout(), format!("{text}\n").as_bytes());
+    _ = writeln!(io::stdout(), "{text}");
 }
