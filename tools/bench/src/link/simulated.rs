@@ -16,6 +16,9 @@ use embedded_can::{Error as _, nb::Can};
 /// The bus of the robot.
 const BUS: Line = Line::Can1;
 
+/// The load of a GM6020 by voltage: without one, its shaft follows a voltage too fast to be identified.
+const TURRET_KG_M2: f32 = 0.03;
+
 /// The time that the world moves on at once.
 const STEP: Duration = Duration::from_micros(250);
 
@@ -150,7 +153,7 @@ fn dji(spec: Spec) -> Option<MotorConfig> {
     Some(match spec.model {
         Model::M3508 => MotorConfig::m3508(id),
         Model::M2006 => MotorConfig::m2006(id),
-        Model::Gm6020 => MotorConfig::gm6020_voltage(id),
+        Model::Gm6020 => MotorConfig::gm6020_voltage(id).with_load_inertia_kg_m2(TURRET_KG_M2),
         Model::Gm6020Current => MotorConfig::gm6020_current(id),
         _ => return None,
     })

@@ -214,7 +214,7 @@ fn tuning_finds_gains_that_settle_faster() {
         assert!(toml.contains("\nkp = ") && toml.contains("\nultimate_gain = "), "{toml}");
         let Outcome::Tuned(tuned) = outcome else { panic!("{outcome:?}") };
         let period_s = tuned.ultimate_period_s;
-        assert!(period_s > 0.005 && period_s < 0.2, "{list}: {tuned:?}");
+        assert!(period_s > 0.005 && period_s < 0.5, "{list}: {tuned:?}");
         let after = tuned.after;
         assert!(after.settled_s.is_some_and(|s| s < 0.6), "{list}: {tuned:?}");
         assert!(after.overshoot < 0.3 && after.steady_error.abs() < 0.5, "{list}: {tuned:?}");
@@ -263,6 +263,14 @@ fn identification_finds_the_shaft_of_the_simulator_and_a_loop_for_it() {
         });
         assert!((reached - 10.0).abs() < 0.1, "{list}: {reached} rad/s");
     }
+}
+
+/// 0.741 Nm/A are 0.741 V s/rad.
+#[test]
+fn a_gm6020_by_voltage_has_a_load_that_lets_it_be_identified() {
+    let (_, identified) = identified("gm6020:5", |_| {});
+    let plant = identified.unwrap().plant;
+    assert!((plant.kv / 0.741 - 1.0).abs() < 0.03 && plant.ks.abs() < 0.1, "{plant:?}");
 }
 
 #[test]
