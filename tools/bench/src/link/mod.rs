@@ -70,6 +70,23 @@ impl Link {
         false
     }
 
+    /// How to get rid of what the link may still send.
+    pub(crate) fn emptying(&self) -> String {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Socket(socket) => {
+                format!(
+                    "have `ip link set {} down` empty the queue before it is back",
+                    socket.name()
+                )
+            }
+            Self::Slcan(_) => {
+                "pull out the adapter, which may keep frames, before it is back".into()
+            }
+            Self::Simulated(_) | Self::Replay(_) => "begin anew".into(),
+        }
+    }
+
     /// Tells whether frames can be sent at all.
     pub(crate) fn sends(&self) -> bool {
         !matches!(self, Self::Replay(_))

@@ -40,10 +40,9 @@ impl Session {
             end.is_safe(true);
         }
         if begun.elapsed() > PATIENCE {
-            let name = self.tap().link.name().to_owned();
+            let emptying = self.tap().link.emptying();
             self.fail(format!(
-                "{doubt}, and the last command may stand. Cut the battery, and have `ip link set {name} down` empty \
-                 the queue before it is back"
+                "{doubt}, and the last command may stand. Cut the battery, and {emptying}"
             ));
             self.stage = Stage::Listening;
         }
