@@ -5,6 +5,7 @@
 //! link <── tap <────────────────────────── runner <── robot
 //! ```
 
+mod counts;
 mod measure;
 mod rest;
 
@@ -61,7 +62,6 @@ pub(crate) struct Session {
     targets: Vec<Option<Target>>,
     start: Instant,
     armed_once: bool,
-    /// The runner has had a step.
     has_sent: bool,
     /// Nothing was sent for a while: the steps in that time are not missing.
     has_paused: bool,
@@ -375,29 +375,6 @@ impl Session {
     fn fail(&mut self, text: String) {
         self.messages.push(text);
         self.has_failed = true;
-    }
-
-    /// Counts of the runner and of the DJI bus, by name.
-    pub(crate) fn counts(&mut self) -> Vec<(&'static str, u64)> {
-        let (s, bus) = (self.runner.statistics(), self.runner.device().counters());
-        let counts = [
-            ("received", s.received),
-            ("taken", s.taken),
-            ("unrelated", s.unrelated),
-            ("malformed", s.malformed),
-            ("receive_errors", s.receive_errors.total()),
-            ("bad_length", bus.bad_length),
-            ("bad_field", bus.bad_field),
-            ("unattached", bus.unattached),
-            ("packed", bus.packed),
-            ("superseded", s.superseded),
-            ("offered", s.offered),
-            ("sent", s.sent),
-            ("refused", s.refused),
-            ("send_errors", s.send_errors.total()),
-            ("bus_losses", s.bus_losses),
-        ];
-        counts.map(|(name, count)| (name, count.into())).into()
     }
 
     /// Ends the recordings; returns what went wrong with them.

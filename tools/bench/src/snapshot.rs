@@ -41,6 +41,8 @@ pub(crate) struct Snapshot {
     pub(crate) refusal: Option<String>,
     pub(crate) load: f32,
     pub(crate) counts: Vec<(&'static str, u64)>,
+    /// By kind.
+    pub(crate) errors: Vec<(&'static str, u64)>,
     pub(crate) rows: Vec<Row>,
     pub(crate) motors: Vec<Motor>,
     pub(crate) is_recording: bool,
@@ -67,6 +69,7 @@ pub(crate) fn of(session: &mut Session) -> Snapshot {
         is_sending,
         refusal: session.refusal().map(|refusal| refusal.to_string()),
         counts: session.counts(),
+        errors: session.errors(),
         motors,
     }
 }

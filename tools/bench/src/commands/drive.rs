@@ -84,7 +84,7 @@ impl Task for Spin {
         let state = self.state(session, out.is_json);
         self.refusal = session.refusal().map(|refusal| refusal.to_string());
         let unread = [("unread", u64::from(out.lost()))];
-        let counts = session.counts().into_iter().chain(unread);
+        let counts = session.counts().into_iter().chain(session.errors()).chain(unread);
         if out.is_json {
             let counts: serde_json::Map<_, _> =
                 counts.map(|(name, count)| (name.to_owned(), json!(count))).collect();

@@ -10,10 +10,10 @@ use drivetrain::time::{Duration, Instant};
 #[derive(Debug)]
 pub(crate) struct Replay {
     name: String,
-    frames: std::vec::IntoIter<(Instant, CanFrame)>,
-    next: Option<(Instant, CanFrame)>,
-    /// The time of the first frame, in the recording and in the session.
-    starts: Option<(Instant, Instant)>,
+    frames: Vec<(Instant, CanFrame)>,
+    next: usize,
+    /// When it begins, in the session.
+    start: Instant,
     time: Time,
 }
 
@@ -21,10 +21,8 @@ impl Replay {
     /// # Errors
     /// Says what is wrong with the file.
     pub(crate) fn open(path: &str, time: Time) -> Result<Self, String> {
-        let mut frames = record::read(path)?.into_iter();
-        let next = frames.next();
-        let starts = next.map(|(first, _)| (first, time.read()));
-        Ok(Self { name: path.to_owned(), frames, next, starts, time })
+        let frames = record::read(path)?;
+        Ok(Self { name: path.to_owned(), frames, next: 0, start: time.read(), time })
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -32,16 +30,21 @@ impl Replay {
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        self.next.is_none()
+        self.next >= self.frames.len()
+    }
+
+    /// Begins from its first frame.
+    pub(crate) fn rewind(&mut self) {
+        (self.next, self.start) = (0, self.time.read());
     }
 
     pub(crate) fn receive(&mut self) -> Option<Heard> {
-        let ((at, frame), (first, start)) = self.next.zip(self.starts)?;
-        let is_due = self.time.read().since(start) + Duration::from_millis(1) > at.since(first);
-        if !is_due {
+        let ((first, _), (at, frame)) = (self.frames.first()?, self.frames.get(self.next)?);
+        let passed = self.time.read().since(self.start) + Duration::from_millis(1);
+        if passed <= at.since(*first) {
             return None;
         }
-        self.next = self.frames.next();
-        Some(Heard::Frame(frame))
+        self.next += 1;
+        Some(Heard::Frame(*frame))
     }
 }

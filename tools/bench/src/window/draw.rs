@@ -28,13 +28,13 @@ const HELP: [&str; 19] = [
     "r           record to session-N.mcap and session-N.log, or end that",
     "b           the ids on the bus, with a guess of those that are unknown",
     "x           the motor falls silent for 1 s (simulator)",
+    "p           plays a recording once more (--replay)",
     ". :         0.1 s or 1 s more of a simulator that stands (--held)",
     "q, Ctrl-C   end, with zeros",
     "An armed robot, a fault and a silent motor are red; a drive that speaks",
     "only when it is asked is idle until then. One lost motor stops all.",
-    "Gains are of the speed loop: A, V or Nm per rad/s, and per rad.",
-    "Results of t and i stand in the log, and are printed as TOML at the end.",
-    "Without a window: drivetrain-bench --help",
+    "Gains are of the speed loop: A, V or Nm per rad/s, and per rad. Results of",
+    "t and i are printed as TOML at the end. Commands: drivetrain-bench --help",
 ];
 
 /// Of a window with fewer lines, the log gives some to the motors.
@@ -211,16 +211,22 @@ fn draw_strip(frame: &mut Frame<'_>, area: Rect, view: &View, ui: &Ui) {
 }
 
 fn draw_bus(frame: &mut Frame<'_>, area: Rect, view: &View) {
-    let room = usize::from(area.height.saturating_sub(3));
-    let lines = view.snapshot.rows.iter().take(room).map(|row| {
+    let nonzero = |counts: &[(&str, u64)]| {
+        let counts = counts.iter().filter(|(_, count)| *count > 0);
+        let counts: Vec<_> = counts.map(|(name, count)| format!("{name} {count}")).collect();
+        if counts.is_empty() { "none".to_owned() } else { counts.join("  ") }
+    };
+    let head = [
+        Line::from(format!("frames: {}", nonzero(&view.snapshot.counts))),
+        Line::from(format!("errors: {}", nonzero(&view.snapshot.errors))),
+    ];
+    let lines = view.snapshot.rows.iter().map(|row| {
         let style = if row.is_known { Style::new() } else { Style::new().fg(Color::Yellow) };
         Line::from(snapshot::row(row)).style(style)
     });
-    let counts = view.snapshot.counts.iter().filter(|(_, count)| *count > 0);
-    let counts: Vec<_> = counts.map(|(name, count)| format!("{name} {count}")).collect();
-    let title = format!("bus: {}", counts.join("  "));
-    let lines: Vec<_> = lines.collect();
-    frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(title)), area);
+    let lines: Vec<_> = head.into_iter().chain(lines).collect();
+    let page = Paragraph::new(lines).wrap(Wrap { trim: false });
+    frame.render_widget(page.block(Block::bordered().title("bus")), area);
 }
 
 fn draw_log(frame: &mut Frame<'_>, area: Rect, view: &View) {
@@ -281,6 +287,7 @@ mod tests {
             refusal: None,
             load: 0.25,
             counts: vec![("received", 7), ("sent", 0)],
+            errors: vec![("crc", 2), ("stuff", 0)],
             rows: Vec::new(),
             motors: vec![motor],
             is_recording: true,
@@ -332,7 +339,7 @@ mod tests {
             }
         }
         let text = screen(&view(false), &Ui { page: Page::Bus, ..Ui::default() }, (140, 36));
-        assert!(text.contains("received 7") && !text.contains("sent 0"), "{text}");
+        assert!(text.contains("frames: received 7 ") && text.contains("errors: crc 2 "), "{text}");
     }
 
     /// As a terminal opens.

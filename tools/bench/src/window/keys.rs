@@ -81,6 +81,7 @@ impl Ui {
             KeyCode::Char('t') => return Some(Action::Tune(motor)),
             KeyCode::Char('i') => return Some(Action::Identify(motor)),
             KeyCode::Char('r') => return Some(Action::Record),
+            KeyCode::Char('p') => return Some(Action::Rewind),
             KeyCode::Char('x') => return Some(Action::Silence(motor)),
             KeyCode::Char('.') => return Some(Action::Advance(100)),
             KeyCode::Char(':') => return Some(Action::Advance(1_000)),

@@ -40,6 +40,8 @@ pub(crate) enum Action {
     Tune(usize),
     Identify(usize),
     Record,
+    /// A recording begins again.
+    Rewind,
     /// A fault of the simulator: a motor falls silent.
     Silence(usize),
     /// A simulator that stands moves on, in ms.
@@ -61,6 +63,7 @@ pub(crate) struct Remote {
     pictured: Option<Instant>,
     options: Options,
     was_held: bool,
+    was_over: bool,
 }
 
 impl Remote {
@@ -82,6 +85,7 @@ impl Remote {
             pictured: None,
             options: options.clone(),
             was_held: false,
+            was_over: false,
         }
     }
 
@@ -143,6 +147,10 @@ impl Remote {
                 self.say_refusal(session, begun);
             }
             Action::Record => self.record(session),
+            Action::Rewind => match &mut session.tap().link {
+                Link::Replay(replay) => replay.rewind(),
+                _ => self.say(session, "only a recording plays again: --replay FILE".into()),
+            },
             Action::Silence(motor) => match &mut session.tap().link {
                 Link::Simulated(simulated) => simulated.silence(motor, Duration::from_secs(1)),
                 _ => self
@@ -288,6 +296,13 @@ impl Pilot for Remote {
         if self.pictured.is_none_or(|at| now.since(at) >= PICTURE) {
             self.pictured = Some(now);
             self.watch_recording(session);
+            let is_over = matches!(&session.tap().link, Link::Replay(replay) if replay.is_over());
+            if is_over && !self.was_over {
+                let text =
+                    "the recording is over: p plays it again, b lists the ids of all that is in it";
+                self.say(session, text.into());
+            }
+            self.was_over = is_over;
             self.picture(session);
         }
         true
@@ -408,6 +423,25 @@ mod tests {
                 "{at}: {log}"
             );
         }
+    }
+
+    #[test]
+    fn a_recording_plays_again_by_a_key() {
+        let path = std::env::temp_dir().join(format!("bench-again-{}.log", std::process::id()));
+        std::fs::write(&path, "(1.0) can0 201#0E160000FFFD2100\n(1.1) can0 201#0E160000FFFD2100\n")
+            .unwrap();
+        let (specs, time) = (motors::parse("m3508:1").unwrap(), Time::manual());
+        let replay = crate::link::Replay::open(path.to_str().unwrap(), time.clone()).unwrap();
+        let robot = Robot::new(&specs, false).unwrap();
+        let mut session = Session::new(robot, Link::Replay(replay), Pace::Fast(time), Vec::new());
+        let (_sender, actions) = mpsc::channel();
+        let remote = Remote::new(&session, actions, Shared::default(), &usual());
+        let mut script = Script(remote, 0, vec![(1_000, Action::Rewind)], Vec::new());
+        session.run(&End::none(), &mut script);
+        std::fs::remove_file(path).unwrap();
+        assert!(session.counts().contains(&("taken", 4)), "{:?}", session.counts());
+        let log = Vec::from(script.0.log).join("\n");
+        assert_eq!(log.matches("the recording is over").count(), 2, "{log}");
     }
 
     #[test]
