@@ -195,12 +195,10 @@ impl Remote {
         if session.tap().recorders.iter().any(Recorder::is_broken) {
             self.end_recording(session);
         }
-        let (ended, endings) =
-            std::mem::take(&mut self.endings).into_iter().partition(JoinHandle::is_finished);
+        let endings = std::mem::take(&mut self.endings).into_iter();
+        let (ended, endings): (Vec<_>, Vec<_>) = endings.partition(JoinHandle::is_finished);
         self.endings = endings;
-        for failure in
-            Vec::from(ended).into_iter().filter_map(|ending| ending.join().ok()).flatten()
-        {
+        for failure in ended.into_iter().filter_map(|ending| ending.join().ok()).flatten() {
             self.say(session, format!("the recording is cut: {failure}"));
             self.last_messages.push(failure);
         }
