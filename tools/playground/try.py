@@ -1,15 +1,21 @@
-"""Uses the page as a visitor does, in headless Chromium: try.py PAGE.html NATIVE_PROGRAM [PICTURE.png]
+"""Uses the page as a visitor does, in headless Chromium: try.py PAGE.html NATIVE_PROGRAM PICTURE.png
 
 Speaks to chromedriver by the WebDriver protocol. Fails when the page does not do what it says.
 """
 
 import base64
+import functools
+import http.server
 import json
 import pathlib
+import struct
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
+
+import operators
 
 # A machine that is busy may be slow: what is waited for has this long.
 PATIENCE_S = 60
@@ -79,23 +85,63 @@ class Browser:
         self.process.terminate()
 
 
-def main(page, native, picture=None):
-    browser = Browser()
-    try:
-        browse(browser, pathlib.Path(page).resolve().as_uri(), native, picture)
-    finally:
-        browser.quit()
+WHERE = "const p = samples.at(-1); return p ? [p.x, p.y, p.armed, p.heading] : [0, 0, false, 0]"
 
 
-def browse(browser, url, native, picture):
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+def main(page, native, picture):
+    page = pathlib.Path(page).resolve()
+    expected = subprocess.run([native], capture_output=True, text=True, check=True).stdout.split()[0]
+    files = functools.partial(Quiet, directory=page.parent)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), files) as host:
+        threading.Thread(target=host.serve_forever, daemon=True).start()
+        browser = Browser()
+        try:
+            # A host of files and nothing else; then without any.
+            visit(browser, f"http://127.0.0.1:{host.server_port}/{page.name}")
+            tour(browser, expected)
+            browser.keys(("keyUp", "w"))
+            quiet(browser)
+            visit(browser, page.as_uri())
+            browse(browser, native, expected, picture)
+            quiet(browser)
+        finally:
+            browser.quit()
+            host.shutdown()
+
+
+def visit(browser, url):
+    """Opens the page, arms the robot and drives it ahead."""
+    print(f"at {url}")
     browser.call("POST", "/url", {"url": url})
-    where = lambda: browser.run("const p = samples.at(-1); return p ? [p.x, p.y, p.armed, p.heading] : [0, 0, false, 0]")
     browser.until("a robot that waits", lambda: browser.text("#status").startswith("not armed"))
     browser.until("feedback of four motors", lambda: all(f"motor {n}:" in browser.text("#frames") for n in range(1, 5)))
-    browser.click("#switch")
-    browser.until("an armed robot", lambda: browser.text("#status").startswith("armed"))
+    arm(browser)
     browser.keys(("keyDown", "w"))
-    browser.until("half a metre ahead", lambda: where()[0] > 0.5)
+    browser.until("half a metre ahead", lambda: browser.run(WHERE)[0] > 0.5)
+
+
+def tour(browser, expected):
+    """The frames of the tour are those of a native run, bit for bit."""
+    browser.click("#tour")
+    browser.until("the hash of the tour", lambda: browser.text("#result") != "")
+    if expected not in browser.text("#result"):
+        raise SystemExit(f"playground: the frames of the tour differ: {expected} natively, here: {browser.text('#result')}")
+    print(f"seen: the same frames as natively, {expected}")
+
+
+def quiet(browser):
+    errors = [entry["message"] for entry in browser.call("POST", "/se/log", {"type": "browser"}) if entry["level"] == "SEVERE"]
+    if errors:
+        raise SystemExit("playground: the browser reports\n" + "\n".join(errors))
+
+
+def browse(browser, native, expected, picture):
+    where = lambda: browser.run(WHERE)
     browser.keys(("keyDown", "q"))
     browser.until("a turn to the left", lambda: where()[3] > 0.3)
 
@@ -113,8 +159,7 @@ def browse(browser, url, native, picture):
     browser.until("a robot that is armed again", lambda: browser.text("#status").startswith("armed"))
     before = where()
     browser.until("and drives", lambda: abs(where()[0] - before[0]) + abs(where()[1] - before[1]) > 0.2)
-    if picture:
-        pathlib.Path(picture).write_bytes(base64.b64decode(browser.call("GET", "/screenshot")))
+    screenshot(browser, picture)
     browser.keys(("keyUp", "w"), ("keyUp", "q"))
 
     browser.click("[data-trouble=second-master]")
@@ -126,21 +171,65 @@ def browse(browser, url, native, picture):
     browser.choose("#layout", "omni")
     browser.until("three omni wheels", lambda: browser.run("return samples.length > 5 && samples.at(-1).wheels.length === 3"))
 
-    browser.click("#tour")
-    browser.until("the hash of the tour", lambda: browser.text("#result") != "")
-    expected = subprocess.run([native], capture_output=True, text=True, check=True).stdout.split()[0]
-    if expected not in browser.text("#result"):
-        raise SystemExit(f"playground: the frames of the tour differ: {expected} natively, here: {browser.text('#result')}")
-    print(f"seen: the same frames as natively, {expected}")
+    tour(browser, expected)
     replay(browser, native)
+    pace(browser, expected)
+    languages(browser)
 
-    browser.click("#language")
-    browser.until("Chinese", lambda: browser.text("#switch").startswith("开关"))
-    browser.until("how fast it is", lambda: browser.run("return Boolean(document.body.dataset.pace)"))
+
+def screenshot(browser, picture):
+    data = base64.b64decode(browser.call("GET", "/screenshot"))
+    width, height = struct.unpack(">II", data[16:24])
+    colours = browser.run("const c = $('world'); return new Set(new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer)).size")
+    if not data.startswith(b"\x89PNG") or width < 1000 or height < 1000 or colours < 4:
+        raise SystemExit(f"playground: the picture has {width} x {height} points, and the robot is drawn in {colours} colours")
+    pathlib.Path(picture).write_bytes(data)
+    print(f"seen: {picture}, {width} x {height} points")
+
+
+def pace(browser, expected):
+    """At least ten times real time, by a count that each machine repeats."""
+    count, frames = operators.of_the_tour(base64.b64decode(browser.run("return WASM")))
+    if frames != expected:
+        raise SystemExit(f"playground: another engine sends other frames: {frames}, not {expected}")
+    if count > operators.MOST:
+        raise SystemExit(f"playground: a second of the tour has {count} operators, {operators.MOST} are allowed")
+    print(f"seen: {count} operators a second of the robot, of {operators.MOST}")
+    browser.until("how fast this browser is", lambda: browser.run("return Boolean(document.body.dataset.pace)"))
     print(f"pace: {browser.run('return document.body.dataset.pace')} times real time in this browser")
-    errors = [entry["message"] for entry in browser.call("POST", "/se/log", {"type": "browser"}) if entry["level"] == "SEVERE"]
-    if errors:
-        raise SystemExit("playground: the browser reports\n" + "\n".join(errors))
+
+
+# Units and symbols, and the name of the other language.
+UNITS = ["language", "speed", "current", "kp", "ki"]
+WORDS = """
+const parts = "script, style, output, #code, #log, #frames, #hash, #result";
+const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), words = new Set();
+while (texts.nextNode()) if (!texts.currentNode.parentElement.closest(parts)) for (const word of texts.currentNode.data.match(PATTERN) ?? []) words.add(word);
+return [...words].sort();
+"""
+NAMES = """
+const flat = (texts, at) => Object.entries(texts).flatMap(([name, text]) => typeof text === "object" ? flat(text, at + name + ".") : [[at + name, typeof text === "function" ? text("1") : text]]);
+return flat(TEXTS[LANGUAGE], "");
+"""
+
+
+def languages(browser):
+    """Each text has a translation, and no text of the page stays in the other language."""
+    english, chinese = (dict(browser.run(NAMES.replace("LANGUAGE", json.dumps(one)))) for one in ("en", "zh"))
+    has_han = lambda text: any("\u4e00" <= sign <= "\u9fff" for sign in text)
+    wrong = english.keys() ^ chinese.keys()
+    wrong |= {name for name, text in chinese.items() if not has_han(text) and name not in UNITS}
+    wrong |= {name for name, text in english.items() if has_han(text) and name not in UNITS}
+    if wrong:
+        raise SystemExit(f"playground: not in both languages: {', '.join(sorted(wrong))}")
+    for language, pattern, allowed in (("zh", "/[A-Za-z]{4,}/g", ["English", "drivetrain"]), ("en", "/[\\u4e00-\\u9fff]+/g", ["中文"])):
+        browser.click("#language")
+        browser.until(f"a page in {language}", lambda: browser.run("return document.documentElement.lang") == language)
+        browser.until("a status in it", lambda: has_han(browser.text("#status")) == (language == "zh"))
+        words = browser.run(WORDS.replace("PATTERN", pattern))
+        if words != allowed:
+            raise SystemExit(f"playground: the page in {language} has the words {words}, {allowed} are its own")
+    print(f"seen: {len(chinese)} texts in two languages")
 
 
 def hands(browser):
