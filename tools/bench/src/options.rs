@@ -257,6 +257,33 @@ mod tests {
     }
 
     #[test]
+    fn each_option_with_a_value_takes_it_in_both_ways() {
+        for (option, value) in [
+            ("--interface", "can1"),
+            ("--serial", "/dev/ttyACM0"),
+            ("--replay", "a.log"),
+            ("--motors", "m2006:3"),
+            ("--log", "a.mcap"),
+            ("--output", "a.log"),
+            ("--rpm", "-30"),
+            ("--amplitude", "2"),
+            ("--hysteresis", "0.3"),
+            ("--turns", "0.5"),
+            ("--seconds", "5"),
+            ("--seed", "7"),
+            ("--mecanum", "0.2,0,0"),
+        ] {
+            let [apart, together] = [' ', '='].map(|sign| {
+                let options = parsed(&format!("{option}{sign}{value}")).unwrap();
+                format!("{options:?}")
+            });
+            assert_eq!(apart, together);
+            assert_ne!(apart, format!("{:?}", usual()), "{option} changes nothing");
+            assert!(crate::help::text().contains(option), "{option} is not in the help");
+        }
+    }
+
+    #[test]
     fn what_makes_no_sense_is_said() {
         for (line, message) in [
             ("spin --rpm 9 --mecanum 1,0,0", "--rpm or --mecanum, not both"),
