@@ -167,6 +167,33 @@ fn after_a_lost_motor_it_is_armed_again_by_a_request() {
     assert!(armed_again.is_some(), "{:?}", session.messages());
 }
 
+// It turned red after each stop, and each re-arming was a tick overrun.
+#[test]
+fn a_drive_that_nobody_asks_is_idle_and_a_pause_is_no_overrun() {
+    let mut session = session("m3508:1,damiao4310:1,vesc7:6");
+    let (mut links, mut was_armed, mut edges) = (Vec::new(), false, Vec::new());
+    run(&mut session, |session, tick| {
+        match tick {
+            1 | 2_500 => session.arm(None),
+            1_000 => session.stop(),
+            2_400 => {
+                let motors = crate::snapshot::of(session).motors;
+                links = motors.into_iter().map(|it| (it.link, it.conditions)).collect();
+            }
+            _ => {}
+        }
+        was_armed = session.stage() == Stage::Armed;
+        edges.extend(session.edges().into_iter().map(|(_, text)| text));
+        tick < 4_000
+    });
+    let expected = ["Online", "Idle", "Online"].map(|link| (link.to_owned(), Vec::new()));
+    assert_eq!(links, expected);
+    assert!(was_armed, "{:?}", session.refusal());
+    let is_silence =
+        |text: &String| ["late", "offline", "overrun"].iter().any(|it| text.contains(it));
+    assert!(!edges.iter().any(is_silence), "{edges:?}");
+}
+
 #[test]
 fn motors_that_are_not_there_are_named_and_nothing_is_left_behind() {
     let present = motors::parse("m3508:1").unwrap();
