@@ -65,17 +65,23 @@ impl TimeStep {
     /// As [`new`](Self::new); `None` for a step that [holds](Self::is_hold).
     #[inline]
     pub(crate) const fn usable(dt_s: f32, dt_max_s: f32) -> Option<Self> {
-        let per_dt = 1.0 / dt_s;
-        // Positive, finite and not zero in one comparison; 1 / NaN, 1 / 0 and 1 / infinity are none of it.
-        if per_dt.to_bits().wrapping_sub(1) >= f32::MAX.to_bits() {
+        if is_within(dt_s, dt_max_s) {
+            return Some(Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt: 1.0 / dt_s });
+        }
+        Self::unusual(dt_s, dt_max_s)
+    }
+
+    #[cold]
+    const fn unusual(dt_s: f32, dt_max_s: f32) -> Option<Self> {
+        if !is_within(dt_s, f32::MAX) {
             return None;
         }
-        if dt_s > dt_max_s {
-            // With a longest step of zero or less every step holds.
-            let frozen = Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
-            return if dt_max_s > 0.0 { Some(frozen) } else { None };
+        if dt_max_s.is_nan() {
+            return Some(Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt: 1.0 / dt_s });
         }
-        Some(Self { dt_s, half_dt_s: 0.5 * dt_s, per_dt })
+        // With a longest step of zero or less every step holds.
+        let frozen = Self { dt_s: dt_max_s, half_dt_s: f32::INFINITY, per_dt: f32::INFINITY };
+        if dt_max_s > 0.0 { Some(frozen) } else { None }
     }
 
     /// Returns the seconds to count with: `dt_max_s` when frozen, 0 when on hold.
@@ -84,10 +90,11 @@ impl TimeStep {
         self.dt_s
     }
 
-    /// Returns whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 3e-39.
+    /// Returns whether nothing may change: `dt_s` was zero, negative, NaN or infinite, or below 1.2e-38.
     #[must_use]
     pub const fn is_hold(&self) -> bool {
-        self.dt_s <= 0.0
+        // Never negative and never NaN: a comparison of bits, which the compiler derives from that of `new`.
+        self.dt_s.to_bits() == 0
     }
 
     /// Returns whether time has passed and the inputs are finite; refusals are counted, up to 65535.
@@ -102,8 +109,18 @@ impl TimeStep {
     /// Returns whether integral and derivative stay for this step: `dt_s` was above the maximum.
     #[must_use]
     pub const fn is_frozen(&self) -> bool {
-        self.dt_s > 0.0 && self.per_dt > f32::MAX
+        !self.is_hold() && self.half_dt_s.to_bits() == f32::INFINITY.to_bits()
     }
+}
+
+/// Returns whether a step is above 0 and up to the longest, by the bits: those of positive numbers are in the order of the
+/// numbers, and those of negative numbers below.
+#[inline]
+const fn is_within(dt_s: f32, dt_max_s: f32) -> bool {
+    const LEAST: i32 = f32::MIN_POSITIVE.to_bits().cast_signed();
+    const MOST: i32 = f32::MAX.to_bits().cast_signed();
+    let (bits, most) = (dt_s.to_bits().cast_signed(), dt_max_s.to_bits().cast_signed());
+    bits >= LEAST && bits <= MOST && bits <= most
 }
 
 #[cfg(test)]
@@ -117,7 +134,7 @@ mod tests {
             let step = TimeStep::new(0.001, dt_max_s);
             assert!(step.is_hold() && !step.is_frozen(), "{dt_max_s}");
         }
-        for dt_max_s in [f32::NAN, f32::INFINITY] {
+        for dt_max_s in [f32::NAN, -f32::NAN, f32::INFINITY] {
             let step = TimeStep::new(1e30, dt_max_s);
             assert!(!step.is_hold() && !step.is_frozen() && step.dt_s() == 1e30, "{dt_max_s}");
         }
@@ -125,17 +142,23 @@ mod tests {
 
     #[test]
     fn every_dt_is_of_one_kind() {
-        for dt_s in [0.0, -0.0, -0.001, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40] {
-            let step = TimeStep::new(dt_s, 0.1);
-            assert!(step.is_hold() && !step.is_frozen(), "{dt_s}");
+        let below = f32::MIN_POSITIVE.next_down();
+        for dt_s in
+            [0.0, -0.0, -0.001, f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, below]
+        {
+            for dt_max_s in [0.1, f32::MAX, f32::INFINITY, f32::NAN, -f32::NAN] {
+                let step = TimeStep::new(dt_s, dt_max_s);
+                assert!(step.is_hold() && !step.is_frozen(), "{dt_s} {dt_max_s}");
+            }
         }
         for dt_s in [0.100_001, 10.0, f32::MAX] {
             let step = TimeStep::new(dt_s, 0.1);
             assert!(step.is_frozen() && !step.is_hold() && step.dt_s() == 0.1, "{dt_s}");
         }
-        for dt_s in [1e-6, 0.001, 0.1] {
+        for dt_s in [f32::MIN_POSITIVE, 1e-6, 0.001, 0.1] {
             let step = TimeStep::new(dt_s, 0.1);
             assert!(!step.is_frozen() && !step.is_hold() && step.dt_s() == dt_s, "{dt_s}");
+            assert!(step.per_dt.is_finite(), "{dt_s}");
         }
     }
 }
