@@ -76,8 +76,9 @@ use crate::time::TimeStep;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Pid {
-    pub(super) core: ErrorPid,
+    // Beside the error and the rate of the core: a step stores all three by one instruction.
     pub(super) measurement: f32,
+    pub(super) core: ErrorPid,
     /// Of half the period; or the bits of the speed of tracking.
     pub(super) way_gate: u32,
     /// The rate of the tracked setpoint.
@@ -122,8 +123,8 @@ impl Pid {
     /// Adds what a controller knows of its setpoint: nothing yet.
     pub(super) const fn of_error(core: ErrorPid) -> Self {
         Self {
-            core,
             measurement: UNKNOWN,
+            core,
             way_gate: CLOSED,
             tracking_rate: 0.0,
             static_gain: 0.0,

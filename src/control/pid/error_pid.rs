@@ -13,9 +13,9 @@ use crate::time::TimeStep;
 // What each step stores stands first, and what it reads next to it.
 #[repr(C)]
 pub(crate) struct ErrorPid {
-    pub(super) output: f32,
     pub(super) error: f32,
     pub(super) rate: f32,
+    pub(super) output: f32,
     pub(super) integral: f32,
     /// Of the integral; closed unless the controller is plain.
     pub(super) integral_gate: u32,
@@ -33,9 +33,9 @@ impl ErrorPid {
     /// Makes one of numbers that were checked. Without options, it refuses every plain step.
     pub(super) const fn new(parameters: Parameters) -> Self {
         Self {
-            output: 0.0,
             error: UNKNOWN,
             rate: 0.0,
+            output: 0.0,
             integral: 0.0,
             integral_gate: CLOSED,
             output_gate: CLOSED,
