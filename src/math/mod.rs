@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`sin_cos`] | sine and cosine, `const` | 1.6e-7 in ±π, 1.8e-7 up to ±1000 |
 //! | [`sqrt`] | square root | half a unit in the last place; 1 unit without `libm` |
-//! | [`atan2`] | angle of a vector, -π..=π | 3.2e-7; 0.005 with `micromath` |
+//! | [`atan2`] | angle of a vector, -π..=π | 2.7e-7; 0.005 with `micromath` |
 //! | [`wrap_pi`], [`wrap_tau`] | an angle in [-π, π) or [0, 2π), `const` | 4e-7 up to ±10 000 |
 //! | [`wrap`], [`wrap_positive`] | the same for any period, `const` | 0; `wrap_positive` rounds its sum once |
 //!
