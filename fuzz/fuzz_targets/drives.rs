@@ -59,12 +59,10 @@ struct Limits {
     rest_nm: f32,
     /// When driven; infinite where the torque is the business of the drive alone, or is reckoned from what feedback says.
     most_nm: f32,
-    /// Updates until it has to be at rest after a frame that the driver gave back.
-    respite: u32,
 }
 
 impl Limits {
-    const REST: Self = Self { rest_nm: 0.0, most_nm: f32::INFINITY, respite: 1 };
+    const REST: Self = Self { rest_nm: 0.0, most_nm: f32::INFINITY };
 
     fn most(self, most_nm: f32) -> Self {
         Self { most_nm: most_nm * 1.001, ..self }
@@ -128,8 +126,7 @@ fn rmd_of(kind: u8, input: &mut Input) {
         let drive = if input.coin() { drive.with_brake() } else { drive };
         run(motor, drive, limits, |motor, _, _| motor.reset_drive())(input);
     }
-    // The first frame after the time-out of the drive is sent back, and its command before may hold until the next frame of rest.
-    let rest = Limits { respite: 3, ..Limits::REST };
+    let rest = Limits::REST;
     match kind % 4 {
         0 => bench(torque(), rest.most(3.0), input),
         1 => bench(gains(), rest.most(3.0), input),
@@ -454,6 +451,9 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
 
     fn send(&mut self, refused: u8) {
         self.owed = self.owed.saturating_sub(1);
+        if self.drive.sends_back() {
+            self.owed = self.owed.max(1);
+        }
         for turn in 0..4 {
             let Some(frame) = Devices::next_frame(&mut self.own, turn) else { break };
             assert!(turn < 2, "more than two frames in an update: {frame:?}");
@@ -462,7 +462,7 @@ impl<M: OwnMotor + Copy + Debug, D: Drive> Bench<M, D> {
             assert!(is_claimed || frame.is_remote_frame(), "{frame:?}");
             if refused & 1 << turn != 0 {
                 assert!(Devices::requeue(&mut self.own, &frame), "{frame:?}");
-                self.owed = self.limits.respite;
+                self.owed = 1;
                 continue;
             }
             self.answers.extend(self.drive.hear(&frame));

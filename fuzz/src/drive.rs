@@ -18,6 +18,11 @@ pub trait Drive {
         _ = frames;
     }
 
+    /// Whether the next frame may be sent back, while the command before holds again.
+    fn sends_back(&self) -> bool {
+        false
+    }
+
     fn shaft_mut(&mut self) -> &mut DriveShaft;
 
     /// Has the drive fail, lose its supply, or refuse.
@@ -65,6 +70,10 @@ impl Drive for RmdDrive {
     forward!();
     fn report(&mut self, frames: &mut Vec<CanFrame>) {
         frames.extend(Self::report(self));
+    }
+    /// After its time-out.
+    fn sends_back(&self) -> bool {
+        !self.is_on()
     }
     fn suffer(&mut self, kind: u8) {
         match kind % 4 {

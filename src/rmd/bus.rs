@@ -116,6 +116,7 @@ impl OwnMotor for Motor {
             track.advance(0.0, feedback.angle_deg);
         }
         self.drive = Some(feedback);
+        self.enabling.is_heard = true;
         // An angle alone ends a silence that was long.
         self.silent = if self.silent < SILENT { 0 } else { SILENT };
         Ingest::Taken
@@ -210,6 +211,9 @@ impl OwnMotor for Motor {
     }
 
     fn inquire(&mut self) -> Option<CanFrame> {
+        if !self.enabling.is_heard {
+            return None;
+        }
         self.asks_angle = !self.asks_angle;
         let question = if self.asks_angle { Command::ReadAngle } else { Command::ReadState };
         Some(self.frame_of(question))
@@ -262,6 +266,7 @@ impl OwnMotor for Motor {
     fn forget_settings(&mut self) {
         (self.state, self.has_angle) = (None, false);
         (self.timeout_found, self.writes) = (None, 0);
+        self.enabling.is_heard = false;
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -13,6 +13,9 @@ pub(super) struct Enabling {
     pub(super) is_on: bool,
     /// The drive is not to be driven, and has confirmed to be off.
     pub(super) is_off: bool,
+    /// Feedback came since then: the drive follows frames. A drive whose time-out has expired sends the first frame back, and
+    /// the second one has to be rest.
+    pub(super) is_heard: bool,
 }
 
 impl Enabling {

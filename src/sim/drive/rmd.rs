@@ -39,8 +39,9 @@ const LASTING: u16 = 0x0092;
 ///
 /// The drive follows any command at once, and holds its last command until the time-out; a new drive has no time-out. "Off" ends the
 /// command and locks the holding brake. A velocity or a position releases the brake, a torque does not. After the time-out the output is
-/// off and the brake locked. The next frame is echoed without effect, and the command before the time-out holds again. With an error the
-/// torque is zero. Frames of the manual that the family does not send are not answered.
+/// off and the brake locked. The next frame is echoed without effect, and the command before the time-out holds again: the worst case, as
+/// the manual does not say whether the command holds. With an error the torque is zero. Frames of the manual that the family does not send
+/// are not answered.
 ///
 /// # Examples
 /// ```
