@@ -122,19 +122,19 @@ impl Motor {
         CanFrame::of(standard_id(self.command_id()), command.encode(self.model.ranges()))
     }
 
-    /// Returns the manual's name of a register, and its configured value.
-    fn expected(&self, register: Register) -> (&'static str, f32) {
+    /// Returns the configured value of a register.
+    fn expected(&self, register: Register) -> f32 {
         match register {
-            Register::PositionRange => ("PMAX", self.model.pmax_rad()),
-            Register::VelocityRange => ("VMAX", self.model.vmax_rad_per_s()),
-            Register::TorqueRange => ("TMAX", self.model.tmax_nm()),
-            _ => ("CTRL_MODE", self.mode.0.number.into()),
+            Register::PositionRange => self.model.pmax_rad(),
+            Register::VelocityRange => self.model.vmax_rad_per_s(),
+            Register::TorqueRange => self.model.tmax_nm(),
+            _ => self.mode.0.number.into(),
         }
     }
 
     /// Tells whether a value in the drive is as configured.
     fn is_right(&self, register: Register, found: f32) -> bool {
-        let (_, expected) = self.expected(register);
+        let expected = self.expected(register);
         (found - expected).abs() <= RANGE_TOLERANCE * expected
     }
 }
@@ -202,9 +202,9 @@ impl OwnMotor for Motor {
 
     /// Asks for unknown settings, then writes the time-out and reads the register back, then enables the drive: each time
     /// anew, for the drive may have lost its supply since.
-    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
         let timeout = Preparation::exact(Register::Timeout, self.timeout.value());
-        let asked = self.settings.prepare([timeout]);
+        let asked = self.settings.prepare(sent, [timeout]);
         Some(match asked {
             Some(asked) => inquiry(self.id, asked),
             None => {
@@ -247,7 +247,8 @@ impl OwnMotor for Motor {
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_right = |register, found| self.is_right(register, found);
-        self.settings.wrong_setting(self.name(), is_right, |register| self.expected(register))
+        let expected = |register| self.expected(register);
+        self.settings.wrong_setting(self.name(), is_right, Register::manual, expected)
     }
 
     fn forget_settings(&mut self) {

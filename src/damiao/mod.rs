@@ -27,7 +27,8 @@
 //! commands, and a drive with other ranges gives another torque. The first answer takes some 50 ms.
 //!
 //! **When the program stops, the drive does**: `TIMEOUT` is written and read back each time before the drive is enabled, 100 ms
-//! unless configured otherwise.
+//! unless configured otherwise. If the drive does not confirm a register in 8 reads, the motor trips, and
+//! [`arm`](crate::motor::Devices::arm) names the register until the drive confirms.
 //!
 //! ```
 //! use drivetrain::damiao::{Model, Motor};

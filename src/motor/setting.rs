@@ -23,7 +23,8 @@ pub struct WrongSetting {
     pub setting: &'static str,
     /// The value in the configuration of the motor, in the unit of the manual.
     pub expected: f32,
-    /// The value in the drive; `None` if the drive has not answered yet.
+    /// The value in the drive; `None` if the drive has not answered yet, NaN if the drive did not answer on the way to be enabled, or
+    /// does not have the setting.
     pub found: Option<f32>,
 }
 
@@ -31,6 +32,10 @@ impl core::fmt::Display for WrongSetting {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { motor, setting, expected, found } = self;
         match found {
+            Some(found) if found.is_nan() => write!(
+                f,
+                "{motor} does not report its {setting}, the program needs {expected}: set it with the tool of the drive, or change the configuration"
+            ),
             Some(found) => write!(
                 f,
                 "{motor} has {setting} {found}, the program needs {expected}: write it, or change the configuration"

@@ -101,7 +101,7 @@ impl Motor {
         let [.., timeout, enable] = values;
         let watchdog = [timeout, enable].map(|(setting, value)| Preparation::exact(setting, value));
         let is_right = |setting, found| values.contains(&(setting, found));
-        match self.settings.prepare(watchdog) {
+        match self.settings.prepare(0, watchdog) {
             Some(Inquiry::Write(setting, value)) => endpoint(self.node, setting, Some(value)),
             Some(Inquiry::Read(setting)) => endpoint(self.node, setting, None),
             _ if self.settings.wrong(is_right).is_some() => self.refuse(NOT_SET),

@@ -164,19 +164,19 @@ impl Motor {
         command.encode(&self.model, self.host, self.id)
     }
 
-    /// Returns the manual's name of a parameter, and its configured value; for the position the end of its range.
-    fn expected(&self, register: Register) -> (&'static str, f32) {
+    /// Returns the configured value of a parameter; for the position the end of its range.
+    fn expected(&self, register: Register) -> f32 {
         match register {
-            Register::RunMode => ("run_mode", self.mode.number(&self.model).into()),
-            Register::Timeout => ("canTimeout", self.timeout.value()),
-            _ => ("mechPos", self.model.pmax_rad()),
+            Register::RunMode => self.mode.number(&self.model).into(),
+            Register::Timeout => self.timeout.value(),
+            _ => self.model.pmax_rad(),
         }
     }
 
     /// Tells whether a value in the drive is right. Of the time-out any value is right: the configured value is written later.
     fn is_right(&self, register: Register, found: f32) -> bool {
         match register {
-            Register::RunMode => found.to_bits() == self.expected(register).1.to_bits(),
+            Register::RunMode => found.to_bits() == self.expected(register).to_bits(),
             Register::MechanicalPosition if self.mode.control.is_angle() => {
                 found.abs() < self.model.pmax_rad()
             }
@@ -256,11 +256,11 @@ impl OwnMotor for Motor {
 
     /// Asks for unknown settings, then makes the preparations, each written and read back, then enables the drive:
     /// each time anew, for the drive may have lost its supply since.
-    fn enable(&mut self, _sent: u8) -> Option<CanFrame> {
-        let (timeout, mode) = (self.timeout.value(), self.mode.preparations());
-        let timeout = Preparation::exact(Register::Timeout, timeout);
+    fn enable(&mut self, sent: u8) -> Option<CanFrame> {
+        let [first, second] = self.mode.preparations();
+        let timeout = Preparation::exact(Register::Timeout, self.timeout.value());
         let timeout = Some(timeout).filter(|_| self.model.has_timeout());
-        let asked = self.settings.prepare(timeout.into_iter().chain(mode.into_iter().flatten()));
+        let asked = self.settings.prepare(sent, [timeout, first, second].into_iter().flatten());
         if asked.is_none() {
             self.mode.reset();
             self.settings.forget();
@@ -289,7 +289,7 @@ impl OwnMotor for Motor {
             return Some(self.frame_of(command));
         }
         self.questions = self.questions.wrapping_add(1);
-        let (_, mode) = self.expected(Register::RunMode);
+        let mode = self.expected(Register::RunMode);
         let is_other =
             self.settings.found(Register::RunMode).is_some_and(|it| it.to_bits() != mode.to_bits());
         if is_other && self.questions.is_multiple_of(4) {
@@ -323,7 +323,8 @@ impl OwnMotor for Motor {
 
     fn wrong_setting(&self) -> Option<WrongSetting> {
         let is_right = |register, found| self.is_right(register, found);
-        self.settings.wrong_setting(self.name(), is_right, |register| self.expected(register))
+        let expected = |register| self.expected(register);
+        self.settings.wrong_setting(self.name(), is_right, Register::manual, expected)
     }
 
     fn forget_settings(&mut self) {

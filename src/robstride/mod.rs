@@ -31,7 +31,8 @@
 //!
 //! **Before a drive is enabled**, these are written and read back, each time: `canTimeout`, 100 ms unless configured otherwise; in
 //! the operation mode `limit_torque`; in the position and speed modes `limit_cur` at zero, opened with the output afterwards, and
-//! `limit_spd`. The target is where the shaft is.
+//! `limit_spd`. The target is where the shaft is. If the drive does not confirm a parameter in 8 reads, the motor trips, and `arm`
+//! names the parameter until the drive confirms.
 //!
 //! **When the program stops, a RobStride does; a CyberGear does not.** A CyberGear has no time-out for commands, and goes on with its
 //! last command when the cable is cut: with its last torque, or to its last position. Only a loss of the supply ends the motion. Keep

@@ -16,13 +16,15 @@ pub(crate) struct Bench {
     /// The frames of the last update.
     pub(crate) frames: Vec<CanFrame>,
     pub(crate) is_cut: bool,
+    /// Whether the drive hears a frame.
+    pub(crate) passes: fn(&CanFrame) -> bool,
 }
 
 impl Bench {
     pub(crate) fn new(mode: impl Into<Mode>, number: f32) -> Self {
         let own = Own::new(Motor::new(Model::J4310, 1, mode).unwrap());
         let drive = DamiaoDrive::new(1, 0x11, J4310).with_register(10, number);
-        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false }
+        Self { own, drive, now_us: 1_000, frames: Vec::new(), is_cut: false, passes: |_| true }
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -36,7 +38,7 @@ impl Bench {
         self.frames.clear();
         while let Some(frame) = self.own.next_frame(0) {
             self.frames.push(frame);
-            if self.is_cut {
+            if self.is_cut || !(self.passes)(&frame) {
                 continue;
             }
             if let Some(answer) = self.drive.hear(&frame) {

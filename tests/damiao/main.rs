@@ -157,25 +157,6 @@ fn nothing_jumps_when_a_motor_far_from_its_target_is_armed() {
 }
 
 #[test]
-fn a_drive_that_does_not_confirm_its_time_out_is_never_enabled() {
-    let mut bench = Bench::armed(mit(), 1.0);
-    for _ in 0..300 {
-        bench.own.set_velocity((), AngularVelocity::from_rad_per_s(6.0)).unwrap();
-        bench.now_us += 1_000;
-        let now = bench.now();
-        bench.own.update(Tick::new(now, 0.001));
-        while let Some(frame) = bench.own.next_frame(0) {
-            let answer = bench.drive.hear(&frame);
-            // Whatever is asked is answered with its feedback alone.
-            if let Some(answer) = answer.filter(|_| frame.header() != 0x7FF) {
-                _ = Devices::ingest(&mut bench.own, &answer, now);
-            }
-        }
-        assert!(!bench.drive.is_enabled());
-    }
-}
-
-#[test]
 fn two_motors_with_one_master_id_are_told_apart() {
     let mode = mit();
     let motor =

@@ -1,9 +1,11 @@
 //! F89 to F91: drives whose time-out, echoes and holding brake are their own, by the example of MyActuator's.
 
+use crate::bench as damiao;
 use crate::case::{Case, cases, drives, saw};
 use crate::rmd_bench::{Bench, torque};
+use crate::robstride_bench as robstride;
 use drivetrain::frame::CanFrame;
-use drivetrain::motor::{Devices, Own, VelocityDrive};
+use drivetrain::motor::{Devices, ImpedanceControl, Own, VelocityDrive};
 use drivetrain::rmd::{Mode, Model};
 use drivetrain::time::Tick;
 use drivetrain::units::AngularVelocity;
@@ -69,6 +71,76 @@ fn f90_a_drive_that_does_not_confirm_its_timeout_is_not_driven() {
     bench.own.arm(bench.now()).unwrap();
     bench.steps(500, |bench| bench.own.set_velocity((), rad_s(6.0)).unwrap());
     assert!(bench.drive.shaft().velocity_rad_per_s() > 5.5);
+    unconfirmed_by_damiao();
+    unconfirmed_by_robstride();
+}
+
+type Passes = fn(&CanFrame) -> bool;
+
+/// Each of the drives has its settings read before arming, and is silent on the way to be enabled.
+fn unconfirmed_by_damiao() {
+    let drive = |bench: &mut damiao::Bench| _ = bench.own.set_velocity((), rad_s(6.0));
+    let cases: [(Passes, &str); 3] = [
+        (|it| it.header() != 0x7FF || it.bytes()[3] != 9, "does not report its TIMEOUT"),
+        (|it| it.header() != 0x7FF || it.bytes()[2..4] != [0x55, 9], "has TIMEOUT 0"),
+        (|it| it.header() != 0x7FF || it.bytes()[3] != 10, "does not report its CTRL_MODE"),
+    ];
+    for (passes, text) in cases {
+        let mut bench = damiao::Bench::armed(damiao::mit(), 1.0);
+        drives(&bench.own);
+        if text.contains("CTRL_MODE") {
+            bench.steps(300, drive);
+        }
+        bench.passes = passes;
+        bench.steps(300, |_| {});
+        let mut asked = 0;
+        bench.steps(300, |bench| {
+            drive(bench);
+            let is_armed = Devices::is_armed(&mut bench.own);
+            asked += u32::from(is_armed && bench.frames.iter().any(|it| it.header() == 0x7FF));
+            assert!(!bench.drive.is_enabled());
+        });
+        assert!((8..=12).contains(&asked) && !Devices::is_armed(&mut bench.own), "{asked}");
+        let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
+        assert!(refused.contains(text) && refused.contains(", the program needs "), "{refused}");
+        saw(refused);
+        bench.passes = |_| true;
+        bench.steps(150, |_| {});
+        assert_eq!(bench.own.arm(bench.now()), Ok(()), "{text}");
+        bench.steps(300, drive);
+        assert!(bench.drive.is_enabled(), "{text}");
+    }
+}
+
+fn unconfirmed_by_robstride() {
+    let drive = |bench: &mut robstride::Bench| _ = bench.own.set_velocity((), rad_s(6.0));
+    let cases: [(Passes, &str); 3] = [
+        (|it| it.bytes()[..2] != [0x28, 0x70], "does not report its canTimeout"),
+        (
+            |it| it.header() >> 24 & 0x1F != 18 || it.bytes()[..2] != [0x28, 0x70],
+            "has canTimeout 0",
+        ),
+        (|it| it.bytes()[..2] != [0x0B, 0x70], "does not report its limit_torque"),
+    ];
+    for (passes, text) in cases {
+        let mode = ImpedanceControl::new(3.0).unwrap().with_gains(20.0, 0.6).unwrap();
+        let mut bench = robstride::Bench::armed(mode);
+        drives(&bench.own);
+        bench.passes = passes;
+        bench.steps(300, |bench| {
+            drive(bench);
+            assert!(!bench.drive.is_enabled());
+        });
+        assert!(!Devices::is_armed(&mut bench.own), "{text}");
+        let refused = bench.own.arm(bench.now()).unwrap_err().to_string();
+        assert!(refused.contains(text) && refused.contains(", the program needs "), "{refused}");
+        saw(refused);
+        bench.passes = |_| true;
+        bench.steps(150, |_| {});
+        assert_eq!(bench.own.arm(bench.now()), Ok(()), "{text}");
+        bench.steps(300, drive);
+        assert!(bench.drive.is_enabled(), "{text}");
+    }
 }
 
 #[cfg_attr(test, test)]

@@ -63,12 +63,12 @@ const fn whole(value: f32) -> u32 {
 }
 
 /// Makes the type `Register` of a family: its noun in errors, the name and the type of its number, then for each register its
-/// number, form, the access of a program (`Rw` or `Ro`), and text.
+/// number, form, the access of a program (`Rw` or `Ro`), its name in the manual, and text.
 macro_rules! registers {
     (
         $(#[$about:meta])*
         $noun:literal $number:ident $width:ident;
-        $($register:ident $value:literal $form:ident $access:ident $doc:literal,)+
+        $($register:ident $value:literal $form:ident $access:ident $manual:literal $doc:literal,)+
     ) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +76,7 @@ macro_rules! registers {
         #[non_exhaustive]
         pub enum Register {
             $(
-                #[doc = concat!($doc, " (", stringify!($value), ").")]
+                #[doc = concat!($manual, ": ", $doc, " (", stringify!($value), ").")]
                 $register = $value,
             )+
         }
@@ -91,6 +91,13 @@ macro_rules! registers {
                     $(Self::$register => {
                         concat!($noun, " ", stringify!($value), " (", stringify!($register), ")")
                     })+
+                }
+            }
+
+            /// The name in the manual.
+            pub(super) const fn manual(self) -> &'static str {
+                match self {
+                    $(Self::$register => $manual,)+
                 }
             }
 

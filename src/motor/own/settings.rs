@@ -44,8 +44,24 @@ pub struct Settings<R, const N: usize> {
     preparing: Option<Preparation<R>>,
     /// How many preparations the drive has confirmed.
     prepared: u8,
+    /// How many frames were sent on the way to an enabled drive until the last answer that led on; `None` right after that answer.
+    led_on: Option<u8>,
+    missed: Option<Missed<R>>,
     /// The next frame about a setting written by the application is a read.
     is_written: bool,
+}
+
+/// Frames on the way to an enabled drive, a write and 8 reads, after which a setting that the drive does not confirm is named.
+const PATIENCE: u8 = 9;
+
+/// A setting that the drive did not confirm on the way to be enabled.
+#[derive(Debug, Clone, Copy)]
+struct Missed<R> {
+    setting: R,
+    /// The value written; `None` for a setting that is only read.
+    written: Option<Preparation<R>>,
+    /// NaN without an answer.
+    found: f32,
 }
 
 /// A setting written and read back each time before a drive is enabled. The drive confirms the setting by a value from `least` to `value`.
@@ -66,6 +82,10 @@ impl<R> Preparation<R> {
     pub(crate) const fn limit(setting: R, value: f32) -> Self {
         Self { setting, value, least: 0.0 }
     }
+
+    fn is_confirmed_by(&self, value: f32) -> bool {
+        (self.least..=self.value).contains(&value)
+    }
 }
 
 impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
@@ -81,6 +101,8 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
             answer: None,
             preparing: None,
             prepared: 0,
+            led_on: None,
+            missed: None,
             is_written: false,
         }
     }
@@ -88,30 +110,50 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
     /// Forgets all values: the drive was away. Requests of the application stay.
     pub const fn forget(&mut self) {
         self.found = [None; N];
-        self.asked = None;
+        (self.asked, self.missed) = (None, None);
         self.prepare_anew();
     }
 
     /// Forgets the confirmations of the drive on the way to be enabled.
     pub(crate) const fn prepare_anew(&mut self) {
         (self.preparing, self.prepared, self.is_written) = (None, 0, false);
+        self.led_on = None;
     }
 
     /// Returns the next question on the way to an enabled drive: for unknown values, then for each preparation, written and read back.
     /// `None` when the drive is ready to be enabled; then [`forget`](Self::forget), for the drive may lose its supply until the next time.
+    ///
+    /// `sent` is how many frames were sent to enable the drive. If several frames do not lead on, the setting counts as not confirmed.
     pub(crate) fn prepare(
         &mut self,
+        sent: u8,
         preparations: impl IntoIterator<Item = Preparation<R>>,
     ) -> Option<Inquiry<R>> {
-        if let Some(unknown) = self.complete() {
-            return Some(unknown);
+        let waits = sent.saturating_sub(*self.led_on.get_or_insert(sent)) >= PATIENCE;
+        if let Some(setting) = self.unknown() {
+            return Some(self.wait_for(setting, None, waits));
         }
         if let Some(written) = self.preparing {
-            return Some(self.ask(Inquiry::Read(written.setting)));
+            return Some(self.wait_for(written.setting, Some(written), waits));
         }
         self.preparing = preparations.into_iter().nth(self.prepared.into());
         let Preparation { setting, value, .. } = self.preparing?;
         Some(self.ask(Inquiry::Write(setting, value)))
+    }
+
+    /// Asks for a setting, and notes a setting that was waited for long enough.
+    fn wait_for(
+        &mut self,
+        setting: R,
+        written: Option<Preparation<R>>,
+        is_missed: bool,
+    ) -> Inquiry<R> {
+        if is_missed {
+            let found = self.missed.filter(|missed| missed.setting == setting);
+            let found = found.map_or(f32::NAN, |missed| missed.found);
+            self.missed = Some(Missed { setting, written, found });
+        }
+        self.ask(Inquiry::Read(setting))
     }
 
     /// Turns each second write of a setting into a question for the setting: for drives without an answer to a write.
@@ -142,12 +184,17 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
 
     /// Returns a question for an unknown value, and awaits the answer; `None` if all values are known.
     pub fn complete(&mut self) -> Option<Inquiry<R>> {
-        let index = self.found.iter().position(Option::is_none)?;
-        let setting = *self.checked.get(index)?;
+        let setting = self.unknown()?;
         Some(self.ask(Inquiry::Read(setting)))
     }
 
-    /// Returns the next question: for unknown values, then for each value in turn.
+    fn unknown(&self) -> Option<R> {
+        let index = self.found.iter().position(Option::is_none)?;
+        self.checked.get(index).copied()
+    }
+
+    /// Returns the next question: for unknown values, then for each value in turn. Each second question is about a setting that the
+    /// drive did not confirm, written and read by turns.
     pub fn inquire(&mut self) -> Option<Inquiry<R>> {
         (self.preparing, self.prepared) = (None, 0);
         let turn = usize::from(self.turn);
@@ -157,6 +204,13 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
                 self.request = None;
             }
             return Some(self.ask(request));
+        }
+        if let Some(Missed { setting, written: Some(written), .. }) = self.missed
+            && turn.is_multiple_of(2)
+        {
+            let is_written = turn.is_multiple_of(4);
+            let write = Inquiry::Write(setting, written.value);
+            return Some(self.ask(if is_written { write } else { Inquiry::Read(setting) }));
         }
         if let Some(unknown) = self.complete() {
             return Some(unknown);
@@ -193,14 +247,21 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         self.asked = None;
         for (checked, found) in self.checked.iter().zip(&mut self.found) {
             if *checked == setting {
+                self.led_on.take_if(|_| found.is_none());
                 *found = Some(value);
             }
         }
-        if let (Some(written), Inquiry::Read(_)) = (self.preparing, inquiry)
-            && written.setting == setting
-        {
+        let is_read = inquiry == Inquiry::Read(setting);
+        if let Some(written) = self.preparing.filter(|it| is_read && it.setting == setting) {
+            let is_confirmed = written.is_confirmed_by(value);
             self.preparing = None;
-            self.prepared += u8::from((written.least..=written.value).contains(&value));
+            self.prepared += u8::from(is_confirmed);
+            self.led_on.take_if(|_| is_confirmed);
+        }
+        if let Some(missed) = self.missed.as_mut().filter(|it| is_read && it.setting == setting) {
+            missed.found = value;
+            let is_wrong = missed.written.is_some_and(|it| !it.is_confirmed_by(value));
+            self.missed.take_if(|_| !is_wrong);
         }
         if self.request == Some(inquiry) {
             (self.request, self.answer) = (None, Some((setting, value)));
@@ -208,16 +269,19 @@ impl<R: Copy + PartialEq, const N: usize> Settings<R, N> {
         true
     }
 
-    /// Returns the first wrong or unknown setting of a motor. `expected` has the name and the value of each.
+    /// Returns the first setting of a motor that is not confirmed, wrong or unknown. `name` and `expected` have the facts of each.
     pub(crate) fn wrong_setting(
         &self,
         motor: MotorName,
         is_right: impl Fn(R, f32) -> bool,
-        expected: impl Fn(R) -> (&'static str, f32),
+        name: impl Fn(R) -> &'static str,
+        expected: impl Fn(R) -> f32,
     ) -> Option<WrongSetting> {
-        let (wrong, found) = self.wrong(is_right)?;
-        let (setting, expected) = expected(wrong);
-        Some(WrongSetting { motor, setting, expected, found })
+        let missed = self.missed.map(|it| (it.setting, it.written, Some(it.found)));
+        let wrong = || self.wrong(is_right).map(|(setting, found)| (setting, None, found));
+        let (wrong, written, found) = missed.or_else(wrong)?;
+        let expected = written.map_or_else(|| expected(wrong), |written| written.value);
+        Some(WrongSetting { motor, setting: name(wrong), expected, found })
     }
 
     /// Returns the first wrong or unknown setting, with its value in the drive.
