@@ -52,6 +52,10 @@ impl Drive for Damiao {
         self.0.fail(14);
     }
     fn missets(&mut self) -> Result<(), &'static str> {
+        self.0 = self.0.with_register(10, 2.0);
+        Ok(())
+    }
+    fn misranges(&mut self) -> Result<(), &'static str> {
         self.0 = self.0.with_register(21, 12.566);
         Ok(())
     }
@@ -93,6 +97,9 @@ impl Drive for RobStride {
     fn missets(&mut self) -> Result<(), &'static str> {
         self.0 = self.0.with_parameter(0x7005, 3.0);
         Ok(())
+    }
+    fn misranges(&mut self) -> Result<(), &'static str> {
+        Err("; ranges cannot be read")
     }
     fn of_neighbour(&self, frame: &CanFrame) -> CanFrame {
         with_id(frame, raw(frame) + 0x100)
@@ -170,10 +177,6 @@ impl Drive for Rmd {
     fn fail(&mut self) {
         self.0.set_reasons(0x0004);
     }
-    fn missets(&mut self) -> Result<(), &'static str> {
-        self.0 = self.0.refusing_timeouts();
-        Ok(())
-    }
     fn echo(&self, command: &CanFrame) -> Result<CanFrame, &'static str> {
         Ok(standard(0x241, *command.bytes()))
     }
@@ -186,20 +189,37 @@ impl Drive for Rmd {
     }
 }
 
-/// An ODrive with node id 3.
-pub(crate) struct Odrive(pub(crate) OdriveDrive);
+/// An ODrive with node id 3, and whether the drive takes its modes.
+pub(crate) struct Odrive(pub(crate) OdriveDrive, pub(crate) bool);
 
 impl Drive for Odrive {
-    usual!();
+    fn hear(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let is_lost = !self.1 && raw(frame) == 0x6B;
+        if is_lost { None } else { self.0.hear(frame) }
+    }
+    fn step(&mut self, dt_s: f32) {
+        self.0.step(dt_s);
+    }
+    fn shaft(&self) -> &DriveShaft {
+        self.0.shaft()
+    }
+    fn lose_supply(&mut self) {
+        self.0.lose_supply();
+    }
     fn reports(&mut self) -> Vec<CanFrame> {
         std::iter::from_fn(|| self.0.next_frame()).collect()
     }
     fn fail(&mut self) {
         self.0.fail(0x40);
     }
+    /// Velocity mode, by another master.
     fn missets(&mut self) -> Result<(), &'static str> {
-        self.0.set_state(7);
+        self.0.hear(&standard(0x6B, [2, 0, 0, 0, 1, 0, 0, 0]));
         Ok(())
+    }
+    fn keeps_modes(&mut self) -> bool {
+        self.1 = false;
+        true
     }
     fn impossible(&mut self) -> Result<CanFrame, &'static str> {
         Ok(standard(0x69, [0, 0, 0xC0, 0x7F, 0, 0, 0, 0]))

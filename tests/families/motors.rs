@@ -20,6 +20,8 @@ type Mode = (&'static str, fn() -> Station);
 pub(crate) struct Family {
     pub(crate) name: &'static str,
     pub(crate) modes: &'static [Mode],
+    /// Drives of the family that differ in a fault, each driven to a torque.
+    pub(crate) others: &'static [Mode],
     /// The mode in which the drive itself follows a position.
     position: &'static str,
     /// The error of an id that the protocol does not have.
@@ -40,6 +42,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "damiao",
         position: "position-velocity",
+        others: &[],
         out_of_range: || damiao::Motor::new(damiao::Model::J4310, 16, mit(3.0)).unwrap_err(),
         modes: &[
             ("MIT", || damiao_in(mit(3.0), 1.0, torque)),
@@ -56,6 +59,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "robstride",
         position: "position",
+        others: &[("CyberGear", || robstride_in(robstride::Model::CYBERGEAR, mit(3.0), torque))],
         out_of_range: || robstride::Motor::new(robstride::Model::RS02, 128, mit(3.0)).unwrap_err(),
         modes: &[
             ("operation", || robstride_in(robstride::Model::RS02, mit(3.0), torque)),
@@ -78,6 +82,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "vesc",
         position: "position",
+        others: &[],
         out_of_range: || vesc::Motor::new(VESC, 254, vesc::Mode::current()).unwrap_err(),
         modes: &[
             ("current", || vesc_in(vesc::Mode::current(), torque)),
@@ -97,6 +102,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "lk",
         position: "position-velocity",
+        others: &[],
         out_of_range: || lk::Motor::new(lk::Model::MF9025_16T, 33, mit(2.0)).unwrap_err(),
         modes: &[
             ("torque", || lk_in(mit(2.0), torque)),
@@ -108,6 +114,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "rmd",
         position: "position-velocity",
+        others: &[],
         out_of_range: || rmd::Motor::new(rmd::Model::X8_120, 33, mit(4.0)).unwrap_err(),
         modes: &[
             ("torque", || rmd_in(mit(4.0), torque)),
@@ -119,6 +126,7 @@ pub(crate) const FAMILIES: [Family; 6] = [
     Family {
         name: "odrive",
         position: "position, 0.6",
+        others: &[("0.5", || odrive_in(mit(3.0), odrive::Firmware::V0_5, torque))],
         out_of_range: || {
             odrive::Motor::new(odrive::Model::D6374, odrive::Firmware::V0_6, 63, quick(), mit(3.0))
                 .unwrap_err()
@@ -237,5 +245,5 @@ fn odrive_in(
         motor = motor.with_endpoints(ENDPOINTS, Duration::from_millis(100)).unwrap();
     }
     let drive = OdriveDrive::new(3, is_0_6, model.torque_constant(), 5.0);
-    Station::new(motor, set, Odrive(drive.with_periods(0.1, 0.002)))
+    Station::new(motor, set, Odrive(drive.with_periods(0.1, 0.002), true))
 }

@@ -94,12 +94,23 @@ pub(crate) trait Drive {
     fn lose_supply(&mut self);
     /// The drive fails, until its error is cleared.
     fn fail(&mut self);
-    /// Sets the drive to a mode or a range that the program is not written for.
+    /// Sets the drive to a mode that the program is not written for.
     ///
     /// # Errors
     /// The reason why the family has no such setting.
     fn missets(&mut self) -> Result<(), &'static str> {
         Err("each command has its mode")
+    }
+    /// Sets the drive to a range that the program is not written for.
+    ///
+    /// # Errors
+    /// The end of the cell of a family without such a setting.
+    fn misranges(&mut self) -> Result<(), &'static str> {
+        Err("")
+    }
+    /// Has the drive take no other mode; `false` for a drive whose settings are read.
+    fn keeps_modes(&mut self) -> bool {
+        false
     }
     /// A frame of the feedback whose value no shaft has.
     ///
